@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ncfix.diagnostics import Code
     from ncfix.machine.basis import Basis
-    from ncfix.machine.library import PluginEffect
+    from ncfix.machine.effects import PluginEffect
     from ncfix.measure.measurement import Measurement
     from ncfix.report.document import Document
     from ncfix.tables.control import Control

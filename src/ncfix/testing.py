@@ -12,7 +12,7 @@ import numpy as np
 
 from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Effect, Machine, loads
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.tables.control import Control, Request
 from ncfix.tables.export import export
 from ncfix.tables.poses import ranges_of

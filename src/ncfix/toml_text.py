@@ -1,4 +1,4 @@
-"""TOML files as people write them: decoded, parsed, and where in the text a key stands, which the parser does not say.
+"""TOML files as people write them: decoded, parsed, written; and where a key stands, which the parser does not say.
 
 Paths are tuples of keys and indices, `("effect", 2, "degree")`. Only keys that stand at the start of a line are
 found; for others the line of the table that holds them is good enough.
@@ -6,6 +6,9 @@ found; for others the line of the table that holds them is good enough.
 
 from __future__ import annotations
 
+import datetime
+import json
+import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -20,6 +23,8 @@ DOTTED = rf"{KEY}(?:\s*\.\s*{KEY})*"
 HEADER = re.compile(rf"\s*(\[\[?)\s*({DOTTED})\s*\]")
 ASSIGNMENT = re.compile(rf"\s*({DOTTED})\s*=")
 QUOTES = re.compile(r'"""|\'\'\'')
+WIDTH = 120
+"""Characters in a line that is written."""
 
 
 def decoded(source: bytes, path: str, code: str) -> str:
@@ -114,3 +119,37 @@ def _still_open(line: str) -> str:
     """The quotes of a many-line string that this line opens and does not close."""
     found = QUOTES.findall(line)
     return found[0] if len(found) % 2 else ""
+
+
+def written(header: str, table: Mapping[str, Any]) -> str:
+    """A table as text: its header, and a line a key; what is None is left out."""
+    rows = [f"{_key(key)} = {_value(item, len(key) + 3)}" for key, item in table.items() if item is not None]
+    return "\n".join([header, *rows])
+
+
+def _key(key: str) -> str:
+    plain = key and all(letter.isascii() and (letter.isalnum() or letter in "_-") for letter in key)
+    return key if plain else json.dumps(key)
+
+
+def _value(item: Any, indent: int = 0) -> str:
+    """A value in TOML; long lists go over several lines."""
+    if isinstance(item, bool):
+        return "true" if item else "false"
+    if isinstance(item, int):
+        return str(item)
+    if isinstance(item, float):
+        return (
+            repr(float(item)) if math.isfinite(item) else "nan" if math.isnan(item) else "inf" if item > 0 else "-inf"
+        )
+    if isinstance(item, str):
+        return json.dumps(item, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(item, datetime.date | datetime.time):
+        return item.isoformat()
+    if isinstance(item, Mapping):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(each)}" for key, each in item.items()) + " }" if item else "{}"
+    parts = [_value(each) for each in item]
+    line = "[" + ", ".join(parts) + "]"
+    if indent + len(line) <= WIDTH:
+        return line
+    return "[\n" + "".join(f"    {part},\n" for part in parts) + "]"

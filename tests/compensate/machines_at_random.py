@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ncfix.machine import Axis, Effect, Machine, Tool
+from ncfix.machine.basis import Backlash, Constant, Fourier, Periodic, Polynomial
 from ncfix.machine.piecewise import Spline, Step, Table
-from ncfix.machine.smooth import Backlash, Constant, Fourier, Periodic, Polynomial
 
 TOPOLOGIES = {
     "table-table": "w C B F X Y Z S t",

@@ -14,7 +14,7 @@ from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Effect, Machine
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 
 TOLERANCE = 1e-3
 DIGIT = 1e-3

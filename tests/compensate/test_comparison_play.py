@@ -20,8 +20,8 @@ from ncfix.compensate.figures.curve import Stretches
 from ncfix.compensate.intent import Intent
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine, State, load
-from ncfix.machine.effect import Effect
-from ncfix.machine.smooth import Backlash
+from ncfix.machine.axes import Effect
+from ncfix.machine.basis import Backlash
 
 PLAY = {"X": 7.2e-3, "Y": -7.2e-3, "Z": -4e-3}
 """mm: what the error changes by as the axis turns from minus to plus; the body of X, a table, goes the other way."""

@@ -9,8 +9,8 @@ from compensate.motions import Arc, motions
 from ncfix.compensate.direction import carried, matters, signs
 from ncfix.compensate.intent import Intent
 from ncfix.machine import Effect, Machine, State
+from ncfix.machine.basis import Backlash
 from ncfix.machine.piecewise import Step
-from ncfix.machine.smooth import Backlash
 
 
 def with_play(topology: str) -> Machine:

@@ -17,7 +17,7 @@ from ncfix.compensate.strategies import get_strategy
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Place
 from ncfix.machine import Effect, Machine
-from ncfix.machine.smooth import Backlash, Polynomial
+from ncfix.machine.basis import Backlash, Polynomial
 
 XYZ = [0, 1, 2]
 

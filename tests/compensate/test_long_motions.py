@@ -17,8 +17,8 @@ from ncfix.compensate.split import STRETCH, Grid, fewest
 from ncfix.compensate.strategies import get_strategy
 from ncfix.control.moves import Moves
 from ncfix.machine import Effect, Machine, State
+from ncfix.machine.basis import Polynomial
 from ncfix.machine.piecewise import Table
-from ncfix.machine.smooth import Polynomial
 
 TOLERANCE = 1e-3
 TURN = 2 * np.pi

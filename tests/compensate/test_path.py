@@ -11,7 +11,7 @@ from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Effect, Machine, State
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 
 TOLERANCE = 1e-3
 CONTROLS = [(kind, tcp) for kind in TOPOLOGIES for tcp in (False, True) if not (tcp and kind == "three-axis")]

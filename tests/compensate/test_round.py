@@ -17,7 +17,7 @@ from ncfix.compensate.strategies import get_strategy
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Setup
 from ncfix.machine import Effect, Machine, load
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.text.reader import read
 
 TOLERANCE = 1e-3

@@ -13,7 +13,7 @@ from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Effect, Machine, load
-from ncfix.machine.smooth import Constant, Polynomial
+from ncfix.machine.basis import Constant, Polynomial
 from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, tools={1: Tool(80.0, 3.0)})

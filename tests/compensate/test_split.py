@@ -13,8 +13,8 @@ from ncfix.compensate.path import plan
 from ncfix.compensate.split import Grid, fewest
 from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Effect, Machine, State
+from ncfix.machine.basis import Backlash, Polynomial
 from ncfix.machine.piecewise import Table
-from ncfix.machine.smooth import Backlash, Polynomial
 
 TOLERANCE = 1e-3
 USED = 0.98 * TOLERANCE

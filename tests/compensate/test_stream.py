@@ -22,7 +22,7 @@ from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Effect, Machine, load
-from ncfix.machine.smooth import Backlash
+from ncfix.machine.basis import Backlash
 from ncfix.text import dialects
 from ncfix.text.reader import read
 from ncfix.text.writer import Splices, spliced

@@ -18,7 +18,7 @@ from ncfix.compensate.following import traced
 from ncfix.control.lane import take
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine, load
-from ncfix.machine.smooth import Backlash
+from ncfix.machine.basis import Backlash
 from ncfix.text.reader import read
 from ncfix.writer import emit
 from ncfix_siemens.sinumerik import vectors

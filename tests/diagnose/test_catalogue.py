@@ -9,7 +9,7 @@ from diagnose.worlds import World
 from ncfix.diagnose.diagnosis import diagnose
 from ncfix.diagnose.twins import TOLD, alike
 from ncfix.machine import Effect
-from ncfix.machine.smooth import Fourier
+from ncfix.machine.basis import Fourier
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import orthonormal, without
 

@@ -18,7 +18,7 @@ from ncfix.diagnose.view import view
 from ncfix.diagnose.wandering import background
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine
-from ncfix.machine.smooth import Backlash
+from ncfix.machine.basis import Backlash
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.reader import reads
 from ncfix.measure.synthetic import Faults, simulate

@@ -10,7 +10,7 @@ from measure.poses import plan
 from ncfix.diagnose.fields import frames_of
 from ncfix.diagnose.view import view
 from ncfix.machine import Effect
-from ncfix.machine.effect import SPINDLE
+from ncfix.machine.axes import SPINDLE
 from ncfix.measure.synthetic import Faults, simulate
 
 ROUNDING = 1e-9

@@ -10,7 +10,7 @@ from ncfix.diagnose.carriers import carriers, conditions
 from ncfix.diagnose.catalogue import Candidate, catalogue
 from ncfix.diagnose.view import View, view
 from ncfix.machine import Effect
-from ncfix.machine.smooth import Backlash, Fourier, Polynomial
+from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.measure.synthetic import Faults, simulate
 
 

@@ -21,7 +21,7 @@ from ncfix.diagnose.catalogue import Candidate, catalogue
 from ncfix.diagnose.groups import Gathered, gather
 from ncfix.diagnose.view import View, view
 from ncfix.machine import Effect, Machine
-from ncfix.machine.smooth import Constant
+from ncfix.machine.basis import Constant
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.synthetic import Faults, simulate

@@ -15,7 +15,7 @@ from ncfix.compensate.account import FixReport
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Effect, Machine
-from ncfix.machine.smooth import Periodic, Polynomial
+from ncfix.machine.basis import Periodic, Polynomial
 from ncfix.text.reader import read
 
 CONTOURS = int(os.environ.get("NCFIX_CONTOURS", "16"))

@@ -6,8 +6,8 @@ import numpy as np
 
 from machine import oracle
 from ncfix.machine import Axis, Effect, Machine, Tool, se3
-from ncfix.machine.axis import Triad
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.axes import Triad
+from ncfix.machine.basis import Polynomial
 
 Rng = np.random.Generator
 LETTERS = "XYZABCUVW"

@@ -12,8 +12,8 @@ import pytest
 from machine import chains
 from ncfix import fast
 from ncfix.machine import Effect, Machine, State, load, loads
+from ncfix.machine.basis import Periodic, Polynomial
 from ncfix.machine.piecewise import Spline, Table
-from ncfix.machine.smooth import Periodic, Polynomial
 
 SHIPPED = ("angle_head", "dmu50", "three_axis", "wCAYFXZSt", "wCBXFZYSt")
 TABLE_TABLE = "w C B F X Y Z S t"

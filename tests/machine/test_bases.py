@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from ncfix.machine.basis import Basis, kinds
-from ncfix.machine.piecewise import Spline, Step, Table
-from ncfix.machine.smooth import Backlash, Constant, Fourier, Periodic, Polynomial
-from ncfix.machine.truncated import Truncated
+from ncfix.machine.basis import Backlash, Basis, Constant, Fourier, Periodic, Polynomial
+from ncfix.machine.piecewise import Spline, Step, Table, Truncated, kinds
 
 KNOTS = (0.0, 0.0, 0.0, 0.0, 20.0, 50.0, 60.0, 60.0, 60.0, 60.0)
 EXAMPLES = [

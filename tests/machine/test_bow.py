@@ -9,10 +9,8 @@ import pytest
 
 from machine import chains
 from ncfix.machine import Axis, Effect, Machine, State, Tool, load
-from ncfix.machine.basis import Basis
-from ncfix.machine.piecewise import Spline, Step, Table
-from ncfix.machine.smooth import Backlash, Constant, Fourier, Periodic, Polynomial
-from ncfix.machine.truncated import Truncated
+from ncfix.machine.basis import Backlash, Basis, Constant, Fourier, Periodic, Polynomial
+from ncfix.machine.piecewise import Spline, Step, Table, Truncated
 
 BASES: tuple[tuple[Basis, int], ...] = (
     (Constant(), 1),

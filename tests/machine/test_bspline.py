@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from ncfix.machine import bspline
+from ncfix.machine.piecewise import spline_slopes, splines
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 5])
@@ -17,7 +17,7 @@ def test_values_and_slopes(degree: int, inside: list[float]) -> None:
     coefficients = np.random.default_rng(degree).normal(size=(3, len(knots) - degree - 1))
     u = np.concatenate([np.linspace(0, 4, 201), inside])
     reference = BSpline(knots, coefficients.T, degree)
-    assert np.allclose(bspline.splines(knots, degree, coefficients, u), reference(u).T, rtol=0, atol=1e-13)
+    assert np.allclose(splines(knots, degree, coefficients, u), reference(u).T, rtol=0, atol=1e-13)
     apart = u[~np.isin(u, inside)]
-    found = bspline.slopes(knots, degree, coefficients, apart)
+    found = spline_slopes(knots, degree, coefficients, apart)
     assert np.allclose(found, reference(apart, nu=1).T, rtol=0, atol=1e-11)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from machine import chains
-from ncfix.machine import Axis, Effect, catalogue
+from ncfix.machine import Axis, Effect
+from ncfix.machine.axes import IDLE, component_names, component_title, squareness_meaning
 from ncfix.machine.codes import CODES
 
 
@@ -25,11 +26,11 @@ from ncfix.machine.codes import CODES
     ],
 )
 def test_titles(name: str, title: str) -> None:
-    assert catalogue.title(name) == title
+    assert component_title(name) == title
 
 
 def test_every_name_has_a_title_of_its_own() -> None:
-    titles = [catalogue.title(name) for name in catalogue.names()]
+    titles = [component_title(name) for name in component_names()]
     assert len(titles) == 7 * 12
     assert len(set(titles)) == len(titles)
 
@@ -38,8 +39,8 @@ def test_the_stated_sense_of_squareness_is_what_the_machine_does() -> None:
     """ "+X to +Y is 90 deg + EC0Y": the angle between the directions in which the axes really run."""
     plain = chains.four_kinds()["w C F X Y Z B t"]
     stated = 0
-    for name in catalogue.names("XYZ"):
-        sentence = catalogue.squareness(name)
+    for name in component_names("XYZ"):
+        sentence = squareness_meaning(name)
         if not sentence:
             continue
         stated += 1
@@ -58,9 +59,9 @@ def test_the_stated_sense_of_squareness_is_what_the_machine_does() -> None:
 def test_components_that_are_said_to_do_nothing_do_nothing() -> None:
     machine = chains.four_kinds()["w X F Y Z C A t"]
     q = chains.random_positions(np.random.default_rng(0), machine, 5)
-    for name in catalogue.names("XYZAC"):
+    for name in component_names("XYZAC"):
         if len(name) == 4:
-            idle = catalogue.IDLE in catalogue.title(name)
+            idle = IDLE in component_title(name)
             error = machine.replace(effects=(Effect(name, (1e-4,)),)).error(q)
             assert idle == bool(np.abs(error).max() < 1e-10), name
 
@@ -71,10 +72,10 @@ def test_every_code_is_explained() -> None:
 
 def test_a_skewed_axis_has_motions_that_are_neither_axial_nor_radial() -> None:
     skewed = Axis("B", True, True, (0.0, -(0.5**0.5), 0.5**0.5))
-    assert catalogue.title("EXB", skewed) == "radial motion of B in X"
-    assert catalogue.title("EYB", skewed) == "motion of B in Y"
+    assert component_title("EXB", skewed) == "radial motion of B in X"
+    assert component_title("EYB", skewed) == "motion of B in Y"
 
 
 def test_the_axis_says_what_the_letter_does_not() -> None:
-    assert catalogue.title("EZB", Axis("B", True, True, (0.0, 0.0, 1.0))) == "axial motion of B in Z"
-    assert catalogue.title("EXW", Axis("W", True, True, (0.0, 0.0, 1.0))) == "radial motion of W in X"
+    assert component_title("EZB", Axis("B", True, True, (0.0, 0.0, 1.0))) == "axial motion of B in Z"
+    assert component_title("EXW", Axis("W", True, True, (0.0, 0.0, 1.0))) == "radial motion of W in X"

@@ -10,8 +10,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from ncfix.machine import Effect, State, catalogue, dumps, load, loads
-from ncfix.machine.basis import kinds
+from ncfix.machine import Effect, State, dumps, load, loads
+from ncfix.machine.axes import squareness_meaning
+from ncfix.machine.piecewise import kinds
 
 MACHINES = ("dmu50", "three_axis", "wCAYFXZSt", "wCBXFZYSt")
 
@@ -52,7 +53,7 @@ def test_the_squareness_table_is_the_catalogue_s(root: Path) -> None:
     )
     assert len(rows) == 6
     for name, first, second, sign, effect in rows:
-        assert catalogue.squareness(name) == f"{first} to {second} is 90 deg {sign} {effect}"
+        assert squareness_meaning(name) == f"{first} to {second} is 90 deg {sign} {effect}"
 
 
 def test_the_figure_is_well_formed_and_has_a_description(root: Path) -> None:

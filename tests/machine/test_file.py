@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from machine import chains
 from machine.files import GOOD, changed
 from ncfix.machine import Axis, Effect, Machine, Tool, dumps, loads
+from ncfix.machine.basis import Backlash, Fourier, Periodic, Polynomial
 from ncfix.machine.piecewise import Spline, Step, Table
-from ncfix.machine.smooth import Backlash, Fourier, Periodic, Polynomial
 
 
 def test_what_a_file_means() -> None:

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from machine import chains
 from ncfix.machine import Effect, Machine, State, se3
+from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.machine.piecewise import Table
-from ncfix.machine.smooth import Backlash, Fourier, Polynomial
 
 seeds = st.integers(0, 10**6)
 

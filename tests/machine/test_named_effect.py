@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from ncfix.diagnostics import ConfigError
-from ncfix.machine import Effect, Machine, State, dumps, library, loads
-from ncfix.machine.smooth import Backlash, Polynomial
+from ncfix.machine import Effect, Machine, State, dumps, loads
+from ncfix.machine.basis import Backlash, Polynomial
+from ncfix.machine.effects import library
 
 HEAD = """
 ncfix = 1
@@ -74,7 +75,7 @@ class RamSag:
 
 
 def test_effects_of_plugins_have_names_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(library, "registry", lambda kind: {"ram-sag": RamSag()})
+    monkeypatch.setattr("ncfix.machine.effects.registry", lambda kind: {"ram-sag": RamSag()})
     known = loads(one("ram-sag", "coefficients = [1e-9]"))
     assert known.effects == (Effect("EAZ", (1e-9,), Polynomial(degree=(2,))),)
-    assert library.library(known)["ram-sag"].title == RamSag.title
+    assert library(known)["ram-sag"].title == RamSag.title

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from ncfix.diagnostics import ConfigError
-from ncfix.machine import basis, dumps, loads
+from ncfix.machine import dumps, loads
 from ncfix.machine.basis import Array, Basis, key
+from ncfix.machine.piecewise import kinds
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +41,8 @@ class Decay(Basis):
 @pytest.fixture
 def _decay(monkeypatch: pytest.MonkeyPatch) -> None:
     """As if a plugin had registered it."""
-    builtin = basis.kinds()
-    monkeypatch.setattr("ncfix.machine.effect_file.kinds", lambda: {**builtin, "decay": Decay})
+    builtin = kinds()
+    monkeypatch.setattr("ncfix.machine.file.kinds", lambda: {**builtin, "decay": Decay})
 
 
 TEXT = """\
@@ -85,10 +86,10 @@ def test_without_the_plugin_the_message_lists_what_there_is() -> None:
 
 
 def test_bases_come_through_the_plugin_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ncfix.plugins.registry", lambda kind, builtin: {**builtin, kind: Decay})
-    basis.kinds.cache_clear()
+    monkeypatch.setattr("ncfix.machine.piecewise.registry", lambda kind, builtin: {**builtin, kind: Decay})
+    kinds.cache_clear()
     try:
-        assert basis.kinds()["bases"] is Decay
-        assert "polynomial" in basis.kinds()
+        assert kinds()["bases"] is Decay
+        assert "polynomial" in kinds()
     finally:
-        basis.kinds.cache_clear()
+        kinds.cache_clear()

@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 from machine import chains
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Axis, Effect, Machine, State
+from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.machine.piecewise import Step, Table
-from ncfix.machine.signals import lagged
-from ncfix.machine.smooth import Backlash, Fourier, Polynomial
+from ncfix.machine.state import lagged
 
 MACHINE = chains.four_kinds()["w C B F X Y Z t"]
 """Columns C B X Y Z; C endless, linear axes within +-300 mm."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Machine, loads
-from ncfix.machine.summary import extent
+from ncfix.machine.effects import extent
 
 MACHINE = """
 topology = "w C F X Z t"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ncfix.machine import State, loads
-from ncfix.machine.survey import curves, drifts
+from ncfix.machine.effects import effect_curves, tip_curves
 
 MACHINE = """
 ncfix = 1
@@ -46,7 +46,7 @@ coefficients = [20e-6]
 
 def test_a_curve_has_the_values_of_its_effect_and_its_band() -> None:
     machine = loads(MACHINE)
-    (curve,) = curves(machine, machine.effects[0])
+    (curve,) = effect_curves(machine, machine.effects[0])
     u = (curve.x - 100.0) / 200.0
     assert (curve.axis, curve.x[0], curve.x[-1]) == ("X", -100.0, 300.0)
     assert np.all(np.diff(curve.x) >= 0)
@@ -56,7 +56,7 @@ def test_a_curve_has_the_values_of_its_effect_and_its_band() -> None:
 
 def test_play_has_a_curve_for_each_direction() -> None:
     machine = loads(MACHINE)
-    up, down = curves(machine, machine.effects[1])
+    up, down = effect_curves(machine, machine.effects[1])
     assert (up.direction, down.direction) == (1, -1)
     assert up.value == pytest.approx(0.003)
     assert down.value == pytest.approx(-0.003)
@@ -64,14 +64,14 @@ def test_play_has_a_curve_for_each_direction() -> None:
 
 def test_an_endless_axis_is_shown_over_one_turn_and_a_constant_not_at_all() -> None:
     machine = loads(MACHINE)
-    (curve,) = curves(machine, machine.effects[2])
+    (curve,) = effect_curves(machine, machine.effects[2])
     assert (curve.x[0], curve.x[-1]) == (0.0, 360.0)
-    assert curves(machine, machine.effects[3]) == []
+    assert effect_curves(machine, machine.effects[3]) == []
 
 
 def test_drifts_are_what_the_machine_does(root: Path) -> None:
     machine = loads((root / "examples/machines/wCBXFZYSt.toml").read_text())
-    found = drifts(machine, tool_length=50.0)
+    found = tip_curves(machine, tool_length=50.0)
     assert [each.axis for each in found] == list(machine.axis_names)
     middle = np.array([np.mean(limits) for limits in machine.ranges])
     for index, drift in enumerate(found):

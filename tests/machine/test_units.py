@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Effect, State, load
-from ncfix.machine.library import library
-from ncfix.machine.smooth import Backlash, Polynomial
-from ncfix.machine.units import units
+from ncfix.machine.basis import Backlash, Polynomial
+from ncfix.machine.effects import library, units
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "machines"
 THREE, FIVE = (load(str(EXAMPLES / f"{name}.toml")) for name in ("three_axis", "wCBXFZYSt"))

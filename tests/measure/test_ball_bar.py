@@ -9,7 +9,7 @@ import pytest
 
 from measure.poses import machine
 from ncfix.machine import Effect, Machine
-from ncfix.machine.smooth import Backlash, Polynomial
+from ncfix.machine.basis import Backlash, Polynomial
 from ncfix.measure.ball_bar import BallBarFigures, figures
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.observe import observe

@@ -8,8 +8,8 @@ import pytest
 from measure.poses import machine, plan
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
-from ncfix.machine.smooth import Polynomial
-from ncfix.machine.truncated import Truncated
+from ncfix.machine.basis import Polynomial
+from ncfix.machine.piecewise import Truncated
 from ncfix.measure.calibrate import calibrate
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.synthetic import Faults, simulate

@@ -9,7 +9,7 @@ import pytest
 
 from measure.poses import machine, plan
 from ncfix.machine import dumps, loads
-from ncfix.machine.library import library
+from ncfix.machine.effects import library
 from ncfix.measure.calibrate import calibrate
 from ncfix.measure.selection import select
 from ncfix.measure.synthetic import Faults, simulate

@@ -13,7 +13,7 @@ import pytest
 
 from measure.poses import machine
 from ncfix.machine import Effect, Machine, State
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.measure.calibrate import calibrate
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.misfit import refusals

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ncfix.diagnostics import ConfigError, RefusedError
 from ncfix.machine import Effect, load, loads
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import export
 from ncfix.tables.lines import Remarks

@@ -10,7 +10,7 @@ import pytest
 
 from ncfix.diagnostics import ConfigError, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, load, loads
-from ncfix.machine.smooth import Backlash
+from ncfix.machine.basis import Backlash
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import Exported, export
 from ncfix.tables.lines import Remarks

@@ -11,7 +11,7 @@ import pytest
 
 from ncfix.diagnostics import ConfigError, RefusedError, UsageError
 from ncfix.machine import Effect, dumps, loads
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import export
 from ncfix.tables.lines import Remarks

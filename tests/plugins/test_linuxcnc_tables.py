@@ -10,7 +10,7 @@ import pytest
 
 from ncfix.diagnostics import ConfigError
 from ncfix.machine import Effect
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import export
 from ncfix.tables.poses import ranges_of

@@ -11,7 +11,7 @@ import pytest
 
 from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Effect, Machine, load
-from ncfix.machine.smooth import Backlash, Polynomial
+from ncfix.machine.basis import Backlash, Polynomial
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import Exported, export
 from ncfix.tables.lines import Remarks

@@ -13,7 +13,7 @@ import pytest
 
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, loads
-from ncfix.machine.smooth import Backlash, Fourier, Polynomial
+from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.tables.control import Control, Request, get_control
 from ncfix.tables.forms import FORMS, read
 from ncfix.tables.poses import ranges_of

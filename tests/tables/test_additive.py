@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Effect, load
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.tables.additive import additive
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.poses import even_poses, ranges_of

@@ -9,7 +9,7 @@ import pytest
 
 from ncfix.diagnostics import ConfigError, NcfixError, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, loads
-from ncfix.machine.smooth import Fourier
+from ncfix.machine.basis import Fourier
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import Exported, emulate, export
 from ncfix.tables.poses import ranges_of

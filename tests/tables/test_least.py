@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Effect, Machine, loads
-from ncfix.machine.smooth import Fourier
+from ncfix.machine.basis import Fourier
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import export
 from ncfix.tables.grid import Array, Grid

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Effect, Machine
-from ncfix.machine.smooth import Backlash
+from ncfix.machine.basis import Backlash
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import Exported, export
 from ncfix.tables.poses import ranges_of

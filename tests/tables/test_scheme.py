@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Effect, Machine, State, load
-from ncfix.machine.smooth import Backlash, Fourier, Polynomial
+from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.tables.poses import random_poses, ranges_of
 from ncfix.tables.residual import Residual, residual
 from ncfix.tables.scheme import Job, Limits, Scheme, automatic

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ncfix.machine import Axis, Effect, Machine, State, Tool
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.tables.exact import exact_correction
 from ncfix.tables.scheme import Job, Limits
 from ncfix.tables.scheme_fixed import fixed

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ncfix.machine import Effect, Machine, State
-from ncfix.machine.smooth import Backlash
+from ncfix.machine.basis import Backlash
 from ncfix.measure.ball_bar import BallBarFigures, figures
 from ncfix.measure.lengths import BallBar
 from ncfix.measure.measurement import Measurement

@@ -15,7 +15,7 @@ from ncfix.compensate.strategies import RotaryThenLinear, get_strategy
 from ncfix.compensate.thesis import rotary_shift
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine, State, load
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 
 D = 154.996
 UM, URAD = 1e-3, 1e-6

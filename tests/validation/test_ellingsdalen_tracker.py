@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Effect, load
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.measure.calibrate import calibrate
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.synthetic import Faults, simulate

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Effect, load
-from ncfix.machine.smooth import Backlash
+from ncfix.machine.basis import Backlash
 from ncfix.measure.calibrate import calibrate
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import Measurement

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Effect, Machine, load
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.measure.calibrate import Problem, calibrate
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.reader import read

@@ -13,7 +13,7 @@ import pytest
 
 from measure.poses import plan
 from ncfix.machine import Effect, load
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.measure.calibrate import Problem
 from ncfix.measure.exchange import Pool, choose
 from ncfix.measure.measurement import Measurement

@@ -175,7 +175,7 @@ def _print(calibration: Calibration, over: Prediction) -> None:
 
 
 def _rows(calibration: Calibration) -> Iterator[tuple[str, str, str, str]]:
-    from ncfix.machine.units import units
+    from ncfix.machine.effects import units
 
     machine, selection = calibration.problem.machine, calibration.problem.selection
     said = [unit for effect in selection.estimated for unit in units(machine, effect)]

@@ -52,25 +52,33 @@ def _effects(path: str | None) -> list[Row]:
 
 
 def _components(machine: Machine, with_all: bool) -> list[Row]:
-    from ncfix.machine import catalogue
-    from ncfix.machine.effect import SPINDLE, Effect
+    from ncfix.machine.axes import (
+        SPINDLE,
+        Effect,
+        component_names,
+        component_title,
+        instruments_for,
+        large_size,
+        squareness_meaning,
+        usual_basis,
+    )
 
     letters = "XYZABC" if with_all else "".join(machine.axis_names)
     axes = {axis.name: axis for axis in machine.axes}
     rows = []
-    for name in catalogue.names(letters + SPINDLE):
+    for name in component_names(letters + SPINDLE):
         effect = Effect(name, ())
-        seen = catalogue.instruments(name)
-        title = catalogue.title(name, axes.get(name[-1]))
+        seen = instruments_for(name)
+        title = component_title(name, axes.get(name[-1]))
         unit = "rad" if effect.rotational else "mm"
-        square = catalogue.squareness(name)
-        basis, much = catalogue.usual_basis(name), catalogue.much(name)
+        square = squareness_meaning(name)
+        basis, much = usual_basis(name), large_size(name)
         rows.append(_row(name, title, unit=unit, basis=basis, much=much, seen=seen, squareness=square))
     return rows
 
 
 def _physical(machine: Machine) -> list[Row]:
-    from ncfix.machine.library import library
+    from ncfix.machine.effects import library
 
     rows = []
     for named in library(machine).values():
@@ -84,7 +92,7 @@ def _physical(machine: Machine) -> list[Row]:
 
 def _nameless(machine: Machine) -> list[Row]:
     """Effects of plugins that this machine cannot have, or that only diagnosis knows."""
-    from ncfix.machine.library import library
+    from ncfix.machine.effects import library
     from ncfix.plugins import registry
 
     there = library(machine)
@@ -119,7 +127,7 @@ def _row(
 def _bases() -> list[Row]:
     from dataclasses import fields
 
-    from ncfix.machine.basis import kinds
+    from ncfix.machine.piecewise import kinds
 
     return [
         {"name": name, "title": basis.title, "keys": ", ".join(field.name for field in fields(basis))}  # type: ignore[arg-type]

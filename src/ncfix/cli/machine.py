@@ -52,7 +52,7 @@ def check(file: str, as_json: bool) -> int:
 
 def _remarks(machine: Machine, path: str) -> list[Message]:
     """What is possible and odd: a control that nobody here knows (a plugin may), play with the other sign."""
-    from ncfix.machine.library import runs_ahead
+    from ncfix.machine.effects import runs_ahead
 
     said = []
     known = {*registry("dialects"), *registry("controls")}
@@ -104,7 +104,7 @@ def _as_dict(machine: Machine) -> dict[str, Any]:
 
 
 def _effect_as_dict(machine: Machine, effect: Effect) -> dict[str, Any]:
-    from ncfix.machine.summary import extent, title_of
+    from ncfix.machine.effects import extent, title_of
 
     found = extent(machine, effect)
     return {
@@ -124,14 +124,14 @@ def _page(machine: Machine) -> list[str]:
 
 
 def _facts(machine: Machine) -> list[str]:
-    from ncfix.machine.summary import facts
+    from ncfix.machine.effects import facts
 
     return [f"{name + ':':<20}{value}" for name, value in facts(machine).items()]
 
 
 def _chain(machine: Machine) -> list[str]:
     """The joints as they follow one another."""
-    from ncfix.machine.summary import vector
+    from ncfix.machine.effects import vector
 
     workpiece = [_axis(axis) for axis in machine.axes if axis.workpiece_side]
     tool = [_axis(axis) for axis in machine.axes if not axis.workpiece_side]
@@ -140,7 +140,7 @@ def _chain(machine: Machine) -> list[str]:
 
 
 def _axis(axis: Axis) -> str:
-    from ncfix.machine.summary import travel_of, vector
+    from ncfix.machine.effects import travel_of, vector
 
     along = f"along {vector(axis.direction)}"
     where = f"about {vector(axis.direction)} through {vector(axis.point)}" if axis.rotary else along
@@ -160,7 +160,7 @@ def _errors(machine: Machine) -> list[str]:
 
 
 def _effect(machine: Machine, effect: Effect) -> str:
-    from ncfix.machine.summary import depends_on
+    from ncfix.machine.effects import depends_on
 
     facts = _effect_as_dict(machine, effect)
     if facts["range"] is None:

@@ -16,7 +16,7 @@ from ncfix.compensate.segments import Segments
 from ncfix.compensate.wordless import correctable, lacking
 from ncfix.control.moves import Kind
 from ncfix.machine.aim import CLOSE
-from ncfix.machine.bow import Bow
+from ncfix.machine.error_model import Bow
 
 SURE = 0.5
 """A motion whose deviation at a first look is under this share of the tolerance is within it."""

@@ -39,7 +39,7 @@ from ncfix.compensate.units import Unit
 from ncfix.control.moves import FeedMode, Kind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
-from ncfix.machine.bow import MORE
+from ncfix.machine.error_model import MORE
 from ncfix.writer.emit import Emission
 from ncfix.writer.pieces import Pieces
 

@@ -10,8 +10,8 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import owners
 from ncfix.compensate.rows import picked, spread, vector_product
 from ncfix.control.moves import Kind, Moves
+from ncfix.machine.chain import turn
 from ncfix.machine.steps import dot
-from ncfix.machine.transport import turn
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.groups import Group
 from ncfix.machine import Effect, Machine
-from ncfix.machine.basis import Basis
-from ncfix.machine.smooth import Fourier, Polynomial
-from ncfix.machine.units import Unit, units
+from ncfix.machine.basis import Basis, Fourier, Polynomial
+from ncfix.machine.effects import Unit, units
 from ncfix.measure.measurement import Array
 
 Mask = NDArray[np.bool_]

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ncfix.machine import Effect, Machine
-from ncfix.machine.effect import SPINDLE
-from ncfix.machine.smooth import Backlash
+from ncfix.machine.axes import SPINDLE
+from ncfix.machine.basis import Backlash
 
 FIX = "fix"
 POSITIONING = ("linuxcnc", "fanuc-pitch", "heidenhain", "siemens", "isg", "fanuc", "heidenhain-kinematics")

@@ -15,7 +15,7 @@ from ncfix.diagnose.catalogue.candidate import LETTERS
 from ncfix.diagnose.groups import Group
 from ncfix.diagnose.view import View
 from ncfix.machine import Effect
-from ncfix.machine.effect import SPINDLE
+from ncfix.machine.axes import SPINDLE
 from ncfix.measure.geometry import base_from_workpiece
 from ncfix.measure.measurement import Array
 

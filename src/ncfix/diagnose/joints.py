@@ -17,8 +17,8 @@ from ncfix.diagnose.fields import UNNAMED, together
 from ncfix.diagnose.groups import Group
 from ncfix.diagnose.view import View
 from ncfix.machine import Effect
-from ncfix.machine.axis import Axis
-from ncfix.machine.smooth import Backlash, Fourier, Polynomial
+from ncfix.machine.axes import Axis
+from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.measure.measurement import Array
 
 FULL = 270.0

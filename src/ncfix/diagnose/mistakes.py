@@ -19,7 +19,7 @@ from ncfix.diagnose.catalogue.build import plain
 from ncfix.diagnose.misfit import Misfit, misfit
 from ncfix.diagnose.verdict import AMBIGUOUS, FOUND, NOTHING
 from ncfix.machine import Effect, Machine
-from ncfix.machine.axis import Axis
+from ncfix.machine.axes import Axis
 from ncfix.measure.measurement import Measurement
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ import numpy as np
 from ncfix.diagnose.catalogue import Candidate
 from ncfix.diagnose.view import View
 from ncfix.machine import Effect, Machine
-from ncfix.machine.library import runs_ahead
+from ncfix.machine.effects import runs_ahead
 
 BOUNDS: dict[str, tuple[float, float]] = {
     "curve": (100.0, 100.0),

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from ncfix.diagnose.catalogue.candidate import Reach
 from ncfix.machine import Effect, Machine
-from ncfix.machine.axis import Axis
-from ncfix.machine.effect import SPINDLE
-from ncfix.machine.smooth import Constant, Polynomial
+from ncfix.machine.axes import SPINDLE, Axis
+from ncfix.machine.basis import Constant, Polynomial
 from ncfix.measure.calibrate import Problem
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.selection import Selection

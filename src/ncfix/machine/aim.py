@@ -1,29 +1,25 @@
-"""Bringing the tool tip of a machine with errors to a point by its linear axes: Newton's method on the exact model.
+"""Where the tool tip of a machine with errors is beside where it shall be, and the linear axes that bring it there.
 
-The derivative is that of the machine without small motions: they change it by parts in ten thousand only, so each pass
-gains about as many digits.
+They are found by Newton's method on the exact model. The derivative is that of the machine without small motions: they
+change it by parts in ten thousand only, so each pass gains about as many digits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
 from ncfix.machine.loops import room
+from ncfix.machine.route import Route, SplitRoute, Turns
 from ncfix.machine.se3 import Array
-from ncfix.machine.state import Poses
+from ncfix.machine.state import Poses, behind_each_other
 from ncfix.machine.steps import SMALL, dot, has_arrived, volume
 
-if TYPE_CHECKING:
-    from ncfix.machine.route import Approach, Route
-
 Mask = NDArray[np.bool_]
-Turns = tuple[Array, Array]
 Tips = Callable[[Poses, Turns], tuple[Array, Array]]
 """Poses with their sines -> the tip (3, n), and the largest squared angle of a small motion (n,)."""
 Vector = Sequence[float | Array]
@@ -108,7 +104,9 @@ def aimed(
     return Aim(q[list(axes)], arrived, off), largest
 
 
-def aimed_ahead(poses: Poses, perfect: Route, approach: Approach, target: Array | None) -> tuple[Aim, NDArray[np.intp]]:
+def aimed_ahead(
+    poses: Poses, perfect: Route, approach: SplitRoute, target: Array | None
+) -> tuple[Aim, NDArray[np.intp]]:
     """Move three linear axes until the tip is at `target` (3, n); None: where a perfect machine has it.
 
     What they do not change is undone once, ahead of all passes; so only the rest is gone through in each.
@@ -120,7 +118,7 @@ def aimed_ahead(poses: Poses, perfect: Route, approach: Approach, target: Array 
     return aim, np.flatnonzero(~aim.arrived | (largest >= SMALL))
 
 
-def _by_columns(poses: Poses, perfect: Route, approach: Approach, target: Array | None) -> tuple[Aim, Array]:
+def _by_columns(poses: Poses, perfect: Route, approach: SplitRoute, target: Array | None) -> tuple[Aim, Array]:
     """The same; also the largest squared angle of a small motion (n,)."""
     within, behind, turns = approach.within, approach.behind, approach.within.turns(poses)
     goal = perfect.tips(poses, turns)[0] if target is None else target
@@ -130,7 +128,7 @@ def _by_columns(poses: Poses, perfect: Route, approach: Approach, target: Array 
     return aim, np.maximum(largest, angle)
 
 
-def _compiled(poses: Poses, perfect: Route, approach: Approach, target: Array | None) -> tuple[Aim, Array]:
+def _compiled(poses: Poses, perfect: Route, approach: SplitRoute, target: Array | None) -> tuple[Aim, Array]:
     """The same, compiled."""
     from ncfix.machine import kernels
 
@@ -156,3 +154,53 @@ def taken(poses: Poses, q: Array, rows: NDArray[np.intp]) -> Poses:
 
 def _rows(values: Array, rows: NDArray[np.intp]) -> Array:
     return values if values.shape[-1] == 1 else values[..., rows]
+
+
+RouteTips = Callable[[Route | None, Poses, Turns | None], Array]
+"""The tip (3, n) by a route, or by the chain without one; sines and versines, if they are known."""
+
+
+def gaps(
+    perfect: Route, route: Route | None, tips: RouteTips, meant: Poses, done: Sequence[Poses], target: Array | None
+) -> list[Array]:
+    """Where the tip is with the axes at each of `done` by a route, minus `target` (n, 3): (n, 3) mm each.
+
+    target  where a perfect machine has the tip as `meant`, if not given
+    """
+    found = [np.empty((meant.positions.shape[1], 3)) for _ in done]
+    for part, goal in meant.chunks():
+        here = [goal if each is meant else each.part(part) for each in done]
+        there = None if target is None else target[part].T
+        for out, gap in zip(found, _gaps(perfect, route, tips, goal, here, there), strict=True):
+            out[part] = gap
+    return found
+
+
+def _gaps(
+    perfect: Route, route: Route | None, tips: RouteTips, meant: Poses, done: Sequence[Poses], target: Array | None
+) -> Iterable[Array]:
+    if route is not None and fast.engaged() and meant.positions.shape[1] > 1:
+        found, angle = _compiled_gaps(perfect, route, meant, done, target)
+        if not (angle >= SMALL).any():
+            return found
+    turns, turning = (route or perfect).turns(meant), list(perfect.rotary)
+    goal = tips(perfect, meant, turns) if target is None else target
+    alike = (np.array_equal(each.positions[turning], meant.positions[turning]) for each in done)
+    both = zip(done, alike, strict=True)
+    return [(tips(route, each, turns if same else None) - goal).T for each, same in both]
+
+
+def _compiled_gaps(
+    perfect: Route, route: Route, meant: Poses, done: Sequence[Poses], target: Array | None
+) -> tuple[Array, Array]:
+    """The same, (k, n, 3), compiled; and the largest squared angles of small motions that were met with, (k, n)."""
+    from ncfix.machine import kernels
+
+    kinds = [meant, *(each for each in done if each is not meant)]
+    poses, n = behind_each_other(kinds), meant.positions.shape[1]
+    given = route.columns(poses, route.turns(poses), route.terms.given(poses))
+    goal = np.empty((3, 0)) if target is None else np.ascontiguousarray(target)
+    sides = np.array([next(k for k, kind in enumerate(kinds) if kind is each) for each in done])
+    out, angle = np.empty((len(done), n, 3)), np.empty((len(done), n))
+    kernels.gaps(perfect.compiled, route.compiled, given, goal, sides, room(given, route.compiled), out, angle)
+    return out, angle

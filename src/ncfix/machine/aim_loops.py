@@ -51,7 +51,7 @@ def aim(
 ) -> None:
     """Newton's method for all poses: as `aim.aimed`, by whole steps.
 
-    within, behind  the two of `route.Approach`; the other functions in `columns` are of the second, then of the first
+    within, behind  the two of `route.SplitRoute`; the other functions in `columns` are of the second, then of the first
     axes            the columns of X, Y and Z
     target          (3, n) mm; (3, 0): where a perfect machine has the tip
     limits          when a tip has arrived, mm, which volume of its motions is none, and how many steps there are

@@ -1,21 +1,23 @@
-"""What a basis is: known functions of one signal, whose weighted sum is an error. The kinds that there are.
+"""What a basis is: known functions of one signal, whose weighted sum is an error. The smooth ones, and play.
 
 A basis sees u = (x - center) / scale, x in the unit of the machine file (mm, degree, or the unit of a state input).
 Its own parameters are the fields of a frozen dataclass, declared with `key`; the machine file is read and written by
 these declarations, so a plugin's basis needs no code for that. Register one with the hook `register_bases`.
 """
 
+# What the methods mean is said once, in `Basis`.
+# ruff: noqa: D102
+
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import field
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ncfix.machine.se3 import Array
+
 REQUIRED = object()
 
 
@@ -120,11 +122,195 @@ def check_shapes(basis: Basis) -> None:
             raise ValueError(f"{name} gives shape {shape} for three places and {basis.size} coefficients")
 
 
-@lru_cache(maxsize=1)
-def kinds() -> dict[str, type[Basis]]:
-    """Every basis by its name: the built-in ones and those of plugins."""
-    from ncfix.machine import piecewise, smooth, truncated
-    from ncfix.plugins import registry
+@dataclass(frozen=True, slots=True)
+class Constant(Basis):
+    """One number, whatever the signal."""
 
-    builtin = (*smooth.BASES, *piecewise.BASES, *truncated.BASES)
-    return registry("bases", {basis.name: basis for basis in builtin})
+    name: ClassVar[str] = "constant"
+    title: ClassVar[str] = "one number, independent of position"
+    needs_signal: ClassVar[bool] = False
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return ("1",)
+
+    def rows(self, u: Array, direction: Array) -> Array:
+        return np.ones((1, *np.shape(u)))
+
+    def slopes(self, u: Array, direction: Array) -> Array:
+        return np.zeros((1, *np.shape(u)))
+
+    def feature(self, span: float) -> float:
+        return np.inf
+
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        return abs(coefficients[0]), 0.0, 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Polynomial(Basis):
+    """Powers of u."""
+
+    degree: tuple[int, ...] = key("integers", "which powers of u, one coefficient each")
+    name: ClassVar[str] = "polynomial"
+    title: ClassVar[str] = "powers of u = (x - center) / scale"
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return tuple(f"u^{power}" for power in self.degree)
+
+    def rows(self, u: Array, direction: Array) -> Array:
+        return powers(u, self.degree)
+
+    def slopes(self, u: Array, direction: Array) -> Array:
+        return _columns(self.degree, u) * powers(u, tuple(max(power - 1, 0) for power in self.degree))
+
+    def feature(self, span: float) -> float:
+        return span / (4 * max(self.degree)) if max(self.degree) else np.inf
+
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        most = max(abs(low), abs(high))
+        if not np.isfinite(most) and any(self.degree):
+            return None
+        size, slope, curvature = 0.0, 0.0, 0.0
+        for coefficient, k in zip(coefficients, self.degree, strict=True):
+            size += abs(coefficient) * most**k if k else abs(coefficient)
+            slope += abs(coefficient) * k * most ** max(k - 1, 0)
+            curvature += abs(coefficient) * k * (k - 1) * most ** max(k - 2, 0)
+        return size, slope, curvature
+
+    @property
+    def family(self) -> tuple[object, ...]:
+        return (self.name,)
+
+    def merged(self, other: Self) -> Self:
+        return replace(self, degree=tuple(sorted({*self.degree, *other.degree})))
+
+    def complaints(self) -> list[tuple[str, str]]:
+        return distinct("degree", self.degree, lowest=0)
+
+
+@dataclass(frozen=True, slots=True)
+class Backlash(Polynomial):
+    """Half the play that opens when the axis reverses: +1/2 when it comes moving up, -1/2 when it comes moving down."""
+
+    degree: tuple[int, ...] = key("integers", "which powers of u, one coefficient each", (0,))
+    name: ClassVar[str] = "backlash"
+    title: ClassVar[str] = "direction of motion (-1, 0 unknown, 1) times half the powers of u"
+
+    @property
+    def needs_direction(self) -> bool:
+        return True
+
+    def rows(self, u: Array, direction: Array) -> Array:
+        return 0.5 * direction * powers(u, self.degree)
+
+    def slopes(self, u: Array, direction: Array) -> Array:
+        return 0.5 * direction * _columns(self.degree, u) * powers(u, tuple(max(p - 1, 0) for p in self.degree))
+
+
+@dataclass(frozen=True, slots=True)
+class Fourier(Basis):
+    """Harmonics of the turn of a rotary axis."""
+
+    order: tuple[int, ...] = key("integers", "harmonics, cos and sin of each in turn")
+    name: ClassVar[str] = "fourier"
+    title: ClassVar[str] = "cos and sin of k times the angle of a rotary axis, k in `order`"
+    rotary_only: ClassVar[bool] = True
+
+    @property
+    def turn(self) -> float:
+        """The u of one period."""
+        return 360.0
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return tuple(f"{function} {k}" for k in self.order for function in ("cos", "sin"))
+
+    def rows(self, u: Array, direction: Array) -> Array:
+        return _waves(u, self.order, self.turn)
+
+    def slopes(self, u: Array, direction: Array) -> Array:
+        waves = _waves(u, self.order, self.turn)
+        rate = 2 * np.pi / self.turn * _columns(self.order, u)
+        slopes = np.empty_like(waves)
+        slopes[0::2], slopes[1::2] = -rate * waves[1::2], rate * waves[0::2]
+        return slopes
+
+    def feature(self, span: float) -> float:
+        return self.turn / (8 * max(self.order))
+
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        sizes = np.hypot(coefficients[0::2], coefficients[1::2])
+        rates = 2 * np.pi / self.turn * np.array(self.order)
+        return float(sizes.sum()), float((sizes * rates).sum()), float((sizes * rates**2).sum())
+
+    @property
+    def family(self) -> tuple[object, ...]:
+        return self.name, self.turn
+
+    def merged(self, other: Self) -> Self:
+        return replace(self, order=tuple(sorted({*self.order, *other.order})))
+
+    def complaints(self) -> list[tuple[str, str]]:
+        return distinct("order", self.order, lowest=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Periodic(Fourier):
+    """Harmonics of a period: a screw's pitch, a scale's grating, a gear."""
+
+    period: float = key("number", "length of one period, mm or degree")
+    name: ClassVar[str] = "periodic"
+    title: ClassVar[str] = "cos and sin of 2 pi k u / period, k in `order`"
+    rotary_only: ClassVar[bool] = False
+
+    @property
+    def turn(self) -> float:
+        """The u of one period."""
+        return self.period
+
+    def complaints(self) -> list[tuple[str, str]]:
+        wrong = [] if self.period > 0 else [("period", f"{self.period:g} is not a positive length")]
+        return wrong + distinct("order", self.order, lowest=1)
+
+
+def powers(u: Array, degree: tuple[int, ...]) -> Array:
+    """Powers of u by repeated multiplication, shape (...) -> (k, ...)."""
+    u = np.asarray(u, dtype=np.float64)
+    ladder = np.empty((max(degree) + 1, *u.shape))
+    ladder[0] = 1.0
+    for power in range(1, len(ladder)):
+        ladder[power] = ladder[power - 1] * u
+    return ladder if degree == tuple(range(len(ladder))) else ladder[list(degree)]
+
+
+HIGHEST = 1000
+"""No error of a machine bends so often."""
+
+
+def distinct(name: str, values: tuple[int, ...], lowest: int) -> list[tuple[str, str]]:
+    """A complaint unless the values are given, distinct, none below `lowest` and none beyond `HIGHEST`."""
+    if not values:
+        return [(name, "is empty")]
+    if min(values) < lowest:
+        return [(name, f"{min(values)} is below {lowest}")]
+    if max(values) > HIGHEST:
+        return [(name, f"goes beyond {HIGHEST}")]
+    if len(set(values)) < len(values):
+        return [(name, "names a value twice")]
+    return []
+
+
+def _columns(values: tuple[int, ...], u: Array) -> Array:
+    return np.asarray(values, dtype=np.float64).reshape(-1, *np.ones(np.ndim(u), dtype=int))
+
+
+def _waves(u: Array, order: tuple[int, ...], period: float) -> Array:
+    phase = (2 * np.pi / period) * np.asarray(u, dtype=np.float64) * _columns(order, u)
+    waves = np.empty((2 * len(order), *np.shape(u)))
+    waves[0::2], waves[1::2] = np.cos(phase), np.sin(phase)
+    return waves
+
+
+SMOOTH: tuple[type[Basis], ...] = (Constant, Polynomial, Fourier, Periodic, Backlash)

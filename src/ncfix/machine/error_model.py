@@ -1,4 +1,4 @@
-"""All effects of a machine, compiled: from poses to the small motions that they make at each joint.
+"""All effects of a machine, compiled: from poses to the small motions of each joint; where and how far these may bend.
 
 Effects that see the same signal through bases of one family are evaluated together: one table of functions, one
 matrix product. What comes out is a *slot*: the six components of a small motion of one joint, of one sort, about one
@@ -7,19 +7,18 @@ reference point.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ncfix.machine.axis import BASE_AXES, Axis, Tool, Vector
+from ncfix.machine.axes import BASE_AXES, SPINDLE, Axis, Effect, Tool, Vector
 from ncfix.machine.basis import Basis
-from ncfix.machine.effect import SPINDLE, Effect
 from ncfix.machine.se3 import Array
-from ncfix.machine.signals import Signal, axis_signal, inputs_of
-from ncfix.machine.state import Poses
+from ncfix.machine.state import Poses, Signal, axis_signal, inputs_of
 
 
 class Sort(Enum):
@@ -40,7 +39,7 @@ class Slot:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class EffectGroup:
     """Effects evaluated together: `gains[s, 6, k] @ basis(u)` is added to slot `slots[s]`, times the factor's u.
 
     A gain takes a coefficient's function to the small motion [x y z a b c] along and about the base axes (the axis's
@@ -75,7 +74,7 @@ class Group:
 class ErrorModel:
     """The compiled effects of a machine."""
 
-    groups: tuple[Group, ...]
+    groups: tuple[EffectGroup, ...]
 
     @cached_property
     def signals(self) -> frozenset[Signal]:
@@ -110,7 +109,7 @@ def compile_effects(axes: tuple[Axis, ...], tool: Tool, effects: Iterable[Effect
     return ErrorModel(tuple(_group(axes, tool, members) for members in together.values()))
 
 
-def _group(axes: tuple[Axis, ...], tool: Tool, members: list[Effect]) -> Group:
+def _group(axes: tuple[Axis, ...], tool: Tool, members: list[Effect]) -> EffectGroup:
     basis = members[0].basis
     for effect in members[1:]:
         basis = basis.merged(effect.basis)
@@ -122,7 +121,7 @@ def _group(axes: tuple[Axis, ...], tool: Tool, members: list[Effect]) -> Group:
         unit = unit_motion(axes, effect)
         gains[slots.index(slot_of(axes, tool, effect))][:, columns] += np.outer(unit, effect.coefficients)
     signal, factor = signals_of(axes, members[0])
-    return Group(basis, signal, factor, direction_axis(axes, members[0]), slots, gains)
+    return EffectGroup(basis, signal, factor, direction_axis(axes, members[0]), slots, gains)
 
 
 def joint_index(axes: tuple[Axis, ...], effect: Effect) -> int:
@@ -178,3 +177,177 @@ def direction_axis(axes: tuple[Axis, ...], effect: Effect) -> int:
     if not effect.basis.needs_direction:
         return -1
     return names.index(effect.input) if effect.input in names else names.index(effect.joint)
+
+
+UNKNOWN_RANGE = 1000.0
+"""The range of a linear axis that does not say its own, mm."""
+
+
+def feature_lengths(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Array:
+    """See `Machine.feature_lengths`."""
+    lengths = np.full(len(axes), np.inf)
+    for effect, index, signal, is_factor in _dependencies(axes, effects):
+        span = _span(axes[index], signal) / abs(signal.scale)
+        feature = span / 4 if is_factor else effect.basis.feature(span)
+        length = feature * abs(signal.scale) * signal.unit
+        lengths[index] = min(lengths[index], length)
+    return lengths
+
+
+def breakpoints(axes: tuple[Axis, ...], effects: tuple[Effect, ...], index: int) -> Array:
+    """See `Machine.breakpoints`."""
+    places: set[float] = set()
+    ends = {limit / axes[index].unit for limit in axes[index].range}
+    for effect, axis, signal, is_factor in _dependencies(axes, effects):
+        if axis == index:
+            held = {signal.low, signal.high} - ends
+            kinks = () if is_factor else effect.basis.kinks
+            places.update(x * signal.unit for x in held if np.isfinite(x))
+            places.update((signal.center + signal.scale * u) * signal.unit for u in kinks)
+    return np.array(sorted(places), dtype=np.float64)
+
+
+def kinks(
+    axes: tuple[Axis, ...], effects: tuple[Effect, ...], points: tuple[Array, ...]
+) -> tuple[tuple[int, Array], ...]:
+    """The axes (columns) with kinks or jumps of their errors, and where these are, ascending, mm and rad.
+
+    That is at the breakpoints (`points`, of each axis), and at the ends of what a basis is given for, where its end
+    values begin to hold.
+    """
+    places = {axis.name: set(own.tolist()) for axis, own in zip(axes, points, strict=True)}
+    units = {axis.name: axis.unit for axis in axes}
+    for effect in effects:
+        if effect.active and effect.signal in places:
+            ends = [end for end in effect.basis.domain if np.isfinite(end)]
+            places[effect.signal].update((effect.center + effect.scale * end) * units[effect.signal] for end in ends)
+    return tuple((j, np.array(sorted(places[axis.name]))) for j, axis in enumerate(axes) if places[axis.name])
+
+
+def needs_tool_length(axes: tuple[Axis, ...], effect: Effect) -> bool:
+    """Whether an effect moves the tip by an amount that depends on the tool's length.
+
+    Angles do. Not those of where a straight axis points: its body is shifted, not turned.
+    """
+    if "tool_length" in (effect.input, effect.times):
+        return True
+    if effect.joint == SPINDLE:
+        return effect.rotational
+    axis = next(each for each in axes if each.name == effect.joint)
+    return effect.rotational and (axis.rotary or effect.carried or not effect.location)
+
+
+def _dependencies(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Iterator[tuple[Effect, int, Signal, bool]]:
+    """Each effect that is not zero, with each axis whose position it depends on; the last says if it is a factor."""
+    for effect in effects:
+        if effect.active:
+            for signal, is_factor in zip(signals_of(axes, effect), (False, True), strict=True):
+                if signal is not None and signal.axis is not None:
+                    yield effect, signal.axis, signal, is_factor
+
+
+def _span(axis: Axis, signal: Signal) -> float:
+    """The range in the unit of the machine file."""
+    if np.isfinite(signal.low) and np.isfinite(signal.high):
+        return signal.high - signal.low
+    return 360.0 if axis.rotary else UNKNOWN_RANGE
+
+
+MORE = 1.1
+"""For products of errors."""
+TWICE = 2.0
+"""A location error acts before the motion of its axis and, the other way, behind it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bow:
+    """Bounds of all small motions of a machine together, and how far the error of the tip may bow on straight motions.
+
+    Along a motion the tip's error is the sum over all joints of Q (t + r x a): t and r the joint's small motion, a the
+    arm from its reference point to the tip, Q the rotation from there to the workpiece. Of a product the second
+    derivative is bounded by those of its factors; so that of the error is, by the ways of the axes. A curve whose
+    second derivative stays below b leaves its chord by at most b / 8. Linear axes that do not move evenly are faster at
+    times by as much as their acceleration, which also bends the error by its slopes. Products of errors are parts in
+    ten thousand of errors; `MORE` has room for them.
+
+    shift, turn       what translations (mm) and rotations (rad) add up to
+    slopes            (2, n_axes) of translations and rotations per mm or rad of each axis
+    curvatures        (2, n_axes) per mm or rad squared
+    reach             mm from any reference point to the tip with all axes at zero and no tool
+    """
+
+    shift: float
+    turn: float
+    slopes: Array
+    curvatures: Array
+    reach: float
+
+    def arm(self, farthest: Array, tool_length: float, rotary: NDArray[np.bool_]) -> float:
+        """How far the tip is at most from any reference point, mm; arguments as in `of`."""
+        return self.reach + abs(tool_length) + float(farthest[~rotary].sum())
+
+    def of(
+        self,
+        ways: Array,
+        farthest: Array,
+        tool_length: float,
+        rotary: NDArray[np.bool_],
+        acceleration: Array | None = None,
+    ) -> tuple[Array, Array]:
+        """How far the error may leave its chord, (k,) mm, and the angles turned by, (k,) rad.
+
+        ways          (k, n_axes) of motions, not negative, mm and rad
+        farthest      (n_axes,) from zero that they go
+        tool_length   the largest, mm
+        acceleration  (k,) mm per motion squared: of each linear axis on the way at most; all axes move evenly if not
+                      given
+        """
+        arm: Array | float = self.arm(farthest, tool_length, rotary)
+        bent: Array | float = 0.0
+        if acceleration is not None:
+            linear = ~rotary
+            ways = ways + np.where(linear, acceleration[:, None], 0.0)
+            arm = arm + linear.sum() * acceleration / 8
+            bent = acceleration * ((self.slopes[0] + self.turn)[linear].sum() + arm * self.slopes[1, linear].sum())
+        way, angle = ways[:, ~rotary].sum(axis=1), ways[:, rotary].sum(axis=1)
+        shifting, turning = ways @ self.slopes.T[:, 0], ways @ self.slopes.T[:, 1]
+        swing = way + arm * angle
+        first = shifting + arm * turning + self.turn * swing
+        second = (ways * ways) @ self.curvatures[0] + arm * ((ways * ways) @ self.curvatures[1])
+        second += 2 * turning * swing + self.turn * (2 * way * angle + arm * angle * angle)
+        whole = second + 2 * first * angle + (self.shift + arm * self.turn) * angle * angle
+        bow: Array = MORE * (whole + bent) / 8
+        return bow, angle
+
+
+def bow_of(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...]) -> Bow | None:
+    """The bounds of a machine; None if one of its effects does not say its own, or depends on more than one axis."""
+    sizes, slopes, curvatures = np.zeros(2), np.zeros((2, len(axes))), np.zeros((2, len(axes)))
+    for effect in effects:
+        if not effect.active:
+            continue
+        signal, factor = signals_of(axes, effect)
+        span = (0.0, 0.0) if signal is None else (signal.low, signal.high)
+        ends = sorted((x - effect.center) / effect.scale for x in span) if signal is not None else span
+        bounds = effect.basis.bounds(effect.coefficients, *ends)
+        if bounds is None or factor is not None or (signal is not None and signal.constant_s):
+            return None
+        kind, double = int(effect.rotational), TWICE if effect.location else 1.0
+        sizes[kind] += double * bounds[0]
+        if signal is not None and signal.axis is not None:
+            if effect.location:
+                return None
+            rate = 1 / abs(signal.scale * signal.unit)
+            slopes[kind, signal.axis] += bounds[1] * rate
+            curvatures[kind, signal.axis] += bounds[2] * rate * rate
+    return Bow(float(sizes[0]), float(sizes[1]), slopes, curvatures, _reach(axes, tool, effects))
+
+
+def _reach(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...]) -> float:
+    """`Bow.reach`: from a reference point over the rotary axes between it and the tool, along the chain.
+
+    However an axis turns what is behind it, it keeps its distance from that axis.
+    """
+    slots = {slot_of(axes, tool, effect) for effect in effects if effect.active}
+    ways = [[slot.reference, *(axis.point for axis in axes[slot.joint :] if axis.rotary), tool.point] for slot in slots]
+    return max((sum(float(np.linalg.norm(step)) for step in np.diff(way, axis=0)) for way in ways), default=0.0)

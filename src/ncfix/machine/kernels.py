@@ -1,4 +1,4 @@
-"""What `transport` does to columns of points and directions, compiled: one pass over memory for many operations.
+"""What `chain` does to columns of points and directions, compiled: one pass over memory for many operations.
 
 The operations and their order are those of the plain way, so that the results are the same to the last bit; a test
 holds the two together.
@@ -26,7 +26,7 @@ placed = LIBRARY.kernel(ROUTE, COLUMNS, "i8[:]", "f8[:,:]", "f8[:,:]", "f8[:,:]"
 
 @LIBRARY.helper
 def small_turn(u: float, v: float, w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """By how much a small rotation vector moves the end of an arm: as `transport.rotated_by`."""
+    """By how much a small rotation vector moves the end of an arm: as `chain.rotated_by`."""
     s = (u * u + v * v) + w * w
     first = 1 - s / 6 * (1 - s / 20 * (1 - s / 42 * (1 - s / 72)))
     second = 0.5 - s / 24 * (1 - s / 30 * (1 - s / 56 * (1 - s / 90)))

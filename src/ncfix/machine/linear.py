@@ -1,4 +1,8 @@
-"""The error model to first order: linear in the coefficients. The one place where a design matrix is made.
+"""First order: how the tool moves relative to the workpiece when an axis moves or a joint errs, and the design matrix.
+
+Everything is taken at the nominal pose. A twist of a joint is [ex ey ez ea eb ec], mm and rad, along and about its
+error axes, at its reference point (`Axis.reference`, carried along by the axis). A result is [dx dy dz rx ry rz] of
+the tool tip relative to the workpiece, in the workpiece frame: what `Machine.error` gives.
 
 A small motion of a joint's body is written as a twist (v, w) about the base origin, in base axes with all joints
 nearer to the foundation at zero; the joint's Jacobian wants it at its reference point in its error axes.
@@ -11,19 +15,112 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool, Triad
+from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, Tool, Triad
 from ncfix.machine.basis import Basis
-from ncfix.machine.effect import Effect
+from ncfix.machine.chain import advance, columns, cross
 from ncfix.machine.error_model import Slot, Sort, direction_axis, joint_index, signals_of, slot_of, unit_motion
-from ncfix.machine.jacobian import joint_jacobian
 from ncfix.machine.se3 import Array
-from ncfix.machine.signals import Signal, inputs_of
-from ncfix.machine.state import Poses
-from ncfix.machine.transport import advance, columns, cross
+from ncfix.machine.state import Poses, Signal, inputs_of
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class Jacobians:
+    """Derivatives at the nominal pose.
+
+    axes    (..., 6, n_axes) by the axis positions, per mm or rad
+    joints  (..., 6, n_joints, 6) by the error twists of the joints: axes in machine order, then the spindle
+    """
+
+    axes: Array
+    joints: Array
+
+
+def axis_jacobian(axes: tuple[Axis, ...], tool: Tool, poses: Poses) -> Array:
+    """By the axis positions, poses last: (6, n_axes, n)."""
+    tip, joints = _in_workpiece_frame(axes, tool, poses, with_errors=False)
+    columns = np.empty((6, len(axes), poses.positions.shape[1]))
+    for index, axis in enumerate(axes):
+        direction, point = joints[index][:, 0], joints[index][:, 1]
+        column = _turning(direction, tip - point) if axis.rotary else _shifting(direction)
+        columns[:, index] = -column if axis.workpiece_side else column
+    return columns
+
+
+def joint_jacobian(axes: tuple[Axis, ...], tool: Tool, poses: Poses) -> Array:
+    """By the error twists of the joints, poses last: (6, n_joints, 6, n)."""
+    tip, joints = _in_workpiece_frame(axes, tool, poses, with_errors=True)
+    columns = np.empty((6, len(axes) + 1, 6, poses.positions.shape[1]))
+    for index, own in enumerate(joints):
+        sign = -1.0 if index < len(axes) and axes[index].workpiece_side else 1.0
+        arm = tip - own[:, 3]
+        for k in range(3):
+            columns[:, index, k] = sign * _shifting(own[:, k])
+            columns[:, index, 3 + k] = sign * _turning(own[:, k], arm)
+    return columns
+
+
+def _shifting(direction: Array) -> Array:
+    return np.concatenate([direction, np.zeros_like(direction)])
+
+
+def _turning(direction: Array, arm: Array) -> Array:
+    return np.concatenate([cross(direction, arm), direction])
+
+
+def _in_workpiece_frame(
+    axes: tuple[Axis, ...], tool: Tool, poses: Poses, with_errors: bool
+) -> tuple[Array, list[Array]]:
+    """The tip (3, n), and the vectors of each joint (3, 2 or 4, n), the spindle last.
+
+    All of them are carried together, one growing bundle of columns: each joint adds its own where it stands.
+    """
+    tip = np.moveaxis(tool.tip(poses.tool_length), -1, 0)[:, None, :]
+    bundle, weight = _joined(tip, np.ones((1, 1)), *_spindle_vectors(tool, with_errors))
+    order = [len(axes)]
+    for index in reversed(range(len(axes))):
+        axis, position = axes[index], poses.positions[index]
+        own, own_weight = _error_vectors(axis, position) if with_errors else _line_vectors(axis)
+        if axis.workpiece_side:
+            bundle, weight = _joined(bundle, weight, own, own_weight)
+            bundle = advance(axis, -position, bundle, weight)
+        else:
+            bundle = advance(axis, position, bundle, weight)
+            bundle, weight = _joined(bundle, weight, own, own_weight)
+        order.append(index)
+    bundle = np.broadcast_to(bundle, (3, bundle.shape[1], poses.positions.shape[1]))
+    size = 4 if with_errors else 2
+    starts = {joint: 1 + size * place for place, joint in enumerate(order)}
+    return bundle[:, 0], [bundle[:, starts[joint] : starts[joint] + size] for joint in range(len(order))]
+
+
+def _line_vectors(axis: Axis) -> tuple[Array, Array]:
+    """Direction and point of an axis line: where its motion leaves them."""
+    return columns(axis.direction, axis.point), np.array([[0.0], [1.0]])
+
+
+def _error_vectors(axis: Axis, position: Array) -> tuple[Array, Array]:
+    """Error axes and reference point of a joint, in the frame of its body's zero position."""
+    triad = columns(*axis.error_axes)
+    if axis.moving_frame:
+        triad = advance(axis, position, triad, weight=0.0)
+    reference = advance(axis, position, columns(axis.reference))
+    return _joined(triad, np.zeros((3, 1)), reference, np.ones((1, 1)))
+
+
+def _spindle_vectors(tool: Tool, with_errors: bool) -> tuple[Array, Array]:
+    if not with_errors:
+        return columns(ORIGIN, ORIGIN), np.zeros((2, 1))
+    return columns(*BASE_AXES, tool.point), np.array([[0.0], [0.0], [0.0], [1.0]])
+
+
+def _joined(bundle: Array, weight: Array, own: Array, own_weight: Array) -> tuple[Array, Array]:
+    n = max(bundle.shape[-1], own.shape[-1])
+    both = [np.broadcast_to(part, (3, part.shape[1], n)) for part in (bundle, own)]
+    return np.concatenate(both, axis=1), np.concatenate([weight, own_weight])
+
+
+@dataclass(frozen=True, slots=True)
+class Dependence:
     """How an error goes with the state, whichever component it is: functions of one signal, perhaps times another.
 
     direction_axis  whose direction of motion the functions need; -1: none
@@ -54,25 +151,25 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Shared:
+class Dependences:
     """The courses of many effects: each of them once, and the number of every effect's own."""
 
-    courses: tuple[Course, ...]
+    courses: tuple[Dependence, ...]
     own: tuple[int, ...]
 
     @staticmethod
-    def of(axes: tuple[Axis, ...], effects: Sequence[Effect]) -> Shared:
+    def of(axes: tuple[Axis, ...], effects: Sequence[Effect]) -> Dependences:
         """Those of these effects."""
         numbers: dict[object, int] = {}
         own: list[int] = []
-        courses: list[Course] = []
+        courses: list[Dependence] = []
         for effect in effects:
-            key = _course_key(effect)
+            key = _dependence_key(effect)
             if key not in numbers:
                 numbers[key] = len(courses)
-                courses.append(course_of(axes, effect))
+                courses.append(dependence_of(axes, effect))
             own.append(numbers[key])
-        return Shared(tuple(courses), tuple(own))
+        return Dependences(tuple(courses), tuple(own))
 
     @property
     def signals(self) -> frozenset[Signal]:
@@ -80,12 +177,12 @@ class Shared:
         return frozenset().union(*(each.signals for each in self.courses))
 
 
-def course_of(axes: tuple[Axis, ...], effect: Effect) -> Course:
+def dependence_of(axes: tuple[Axis, ...], effect: Effect) -> Dependence:
     """How an effect goes with the state."""
-    return Course(effect.basis, *signals_of(axes, effect), direction_axis(axes, effect))
+    return Dependence(effect.basis, *signals_of(axes, effect), direction_axis(axes, effect))
 
 
-def _course_key(effect: Effect) -> tuple[object, ...]:
+def _dependence_key(effect: Effect) -> tuple[object, ...]:
     """What the course depends on; cheaper to compare than a course is to make."""
     e = effect
     where = e.joint, e.input, e.range, e.center, e.scale, e.time_constant_s
@@ -96,13 +193,13 @@ def joint_errors(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], 
     """See `Machine.joint_errors`; poses last: (n_joints, 6, n)."""
     errors = np.zeros((len(axes) + 1, 6, poses.positions.shape[1]))
     for effect in effects:
-        value = np.asarray(effect.coefficients) @ course_of(axes, effect).rows(poses)
+        value = np.asarray(effect.coefficients) @ dependence_of(axes, effect).rows(poses)
         errors[joint_index(axes, effect)] += unit_twist(axes, tool, effect, poses) * value
     return errors
 
 
-def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], shared: Shared, poses: Poses) -> Array:
-    """See `Machine.design`; `shared` are the courses of the effects; poses last: (6, k, n)."""
+def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], shared: Dependences, poses: Poses) -> Array:
+    """See `Machine.design`; `shared` says how the effects depend on the state; poses last: (6, k, n)."""
     n = poses.positions.shape[1]
     by_joint = joint_jacobian(axes, tool, poses)
     responses: dict[object, Array] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,20 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ncfix.machine import bending, fingerprint, jacobian, linear, se3
-from ncfix.machine.aim import Aim, aimed, aimed_ahead, taken
-from ncfix.machine.axis import ORIGIN, Axis, Tool, Vector
-from ncfix.machine.bow import Bow, bow_of
-from ncfix.machine.effect import Effect
-from ncfix.machine.error_model import ErrorModel, compile_effects, direction_axis
-from ncfix.machine.forward import Chain, build_chain, carried_frames, carried_tips
-from ncfix.machine.gap import gaps
-from ncfix.machine.jacobian import Jacobians
-from ncfix.machine.route import Approach, Route, Turns, approach_of, route_of
+from ncfix.machine import error_model, linear, se3
+from ncfix.machine.aim import Aim, aimed, aimed_ahead, gaps, taken
+from ncfix.machine.axes import ORIGIN, Axis, Effect, Tool, Vector, degrees
+from ncfix.machine.chain import JointChain, build_chain, carried_frames, carried_tips
+from ncfix.machine.error_model import Bow, ErrorModel, bow_of, compile_effects, direction_axis
+from ncfix.machine.linear import Jacobians
+from ncfix.machine.route import Route, SplitRoute, Turns, route_of, split_route_of
 from ncfix.machine.se3 import Array
-from ncfix.machine.signals import Signal, inputs_of, with_lags
-from ncfix.machine.state import Poses, State, flatten, poses_first
+from ncfix.machine.state import Poses, Signal, State, flatten, inputs_of, poses_first, with_lags
 from ncfix.machine.steps import SMALL
+from ncfix.toml_text import written
 
 DEFAULT_INCREMENT = (0.001, 0.001 * np.pi / 180)
 """What controls resolve, linear and rotary axes: 1 um, in mm, and 0.001 degree, in rad."""
@@ -101,7 +99,7 @@ class Machine:
         return compile_effects(self.axes, self.tool, self.effects)
 
     @cached_property
-    def _chain(self) -> Chain:
+    def _chain(self) -> JointChain:
         return build_chain(self.axes, self._model)
 
     @cached_property
@@ -115,18 +113,21 @@ class Machine:
         return route
 
     @cached_property
-    def _approach(self) -> Approach | None:
-        return approach_of(self.axes, self.tool, self._chain.joints, self._model, self.workpiece_offset)
+    def _approach(self) -> SplitRoute | None:
+        return split_route_of(self.axes, self.tool, self._chain.joints, self._model, self.workpiece_offset)
 
     @cached_property
     def hash(self) -> str:
-        """12 hexadecimal digits of everything that matters to a correction."""
-        return fingerprint.fingerprint(self)
+        """12 hexadecimal digits of what matters to a correction: not of names, uncertainties, provenance or zeros."""
+        effects = tuple(dataclasses.replace(effect, covariance=None) for effect in self.effects if effect.active)
+        axes = tuple(dataclasses.replace(axis, pitch=None) for axis in self.axes)
+        bare = self.replace(name="", control=None, provenance={}, effects=effects, axes=axes)
+        return hashlib.sha256(dumps(bare).encode()).hexdigest()[:12]
 
     @cached_property
     def depends_on_tool_length(self) -> bool:
         """Whether the error of the tip depends on the length of the tool."""
-        return any(bending.needs_tool_length(self.axes, effect) for effect in self.effects if effect.active)
+        return any(error_model.needs_tool_length(self.axes, effect) for effect in self.effects if effect.active)
 
     def feature_lengths(self) -> Array:
         """The smallest distance over which the errors may bend as each axis moves, shape (n_axes,), mm or rad.
@@ -138,7 +139,7 @@ class Machine:
 
     @cached_property
     def _feature_lengths(self) -> Array:
-        return bending.feature_lengths(self.axes, self.effects)
+        return error_model.feature_lengths(self.axes, self.effects)
 
     def breakpoints(self, axis: str) -> Array:
         """Positions of an axis at which an error has a kink or a jump, ascending, shape (k,), mm or rad.
@@ -149,12 +150,12 @@ class Machine:
 
     @cached_property
     def _breakpoints(self) -> tuple[Array, ...]:
-        return tuple(bending.breakpoints(self.axes, self.effects, index) for index in range(len(self.axes)))
+        return tuple(error_model.breakpoints(self.axes, self.effects, index) for index in range(len(self.axes)))
 
     @cached_property
     def kinks(self) -> tuple[tuple[int, Array], ...]:
-        """The axes (columns) with kinks or jumps of their errors, and where these are, see `bending.kinks`."""
-        return bending.kinks(self.axes, self.effects, self._breakpoints)
+        """The axes (columns) with kinks or jumps of their errors, and where these are, see `error_model.kinks`."""
+        return error_model.kinks(self.axes, self.effects, self._breakpoints)
 
     @cached_property
     def directed(self) -> tuple[int, ...]:
@@ -304,7 +305,7 @@ class Machine:
         shape, poses = flatten(q, State(tool_length), self.axes, frozenset())
         out = np.empty((poses.positions.shape[1], 6, len(self.axes)))
         for part, chunk in poses.chunks():
-            out[part] = np.moveaxis(jacobian.axis_jacobian(self.axes, self.tool, chunk), -1, 0)
+            out[part] = np.moveaxis(linear.axis_jacobian(self.axes, self.tool, chunk), -1, 0)
         return out.reshape(*shape, 6, len(self.axes))
 
     def jacobians(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Jacobians:
@@ -312,7 +313,7 @@ class Machine:
         shape, poses = flatten(q, State(tool_length), self.axes, frozenset())
         out = np.empty((poses.positions.shape[1], 6, len(self.axes) + 1, 6))
         for part, chunk in poses.chunks():
-            out[part] = np.moveaxis(jacobian.joint_jacobian(self.axes, self.tool, chunk), -1, 0)
+            out[part] = np.moveaxis(linear.joint_jacobian(self.axes, self.tool, chunk), -1, 0)
         return Jacobians(self.axis_jacobian(q, tool_length), out.reshape(*shape, *out.shape[1:]))
 
     def joint_errors(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
@@ -337,7 +338,7 @@ class Machine:
         machine if not given, and may be any others of its joints.
         """
         effects = self.effects if effects is None else tuple(effects)
-        shared = linear.Shared.of(self.axes, effects)
+        shared = linear.Dependences.of(self.axes, effects)
         shape, poses = self._with_signals(q, state, shared.signals)
         return poses_first(linear.design(self.axes, self.tool, effects, shared, poses), shape)
 
@@ -393,3 +394,23 @@ class Machine:
         for part, chunk in poses.chunks():
             out[:, :, part] = function(chunk)
         return poses_first(out, shape)
+
+
+def dumps(machine: Machine) -> str:
+    """The machine as the text of a machine file; `loads(dumps(machine)) == machine`."""
+    head: dict[str, Any] = {"name": machine.name, "topology": machine.topology, "control": machine.control}
+    for key, pair, default in (
+        ("least_increment", machine.least_increment, DEFAULT_INCREMENT),
+        ("max_correction", machine.max_correction, DEFAULT_CORRECTION),
+    ):
+        if pair != default:
+            head[key] = {"linear": pair[0], "rotary": degrees(pair[1])}
+    if machine.workpiece_offset != ORIGIN:
+        head["workpiece_offset"] = machine.workpiece_offset
+    blocks = [written("ncfix = 1", head), *(written(f"[axis.{axis.name}]", axis.file_keys()) for axis in machine.axes)]
+    if machine.tool != Tool():
+        blocks.append(written("[tool]", {"direction": machine.tool.direction, "point": machine.tool.point}))
+    blocks += [written("[[effect]]", effect.file_keys()) for effect in machine.effects]
+    if machine.provenance:
+        blocks.append(written("[provenance]", machine.provenance))
+    return "\n\n".join(blocks) + "\n"

@@ -1,6 +1,6 @@
 """Is a well-formed machine one that there is? Sizes against those of real machines, units likely meant, axes that span.
 
-What is *much* for an error component says `ncfix.machine.catalogue`, for a machine of a metre. Errors along an axis
+What is *much* for an error component says `axes.large_size`, for a machine of a metre. Errors along an axis
 grow with its travel, where an axis lies is known the less the further one must reach, and arms of rotary joints err ten
 times as much as machines with slides: their users speak of tenths of a millimetre and more where those of machining
 centres speak of hundredths. So `much` here scales with travel, reach and the kind of chain; it never is less than on a
@@ -16,15 +16,13 @@ from itertools import pairwise
 import numpy as np
 
 from ncfix.diagnostics import Message, Place, RefusedError
-from ncfix.machine import catalogue
-from ncfix.machine.axis import Axis
-from ncfix.machine.effect import SPINDLE, Effect
+from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, large_size
+from ncfix.machine.effects import travel
 from ncfix.machine.error_model import signals_of
-from ncfix.machine.linear import course_of
+from ncfix.machine.linear import dependence_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State, flatten
-from ncfix.machine.summary import travel
 
 BEYOND = 10.0
 """Times what is much: no machine that runs is so wrong."""
@@ -97,7 +95,7 @@ def much(machine: Machine, name: str) -> float:
     """What is much of an error component on this machine, mm or rad."""
     location, joint = len(name) == 4, name[-1]
     axis = next((each for each in machine.axes if each.name == joint), None)
-    size = float(catalogue.much(name)) * (ARM if is_arm(machine) else 1.0)
+    size = float(large_size(name)) * (ARM if is_arm(machine) else 1.0)
     if axis is not None and not axis.rotary and not location:
         return size * max(1.0, _travel_mm(axis) / METRE)
     if name[1] in "XYZ":
@@ -141,7 +139,7 @@ def functions(machine: Machine, effect: Effect) -> Array:
     values = dict(zip(inputs, mesh[len(axes) : -1], strict=True))
     state = State(values.get("tool_length", 0.0), mesh[-1][:, None], values)
     _, poses = flatten(q, state, machine.axes, frozenset(inputs))
-    rows: Array = course_of(machine.axes, effect).rows(poses)
+    rows: Array = dependence_of(machine.axes, effect).rows(poses)
     return np.asarray(rows)
 
 
@@ -169,7 +167,7 @@ def _sizes(machine: Machine) -> Iterator[Fault]:
         size = max(_largest(machine, group) for group in _alike(machine, name))
         limit = much(machine, name)
         if size > limit:
-            yield _said(name, size, limit, catalogue.title(name, _axis(machine, name[-1])))
+            yield _said(name, size, limit, component_title(name, _axis(machine, name[-1])))
 
 
 def _axis(machine: Machine, joint: str) -> Axis | None:

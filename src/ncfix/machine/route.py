@@ -3,6 +3,9 @@
 Motions that are the same at all poses are worked into the steps when the route is made: where the axes really lie,
 their zero offsets, the workpiece offset. Each is moved ahead of the steps before it, which are seen from behind it from
 then on, until it has arrived at the tip of the tool. So a pose costs little more than on a machine without such errors.
+
+Powers and harmonics of axis positions are worked out on the way. All other functions come from their bases as columns,
+whatever they are, and are added up with the rest.
 """
 
 from __future__ import annotations
@@ -14,15 +17,169 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.machine import se3, steps
-from ncfix.machine.axis import Axis, Tool, Vector
-from ncfix.machine.error_model import ErrorModel, Group, Slot
-from ncfix.machine.forward import Joint, lies_on_axis
+from ncfix.machine.axes import Axis, Tool, Vector
+from ncfix.machine.basis import Constant, Fourier, Polynomial
+from ncfix.machine.chain import JointModel, SmallMotion, columns, lies_on_axis, turn
+from ncfix.machine.error_model import EffectGroup, ErrorModel, Slot
 from ncfix.machine.loops import Columns, Packed, packed, room
+from ncfix.machine.piecewise import Spline, Step, Table
 from ncfix.machine.se3 import Array
-from ncfix.machine.state import Poses
-from ncfix.machine.steps import BACK, FORTH, PARTS, SHIFT, TURN, Functions, Number, Steps
-from ncfix.machine.terms import Held, Place, Terms, changes_with, terms_of
-from ncfix.machine.transport import SmallMotion, columns, turn
+from ncfix.machine.state import Poses, Signal
+from ncfix.machine.steps import BACK, FORTH, GIVEN, PARTS, POWERS, SHIFT, TURN, WAVES, Functions, Number, Steps
+
+SUMS = (Table, Spline, Step)
+"""Bases that add up their functions themselves, each sum on its own."""
+ANY = (1.0, -np.inf, np.inf, 0.0, 1.0)
+"""A signal that is the position as it is."""
+ClampedAngle = tuple[int, float, float]
+"""An axis whose harmonics are held at the ends of a range, and these, rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class SmallMotionPlace:
+    """Where a small motion is done: the slots whose sum it is, and the rotation from base axes to those of the step."""
+
+    slots: tuple[Slot, ...]
+    turn: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What has to be given besides the positions.
+
+    groups  whose bases work out functions, or sums with these gains (m, k)
+    held    axes whose harmonics are held at the ends of a range, rad
+    """
+
+    groups: tuple[tuple[EffectGroup, Array | None], ...]
+    held: tuple[ClampedAngle, ...]
+
+    def see(self, axes: Sequence[int]) -> bool:
+        """Whether any of these functions changes with one of the axes."""
+        return any(changes_with(group, axes) for group, _ in self.groups)
+
+    def given(self, poses: Poses) -> list[Array]:
+        """The functions that bases work out, (n,) or (1,) each, in order."""
+        found: list[Array] = []
+        for group, gains in self.groups:
+            u, way = group.arguments(poses)
+            values = group.basis.rows(u, way) if gains is None else group.basis.combine(gains, u, way)
+            if group.factor is not None:
+                values = values * group.factor.u(poses, (-np.inf, np.inf))
+            found += list(values)
+        return found
+
+
+def changes_with(group: EffectGroup, axes: Sequence[int]) -> bool:
+    """Whether the functions of a group change with one of the axes."""
+    return any(signal is not None and signal.axis in axes for signal in (group.signal, group.factor))
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A group as numbers: its functions, and the gains (parts, functions) by which they add to the small motions."""
+
+    family: int
+    axis: int
+    signal: tuple[float, ...]
+    orders: tuple[int, ...]
+    gains: Array
+
+
+def terms_of(
+    axes: tuple[Axis, ...], groups: Sequence[EffectGroup], places: Sequence[SmallMotionPlace], held: list[ClampedAngle]
+) -> tuple[Functions, Terms]:
+    """The functions of the small motions at `places`, and what has to be given for them; `held` is added to."""
+    parts: list[_Part] = []
+    given: list[tuple[EffectGroup, Array | None]] = []
+    for group in groups:
+        gains = _gains(group, places)
+        if not gains.any():
+            continue
+        signal, basis = group.signal, group.basis
+        if isinstance(basis, Constant):
+            parts.append(_Part(POWERS, 0, ANY, (0,), gains))
+        elif signal is not None and isinstance(basis, Polynomial) and _is_power(group, signal):
+            numbers = signal.unit, signal.low, signal.high, signal.center, signal.scale
+            parts.append(_sorted(_Part(POWERS, signal.axis or 0, numbers, basis.degree, gains), 1))
+        elif signal is not None and isinstance(basis, Fourier) and _is_wave(axes, group, signal):
+            parts.append(_sorted(_Part(WAVES, _row(axes, signal, held), ANY, basis.order, gains), 2))
+        else:
+            parts.append(_given(group, gains, given))
+    return _functions(parts), Terms(tuple(given), tuple(held))
+
+
+def _is_power(group: EffectGroup, signal: Signal) -> bool:
+    """Powers of an axis position that does not turn back."""
+    plain = signal.axis is not None and not signal.endless and not signal.constant_s
+    return type(group.basis) is Polynomial and plain and group.factor is None
+
+
+def _is_wave(axes: tuple[Axis, ...], group: EffectGroup, signal: Signal) -> bool:
+    """Harmonics of the angle of a rotary axis."""
+    plain = (signal.center, signal.scale, signal.constant_s) == (0.0, 1.0, 0.0) and group.factor is None
+    return type(group.basis) is Fourier and plain and signal.axis is not None and axes[signal.axis].rotary
+
+
+def _row(axes: tuple[Axis, ...], signal: Signal, held: list[ClampedAngle]) -> int:
+    """The row of the sine that a wave is made of: its axis's, or one held at the ends of a range."""
+    assert signal.axis is not None
+    if not np.isfinite([signal.low, signal.high]).any():
+        return signal.axis
+    hold = signal.axis, signal.low * signal.unit, signal.high * signal.unit
+    if hold not in held:
+        held.append(hold)
+    return len(axes) + held.index(hold)
+
+
+def _gains(group: EffectGroup, places: Sequence[SmallMotionPlace]) -> Array:
+    """By which the functions of a group add to the numbers of all small motions, (PARTS * places, functions)."""
+    gains = np.zeros((len(places), PARTS, group.gains.shape[-1]))
+    for total, place in zip(gains, places, strict=True):
+        for slot in place.slots:
+            if slot in group.slots:
+                way, turn = np.split(group.gains[group.slots.index(slot)], 2)
+                arm = np.subtract(slot.reference, place.slots[0].reference)
+                total += np.concatenate(
+                    [place.turn @ each for each in (way, turn, np.cross(arm, turn, axisb=0, axisc=0))]
+                )
+    return gains.reshape(-1, gains.shape[-1])
+
+
+def _sorted(part: _Part, width: int) -> _Part:
+    """The functions in ascending order, `width` of them with each order."""
+    order = np.argsort(part.orders, kind="stable")
+    take = (width * order[:, None] + np.arange(width)).ravel()
+    orders = tuple(part.orders[i] for i in order.tolist() for _ in range(width))
+    return _Part(part.family, part.axis, part.signal, orders, part.gains[:, take])
+
+
+def _given(group: EffectGroup, gains: Array, given: list[tuple[EffectGroup, Array | None]]) -> _Part:
+    """A group whose basis works out its functions, or its sums."""
+    if not isinstance(group.basis, SUMS):
+        given.append((group, None))
+        return _Part(GIVEN, 0, ANY, (0,) * gains.shape[1], gains)
+    rows = np.flatnonzero(gains.any(axis=1))
+    given.append((group, np.ascontiguousarray(gains[rows])))
+    return _Part(GIVEN, 0, ANY, (0,) * len(rows), (np.arange(len(gains))[:, None] == rows).astype(np.float64))
+
+
+def _functions(parts: list[_Part]) -> Functions:
+    """All groups as arrays."""
+    first = np.cumsum([0, *(len(part.orders) for part in parts)])
+    gains = np.concatenate([part.gains for part in parts], axis=1) if parts else np.zeros((0, 0))
+    to, function = np.nonzero(gains)
+    return Functions(
+        np.array([part.family for part in parts], dtype=np.int64),
+        np.array([part.axis for part in parts], dtype=np.int64),
+        np.array([part.signal for part in parts], dtype=np.float64).ravel(),
+        first.astype(np.int64),
+        np.array([order for part in parts for order in part.orders], dtype=np.int64),
+        to.astype(np.int64),
+        function.astype(np.int64),
+        gains[to, function],
+    )
+
 
 Turns = tuple[Array, Array]
 """Sines and versines (1 - cosine) of rotary axes, see `Route.turns`."""
@@ -130,7 +287,7 @@ def _are_many(n: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Approach:
+class SplitRoute:
     """A route in two, for those who bring the tip to a point by linear axes.
 
     axes    their columns, X Y Z
@@ -144,7 +301,7 @@ class Approach:
 
 
 def route_of(
-    axes: tuple[Axis, ...], tool: Tool, joints: tuple[Joint, ...], model: ErrorModel | None, offset: Vector
+    axes: tuple[Axis, ...], tool: Tool, joints: tuple[JointModel, ...], model: ErrorModel | None, offset: Vector
 ) -> Route | None:
     """The route through joints with the errors of a model, or without; None where it cannot be written as steps.
 
@@ -156,9 +313,9 @@ def route_of(
     return None if path is None else _written_out(axes, groups, *path, [])
 
 
-def approach_of(
-    axes: tuple[Axis, ...], tool: Tool, joints: tuple[Joint, ...], model: ErrorModel, offset: Vector
-) -> Approach | None:
+def split_route_of(
+    axes: tuple[Axis, ...], tool: Tool, joints: tuple[JointModel, ...], model: ErrorModel, offset: Vector
+) -> SplitRoute | None:
     """The route with errors in two, for those who move X, Y and Z.
 
     None without a route or these axes, and where functions that bases work out change with them.
@@ -166,17 +323,17 @@ def approach_of(
     path, names = _path(tool, joints, model.groups, offset, real=True), [axis.name for axis in axes]
     if path is None or not set(names).issuperset("XYZ"):
         return None
-    moved, (start, links), held = (names.index("X"), names.index("Y"), names.index("Z")), path, list[Held]()
+    moved, (start, links), held = (names.index("X"), names.index("Y"), names.index("Z")), path, list[ClampedAngle]()
     if _written_out(axes, model.groups, start, links, held).terms.see(moved):
         return None
     cut = 1 + max((i for i, link in enumerate(links) if link.changes_with(moved, model.groups)), default=-1)
     parts = links[:cut], [link.undone() for link in reversed(links[cut:])]
     within, behind = (_written_out(axes, model.groups, start, part, held) for part in parts)
-    return Approach(moved, within, behind)
+    return SplitRoute(moved, within, behind)
 
 
 def _path(
-    tool: Tool, joints: tuple[Joint, ...], groups: tuple[Group, ...], offset: Vector, *, real: bool
+    tool: Tool, joints: tuple[JointModel, ...], groups: tuple[EffectGroup, ...], offset: Vector, *, real: bool
 ) -> tuple[Array, list[Link]] | None:
     """The start of a route, as in `Steps`, and its steps, with errors if it is the `real` one; None without one."""
     links: list[Link] = []
@@ -192,12 +349,12 @@ def _path(
 
 
 def _written_out(
-    axes: tuple[Axis, ...], groups: tuple[Group, ...], start: Array, links: list[Link], held: list[Held]
+    axes: tuple[Axis, ...], groups: tuple[EffectGroup, ...], start: Array, links: list[Link], held: list[ClampedAngle]
 ) -> Route:
     """Steps as numbers; the ranges at whose ends harmonics are held are added to `held`."""
-    places = [Place(link.slots, link.seen_from[:3, :3]) for link in links if link.slots]
+    places = [SmallMotionPlace(link.slots, link.seen_from[:3, :3]) for link in links if link.slots]
     functions, terms = terms_of(axes, groups, places, held)
-    legs = _numbers(start, links)
+    legs = _steps(start, links)
     listed = Steps(*(part.tolist() for part in legs)), Functions(*(part.tolist() for part in functions))
     return Route(listed, packed(legs, functions), terms, tuple(i for i, axis in enumerate(axes) if axis.rotary))
 
@@ -228,7 +385,7 @@ class Link:
         other = BACK if self.kind == FORTH else FORTH
         return replace(self, kind=other) if self.slots else replace(self, direction=-self.direction)
 
-    def changes_with(self, axes: Sequence[int], groups: tuple[Group, ...]) -> bool:
+    def changes_with(self, axes: Sequence[int], groups: tuple[EffectGroup, ...]) -> bool:
         """Whether it is one along these axes, or a small motion that changes with one of them."""
         if not self.slots:
             return self.axis in axes
@@ -242,7 +399,7 @@ class Link:
         return replace(self, direction=turn @ self.direction, point=point, center=center, seen_from=motion)
 
 
-def _nominal(index: int, joint: Joint) -> list[Link]:
+def _nominal(index: int, joint: JointModel) -> list[Link]:
     """What a joint does to what lies outward of it."""
     axis = joint.axis
     if axis is None:
@@ -250,7 +407,7 @@ def _nominal(index: int, joint: Joint) -> list[Link]:
     return [Link(TURN if axis.rotary else SHIFT, index, np.asarray(axis.direction), np.asarray(axis.point))]
 
 
-def _forth(index: int, joint: Joint, groups: tuple[Group, ...]) -> list[Link] | None:
+def _forth(index: int, joint: JointModel, groups: tuple[EffectGroup, ...]) -> list[Link] | None:
     """The same with its errors; None where it cannot be written as steps."""
     placed = (*joint.location, *joint.carried)
     if any(slot in group.slots and _varies(group) for group in groups for slot in placed):
@@ -269,7 +426,7 @@ def _forth(index: int, joint: Joint, groups: tuple[Group, ...]) -> list[Link] | 
     return links if carried is None else [*links, Link(rigid=_rigid(carried))]
 
 
-def _error_motion(index: int, joint: Joint) -> list[Link] | None:
+def _error_motion(index: int, joint: JointModel) -> list[Link] | None:
     """The motion of a joint and its error motion, in the order in which the center of the error motion stays in place.
 
     The error motion of a linear axis, or in a frame that turns with its axis, is the same before the motion of the axis
@@ -289,11 +446,11 @@ def _error_motion(index: int, joint: Joint) -> list[Link] | None:
     return [*moved, small]
 
 
-def _varies(group: Group) -> bool:
+def _varies(group: EffectGroup) -> bool:
     return group.signal is not None or group.factor is not None
 
 
-def _constant(slot: Slot, groups: tuple[Group, ...]) -> Array:
+def _constant(slot: Slot, groups: tuple[EffectGroup, ...]) -> Array:
     """A small motion that is the same at all poses, (6, 1)."""
     total = np.zeros((6, 1))
     for group in groups:
@@ -320,7 +477,7 @@ def _constants_ahead(links: list[Link]) -> tuple[list[Link], Array]:
     return found[::-1], ahead
 
 
-def _numbers(start: Array, links: list[Link]) -> Steps:
+def _steps(start: Array, links: list[Link]) -> Steps:
     small = np.cumsum([bool(link.slots) for link in links]) - 1
     return Steps(
         start.ravel(),

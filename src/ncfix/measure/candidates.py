@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
-from ncfix.machine.axis import Axis
+from ncfix.machine.axes import Axis
 from ncfix.measure.halton import halton
 from ncfix.measure.measurement import Array, Measurement
 

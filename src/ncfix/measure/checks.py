@@ -9,7 +9,7 @@ import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Machine
-from ncfix.machine.effect import COMPONENTS, NAME
+from ncfix.machine.axes import COMPONENTS, NAME
 from ncfix.measure.kinds import ENDS
 from ncfix.measure.measurement import Array, Index, Measurement, groups
 

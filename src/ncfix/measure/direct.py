@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.machine import Effect, Machine
-from ncfix.machine.axis import Axis
+from ncfix.machine.axes import Axis
 from ncfix.machine.error_model import unit_motion
-from ncfix.machine.linear import course_of
-from ncfix.machine.signals import with_lags
-from ncfix.machine.state import State, flatten
+from ncfix.machine.linear import dependence_of
+from ncfix.machine.state import State, flatten, with_lags
 from ncfix.measure.checks import component_of
 from ncfix.measure.measurement import Array, Index, Measurement, groups
 from ncfix.measure.observation import DEFAULT_NOISE, LEVER, Mask, Observation, Unknowns, repeatability
@@ -146,7 +145,7 @@ class DirectReading(Observation):
         shares = self._shares(effect)
         if not shares.any():
             return np.zeros((len(self.measurement), effect.basis.size))
-        course = course_of(self.machine.axes, effect)
+        course = dependence_of(self.machine.axes, effect)
         _, poses = flatten(self.q, self.state, self.machine.axes, course.inputs)
         return shares[:, None] * course.rows(with_lags(poses, course.signals)).T
 

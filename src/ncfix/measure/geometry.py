@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ncfix.machine import Machine, Tool, se3
-from ncfix.machine.effect import SPINDLE
+from ncfix.machine.axes import SPINDLE
 from ncfix.measure.measurement import Array
 
 TOOL, WORKPIECE = "tool", "workpiece"

@@ -14,8 +14,8 @@ import numpy as np
 
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
-from ncfix.machine.effect import SPINDLE
-from ncfix.machine.smooth import Backlash, Polynomial
+from ncfix.machine.axes import SPINDLE
+from ncfix.machine.basis import Backlash, Polynomial
 
 TERM = re.compile(r"([XYZABC][A-Z])(\d|b)(?:-(\d))?")
 RADIAN = 180 / np.pi

@@ -14,7 +14,7 @@ import numpy as np
 
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
-from ncfix.machine.library import library
+from ncfix.machine.effects import library
 from ncfix.measure.candidates import Room, candidates, has_r_test, r_test
 from ncfix.measure.exchange import Pool, choose, information, variances
 from ncfix.measure.measurement import Array, Index, Measurement

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.special import stdtr
 
 from ncfix.machine import Effect
-from ncfix.machine.smooth import Polynomial
-from ncfix.machine.truncated import Truncated
+from ncfix.machine.basis import Polynomial
+from ncfix.machine.piecewise import Truncated
 from ncfix.measure import calibrate
 from ncfix.measure.measurement import Array
 from ncfix.measure.selection import Selection

@@ -14,13 +14,11 @@ import numpy as np
 
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
-from ncfix.machine.axis import Axis
-from ncfix.machine.basis import Basis
-from ncfix.machine.effect import COMPONENTS, NAME, SPINDLE
+from ncfix.machine.axes import COMPONENTS, NAME, SPINDLE, Axis
+from ncfix.machine.basis import Basis, Constant, Fourier, Polynomial
+from ncfix.machine.effects import library
 from ncfix.machine.fields import did_you_mean
-from ncfix.machine.library import library
-from ncfix.machine.smooth import Constant, Fourier, Polynomial
-from ncfix.machine.truncated import Truncated
+from ncfix.machine.piecewise import Truncated
 
 ALL = "all"
 
@@ -79,7 +77,7 @@ def select(
     machine: Machine, wanted: str | None = None, reference: Sequence[float] | None = None, knots: int = 0
 ) -> Selection:
     """The effects that are meant by a list such as `EC0Y,E?X,EZZ`, by `all`, or by the name of a model;
-    names of physical effects (`ncfix.machine.library`) may stand in the list.
+    names of physical effects (`ncfix.machine.effects`) may stand in the list.
 
     Nothing given means those of the machine; a machine without effects gets all of them. `reference` is the point to
     which new effects refer; with `knots` the new error motions of linear axes are piecewise, with so many knots.

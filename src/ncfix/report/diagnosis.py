@@ -24,7 +24,7 @@ from ncfix.diagnose.words import (
     why,
 )
 from ncfix.machine import Effect
-from ncfix.machine.summary import with_unit
+from ncfix.machine.effects import with_unit
 from ncfix.measure.measurement import Array
 from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
 

@@ -7,8 +7,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ncfix.machine import Axis, Effect, Machine
-from ncfix.machine.summary import depends_on, extent, facts, title_of, travel_of, vector, with_unit
-from ncfix.machine.survey import Curve, Drift, curves, drifts
+from ncfix.machine.effects import (
+    EffectCurve,
+    TipCurve,
+    depends_on,
+    effect_curves,
+    extent,
+    facts,
+    tip_curves,
+    title_of,
+    travel_of,
+    vector,
+    with_unit,
+)
 from ncfix.report.document import Line, Part, Plot, Section, Table, Text
 
 WAYS = {1: "upwards", -1: "downwards", 0: ""}
@@ -42,10 +53,10 @@ def _tip(machine: Machine) -> Section:
         "Actual minus nominal position of the tool tip in the workpiece frame, as one axis moves and the others stand "
         "in the middle of their travel; tool length zero, approached from below."
     )
-    return Section("Error of the tool tip", [Text(words), *(_drift(machine, each) for each in drifts(machine))])
+    return Section("Error of the tool tip", [Text(words), *(_drift(machine, each) for each in tip_curves(machine))])
 
 
-def _drift(machine: Machine, drift: Drift) -> Plot:
+def _drift(machine: Machine, drift: TipCurve) -> Plot:
     lines = [Line(drift.x, 1e3 * values, label=f"d{name}") for name, values in zip("xyz", drift.error.T, strict=True)]
     return Plot(f"um over {with_unit(machine, drift.axis)}", lines)
 
@@ -89,7 +100,7 @@ def _joints(machine: Machine) -> Iterator[Section]:
 
 
 def _plots(machine: Machine, effect: Effect) -> Iterator[Part]:
-    found = curves(machine, effect)
+    found = effect_curves(machine, effect)
     if found:
         _, unit = _unit(effect)
         band = "; band: two standard deviations" if found[0].sigma is not None else ""
@@ -97,7 +108,7 @@ def _plots(machine: Machine, effect: Effect) -> Iterator[Part]:
         yield Plot(caption, [_line(effect, curve) for curve in found])
 
 
-def _line(effect: Effect, curve: Curve) -> Line:
+def _line(effect: Effect, curve: EffectCurve) -> Line:
     factor, _ = _unit(effect)
     spread = None if curve.sigma is None else 2 * factor * curve.sigma
     return Line(curve.x, factor * curve.value, spread, WAYS[curve.direction])

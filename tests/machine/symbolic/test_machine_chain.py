@@ -11,7 +11,7 @@ import sympy as sp
 from machine import chains
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Axis, Effect, Machine, State, Tool
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine.basis import Polynomial
 from ncfix.machine.symbolic import derive, from_machine
 from ncfix.machine.symbolic.exact import Constants
 from ncfix.machine.symbolic.python import compiled

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ncfix.machine import Effect, Machine
-from ncfix.machine.axis import Axis
+from ncfix.machine.axes import Axis
 from ncfix.measure.measurement import Array
 
 LETTERS = "XYZ"

@@ -9,9 +9,9 @@ import numpy as np
 
 from ncfix.diagnose.catalogue import shapes
 from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Candidate, Reach, along, stacked, weighed, zero
-from ncfix.machine import Effect, catalogue
-from ncfix.machine.axis import Axis
-from ncfix.machine.smooth import Backlash, Periodic
+from ncfix.machine import Effect
+from ncfix.machine.axes import Axis, component_title
+from ncfix.machine.basis import Backlash, Periodic
 from ncfix.measure.measurement import Array
 
 PIVOT = 10.0
@@ -44,7 +44,7 @@ def _curves(reach: Reach, axis: Axis) -> Iterator[Candidate]:
         own = shift if component in LETTERS else tilt
         loadings = tuple(stacked(a, *[PIVOT * b] * (len(parts) - 1)) for a, b in zip(own, shift, strict=True))
         yield Candidate(
-            name, catalogue.title(name, axis), axis.name, f"{axis.name} geometry", parts, loadings, (), WORN, lead=1
+            name, component_title(name, axis), axis.name, f"{axis.name} geometry", parts, loadings, (), WORN, lead=1
         )
 
 

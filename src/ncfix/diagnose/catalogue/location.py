@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Candidate, Reach, across, along, zero
-from ncfix.machine import Effect, catalogue
-from ncfix.machine.axis import Axis
-from ncfix.machine.smooth import Polynomial
+from ncfix.machine import Effect
+from ncfix.machine.axes import Axis, component_title
+from ncfix.machine.basis import Polynomial
 
 ONE = (np.eye(1),)
 
@@ -24,7 +24,7 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
     for axis in (*reach.linear, *reach.rotary):
         for name in _lines(axis):
             if name not in known:
-                title = catalogue.title(name, axis)
+                title = component_title(name, axis)
                 remedy = "re-measure where the axis lies"
                 effect = zero([Effect(name, ())])
                 family, first = f"{axis.name} location", not _located(reach, axis)

@@ -9,8 +9,8 @@ import numpy as np
 from ncfix.diagnose.catalogue import shapes
 from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Candidate, Reach, across, along, stacked, weighed, zero
 from ncfix.machine import Effect
-from ncfix.machine.axis import Axis
-from ncfix.machine.smooth import Backlash, Fourier
+from ncfix.machine.axes import Axis
+from ncfix.machine.basis import Backlash, Fourier
 from ncfix.measure.measurement import Array
 
 ORDERS = (1, 2, 3, 4, 5, 6, 7, 8)

@@ -19,9 +19,9 @@ from ncfix.diagnose.catalogue import shapes
 from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Candidate, Reach, across, along, stacked, weighed, zero
 from ncfix.diagnose.catalogue.weight import by_foundation
 from ncfix.machine import Axis, Effect
-from ncfix.machine.effect import SPINDLE
+from ncfix.machine.axes import SPINDLE
+from ncfix.machine.basis import Polynomial
 from ncfix.machine.piecewise import Step
-from ncfix.machine.smooth import Polynomial
 from ncfix.measure.measurement import Array
 
 LAGS = (None, 600.0, 1800.0, 5400.0)

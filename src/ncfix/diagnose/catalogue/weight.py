@@ -13,9 +13,8 @@ import numpy as np
 
 from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Candidate, Reach, across, along, stacked, weighed, zero
 from ncfix.machine import Effect
-from ncfix.machine.axis import Axis
-from ncfix.machine.effect import SPINDLE
-from ncfix.machine.smooth import Fourier, Polynomial
+from ncfix.machine.axes import SPINDLE, Axis
+from ncfix.machine.basis import Fourier, Polynomial
 from ncfix.measure.measurement import Array
 
 POWERS = (0, 1, 2, 3, 4)

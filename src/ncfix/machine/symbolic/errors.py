@@ -8,9 +8,7 @@ from difflib import get_close_matches
 from fnmatch import fnmatchcase
 
 from ncfix.diagnostics import NcfixError, UsageError
-from ncfix.machine import catalogue
-from ncfix.machine.axis import Vector
-from ncfix.machine.effect import COMPONENTS, SPINDLE, Effect
+from ncfix.machine.axes import COMPONENTS, SPINDLE, Effect, Vector, component_title
 from ncfix.machine.machine import Machine
 from ncfix.machine.symbolic.variables import Size, Variable
 
@@ -76,7 +74,7 @@ def _symbol(machine: Machine, name: str) -> ErrorSymbol:
         text = f"the effects {name} of this machine differ in reference or carried: one symbol cannot stand for them"
         raise UsageError.of("NCF393", text, hint="leave it out, or give them one reference point")
     axes = {axis.name: axis for axis in machine.axes}
-    title = catalogue.title(name, axes.get(effect.joint))
+    title = component_title(name, axes.get(effect.joint))
     return ErrorSymbol(
         variable=Variable(name, Size.SMALL, title, rotary=effect.rotational, arguments=_arguments(same)),
         joint=effect.joint,

@@ -10,10 +10,9 @@ from collections.abc import Callable, Iterable, Sequence
 
 import sympy as sp
 
-from ncfix.machine.axis import Axis
-from ncfix.machine.axis import Vector as Numbers
-from ncfix.machine.effect import SPINDLE
-from ncfix.machine.forward import lies_on_axis
+from ncfix.machine.axes import SPINDLE, Axis
+from ncfix.machine.axes import Vector as Numbers
+from ncfix.machine.chain import columns, lies_on_axis
 from ncfix.machine.machine import Machine
 from ncfix.machine.symbolic.chain import Chain
 from ncfix.machine.symbolic.errors import DEFAULT, ErrorSymbol, chosen
@@ -35,7 +34,6 @@ from ncfix.machine.symbolic.steps import (
     scaled,
 )
 from ncfix.machine.symbolic.variables import Size, Variable
-from ncfix.machine.transport import columns
 
 Carry = Callable[[Numbers, Vector], Vector]
 """Takes a reference point (numbers and symbols, all axes at zero) to where the joint has carried it."""

@@ -1,0 +1,400 @@
+"""What a machine is made of: its axes in their order, the tool, and the errors of each. Names follow ISO 230-1.
+
+`EYX` is the motion of axis X along Y, `EAC` its tilt about X of axis C: they change with the axis position.
+`EC0Y`, `EX0C` are location errors: where and how the axis line lies. `S` is the spindle, the end of the tool branch.
+docs/conventions.md has the frames and signs.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from ncfix.machine import se3
+from ncfix.machine.basis import Basis, Constant
+from ncfix.machine.se3 import Array
+
+Vector = tuple[float, float, float]
+Triad = tuple[Vector, Vector, Vector]
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+DEGREE = math.pi / 180
+BASE_AXES: Triad = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def degrees(angle: float) -> float:
+    """An angle in degrees that reads back as exactly this many rad, as short as it can be."""
+    near = math.degrees(angle)
+    candidates = [round(near, 9), near, math.nextafter(near, math.inf), math.nextafter(near, -math.inf)]
+    return next((each for each in candidates if each * DEGREE == angle), near)
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A prismatic or revolute joint. Geometry in the base frame with all axes at zero.
+
+    name            the axis letter
+    rotary          revolute (rad) or prismatic (mm)
+    workpiece_side  it carries the workpiece rather than the tool
+    direction       unit vector: how the moving body moves when the number grows; of a rotary axis right-handed
+    point           a point on the axis line, mm
+    range           lowest and highest position, mm or rad; infinite where endless or not given
+    error_axes      the triad along and about which its errors act, as rows
+    moving_frame    that triad turns with the axis itself
+    pitch           mm, of its screw, where known
+    """
+
+    name: str
+    rotary: bool
+    workpiece_side: bool
+    direction: Vector
+    point: Vector = ORIGIN
+    range: tuple[float, float] = (-np.inf, np.inf)
+    error_axes: Triad = BASE_AXES
+    moving_frame: bool = False
+    pitch: float | None = None
+
+    @property
+    def endless(self) -> bool:
+        """A rotary axis that may turn round and round: 370 degrees is where 10 degrees is."""
+        return self.rotary and not np.isfinite(self.range).any()
+
+    @property
+    def reference(self) -> Vector:
+        """Where errors of an effect refer to if it does not say: the axis point, or the base origin of a linear one."""
+        return self.point if self.rotary else ORIGIN
+
+    @property
+    def zero_sense(self) -> float:
+        """What turns a location error along or about the axis into the zero offset that is added to its position.
+
+        The file gives the offset as such, so one along an error axis that points against `direction` counts as it is
+        written; of errors that are only partly along the axis, the projection on `direction` counts.
+        """
+        against = np.asarray(self.error_axes) @ np.asarray(self.direction) < -1 + 1e-9
+        return -1.0 if against.any() else 1.0
+
+    @property
+    def unit(self) -> float:
+        """Internal units per unit of the machine file: rad per degree, or 1."""
+        return DEGREE if self.rotary else 1.0
+
+    @property
+    def screw(self) -> tuple[Array, Array]:
+        """The twist of unit motion (v, w) about the base origin."""
+        direction = np.asarray(self.direction)
+        if self.rotary:
+            return np.cross(self.point, direction), direction
+        return direction, np.zeros(3)
+
+    def motion(self, position: Array) -> Array:
+        """The nominal motion of its body, shape (...) [mm or rad] -> (..., 4, 4), base frame."""
+        position = np.asarray(position, dtype=np.float64)
+        displacement = position[..., None] * np.asarray(self.direction)
+        return se3.turn(displacement, self.point) if self.rotary else se3.shift(displacement)
+
+    def file_keys(self) -> dict[str, Any]:
+        """Its table in a machine file; None for the keys left out."""
+        low, high = self.range
+        limits = None if math.isinf(low) else [degrees(low), degrees(high)] if self.rotary else [low, high]
+        return {
+            "type": "rotary" if self.rotary else "linear",
+            "direction": self.direction,
+            "point": None if self.point == ORIGIN else self.point,
+            "range": limits,
+            "error_axes": None if self.error_axes == BASE_AXES else self.error_axes,
+            "error_frame": "moving" if self.moving_frame else None,
+            "pitch": self.pitch,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """The end of the tool branch, base frame with all axes at zero: the gauge line, and the way from the tip to it."""
+
+    direction: Vector = (0.0, 0.0, 1.0)
+    point: Vector = field(default=ORIGIN)
+
+    def tip(self, length: Array) -> Array:
+        """The tip of a tool of this length, shape (...) [mm] -> (..., 3)."""
+        tip: Array = np.asarray(self.point) - np.asarray(length)[..., None] * np.asarray(self.direction)
+        return tip
+
+
+@dataclass(frozen=True, slots=True)
+class Topology:
+    """The axes on both branches, in the order of the string."""
+
+    workpiece: tuple[str, ...]
+    tool: tuple[str, ...]
+    spindle: bool = False
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """All axes, from the workpiece to the tool."""
+        return self.workpiece + self.tool
+
+    def __str__(self) -> str:
+        spindle = ("S",) if self.spindle else ()
+        return " ".join(("w", *self.workpiece, "F", *self.tool, *spindle, "t"))
+
+
+def parse_topology(text: str) -> tuple[Topology | None, list[str]]:
+    """The topology, or what is wrong with the string. Blanks between the letters may be left out."""
+    letters = text.split() if " " in text.strip() else list(text.strip())
+    wrong = list(_topology_faults(letters))
+    if wrong:
+        return None, wrong
+    foundation = letters.index("F")
+    workpiece, tool = tuple(letters[1:foundation]), tuple(letters[foundation + 1 : -1])
+    spindle = tool[-1:] == ("S",)
+    return Topology(workpiece, tool[:-1] if spindle else tool, spindle), []
+
+
+def _topology_faults(letters: list[str]) -> list[str]:
+    wrong = []
+    if letters[:1] != ["w"]:
+        wrong.append("it must start with w, the workpiece")
+    if letters[-1:] != ["t"]:
+        wrong.append("it must end with t, the tool")
+    if letters.count("F") != 1:
+        wrong.append(f"the foundation F must be named once, not {letters.count('F')} times")
+    joints = letters[1:-1]
+    if "S" in joints[:-1]:
+        wrong.append("the spindle S can only stand last, before t")
+    strange = [each for each in joints if not (len(each) == 1 and "A" <= each <= "Z")]
+    wrong += [f"{each!r} is not an axis letter" for each in strange]
+    twice = sorted({each for each in joints if joints.count(each) > 1 and each != "F"})
+    return wrong + [f"axis {each} is named twice" for each in twice]
+
+
+COMPONENTS = "XYZABC"
+"""X Y Z: translations along the error axes, mm. A B C: rotations about them, rad."""
+SPINDLE = "S"
+NAME = re.compile(r"E([XYZABC])(0?)([A-Z])")
+
+Matrix = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """A component of the error of one joint: `sum coefficients * basis(u)`, u = (x - center) / scale.
+
+    name             ISO 230-1 component
+    coefficients     mm (translations) or rad (rotations)
+    basis            the functions
+    center, scale    of u, in the unit of the machine file
+    covariance       of the coefficients
+    reference        the point at which rotations cause no translation, base frame with all axes at zero, mm;
+                     None: the axis point of a rotary axis, the base origin for a linear one
+    range            of x: outside it the end values hold; None: the range of the axis
+    input            the signal x if it is not the axis position: another axis, or a name in `State.inputs`
+    times            a second signal whose u multiplies the sum
+    times_center, times_scale   of that u; None: those of `center` and `scale`
+    time_constant_s  the input acts through a first-order lag
+    carried          a location error that carries the whole body with it, rather than the axis line only
+    """
+
+    name: str
+    coefficients: tuple[float, ...]
+    basis: Basis = Constant()  # noqa: RUF009
+    center: float = 0.0
+    scale: float = 1.0
+    covariance: Matrix | None = None
+    reference: Vector | None = None
+    range: tuple[float, float] | None = None
+    input: str | None = None
+    times: str | None = None
+    times_center: float | None = None
+    times_scale: float | None = None
+    time_constant_s: float | None = None
+    carried: bool = False
+
+    @property
+    def component(self) -> int:
+        """0..5 for X Y Z A B C."""
+        return COMPONENTS.index(self.name[1])
+
+    @property
+    def joint(self) -> str:
+        """The axis that it belongs to, or `S`."""
+        return self.name[-1]
+
+    @property
+    def rotational(self) -> bool:
+        """Whether it is an angle."""
+        return self.component >= 3
+
+    @property
+    def location(self) -> bool:
+        """Whether it tells where the axis lies, not how it moves."""
+        return len(self.name) == 4
+
+    @property
+    def signal(self) -> str | None:
+        """The name of the signal that its basis sees; None if it sees none."""
+        if self.input is not None:
+            return self.input
+        return self.joint if self.basis.needs_signal else None
+
+    @property
+    def active(self) -> bool:
+        """Whether any coefficient is not zero."""
+        return any(self.coefficients)
+
+    def file_keys(self) -> dict[str, Any]:
+        """Its table in a machine file, in the order in which people read the keys; None for those left out."""
+        basis = self.basis
+        parameters = {each.name: getattr(basis, each.name) for each in fields(basis)}  # type: ignore[arg-type]
+        return {
+            "name": self.name,
+            "basis": None if basis.name == "constant" else basis.name,
+            "input": self.input,
+            "time_constant_s": self.time_constant_s,
+            **parameters,
+            "center": self.center or None,
+            "scale": None if self.scale == 1 else self.scale,
+            "range": self.range,
+            "times": self.times,
+            "times_center": self.times_center,
+            "times_scale": self.times_scale,
+            "coefficients": self.coefficients,
+            "covariance": self.covariance,
+            "reference": self.reference,
+            "carried": self.carried or None,
+        }
+
+
+SKEWED = 0.01
+"""Cosine, or one minus it, from which an axis counts as skewed."""
+
+LINEAR = "XYZ"
+TURNS_ABOUT = dict(zip("ABC", LINEAR, strict=True))
+"""Rotation letter -> the direction that it turns about."""
+IDLE = "no effect unless carried"
+"""Said of what leaves an axis line in itself."""
+
+
+def component_title(name: str, axis: Axis | None = None) -> str:
+    """What an ISO 230-1 component is, e.g. "straightness of X in Y".
+
+    Without the axis it goes by the letter: X Y Z U V W are linear, others rotary, and A B C turn about X Y Z.
+    """
+    match = NAME.fullmatch(name)
+    if match is None:
+        raise ValueError(f"{name!r} is not the name of an ISO 230-1 component")
+    component, zero, joint = match.groups()
+    if joint == SPINDLE:
+        return _spindle(component, bool(zero))
+    turns = axis.rotary if axis else joint not in "XYZUVW"
+    if zero:
+        return _location(component, joint, turns)
+    return _rotary_motion(component, joint, axis) if turns else _linear_motion(component, joint)
+
+
+def component_names(joints: str = "XYZABC" + SPINDLE) -> tuple[str, ...]:
+    """The components of these joints: error motions first, then location errors."""
+    return tuple(f"E{component}{zero}{joint}" for joint in joints for zero in ("", "0") for component in COMPONENTS)
+
+
+def squareness_meaning(name: str) -> str:
+    """What the location error of a linear axis does to the angle to the axis beside it, e.g. "X-Y is 90 deg + EC0Y".
+
+    Empty where the name is none of EB0X EC0X EA0Y EC0Y EA0Z EB0Z.
+    """
+    match = NAME.fullmatch(name)
+    if match is None or match[1] not in TURNS_ABOUT or not match[2] or match[3] not in LINEAR:
+        return ""
+    about, axis = TURNS_ABOUT[match[1]], match[3]
+    if about == axis:
+        return ""
+    (other,) = set(LINEAR) - {about, axis}
+    turns_towards_other = (LINEAR.index(axis) - LINEAR.index(about)) % 3 == 1
+    sign = "-" if turns_towards_other else "+"
+    return f"+{min(axis, other)} to +{max(axis, other)} is 90 deg {sign} {name}"
+
+
+def _linear_motion(component: str, joint: str) -> str:
+    if component == joint:
+        return f"positioning of {joint}"
+    if component in LINEAR:
+        return f"straightness of {joint} in {component}"
+    if TURNS_ABOUT[component] == joint:
+        return f"roll of {joint}"
+    return f"tilt of {joint} about {TURNS_ABOUT[component]}"
+
+
+def _rotary_motion(component: str, joint: str, axis: Axis | None) -> str:
+    if component == joint:
+        return f"angular positioning of {joint}"
+    if component in LINEAR:
+        return f"{_sense(component, joint, axis)}motion of {joint} in {component}"
+    return f"tilt of {joint} about {TURNS_ABOUT[component]}"
+
+
+def _sense(component: str, joint: str, axis: Axis | None) -> str:
+    """Whether a direction is that of the axis line or across it; neither for a skewed axis."""
+    if axis is None:
+        return "axial " if component == TURNS_ABOUT.get(joint) else "radial "
+    pairs = zip(axis.error_axes[LINEAR.index(component)], axis.direction, strict=True)
+    along = abs(sum(a * b for a, b in pairs))
+    return "axial " if along > 1 - SKEWED else "radial " if along < SKEWED else ""
+
+
+def _location(component: str, joint: str, rotary: bool) -> str:
+    if component == joint:
+        return f"zero offset of {joint}"
+    if component in LINEAR:
+        if not rotary:
+            return f"offset of the line of {joint} in {component}; {IDLE}"
+        if component == TURNS_ABOUT.get(joint):
+            return f"offset of {joint} along its axis line, {component}; {IDLE}"
+        return f"offset of the axis line of {joint} in {component}"
+    if not rotary and TURNS_ABOUT[component] == joint:
+        return f"roll of {joint} as a whole; {IDLE}"
+    what = "tilt of the axis line" if rotary else "direction"
+    return f"{what} of {joint}, turned about {TURNS_ABOUT[component]}"
+
+
+def _spindle(component: str, location: bool) -> str:
+    what = "place" if location else "motion"
+    if component in LINEAR:
+        return f"{what} of the spindle in {component}"
+    return f"{'tilt' if location else 'tilt motion'} of the spindle about {TURNS_ABOUT[component]}"
+
+
+def instruments_for(name: str) -> str:
+    """The kinds of measurement that see a component, docs/formats.md."""
+    match = NAME.fullmatch(name)
+    if match is None:
+        raise ValueError(f"{name!r} is not the name of an ISO 230-1 component")
+    component, zero, joint = match.groups()
+    if joint == SPINDLE:
+        return "tcp tcp6 probe points" if component in LINEAR else "tcp6 points; others with two tool lengths"
+    return "tcp tcp6 probe points length" + ("" if zero else " axis")
+
+
+def usual_basis(name: str) -> str:
+    """The basis that suits a component: what identifiability leaves to it."""
+    match = NAME.fullmatch(name)
+    if match is None or match[2] or match[3] == SPINDLE:
+        return "constant"
+    component, _, joint = match.groups()
+    if joint not in "XYZUVW":
+        along = component in (joint, TURNS_ABOUT.get(joint))
+        return f"fourier order {1 if along else 2} up"
+    return "polynomial degree 2 up" if component in LINEAR and component != joint else "polynomial degree 1 up"
+
+
+def large_size(name: str) -> str:
+    """A size, mm or rad over the travel, that is large for a machine tool in use."""
+    match = NAME.fullmatch(name)
+    if match is None:
+        return ""
+    component, zero, _ = match.groups()
+    if component in LINEAR:
+        return "0.1" if zero else "0.03"
+    return "0.0002" if zero else "0.0001"

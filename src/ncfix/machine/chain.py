@@ -1,0 +1,383 @@
+"""The exact chain of nominal motions and error motions out to the tool tip, many poses at a time.
+
+Each joint moves its body by B = Lc L E M(q + offset) inverse(L), in base coordinates with all axes at zero: M nominal
+motion, E error motion, L location errors of the axis line, Lc location errors that carry the body (`carried`). The
+tool branch is the product of its joints from the foundation outward, then the spindle; so is the workpiece branch.
+
+What is carried are columns (3, m, n): m points or directions, n poses. `weight` tells them apart: 1 for a point, 0 for
+a direction, shape () or (m, 1). A pose is carried as four columns, three directions and an origin; a tool tip as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix import fast
+from ncfix.machine import se3
+from ncfix.machine.axes import Axis, Tool, Vector
+from ncfix.machine.error_model import ErrorModel, Slot, Sort
+from ncfix.machine.se3 import Array
+from ncfix.machine.state import Poses
+
+Weight = float | Array
+
+SMALL = 0.08
+"""rad; rotation vectors with such components are left to the power series, which is exact there."""
+
+
+def columns(*vectors: Sequence[float]) -> Array:
+    """Constant vectors as columns, shape (3, m, 1)."""
+    return np.array(vectors, dtype=np.float64).T[:, :, None]
+
+
+def cross(a: Array, b: Array) -> Array:
+    """The vector product along the first dimension, (3, ...) each."""
+    ax, ay, az = a
+    bx, by, bz = b
+    x = ay * bz - az * by
+    out = np.empty((3, *x.shape))
+    out[0] = x
+    np.subtract(az * bx, ax * bz, out=out[1])
+    np.subtract(ax * by, ay * bx, out=out[2])
+    return out
+
+
+def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> Array:
+    """What is carried, after the axis went to `position` (n,): the nominal motion M."""
+    direction = np.asarray(axis.direction)
+    if not axis.rotary:
+        return moved + direction[:, None, None] * position * weight if np.any(weight) else moved
+    if _is_many(moved) and position.shape == moved.shape[2:]:
+        from ncfix.machine import kernels
+
+        constants = np.array(axis.direction, dtype=np.float64), np.array(axis.point, dtype=np.float64)
+        out = np.empty_like(moved)
+        kernels.advanced(*constants, *turn(position), moved, _weights(moved, weight), out)
+        return out
+    arm = moved - np.asarray(axis.point)[:, None, None] * weight
+    once = cross_with(axis.direction, arm)
+    sine, versine = turn(position)
+    result: Array = moved + sine * once + versine * cross_with(axis.direction, once)
+    return result
+
+
+def _is_many(moved: Array) -> bool:
+    """Whether compiled kernels are to take it: columns for each of many poses."""
+    return fast.engaged() and moved.shape[2] > 1 and moved.flags.c_contiguous
+
+
+def _weights(moved: Array, weight: Weight) -> Array:
+    """The weight of each column, (m,)."""
+    return np.broadcast_to(np.asarray(weight, dtype=np.float64).reshape(-1), moved.shape[1:2]).copy()
+
+
+def turn(angle: Array) -> tuple[Array, Array]:
+    """Sine and versine (1 - cosine) of angles, to some 1e-16; the versine without loss of digits for small ones.
+
+    By the tangent of half the angle: one function for both, and one that numpy works out eight at a time where it can.
+    """
+    half = np.tan(angle / 2)
+    sine: Array = 2 * half / (1 + half * half)
+    return sine, half * sine
+
+
+def dot(direction: Sequence[float], vector: Array) -> Array:
+    """The scalar product of a constant direction and vectors (3, ...), summed in the order of the components."""
+    x, y, z = direction
+    result: Array = x * vector[0] + y * vector[1] + z * vector[2]
+    return result
+
+
+def cross_with(direction: Sequence[float], arm: Array) -> Array:
+    """The vector product of a constant direction, often one of the base axes, and arms (3, ...)."""
+    x, y, z = direction
+    out = np.empty_like(arm)
+    for place, (first, second) in enumerate(((y, z), (z, x), (x, y))):
+        following, last = arm[(place + 2) % 3], arm[(place + 1) % 3]
+        if first == 0.0:
+            np.multiply(last, -second, out=out[place])
+        elif second == 0.0:
+            np.multiply(following, first, out=out[place])
+        else:
+            np.subtract(first * following, second * last, out=out[place])
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class SmallMotion:
+    """A proper rigid motion near the identity: a rotation about `center`, then a translation. None is none.
+
+    rotation     (3, 1, n) rotation vector, rad
+    translation  (3, 1, n) mm
+    center       (3, 1, n) mm
+    """
+
+    rotation: Array | None
+    translation: Array | None
+    center: Array
+
+    def forth(self, moved: Array, weight: Weight = 1.0) -> Array:
+        """Carry with it."""
+        if self._varies_like(moved):
+            from ncfix.machine import kernels
+
+            out = np.empty_like(moved)
+            kernels.forth(*self._rows, moved, _weights(moved, weight), out)
+            return out
+        if self.rotation is not None:
+            moved = _turned(self.rotation, self.center, moved, weight)
+        return moved if self.translation is None else moved + self.translation * weight
+
+    def back(self, moved: Array, weight: Weight = 1.0) -> Array:
+        """Undo it."""
+        if self._varies_like(moved):
+            from ncfix.machine import kernels
+
+            out = np.empty_like(moved)
+            kernels.back(*self._rows, moved, _weights(moved, weight), out)
+            return out
+        if self.translation is not None:
+            moved = moved - self.translation * weight
+        if self.rotation is not None:
+            moved = _turned(-self.rotation, self.center, moved, weight)
+        return moved
+
+    def _varies_like(self, moved: Array) -> bool:
+        """Whether rotation and translation differ from pose to pose, as the compiled kernels have it."""
+        if self.rotation is None or self.translation is None or not _is_many(moved):
+            return False
+        same = self.rotation.shape == self.translation.shape == (3, 1, moved.shape[2])
+        return same and bool(np.abs(self.rotation).max() < SMALL)
+
+    @property
+    def _rows(self) -> tuple[Array, Array, Array]:
+        """Rotation, translation and center, (3, n) each, contiguous."""
+        assert self.rotation is not None
+        assert self.translation is not None
+        center = np.broadcast_to(self.center, self.rotation.shape)
+        rotation, translation, center = map(_first_row, (self.rotation, self.translation, center))
+        return rotation, translation, center
+
+
+def _first_row(vectors: Array) -> Array:
+    return np.ascontiguousarray(vectors[:, 0])
+
+
+def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array:
+    """What is carried, after a small rotation about a center."""
+    if vector.size == 3 and center.size == 3 and _is_many(moved):
+        from ncfix.machine import kernels
+
+        first, second = (factor.item() for factor in se3.rotation_factors((vector * vector).sum(0)))
+        weights = _weights(moved, weight)
+        out = np.empty_like(moved)
+        kernels.turned(vector.ravel(), first, second, center.ravel(), moved, weights, out)
+        return out
+    return moved + rotated_by(vector, moved - center * weight)
+
+
+def rotated_by(vector: Array, arm: Array) -> Array:
+    """By how much a rotation vector (3, ...) moves the end of an arm (3, ...): (R - 1) arm, to all digits if small."""
+    first, second = se3.rotation_factors((vector * vector).sum(0))
+    once = cross(vector, arm)
+    result: Array = first * once + second * cross(vector, once)
+    return result
+
+
+def composed(motions: Sequence[tuple[Array, Array]], rotates: bool) -> SmallMotion:
+    """One small motion from several about different reference points: (small motion (6, n), reference (3, 1, n)) each.
+
+    The sum is taken of translations, of rotation vectors and of the velocities that the rotations cause, and its
+    exponential is the motion: with one reference point it is exactly a rotation about that point.
+    """
+    values, center = motions[0]
+    translation, rotation = values[:3, None], values[3:, None]
+    rest: Array | None = None
+    for other, reference in motions[1:]:
+        translation = translation + other[:3, None]
+        rotation = rotation + other[3:, None]
+        moment = cross(reference - center, other[3:, None])
+        rest = moment if rest is None else rest + moment
+    if not rotates:
+        return SmallMotion(None, translation, center)
+    if rest is not None:
+        translation = translation + _integrated(rotation, rest)
+    return SmallMotion(rotation, translation if np.any(translation) else None, center)
+
+
+def _integrated(vector: Array, velocity: Array) -> Array:
+    """The translation of the screw with this rotation vector and velocity of the center."""
+    squared = (vector * vector).sum(0)
+    second, third = se3.rotation_factors(squared)[1], se3.screw_factor(squared)
+    once = cross(vector, velocity)
+    result: Array = velocity + second * once + third * cross(vector, once)
+    return result
+
+
+FRAME_AXES = columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+OF_FRAME = np.array([0.0, 0.0, 0.0, 1.0])[:, None]
+"""Weights of the columns of a frame: three directions, which translations leave alone, and a point."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointModel:
+    """A joint with the slots of its small motions; the spindle has no axis."""
+
+    axis: Axis | None
+    motion: tuple[Slot, ...] = ()
+    location: tuple[Slot, ...] = ()
+    carried: tuple[Slot, ...] = ()
+    rotating: frozenset[Slot] = frozenset()
+
+    def at(self, position: Array, small: Mapping[Slot, Array]) -> JointPose:
+        """The joint at a position (n,), with the small motions worked out for these poses."""
+        location, offset = self.axis_line(small)
+        error = self.together(self.motion, small, position)
+        carried = self.together(self.carried, small, None)
+        return JointPose(self.axis, position if offset is None else position + offset, error, location, carried)
+
+    def together(
+        self, slots: tuple[Slot, ...], small: Mapping[Slot, Array], position: Array | None
+    ) -> SmallMotion | None:
+        """The small motion that slots make together at positions (n,); None: with the axis at zero."""
+        if not slots:
+            return None
+        terms = [(self._turned(small[slot], position), self._carried_along(slot, position)) for slot in slots]
+        return composed(terms, any(slot in self.rotating for slot in slots))
+
+    def _carried_along(self, slot: Slot, position: Array | None) -> Array:
+        """The reference point, where the joint's nominal motion has carried it."""
+        point = columns(slot.reference)
+        if self.axis is None or position is None or lies_on_axis(self.axis, point):
+            return point
+        return advance(self.axis, position, point)
+
+    def _turned(self, small: Array, position: Array | None) -> Array:
+        """A small motion in base axes, where the error frame turns with the joint."""
+        if self.axis is None or position is None or not (self.axis.moving_frame and self.axis.rotary):
+            return small
+        pair = np.stack([small[:3], small[3:]], axis=1)
+        turned = advance(self.axis, position, pair, weight=0.0)
+        return np.concatenate([turned[:, 0], turned[:, 1]])
+
+    def axis_line(self, small: Mapping[Slot, Array]) -> tuple[SmallMotion | None, Array | None]:
+        """The motion of the axis line, and the zero offset: the component along or about the axis itself."""
+        if not self.location or self.axis is None:
+            return None, None
+        along, terms = self._along, []
+        for slot in self.location:
+            across = small[slot].copy()
+            across[along] -= np.multiply.outer(self.axis.direction, dot(self.axis.direction, small[slot][along]))
+            terms.append((across, columns(slot.reference)))
+        return composed(terms, any(slot in self.rotating for slot in self.location)), self.zero_offset(small)
+
+    @property
+    def _along(self) -> slice:
+        """The components of a small motion of which one is along or about the axis."""
+        return slice(3, 6) if self.axis is not None and self.axis.rotary else slice(0, 3)
+
+    def zero_offset(self, small: Mapping[Slot, Array]) -> Array | None:
+        """What location errors along or about the axis add to its position, (n,) or (1,); None without any."""
+        if not self.location or self.axis is None:
+            return None
+        offset = np.zeros(1)
+        for slot in self.location:
+            offset = offset + self.axis.zero_sense * dot(self.axis.direction, small[slot][self._along])
+        return offset
+
+
+@dataclass(frozen=True, slots=True)
+class JointPose:
+    """A joint at its positions, with its errors."""
+
+    axis: Axis | None
+    position: Array
+    error: SmallMotion | None = None
+    location: SmallMotion | None = None
+    carried: SmallMotion | None = None
+
+    def forth(self, moved: Array, weight: Weight = 1.0) -> Array:
+        """Carry outward bodies' points by B: from the joint's zero position to where it really is."""
+        if self.location is not None:
+            moved = self.location.back(moved, weight)
+        if self.axis is not None:
+            moved = advance(self.axis, self.position, moved, weight)
+        for small in (self.error, self.location, self.carried):
+            if small is not None:
+                moved = small.forth(moved, weight)
+        return moved
+
+    def back(self, moved: Array, weight: Weight = 1.0) -> Array:
+        """Carry by the inverse of B."""
+        for small in (self.carried, self.location, self.error):
+            if small is not None:
+                moved = small.back(moved, weight)
+        if self.axis is not None:
+            moved = advance(self.axis, -self.position, moved, weight)
+        return moved if self.location is None else self.location.forth(moved, weight)
+
+
+@dataclass(frozen=True, slots=True)
+class JointChain:
+    """The joints from the tool back to the foundation, then out to the workpiece; all of them with their errors.
+
+    joints  in machine order (workpiece side from the workpiece to the foundation, then tool side), then the spindle
+    """
+
+    joints: tuple[JointModel, ...]
+
+    def at(self, poses: Poses, model: ErrorModel | None) -> tuple[JointPose, ...]:
+        """The joints at these poses; without a model the nominal ones."""
+        if model is None:
+            nominal = [JointPose(joint.axis, poses.positions[i]) for i, joint in enumerate(self.joints[:-1])]
+            return (*nominal, JointPose(None, np.zeros(1)))
+        small = model.small_motions(poses)
+        moving = [joint.at(poses.positions[i], small) for i, joint in enumerate(self.joints[:-1])]
+        return (*moving, self.joints[-1].at(np.zeros(1), small))
+
+
+def carry(joints: tuple[JointPose, ...], moved: Array, weight: Weight = 1.0) -> Array:
+    """From the end of the tool branch to the end of the workpiece branch."""
+    for joint in reversed(joints):
+        if joint.axis is None or not joint.axis.workpiece_side:
+            moved = joint.forth(moved, weight)
+    for joint in reversed(joints):
+        if joint.axis is not None and joint.axis.workpiece_side:
+            moved = joint.back(moved, weight)
+    return moved
+
+
+def carried_tips(joints: tuple[JointPose, ...], tool: Tool, lengths: Array, offset: Vector) -> Array:
+    """The tip of a tool of `lengths` (n,) or (1,), (3, 1, n) mm, in the frame at `offset` on the workpiece branch."""
+    start = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
+    tip: Array = carry(joints, start) - columns(offset)
+    return tip
+
+
+def carried_frames(joints: tuple[JointPose, ...], tool: Tool, lengths: Array, offset: Vector) -> Array:
+    """The frame at the tip, as `carried_tips`: the directions of its axes, and where it is, (3, 4, n)."""
+    tip = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
+    axes = np.broadcast_to(FRAME_AXES, (3, 3, tip.shape[-1]))
+    frame: Array = carry(joints, np.concatenate([axes, tip], axis=1), OF_FRAME) - columns(offset) * OF_FRAME
+    return frame
+
+
+def build_chain(axes: tuple[Axis, ...], model: ErrorModel) -> JointChain:
+    """The joints of the machine and the slots that each of them has."""
+    slots = list(dict.fromkeys(slot for group in model.groups for slot in group.slots))
+    rotating = frozenset(slot for slot in slots if model.rotates(slot))
+    joints = []
+    for index, axis in enumerate((*axes, None)):
+        own = {sort: tuple(s for s in slots if s.joint == index and s.sort is sort) for sort in Sort}
+        joints.append(JointModel(axis, own[Sort.MOTION], own[Sort.LOCATION], own[Sort.CARRIED], rotating))
+    return JointChain(tuple(joints))
+
+
+def lies_on_axis(axis: Axis, point: Array) -> bool:
+    """Whether the axis, as a rotary one, leaves the point where it is."""
+    direction = np.asarray(axis.direction)[:, None, None]
+    arm = cross(direction, point - np.asarray(axis.point)[:, None, None])
+    return axis.rotary and float(np.abs(arm).max()) < 1e-12

@@ -1,0 +1,441 @@
+"""Effects for people: physical ones by name, how large an effect is over the travel, its curve, its units.
+
+`spindle-growth`, `backlash-X`, ... stand for one or more components with the basis and the input that the physics asks
+for, zero until they are estimated. `calibrate --effects` and the selection of effects take these names beside those of
+ISO 230-1. Dead weight acts on an axis by the positions of axes that it carries, not of those that carry it (Soons 1993,
+section 2.5, rule 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import nan
+from typing import Protocol
+
+import numpy as np
+
+from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title
+from ncfix.machine.basis import Backlash, Periodic, Polynomial
+from ncfix.machine.error_model import signals_of
+from ncfix.machine.linear import dependence_of
+from ncfix.machine.machine import Machine
+from ncfix.machine.se3 import Array
+from ncfix.machine.state import State, flatten
+from ncfix.plugin_faults import called, handed
+from ncfix.plugins import registry
+
+WARM = 20.0
+"""Degree C at which thermal effects are zero."""
+HOUR = 3600.0
+LEVER = 100.0
+"""mm: an angle is much if it moves what is this far away by what is much."""
+STATES_S = (900.0, 7200.0)
+"""Time constants of thermal states, s: where their estimation begins."""
+LINEAR = Polynomial(degree=(1,))
+
+
+class PluginEffect(Protocol):
+    """What a plugin registers with `register_effects`: a name, a title, and the effects of a machine, with zeros."""
+
+    name: str
+    title: str
+
+    def effects(self, machine: Machine) -> Sequence[Effect]:
+        """The effects that it is made of on this machine; none if the machine cannot have it."""
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicalEffect:
+    """A physical effect of one machine.
+
+    largest      (mm or rad, over the travel) what would be much; NaN if nobody says
+    instruments  kinds of measurement that see it
+    needs        state columns without which it cannot be seen
+    """
+
+    name: str
+    title: str
+    effects: tuple[Effect, ...]
+    largest: float
+    instruments: tuple[str, ...]
+    needs: tuple[str, ...] = ()
+
+
+SEEN = ("tcp", "tcp6", "probe", "length")
+
+
+def library(machine: Machine) -> dict[str, PhysicalEffect]:
+    """Every physical effect that this machine can have, by name; those of plugins too."""
+    found = [each for axis in machine.axes for each in _of_axis(axis)]
+    found += [each for pair in _carried(machine) for each in _dead_weight(*pair)]
+    found += _of_spindle(machine)
+    return {each.name: each for each in (*found, *_of_plugins(machine, {each.name for each in found}))}
+
+
+def _of_plugins(machine: Machine, taken: set[str]) -> Iterator[PhysicalEffect]:
+    for name, plugin in registry("effects").items():
+        effects = _brought(name, plugin, machine) if hasattr(plugin, "effects") else ()
+        if effects and name not in taken:
+            yield PhysicalEffect(name, plugin.title, effects, nan, (), tuple(getattr(plugin, "needs", ())))
+
+
+def _brought(name: str, plugin: PluginEffect, machine: Machine) -> tuple[Effect, ...]:
+    found = called("effects", name, plugin.effects, machine, gives=Iterable)
+    return tuple(handed("effects", name, each, Effect) for each in found)
+
+
+def _of_axis(axis: Axis) -> Iterator[PhysicalEffect]:
+    component = _along(axis)
+    if component is None:
+        return
+    name, q = f"E{component}{axis.name}", axis.name
+    center, scale = _span(axis)
+    sides, lever = (f"dir_{q}",), 1 / LEVER if axis.rotary else 1.0
+    play = Effect(name, (0.0,), Backlash())
+    yield PhysicalEffect(
+        f"backlash-{q}", f"play of {q} when it reverses", (play,), 0.01 * lever, (*SEEN, "axis"), sides
+    )
+    worn = Effect(name, (0.0,) * 3, Backlash(degree=(0, 1, 2)), center=center, scale=scale)
+    yield PhysicalEffect(
+        f"worn-{q}", f"play of {q} that differs along it", (worn,), 0.01 * lever, (*SEEN, "axis"), sides
+    )
+    wound = Effect(name, (0.0,), Backlash(degree=(1,)), center=center, scale=scale)
+    yield PhysicalEffect(
+        f"wind-up-{q}", f"play of {q} that grows along its screw", (wound,), 0.005 * lever, (*SEEN, "axis"), sides
+    )
+    if axis.pitch is not None:
+        screw = Effect(name, (0.0,) * 4, Periodic(order=(1, 2), period=axis.pitch))
+        yield PhysicalEffect(
+            f"screw-{q}", f"screw of {q}, once and twice a turn", (screw,), 0.003 * lever, (*SEEN, "axis")
+        )
+    if not axis.rotary:
+        sensor = f"temp_{q.lower()}"
+        warm = Effect(name, (0.0,), LINEAR, center, scale, times=sensor, times_center=WARM, times_scale=1.0)
+        yield PhysicalEffect(f"expansion-{q}", f"scale of {q} that grows with {sensor}", (warm,), 0.02, SEEN, (sensor,))
+    if axis.workpiece_side and not axis.rotary:
+        for load, what in ("load_kg", "the workpiece"), ("load_kgm", "the workpiece's moment, mass times height"):
+            tilts = tuple(_loaded(f"E{turn}{q}", center, scale, load) for turn in "ABC")
+            kind = "load" if load == "load_kg" else "moment"
+            yield PhysicalEffect(f"{kind}-{q}", f"guide of {q} that tilts under {what}", tilts, 1e-4, SEEN, (load,))
+
+
+def _loaded(name: str, center: float, scale: float, load: str) -> Effect:
+    """Linear in the load and along the axis (Soons, section 2.6)."""
+    basis = Polynomial(degree=(0, 1))
+    return Effect(name, (0.0, 0.0), basis, center, scale, times=load, times_center=0.0, times_scale=1.0)
+
+
+def _dead_weight(own: Axis, carried: Axis) -> Iterator[PhysicalEffect]:
+    """f(own) times the position of what it carries: the part that is not of either axis alone."""
+    center, scale = _span(own)
+    middle, half = _span(carried)
+    for turn in "ABC":
+        bent = Effect(
+            f"E{turn}{own.name}",
+            (0.0, 0.0),
+            Polynomial(degree=(1, 2)),
+            center,
+            scale,
+            times=carried.name,
+            times_center=middle,
+            times_scale=half,
+        )
+        name = f"weight-E{turn}{own.name}-{carried.name}"
+        title = f"tilt of {own.name} about {'XYZ'['ABC'.index(turn)]} by the weight of {carried.name}"
+        yield PhysicalEffect(name, title, (bent,), 5e-5, SEEN)
+
+
+def _of_spindle(machine: Machine) -> Iterator[PhysicalEffect]:
+    along = "XYZ"[int(np.abs(np.asarray(machine.tool.direction)).argmax())]
+    warm, late = "temp_spindle", 1800.0
+    grown = Effect(f"E{along}{SPINDLE}", (0.0,), LINEAR, center=WARM, input=warm)
+    yield PhysicalEffect("spindle-growth", f"spindle that grows with {warm}", (grown,), 0.05, SEEN[:3], (warm,))
+    lagged = Effect(f"E{along}{SPINDLE}", (0.0,), LINEAR, center=WARM, input=warm, time_constant_s=late)
+    title = f"spindle that grows after {warm}, time constant {late:g} s"
+    yield PhysicalEffect("spindle-growth-late", title, (lagged,), 0.05, SEEN[:3], (warm, "time_s"))
+    for axis in "XYZ":
+        moved = Effect(f"E{axis}{SPINDLE}", (0.0,), LINEAR, scale=HOUR, input="time_s")
+        yield PhysicalEffect(
+            f"drift-{axis}", f"structure that drifts in {axis}, per hour", (moved,), 0.03, SEEN[:3], ("time_s",)
+        )
+        states = tuple(
+            Effect(f"E{axis}{SPINDLE}", (0.0,), LINEAR, center=WARM, input="temp_structure", time_constant_s=constant)
+            for constant in STATES_S
+        )
+        hours = " and ".join(map(_hours, STATES_S))
+        title = f"structure that moves in {axis} after temp_structure, two thermal states, {hours}"
+        yield PhysicalEffect(f"warming-{axis}", title, states, 0.03, SEEN[:3], ("temp_structure", "time_s"))
+
+
+def _hours(seconds: float) -> str:
+    return f"{seconds / HOUR:g} h"
+
+
+def _carried(machine: Machine) -> Iterator[tuple[Axis, Axis]]:
+    """Pairs of linear axes of one branch: one, and one that it carries."""
+    for held in (True, False):
+        outward = [axis for axis in machine.axes if axis.workpiece_side == held and not axis.rotary]
+        if held:
+            outward.reverse()
+        for index, own in enumerate(outward):
+            yield from ((own, other) for other in outward[index + 1 :])
+
+
+def runs_ahead(axis: Axis, effect: Effect) -> bool:
+    """Whether a body is ahead of its axis on both ways. Lost motion leaves it behind, on either side of the chain."""
+    component = _along(axis)
+    if component is None or effect.name != f"E{component}{axis.name}" or not isinstance(effect.basis, Backlash):
+        return False
+    play = sum(size for size, power in zip(effect.coefficients, effect.basis.degree, strict=True) if power == 0)
+    sense = np.asarray(axis.error_axes)["XYZABC".index(component) % 3] @ np.asarray(axis.direction)
+    return bool(play * sense > 0)
+
+
+def _along(axis: Axis) -> str | None:
+    """The component along or about the axis itself; None if it is none of its error axes."""
+    shares = np.abs(np.asarray(axis.error_axes) @ np.asarray(axis.direction))
+    index = int(shares.argmax())
+    return ("ABC" if axis.rotary else "XYZ")[index] if shares[index] > 1 - 1e-9 else None
+
+
+def _span(axis: Axis) -> tuple[float, float]:
+    """Centre and half of the travel, in the file's unit."""
+    low, high = (limit / axis.unit for limit in axis.range)
+    bounded = bool(np.isfinite([low, high]).all())
+    return ((low + high) / 2, (high - low) / 2) if bounded else (0.0, 180.0 if axis.rotary else 100.0)
+
+
+SAMPLES = 361
+"""Positions looked at along an axis."""
+
+
+def extent(machine: Machine, effect: Effect) -> tuple[float, float] | None:
+    """Lowest and highest value of an effect over the travel, mm or rad.
+
+    None where that has no answer: it depends on a signal that is no axis, or on an axis without a range.
+    """
+    signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
+    if any(signal.axis is None for signal in signals):
+        return None
+    axes = sorted({signal.axis for signal in signals if signal.axis is not None})
+    q = _grid(machine, axes)
+    if not np.isfinite(q).all():
+        return None
+    values = [_values(machine, effect, q, way) for way in ((-1, 1) if effect.basis.needs_direction else (0,))]
+    return float(np.min(values)), float(np.max(values))
+
+
+def at_the_ends(machine: Machine, effect: Effect) -> Array:
+    """Values of an effect with all axes at their lowest and at their highest positions, mm or rad.
+
+    None of them where it depends on a signal that is no axis.
+    """
+    if any(signal is not None and signal.axis is None for signal in signals_of(machine.axes, effect)):
+        return np.empty(0)
+    ranges = machine.ranges
+    return _values(machine, effect, np.where(np.isfinite(ranges), ranges, [0.0, 2 * np.pi]).T, 1)
+
+
+def with_unit(machine: Machine, name: str) -> str:
+    """The name of an axis with the unit of its positions; that of a signal as it is."""
+    units = {axis.name: "degree" if axis.rotary else "mm" for axis in machine.axes}
+    return f"{name}, {units[name]}" if name in units else name
+
+
+def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array:
+    _, poses = flatten(q, State(direction=direction), machine.axes, frozenset())
+    found: Array = np.asarray(effect.coefficients) @ dependence_of(machine.axes, effect).rows(poses)
+    return found
+
+
+def _grid(machine: Machine, axes: list[int]) -> Array:
+    """Positions over the travel of these axes, the others at zero, shape (n, n_axes)."""
+    columns = [travel(machine, axis) for axis in axes]
+    places = np.stack([each.ravel() for each in np.meshgrid(*columns)], axis=-1) if columns else np.empty((1, 0))
+    q = np.zeros((len(places), len(machine.axes)))
+    q[:, axes] = places
+    return q
+
+
+def travel(machine: Machine, axis: int) -> Array:
+    """(n,) positions of an axis over its travel, with its kinks, mm or rad; NaN if it has no end."""
+    low, high = (0.0, 2 * np.pi) if machine.axes[axis].endless else machine.ranges[axis]
+    kinks = machine.breakpoints(machine.axis_names[axis])
+    inside = kinks[(kinks >= low) & (kinks <= high)]
+    return np.concatenate([np.linspace(low, high, SAMPLES), inside]) if np.isfinite(high - low) else np.array([np.nan])
+
+
+def vector(values: Sequence[float]) -> str:
+    """Three numbers for people."""
+    return f"({', '.join(f'{value:.6g}' for value in values)})"
+
+
+def facts(machine: Machine) -> dict[str, str]:
+    """What a machine file says besides chain and errors."""
+    sizes = {"least increment": machine.least_increment, "largest correction": machine.max_correction}
+    said = {"topology": machine.topology, "control": machine.control or ""}
+    said |= {name: f"{linear:g} mm, {np.degrees(rotary):g} deg" for name, (linear, rotary) in sizes.items()}
+    said |= {str(name): str(value) for name, value in machine.provenance.items()}
+    return {name: value for name, value in said.items() if value}
+
+
+def travel_of(axis: Axis) -> str:
+    """The range of an axis for people."""
+    low, high = (limit / axis.unit for limit in axis.range)
+    return f"{low:g} ... {high:g} {'deg' if axis.rotary else 'mm'}" if np.isfinite(high - low) else "no limits"
+
+
+def title_of(machine: Machine, effect: Effect) -> str:
+    """What an effect is."""
+    return component_title(effect.name, {axis.name: axis for axis in machine.axes}.get(effect.joint))
+
+
+def depends_on(effect: Effect) -> str:
+    """What an effect is a function of, for people."""
+    signals = [signal for signal in (effect.signal, effect.times) if signal is not None]
+    return f"{effect.basis.name} of {', '.join(signals)}" if signals else "constant"
+
+
+@dataclass(frozen=True, slots=True)
+class EffectCurve:
+    """An effect over the axis that it depends on.
+
+    axis       the axis
+    x          (n,) positions, mm or degree
+    value      (n,) mm or rad
+    sigma      (n,) standard deviation by the effect's covariance, mm or rad; None if it has none
+    direction  of approach: 1 or -1, 0 where that does not matter
+    """
+
+    axis: str
+    x: Array
+    value: Array
+    sigma: Array | None
+    direction: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class TipCurve:
+    """How the error of the tool tip changes as one axis moves over its travel, the others in the middle of theirs.
+
+    x      (n,) positions, mm or degree
+    error  (n, 3) actual minus nominal position of the tip, workpiece frame, mm
+    """
+
+    axis: str
+    x: Array
+    error: Array
+
+
+def effect_curves(machine: Machine, effect: Effect) -> list[EffectCurve]:
+    """An effect over its travel, once for each direction of approach if that matters.
+
+    None if it depends on no axis, on two things at once, or on an axis without a range.
+    """
+    signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
+    if len(signals) != 1 or signals[0].axis is None:
+        return []
+    q = _moved(machine, signals[0].axis)
+    if q is None:
+        return []
+    return [
+        _curve(machine, effect, q, signals[0].axis, way) for way in ((1, -1) if effect.basis.needs_direction else (0,))
+    ]
+
+
+def tip_curves(machine: Machine, tool_length: float = 0.0) -> list[TipCurve]:
+    """The error of the tip along each axis; of approach from below, and with all inputs at zero."""
+    found = []
+    for index, axis in enumerate(machine.axes):
+        q = _moved(machine, index)
+        if q is not None and np.isfinite(q).all():
+            state = State(tool_length=tool_length, direction=1, inputs=dict.fromkeys(machine.inputs, 0.0))
+            error = machine.actual_tip(q, state) - machine.tip(q, tool_length)
+            found.append(TipCurve(axis.name, q[:, index] / axis.unit, error))
+    return found
+
+
+def _curve(machine: Machine, effect: Effect, q: Array, axis: int, direction: int) -> EffectCurve:
+    _, poses = flatten(q, State(direction=direction), machine.axes, frozenset())
+    rows = dependence_of(machine.axes, effect).rows(poses)
+    value: Array = np.asarray(effect.coefficients) @ rows
+    sigma = None
+    if effect.covariance is not None:
+        sigma = np.sqrt(np.maximum(np.einsum("kn,kl,ln->n", rows, np.asarray(effect.covariance), rows), 0.0))
+    return EffectCurve(machine.axis_names[axis], q[:, axis] / machine.axes[axis].unit, value, sigma, direction)
+
+
+def _moved(machine: Machine, axis: int) -> Array | None:
+    """(n, n_axes): one axis over its travel, in order, the others in the middle of theirs; None without a range."""
+    x = travel(machine, axis)
+    if not np.isfinite(x).all():
+        return None
+    q = np.tile([_middle(machine, index) for index in range(len(machine.axes))], (len(x), 1))
+    q[:, axis] = np.sort(x)
+    return q
+
+
+def _middle(machine: Machine, axis: int) -> float:
+    low, high = machine.ranges[axis]
+    return float(low + high) / 2 if np.isfinite([low, high]).all() else 0.0
+
+
+UM, URAD = 1e3, 1e6
+METRE = 1000.0
+COUNTED = {"time_s": ("h", 3600.0), "load_kg": ("kg", 1.0), "load_kgm": ("kg m", 1.0), "tool_length": ("m", METRE)}
+"""Signals that are no positions: unit, and how much of the signal it is."""
+KELVIN = ("K", 1.0)
+
+Unit = tuple[float, str]
+"""What mm or rad is multiplied with, and the name of what comes out."""
+
+
+def units(machine: Machine, effect: Effect) -> tuple[Unit, ...]:
+    """The units that people use for the coefficients of an effect: a gain in um/m, growth in um/K, play in um.
+
+    A coefficient belongs to a power of u = (x - center) / scale. Where u is a share of an axis' travel it is said as it
+    stands, um at u = 1: the end of the travel. Where u counts mm, degrees, kelvins, hours or kilograms the unit says so.
+    """
+    size, name = (URAD, "urad") if effect.rotational else (UM, "um")
+    factor, times = _per(machine, effect.times, effect.times_scale or effect.scale)
+    found = []
+    for power in _powers(effect):
+        each, signal = _per(machine, effect.signal, effect.scale) if power else (1.0, "")
+        below = [_power(signal, power), times]
+        found.append((size * each**power * factor, _ratio(name, [part for part in below if part])))
+    return tuple(found)
+
+
+def _powers(effect: Effect) -> tuple[int, ...]:
+    """To which power of u each coefficient belongs; 0 where it is of the size of the function itself."""
+    if isinstance(effect.basis, Polynomial | Backlash):
+        return effect.basis.degree
+    return (0,) * effect.basis.size
+
+
+def _per(machine: Machine, signal: str | None, scale: float) -> Unit:
+    """From "per u" to "per unit of the signal"; no unit where u is a share of a travel, or of who knows what."""
+    if signal is None:
+        return 1.0, ""
+    unit, size = _unit_of(machine, signal, scale)
+    return (size / scale, unit) if unit else (1.0, "")
+
+
+def _unit_of(machine: Machine, signal: str, scale: float) -> tuple[str, float]:
+    if signal in machine.axis_names:
+        rotary = bool(machine.rotary[machine.axis_names.index(signal)])
+        return (("deg", 1.0) if rotary else ("m", METRE)) if np.isclose(scale, 1.0) else ("", 1.0)
+    return KELVIN if signal.startswith("temp_") else COUNTED.get(signal, ("", 1.0))
+
+
+def _power(unit: str, power: int) -> str:
+    return f"{unit}^{power}" if unit and power > 1 else unit
+
+
+def _ratio(name: str, below: list[str]) -> str:
+    """um, um/m, um/(m K)."""
+    if not below:
+        return name
+    joined = " ".join(below)
+    return f"{name}/({joined})" if " " in joined else f"{name}/{joined}"
