@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ncfix.compensate.strategies import Strategy, get_strategy
+from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State, dumps, loads
 from ncfix.tables.control import Control, Files, Option, Properties, Request, Written

@@ -10,7 +10,7 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow, placed
-from ncfix.compensate.kinematics import joints_from_commands
+from ncfix.compensate.plan.kinematics import joints_from_commands
 from ncfix.control.moves import Kind, Moves
 from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import State, load

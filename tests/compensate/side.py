@@ -10,7 +10,7 @@ import numpy as np
 
 from ncfix.compensate.figures.comparison import Cut, SideBySide
 from ncfix.compensate.figures.simulation import Along
-from ncfix.compensate.intent import Intent
+from ncfix.compensate.plan.intent import Intent
 from ncfix.control.moves import Moves
 from ncfix.machine import Machine, State
 

@@ -7,11 +7,10 @@ import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions, sweep_of
-from ncfix.compensate.arcs import turns_begun
+from ncfix.compensate.arcs import Closure, turns_begun
 from ncfix.compensate.assembly import Plan
-from ncfix.compensate.budget import Closure
 from ncfix.compensate.path import plan
-from ncfix.compensate.strategies import get_strategy
+from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Polynomial

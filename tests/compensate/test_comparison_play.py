@@ -17,7 +17,7 @@ from compensate.side import compared
 from compensate.test_comparison import fixed, moves_of
 from ncfix.compensate.figures.backlash import Bodies
 from ncfix.compensate.figures.curve import Stretches
-from ncfix.compensate.intent import Intent
+from ncfix.compensate.plan.intent import Intent
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine, State, load
 from ncfix.machine.axes import Effect

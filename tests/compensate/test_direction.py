@@ -6,8 +6,8 @@ import numpy as np
 
 from compensate.machines_at_random import TOPOLOGIES, perfect
 from compensate.motions import Arc, motions
-from ncfix.compensate.direction import carried, matters, signs
-from ncfix.compensate.intent import Intent
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import carried, matters, signs
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash
 from ncfix.machine.piecewise import Step

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.compensate.excursion import arcs_within, skew, surely_within
-from ncfix.compensate.kinematics import joints_from_commands
-from ncfix.compensate.segments import Segments
+from ncfix.compensate.plan.kinematics import joints_from_commands
+from ncfix.compensate.plan.segments import Segments, arcs_within, skew, surely_within
 from ncfix.machine import Machine, load
 
 LENGTH = 120.0

@@ -15,13 +15,13 @@ from ncfix import fast
 from ncfix.compensate.ends import corrected
 from ncfix.compensate.figures.curve import Curve, Samples, arc_lengths
 from ncfix.compensate.figures.nearest import Search
-from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import bounds, deviations_seen, uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.path import plan
-from ncfix.compensate.segments import Segments
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.segments import Segments
+from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.split import STRETCH, Grid, fewest
-from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import path_error, samples
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State, load

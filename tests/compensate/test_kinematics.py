@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect
-from ncfix.compensate.findings import PoseError
-from ncfix.compensate.kinematics import (
+from ncfix.compensate.plan.findings import PoseError
+from ncfix.compensate.plan.kinematics import (
     affine_tip,
     commands_from_joints,
     joints_from_commands,

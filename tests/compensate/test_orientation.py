@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
-from ncfix.compensate.orientation import Full, damped
-from ncfix.compensate.rates import Path
+from ncfix.compensate.plan.strategies import Full, Path, damped
 from ncfix.machine import Effect, Machine, State
 
 NANOMETRE = 1e-6

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ncfix.compensate.rates import Path, limited
+from ncfix.compensate.plan.strategies import Path, limited
 
 RATE = 0.01
 FUZZ = 1e-12

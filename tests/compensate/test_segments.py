@@ -7,7 +7,7 @@ import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect
 from compensate.motions import Arc, interpolated, motions
-from ncfix.compensate.segments import Segments, sweep_between
+from ncfix.compensate.plan.segments import Segments, sweep_between
 
 MACHINE = perfect(TOPOLOGIES["table-table"])
 XYZ = [2, 3, 4]

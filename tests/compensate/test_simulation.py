@@ -10,7 +10,7 @@ import pytest
 from compensate.side import compared
 from ncfix.compensate.figures.simulation import Along, TipError, tip_errors
 from ncfix.compensate.following import follow
-from ncfix.compensate.intent import Intent
+from ncfix.compensate.plan.intent import Intent
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import DifferenceError

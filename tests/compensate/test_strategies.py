@@ -8,9 +8,9 @@ import pytest
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import motions
 from ncfix.compensate import ends
-from ncfix.compensate.findings import PoseError
 from ncfix.compensate.path import plan
-from ncfix.compensate.strategies import RotaryThenLinear, Strategy, get_strategy, parted, strategies
+from ncfix.compensate.plan.findings import PoseError
+from ncfix.compensate.plan.strategies import RotaryThenLinear, Strategy, get_strategy, parted, strategies
 from ncfix.control.moves import Kind
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine, State

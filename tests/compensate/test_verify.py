@@ -12,7 +12,7 @@ from compensate.motions import Arc, changed, dense_errors, motions
 from ncfix.compensate.assembly import untouched
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.path import plan
-from ncfix.compensate.strategies import get_strategy
+from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.verify import FigureTally, Samples, path_error
 from ncfix.control.moves import Kind, Rule
 from ncfix.control.setup import Setup

@@ -17,7 +17,7 @@ from ncfix.compensate.checking import check_on
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import follow
-from ncfix.compensate.intent import Intent
+from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.task import Task
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup, Tool

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import kinematics_of, placed, rotary_names
-from ncfix.compensate.kinematics import joints_from_commands
+from ncfix.compensate.plan.kinematics import joints_from_commands
 from ncfix.control.moves import Kind, Moves
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace

@@ -11,7 +11,7 @@ import numpy as np
 
 from metamorphic.harness import LENGTH, SETUP, Route, Step
 from ncfix.compensate.following import placed
-from ncfix.compensate.kinematics import commands_from_joints
+from ncfix.compensate.plan.kinematics import commands_from_joints
 from ncfix.machine import Machine
 
 HEAD = "G21 G17 G40 G49 G80 G90 G94\nG54\n"

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.compensate.strategies import RotaryThenLinear, get_strategy
-from ncfix.compensate.thesis import rotary_shift
+from ncfix.compensate.plan.strategies import RotaryThenLinear, get_strategy, rotary_shift
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine, State, load
 from ncfix.machine.basis import Polynomial

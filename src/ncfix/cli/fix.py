@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def _strategies() -> Iterable[str]:
-    from ncfix.compensate.strategies import strategies
+    from ncfix.compensate.plan.strategies import strategies
 
     return strategies()
 

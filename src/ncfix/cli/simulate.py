@@ -134,7 +134,7 @@ class Errors:
     def whole(self) -> tuple[Iterable[bytes], Along, Sequence[Message]]:
         """The same of a program as a whole."""
         from ncfix.compensate.figures.simulation import tip_errors
-        from ncfix.compensate.intent import Intent
+        from ncfix.compensate.plan.intent import Intent
         from ncfix.machine import State
 
         path = self.source.path

@@ -47,7 +47,7 @@ def along(
     its numbers show it.
     """
     from ncfix.compensate.figures.simulation import Along, seems_corrected, tip_errors, tip_with
-    from ncfix.compensate.intent import Intent
+    from ncfix.compensate.plan.intent import Intent
     from ncfix.machine import State
 
     program, followed = _followed(following, path)

@@ -122,7 +122,7 @@ def _positions(moves: Moves, machine: Machine | None) -> tuple[Any, Any]:
     """Axis positions at the ends of the motions, mm and degrees, and where the tip is in the workpiece, mm."""
     import numpy as np
 
-    from ncfix.compensate.kinematics import reached_joints
+    from ncfix.compensate.plan.kinematics import reached_joints
 
     if machine is None:
         q, tip = moves.end, np.empty((len(moves), 0))

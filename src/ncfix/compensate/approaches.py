@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.kinematics import commands_from_joints
-from ncfix.compensate.steer import steer
+from ncfix.compensate.plan.arrays import Array, Index, Mask
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import commands_from_joints, steer
 from ncfix.control.moves import Moves
 from ncfix.writer.frames import FrameMap
 

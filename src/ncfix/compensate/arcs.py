@@ -11,12 +11,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ncfix.compensate.budget import Closure
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import slices
-from ncfix.compensate.rows import picked, vector_product
-from ncfix.compensate.segments import Circles, Segments, sweep_between
+from ncfix.compensate.plan.arrays import Array, Index, Mask, picked, slices, vector_product
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.segments import Circles, Segments, sweep_between
 
 LOOKS = np.arange(1, 13) / 13
 """Fractions of each arc at which the corrected path is looked at to find the centre."""
@@ -34,6 +31,19 @@ would make it one."""
 
 
 Pair = tuple[Array, Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Closure:
+    """What difference between an arc's radii at start and end a control accepts: any below `mm`, any below `relative`
+    times the radius."""
+
+    mm: float = 0.0283
+    relative: float = 0.001
+
+    def allowance(self, radius: float) -> float:
+        """The accepted difference for that radius, mm."""
+        return max(self.mm, self.relative * radius)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.known import Known
-from ncfix.compensate.ragged import offsets, owners, places, sums
-from ncfix.compensate.rows import lengths, picked
+from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, offsets, owners, picked, places, sums
+from ncfix.compensate.plan.findings import Finding
 from ncfix.control.moves import Kind, Moves
 from ncfix.writer.pieces import Pieces
 
 if TYPE_CHECKING:
     from ncfix.compensate.grids import Split
-    from ncfix.compensate.segments import Segments
+    from ncfix.compensate.plan.segments import Segments
 
 LEAST_SHARE = 1e-6
 """Of a motion's time, for a piece that goes nowhere: inverse-time feed is divided by it."""

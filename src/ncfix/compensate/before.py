@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.direction import Signs
-from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.plan.arrays import Array, Mask
+from ncfix.compensate.plan.kinematics import Signs
 
 
 @dataclass(frozen=True, slots=True)

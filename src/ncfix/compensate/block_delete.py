@@ -16,8 +16,9 @@ from itertools import combinations
 import numpy as np
 
 from ncfix.compensate.account import Reason
-from ncfix.compensate.findings import Finding, Mask
 from ncfix.compensate.options import FixOptions
+from ncfix.compensate.plan.arrays import Mask
+from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.settle import Settled, settle
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup

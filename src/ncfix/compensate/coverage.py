@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ncfix.compensate.findings import Index, Mask
+from ncfix.compensate.plan.arrays import Index, Mask
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.passing import PASS_RULES, Pass
 

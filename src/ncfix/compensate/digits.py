@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Index
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.rows import picked, some
+from ncfix.compensate.plan.arrays import Array, Index, picked, some
+from ncfix.compensate.plan.intent import Intent
 from ncfix.control.moves import Moves
 from ncfix.machine import Machine
 from ncfix.text.number_style import decimals_for

@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.plan.arrays import Array, Mask
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place, RefusedError
 from ncfix.text.tree import Program

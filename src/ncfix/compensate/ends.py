@@ -8,16 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ncfix.compensate import arcs
-from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.held import with_rotary_held
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.kinematics import commands_from_joints
-from ncfix.compensate.ragged import slices
-from ncfix.compensate.rates import Path
-from ncfix.compensate.rows import chosen, every, finite, picked, put
+from ncfix.compensate.plan.arrays import Array, Index, Mask, chosen, every, finite, picked, put, slices
+from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import Correction, commands_from_joints
+from ncfix.compensate.plan.strategies import Path, Strategy
 from ncfix.compensate.standing import standing
-from ncfix.compensate.steer import Correction
-from ncfix.compensate.strategies import Strategy
 from ncfix.machine import Machine
 
 BATCH = 32_768

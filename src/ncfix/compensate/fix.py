@@ -32,16 +32,15 @@ from ncfix.compensate.block_delete import (
 )
 from ncfix.compensate.coverage import without_figure
 from ncfix.compensate.double import numbers_at_the_beginning, suspected
-from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
-from ncfix.compensate.intent import Intent
 from ncfix.compensate.left import either, left_by_motion, left_where_they_stand
 from ncfix.compensate.options import FixOptions
+from ncfix.compensate.plan.arrays import Mask, lengths
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.proof import SelfCheckError, proven
 from ncfix.compensate.rounding import rounding_along
-from ncfix.compensate.rows import lengths
 from ncfix.compensate.settle import Settled, increments
-from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import Figures, PathError, path_error
 from ncfix.control.knowledge import PROBED
 from ncfix.control.moves import Moves, Trace

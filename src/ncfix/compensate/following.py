@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.compensate.kinematics import commands_from_joints, joints_from_commands
+from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace

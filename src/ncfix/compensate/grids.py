@@ -7,17 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.ends import as_commands, path_of
-from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.held import with_rotary_held
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.kinematics import regular
-from ncfix.compensate.ragged import batches, offsets, owners, places, sums
+from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, offsets, owners, picked, places, sums
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import regular
+from ncfix.compensate.plan.sampling import MOST, bends, crossed, merged, reversals
+from ncfix.compensate.plan.segments import Segments
+from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.round import RoundGrid
-from ncfix.compensate.rows import picked
-from ncfix.compensate.sampling import MOST, bends, crossed, merged, reversals
-from ncfix.compensate.segments import Segments
 from ncfix.compensate.split import Grid, fewest
-from ncfix.compensate.strategies import Strategy
 
 PER_BEND = 8
 """Nodes for each time that the error may bend."""

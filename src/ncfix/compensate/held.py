@@ -15,10 +15,10 @@ import math
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.steer import Correction, steer
-from ncfix.compensate.strategies import Strategy
+from ncfix.compensate.plan.arrays import Array, Index, Mask
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import Correction, steer
+from ncfix.compensate.plan.strategies import Strategy
 
 FULL = 2 * math.pi
 NO_ANGLE = 1e-9

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.control.moves import Moves
 from ncfix.writer.emit import Emission
 from ncfix.writer.pieces import Pieces

@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.budget import DENSITY
-from ncfix.compensate.excursion import accelerations
-from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import INSTANT
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import batches, largest, owners, slices
-from ncfix.compensate.rows import every, farthest, lengths, picked, some
-from ncfix.compensate.sampling import MOST, bends, interior, merged, passed
-from ncfix.compensate.segments import Segments
-from ncfix.compensate.wordless import correctable, lacking
+from ncfix.compensate.plan.arrays import (
+    Array,
+    Index,
+    Mask,
+    batches,
+    every,
+    farthest,
+    largest,
+    lengths,
+    owners,
+    picked,
+    slices,
+    some,
+)
+from ncfix.compensate.plan.intent import Intent, correctable, lacking
+from ncfix.compensate.plan.sampling import DENSITY, MOST, bends, interior, merged, passed
+from ncfix.compensate.plan.segments import Segments, accelerations
 from ncfix.control.moves import Kind
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import Bow

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.rows import greatest, picked
-from ncfix.compensate.wordless import lacking
+from ncfix.compensate.plan.arrays import Array, Index, Mask, greatest, picked
+from ncfix.compensate.plan.intent import lacking
 from ncfix.compensate.written import Written
 from ncfix.control.moves import Kind
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.plan.arrays import Array, Mask
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
 from ncfix.text.tree import Program

@@ -6,12 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ncfix.compensate.excursion import arcs_within, surely_within
-from ncfix.compensate.findings import Array, Finding, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import distinct
-from ncfix.compensate.rows import finite, greatest, lengths, some
-from ncfix.compensate.segments import Segments
+from ncfix.compensate.plan.arrays import Array, Index, Mask, distinct, finite, greatest, lengths, some
+from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.segments import Segments, arcs_within, surely_within
 from ncfix.compensate.written import Written
 from ncfix.control.moves import Moves
 from ncfix.machine import Machine, State

@@ -16,13 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import owners
-from ncfix.compensate.rows import lengths, picked
-from ncfix.compensate.sampling import interior
-from ncfix.compensate.segments import Segments
-from ncfix.compensate.wordless import correctable
+from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, owners, picked
+from ncfix.compensate.plan.intent import Intent, correctable
+from ncfix.compensate.plan.sampling import interior
+from ncfix.compensate.plan.segments import Segments
 from ncfix.control.moves import Kind, Moves
 
 NO_WAY = 1e-9

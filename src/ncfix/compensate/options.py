@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class FixOptions:
     """Options of `fix`.
 
-    strategy       name of the strategy (`ncfix.compensate.strategies`)
+    strategy       name of the strategy (`ncfix.compensate.plan.strategies`)
     tolerance_um   how far the tool tip may leave the intended path, along the whole path
     allow_refused  write the program even if motions had to be left uncorrected
     force          correct a program that carries a stamp

@@ -12,14 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.compensate.arcs import fitted, full_circles
-from ncfix.compensate.budget import Closure
-from ncfix.compensate.excursion import arcs_within
-from ncfix.compensate.findings import Index, Mask
-from ncfix.compensate.intent import Intent
+from ncfix.compensate.arcs import Closure, fitted, full_circles
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.ragged import distinct
-from ncfix.compensate.segments import Segments
+from ncfix.compensate.plan.arrays import Index, Mask, distinct
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.segments import Segments, arcs_within
 from ncfix.compensate.settle import agree
 from ncfix.control.moves import Kind, Moves
 from ncfix.control.parts import taken

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix.compensate.crew import Read, Share
-from ncfix.compensate.findings import Index
 from ncfix.compensate.fix import refuse_stamped
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.passage import Passage
+from ncfix.compensate.plan.arrays import Index
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, stretch
 from ncfix.text.tree import Program

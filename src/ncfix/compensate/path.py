@@ -15,26 +15,51 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix.compensate.approaches import corrected_approaches
-from ncfix.compensate.arcs import fitted
+from ncfix.compensate.arcs import Closure, fitted
 from ncfix.compensate.assembly import Plan, assembled, untouched, with_approaches
-from ncfix.compensate.budget import Budget, Closure
 from ncfix.compensate.ends import corrected, with_closed_circles, with_rotary_as_it_stands
-from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import Cutter, Split, joined, split, taken
-from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import beside as left_beside
 from ncfix.compensate.judge import deviations, uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.offset import Beside, beside_contours
+from ncfix.compensate.plan.arrays import Array, Index, Mask, every, finite, vector_product
+from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.plan.intent import Intent, crooked
+from ncfix.compensate.plan.sampling import too_long
+from ncfix.compensate.plan.segments import Segments
+from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.round import may_be_round
-from ncfix.compensate.rows import every, finite, vector_product
-from ncfix.compensate.sampling import too_long
-from ncfix.compensate.segments import Segments
 from ncfix.compensate.standing import standing
-from ncfix.compensate.strategies import Strategy
-from ncfix.compensate.wordless import crooked
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Machine, State
+
+SAMPLED = 0.02
+"""Share of the tolerance held back for what happens between samples. Samples stand at least `DENSITY` to the shortest
+distance over which the model bends, an eighth of a wave: a wave's peak between two of them rises above the higher by
+less than 1 - cos(pi / 32) = 0.5 % of its height, and a parabola's over its chord by less than 1 / 64 of the arrow."""
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """A path tolerance, and what rounding does besides.
+
+    tolerance  what was asked of the path before rounding, mm
+    rounding   how far the tip may be off because commands are rounded: the norm of half output steps, mm
+    """
+
+    tolerance: float
+    rounding: float = 0.0
+
+    @property
+    def path(self) -> float:
+        """What the path between emitted points may use."""
+        return (1 - SAMPLED) * self.tolerance
+
+    @property
+    def fine(self) -> bool:
+        """Whether the control's digits are fine enough for such a tolerance."""
+        return self.rounding <= self.tolerance / 2
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,27 +14,38 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix import fast
+from ncfix.compensate.arcs import Closure
 from ncfix.compensate.assembly import Plan
-from ncfix.compensate.budget import Budget, Closure
 from ncfix.compensate.digits import on_digits
-from ncfix.compensate.direction import REST, matters
-from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import Split
-from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import CORNER, SURE, led_bounds, looked_at, straight_bounds
 from ncfix.compensate.limits import FUZZ, JUMP
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.others import Others, planned, together
 from ncfix.compensate.partition import Part
-from ncfix.compensate.path import Demands, in_pieces, not_split
+from ncfix.compensate.path import Budget, Demands, in_pieces, not_split
 from ncfix.compensate.plain_poses import Poses
-from ncfix.compensate.ragged import distinct, offsets, owners, places
+from ncfix.compensate.plan.arrays import (
+    Array,
+    Index,
+    Mask,
+    distinct,
+    extent,
+    lengths,
+    offsets,
+    owners,
+    picked,
+    places,
+    some,
+)
+from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import REST, matters
+from ncfix.compensate.plan.sampling import passed
+from ncfix.compensate.plan.segments import Segments
+from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.compensate.rounding import rounding
-from ncfix.compensate.rows import extent, lengths, picked, some
-from ncfix.compensate.sampling import passed
-from ncfix.compensate.segments import Segments
 from ncfix.compensate.settle import Settled
-from ncfix.compensate.strategies import Strategy, get_strategy
 from ncfix.compensate.units import Unit
 from ncfix.control.moves import FeedMode, Kind, Moves, Rule
 from ncfix.machine import Machine, State

@@ -13,14 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix import fast
-from ncfix.compensate.budget import DENSITY
-from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.known import TURNED, Known
 from ncfix.compensate.plain import Course
-from ncfix.compensate.ragged import batches, owners, places
-from ncfix.compensate.rows import greatest, lengths, picked, totals
-from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, even, features, passed
-from ncfix.compensate.segments import Segments
+from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, greatest, lengths, owners, picked, places, totals
+from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends_closely, even, features, passed
+from ncfix.compensate.plan.segments import Segments
 from ncfix.compensate.verify import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
 from ncfix.compensate.written import Written
 from ncfix.control.moves import Kind

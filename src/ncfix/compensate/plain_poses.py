@@ -11,12 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix.compensate.ends import led_as_commands
-from ncfix.compensate.excursion import accelerations, skew, stays_within
-from ncfix.compensate.findings import Array, Index
-from ncfix.compensate.kinematics import moves_as_one, reached_joints
 from ncfix.compensate.limits import FUZZ, excess
-from ncfix.compensate.rows import lengths
-from ncfix.compensate.segments import Segments
+from ncfix.compensate.plan.arrays import Array, Index, lengths
+from ncfix.compensate.plan.kinematics import moves_as_one, reached_joints
+from ncfix.compensate.plan.segments import Segments, accelerations, skew, stays_within
 from ncfix.machine import Machine
 
 

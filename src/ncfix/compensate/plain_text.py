@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.findings import Array
 from ncfix.compensate.idle import standing_still
 from ncfix.compensate.plain import Course
-from ncfix.compensate.rows import squares
+from ncfix.compensate.plan.arrays import Array, squares
 from ncfix.text.language import Language
 from ncfix.writer.bulk import Bulk
 from ncfix.writer.emit import Emission, emit

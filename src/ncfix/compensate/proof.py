@@ -9,8 +9,7 @@ import numpy as np
 
 from ncfix.compensate.arcs import across
 from ncfix.compensate.block_delete import Readings, Together
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.rows import every, picked
+from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked
 from ncfix.compensate.settle import Settled
 from ncfix.control.moves import Moves, Trace
 from ncfix.diagnostics import NcfixError

@@ -13,12 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.compensate.arcs import APART, NUDGE, across
-from ncfix.compensate.budget import Closure
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import largest, owners, places, sums
-from ncfix.compensate.segments import Segments, sweep_between
+from ncfix.compensate.arcs import APART, NUDGE, Closure, across
+from ncfix.compensate.plan.arrays import Array, Index, Mask, largest, owners, places, sums
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.segments import Segments, sweep_between
 from ncfix.compensate.split import Grid
 from ncfix.writer.target import TANGENTIAL
 

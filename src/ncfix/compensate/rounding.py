@@ -13,10 +13,9 @@ from itertools import product
 import numpy as np
 
 from ncfix.compensate.assembly import Plan
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.rows import lengths, picked, some
-from ncfix.compensate.sampling import reach
+from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, picked, some
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.sampling import reach
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine
 from ncfix.writer.pieces import Pieces

@@ -20,8 +20,7 @@ from typing import Protocol
 import numpy as np
 
 from ncfix import fast
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.ragged import largest, offsets, owners, places
+from ncfix.compensate.plan.arrays import Array, Index, Mask, largest, offsets, owners, places
 
 STRETCH = 1024
 """Nodes of a motion after which a piece ends in any case."""

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Mask
-from ncfix.compensate.kinematics import commands_from_joints, reached_joints
-from ncfix.compensate.ragged import distinct
-from ncfix.compensate.rows import every
-from ncfix.compensate.wordless import stays
+from ncfix.compensate.plan.arrays import Array, Mask, distinct, every
+from ncfix.compensate.plan.intent import stays
+from ncfix.compensate.plan.kinematics import commands_from_joints, reached_joints
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine
 

@@ -20,7 +20,7 @@ from ncfix.compensate.account import FixReport
 from ncfix.compensate.corrector import Corrector, Done
 from ncfix.compensate.crew import Ground, Read, crew
 from ncfix.compensate.double import LOOKED, suspected
-from ncfix.compensate.strategies import get_strategy
+from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
 from ncfix.control.parts import NotInPartsError

@@ -12,9 +12,9 @@ from ncfix.compensate.checking import Checked, refused, remarks_of, stamped, tog
 from ncfix.compensate.corrector import Corrector
 from ncfix.compensate.crew import Read, Share
 from ncfix.compensate.double import suspected
-from ncfix.compensate.notes import Notes
 from ncfix.compensate.partition import Part, Parts
-from ncfix.compensate.strategies import get_strategy
+from ncfix.compensate.plan.findings import Notes
+from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units

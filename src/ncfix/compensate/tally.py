@@ -11,12 +11,12 @@ import numpy as np
 from ncfix.compensate.account import NOTHING_SEEN, Account, FixReport, Refusal, with_what_is_left
 from ncfix.compensate.coverage import without_figure
 from ncfix.compensate.double import Numbers, numbers_at_the_beginning, together
-from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import largest_correction, refusals
-from ncfix.compensate.intent import Intent
 from ncfix.compensate.left import Left, joined, left_by_motion, left_where_they_stand
-from ncfix.compensate.notes import Notes
 from ncfix.compensate.options import FixOptions
+from ncfix.compensate.plan.arrays import Mask
+from ncfix.compensate.plan.findings import Notes
+from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.rounding import rounding_along
 from ncfix.compensate.settle import Settled, increments
 from ncfix.compensate.verify import Figures, PathError

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from ncfix.compensate.following import Resolve, kinematics_of, rotary_names
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.strategies import get_strategy
+from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.parts import Follower, NotInPartsError
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine

@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from ncfix.compensate.crew import Read
-from ncfix.compensate.direction import Signs, matters
 from ncfix.compensate.following import placed, with_tool_lengths
-from ncfix.compensate.intent import Intent
 from ncfix.compensate.partition import Part, Parts
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.task import Task
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.parts import NotInPartsError, PartReader, joined, joined_moves, last_of

@@ -11,17 +11,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.budget import DENSITY
-from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import INSTANT
-from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.offset import beside_contours
-from ncfix.compensate.ragged import batches, owners, places
-from ncfix.compensate.rows import finite, lengths, picked, some, vector_product
-from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, merged, passed
-from ncfix.compensate.wordless import correctable
+from ncfix.compensate.plan.arrays import (
+    Array,
+    Index,
+    Mask,
+    batches,
+    finite,
+    lengths,
+    owners,
+    picked,
+    places,
+    some,
+    vector_product,
+)
+from ncfix.compensate.plan.intent import Intent, correctable
+from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends_closely, merged, passed
 from ncfix.compensate.written import Written
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Machine, State

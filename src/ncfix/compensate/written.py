@@ -7,10 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.rows import finite, picked, put
-from ncfix.compensate.segments import Segments, sweep_between
+from ncfix.compensate.plan.arrays import Array, Index, Mask, finite, picked, put
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.segments import Segments, sweep_between
 from ncfix.writer.pieces import Pieces
 
 

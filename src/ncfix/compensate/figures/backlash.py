@@ -15,13 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.compensate.direction import REST, Signs, carried, signs
 from ncfix.compensate.figures.curve import Curve, Samples, Stretches, length
 from ncfix.compensate.figures.nearest import Nearest, Search
-from ncfix.compensate.findings import Array, Index
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.rows import finite, some
-from ncfix.compensate.sampling import BISECTIONS
+from ncfix.compensate.plan.arrays import Array, Index, finite, some
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import REST, Signs, carried, signs
+from ncfix.compensate.plan.sampling import BISECTIONS
 from ncfix.machine import State
 
 LATERAL = 1e-5

@@ -24,17 +24,16 @@ import numpy as np
 
 from ncfix.compensate.coverage import Why, not_looked_at
 from ncfix.compensate.crew import Read
-from ncfix.compensate.direction import Signs, matters
 from ncfix.compensate.figures.backlash import Bodies, Flank
 from ncfix.compensate.figures.curve import Curve, Samples, Stretches
 from ncfix.compensate.figures.nearest import Nearest, Search, over_holes, over_peaks
 from ncfix.compensate.figures.simulation import Along, actual_tip, lines_of
-from ncfix.compensate.findings import Array, Index
-from ncfix.compensate.intent import Intent
+from ncfix.compensate.plan.arrays import Array, Index
+from ncfix.compensate.plan.intent import Intent, left_in_cuts
+from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.rounding import rounding_of_arcs
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
-from ncfix.compensate.wordless import left_in_cuts
 from ncfix.control.moves import Moves
 from ncfix.control.parts import joined_moves, taken
 from ncfix.diagnostics import DifferenceError, Message

@@ -12,14 +12,22 @@ from typing import Any, cast
 
 import numpy as np
 
-from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.coverage import at_measured_places
 from ncfix.compensate.figures.simulation import BATCH
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import owners, places, slices
-from ncfix.compensate.rows import every, finite, picked, some
-from ncfix.compensate.sampling import MOST, MOST_SHOWN, arc_radii, bends, even, merged, reach, reversals, with_kinks
+from ncfix.compensate.plan.arrays import Array, Index, Mask, every, finite, owners, picked, places, slices, some
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.sampling import (
+    DENSITY,
+    MOST,
+    MOST_SHOWN,
+    arc_radii,
+    bends,
+    even,
+    merged,
+    reach,
+    reversals,
+    with_kinks,
+)
 from ncfix.control.moves import Kind
 
 ROUND, TWISTED = 1e-6, 2e-5

@@ -22,9 +22,7 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.compensate.figures.curve import Curve, Samples, length
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.ragged import batches, owners, places
-from ncfix.compensate.rows import picked
+from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places
 from ncfix.control.parts import NotInPartsError
 
 ALONG = 0.02

@@ -14,16 +14,14 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.crew import Read
 from ncfix.compensate.double import looks_corrected, numbers_of
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.kinematics import commands_from_joints
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.ragged import batches, distinct, owners, slices
-from ncfix.compensate.sampling import MOST_SHOWN, closely, even, merged, with_kinks
-from ncfix.compensate.strategies import get_strategy
+from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, distinct, owners, slices
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import commands_from_joints
+from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, closely, even, merged, with_kinks
+from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
 from ncfix.control.moves import Kind, Moves, Rule

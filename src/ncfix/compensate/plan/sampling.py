@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.budget import DENSITY
-from ncfix.compensate.excursion import accelerations
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import offsets, owners, places
-from ncfix.compensate.rows import picked, vector_product
-from ncfix.compensate.segments import Segments
+from ncfix.compensate.plan.arrays import Array, Index, Mask, offsets, owners, picked, places, vector_product
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.segments import Segments, accelerations
 from ncfix.machine import Machine
 
+DENSITY = 4
+"""Samples per shortest distance over which the error model bends."""
 TURN = 2 * np.pi
 EIGHTH = TURN / 8
 """rad; whatever the errors do, turning an axis bends their effect in the workpiece over an eighth of a turn."""

@@ -1,22 +1,54 @@
-"""Commands and axis positions: what the control makes of X Y Z, with tool-centre-point control and without.
+"""Commands and axis positions: what the control makes of X Y Z, and which positions bring the tip to a point.
 
-Without it a command is the axis positions. With it, X Y Z of a command are where the tool tip shall be in the
-workpiece, in the sense that with all rotary axes at zero the program means what it means without: the tip goes where
-it would go if the linear axes had the commanded numbers, the rotary axes stood at zero and the tool had no length.
-The control then finds the linear axis positions that bring the tip there with the rotary axes at their commanded
-places. The tip moves by a linear map of X Y Z as long as nothing else moves, so three equations are solved.
+Without tool-centre-point control a command is the axis positions. With it, X Y Z of a command are where the tool tip
+shall be in the workpiece, in the sense that with all rotary axes at zero the program means what it means without: the
+tip goes where it would go if the linear axes had the commanded numbers, the rotary axes stood at zero and the tool had
+no length. The control then finds the linear axis positions that bring the tip there with the rotary axes at their
+commanded places. The tip moves by a linear map of X Y Z as long as nothing else moves, so three equations are solved.
+On an erroneous machine `steer` finds them by Newton's method on the exact model.
+
+Directions are those of the program on a perfect machine: the sign of each axis's motion, and the last one that it had
+where it rests. The corrections themselves move axes to and fro by micrometres; an axis that rests in the program is
+taken to keep the side of its play that it last had.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike
+from dataclasses import dataclass
 
-from ncfix.compensate.findings import Array, Index, Mask, pose_error
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ncfix.compensate.plan.arrays import Array, Index, Mask
+from ncfix.compensate.plan.findings import pose_error
 from ncfix.diagnostics import RefusedError
-from ncfix.machine import Machine
+from ncfix.machine import Machine, State
 from ncfix.machine.aim import FLAT
 from ncfix.machine.steps import dot, volume
+
+Signs = NDArray[np.int8]
+
+REST = 1e-9
+"""mm or rad; an axis that moves less in a motion does not move."""
+
+
+def matters(machine: Machine) -> bool:
+    """Whether any error depends on the direction of motion."""
+    return machine.depends_on_direction
+
+
+def signs(motion: Array, rest: float = REST) -> Signs:
+    """The direction of a motion (n, n_axes) mm and rad: -1, 1, or 0 where it is below `rest` or not known."""
+    known = np.where(np.isfinite(motion), motion, 0.0)
+    return np.where(np.abs(known) < rest, 0, np.sign(known)).astype(np.int8)
+
+
+def carried(directions: Signs) -> Signs:
+    """Each axis's last direction that is not 0, row after row; 0 before its first motion. Shape (n, n_axes)."""
+    rows = np.arange(len(directions))[:, None]
+    last = np.maximum.accumulate(np.where(directions != 0, rows, 0), axis=0)
+    return np.take_along_axis(directions, last, axis=0)
+
 
 SPATIAL = ("X", "Y", "Z")
 
@@ -169,3 +201,60 @@ def common(values: Array) -> Array:
     if len(values) and (values == values[0]).all():
         return np.asarray(values[0])
     return values
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """Corrected axis positions.
+
+    q          (n, n_axes) what to command, mm and rad
+    converged  (n,) the tip is where it should be, to 1 nm
+    oriented   (n,) the tool orientation is corrected too, without damping or limits
+    before     (n,) mm: how far the tip is off without a correction; None if that was not looked at
+    """
+
+    q: Array
+    converged: Mask
+    oriented: Mask
+    before: Array | None = None
+
+
+def rows_of(state: State, rows: Index | slice) -> State:
+    """The state of some rows; what is given for all rows together stays."""
+    inputs = {name: _rows(np.asarray(values), rows, 0) for name, values in state.inputs.items()}
+    length = _rows(np.asarray(state.tool_length, dtype=np.float64), rows, 0)
+    return State(length, _rows(np.asarray(state.direction), rows, 1), inputs)
+
+
+def _rows(values: Array, rows: Index | slice, trailing: int) -> Array:
+    return values[rows] if values.ndim > trailing else values
+
+
+def moved(q: Array, columns: Index, step: Array) -> Array:
+    """Axis positions with `step` (n, 3) mm added to X Y Z."""
+    result = q.copy()
+    result[:, columns] += step
+    return result
+
+
+def steer(machine: Machine, q: Array, target: Array | None, state: State) -> tuple[Array, Mask]:
+    """Move X Y Z until the erroneous machine's tip is at `target`; None: where a perfect machine has it at q.
+
+    q       (n, n_axes) where to begin; only X Y Z are changed
+    target  (n, 3) tool tip in the workpiece frame, mm
+
+    See `Machine.aim`. Returns the positions and which of them have arrived: the gap, falling by the ratio that the last
+    two passes show, will be under 1 nm.
+    """
+    found = steered(machine, q, target, state)
+    return found.q, found.converged
+
+
+def steered(machine: Machine, q: Array, target: Array | None, state: State) -> Correction:
+    """As `steer`; how far off the tip was tells something about the program if that is where it began."""
+    columns = linear_columns(machine)
+    x, y, z = columns.tolist()
+    aim = machine.aim(q, (x, y, z), state, target)
+    result = q.copy()
+    result[:, columns] = aim.place
+    return Correction(result, aim.arrived, np.zeros(len(q), dtype=bool), aim.off)

@@ -7,6 +7,11 @@ the tool tip of a perfect machine is in the workpiece meanwhile.
 Actual and intended tip are compared at the same fraction of the block: the tool has a certain direction and feed
 there, which belong to that point of the workpiece and no other. The distance so found is never less than that to the
 nearest point of the intended path.
+
+Some axes must get no word, because only the machine knows where they stand. Such an axis stays there, and what its
+correction would do is left undone until the program names it. All other corrections are those of the exact solution, so
+what is left at the tip lies along the axes without words, but for the error times how it changes over so small a way.
+Deviations are taken without that part: no splitting, and no other word, could take it away.
 """
 
 from __future__ import annotations
@@ -17,22 +22,26 @@ from functools import cached_property
 
 import numpy as np
 
-from ncfix.compensate.direction import REST, Signs, carried, matters, signs
-from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.kinematics import (
+from ncfix.compensate.plan.arrays import Array, Index, Mask, picked, some
+from ncfix.compensate.plan.kinematics import (
+    REST,
+    Signs,
+    carried,
     commands_from_joints,
     common,
     linear_columns,
+    matters,
     programmed_tip,
     reached_joints,
     regular,
+    rows_of,
+    signs,
     solve,
+    steer,
     tip_maps,
 )
-from ncfix.compensate.rows import picked, some
-from ncfix.compensate.segments import Segments
-from ncfix.compensate.steer import rows_of, steer
-from ncfix.control.moves import Kind, Moves
+from ncfix.compensate.plan.segments import Segments
+from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Machine, State
 
 INSTANT, WHILE = 1e-4, 1e-3
@@ -223,3 +232,55 @@ class Intent:
         gap = self.gaps(rows, programmed, [self.joints(rows, commands)], self.states(rows, fraction))[0]
         commands[:, self.columns] -= solve(self.follows(rows, commands), gap)
         return commands
+
+
+SQUARE = 1 - 1e-9
+"""An axis that makes no smaller a component of a unit normal is square to its plane."""
+
+
+def stays(moves: Moves, kept: Mask, shift: Array, before: Array | None) -> Mask:
+    """(n, n_axes) axes of corrected motions that stay where they stand, and would not without this rule.
+
+    shift   (n, n_axes) wanted corrections
+    before  (n_axes,) how far off the axes stand at the start of the first motion
+    """
+    moving = (shift != 0).any(axis=0)
+    if before is not None:
+        moving |= before != 0
+    result: Mask = moves.wordless & ~kept[:, None] & moving
+    return result
+
+
+def left_in_cuts(moves: Moves) -> dict[str, Index]:
+    """Axis letter -> motions that cut and may be corrected, but not along that linear axis."""
+    lacking = moves.wordless & (moves.cuts & (moves.rule == Rule.CORRECT))[:, None]
+    columns = np.flatnonzero(lacking.any(axis=0) & ~moves.rotary)
+    return {moves.axes[column]: np.flatnonzero(lacking[:, column]) for column in columns}
+
+
+def crooked(intent: Intent) -> Mask:
+    """(n,) arcs along an axis that must get no word: their pieces would need some."""
+    arcs = intent.segments.arc
+    if intent.mute is None or not arcs.any():
+        return np.zeros(len(arcs), dtype=bool)
+    in_plane = np.abs(intent.moves.normal) < SQUARE
+    result: Mask = arcs & (in_plane & intent.mute).any(axis=1)
+    return result
+
+
+def lacking(intent: Intent, rows: Index) -> Index:
+    """Places (j,) in `rows` (k,) of motions of which X, Y or Z must get no word."""
+    return np.flatnonzero(intent.mute[rows].any(axis=1)) if intent.mute is not None else np.zeros(0, dtype=np.intp)
+
+
+def correctable(intent: Intent, rows: Index, commands: Array, gap: Array) -> Array:
+    """What of a gap (k, 3) mm between tips words could take away, where motions `rows` (k,) have `commands`."""
+    on = lacking(intent, rows)
+    if not on.size:
+        return gap
+    assert intent.mute is not None
+    follows = intent.follows(rows[on], commands[on])
+    ways = solve(follows, gap[on])
+    result = gap.copy()
+    result[on] = np.einsum("kij,kj->ki", follows, np.where(intent.mute[rows[on]], 0.0, ways))
+    return result

@@ -1,0 +1,448 @@
+"""Strategies: which command makes the erroneous machine do what the program meant, and what each of them leaves.
+
+All of them take axis positions and give corrected axis positions, many poses at a time, by the exact forward model of
+the machine. A strategy is stateless; `solve` tells for each pose how it went, `correct` raises where it did not.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ncfix.compensate.plan.arrays import Array, Index, Mask
+from ncfix.compensate.plan.findings import pose_error
+from ncfix.compensate.plan.kinematics import (
+    Correction,
+    affine_tip,
+    linear_columns,
+    moved,
+    regular,
+    rows_of,
+    solve,
+    steer,
+    steered,
+)
+from ncfix.diagnostics import UsageError
+from ncfix.machine import Axis, Effect, Machine, State
+
+APART = 1.0
+"""rad of allowance between stretches that have nothing to do with each other; above any rotary correction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """How poses follow each other, for limits on rates.
+
+    travel_mm   (n,) way of the tool tip in the workpiece from the pose before, mm
+    travel_rad  (n,) way of the rotary axes from the pose before, rad
+    begins      (n,) the pose begins a new stretch: what was before puts no limit on it
+    pinned      (n,) the correction of this pose is decided already and stands in `decided`
+    decided     (n, n_rotary) rad; read where pinned
+    """
+
+    travel_mm: Array
+    travel_rad: Array
+    begins: Mask
+    pinned: Mask
+    decided: Array
+
+    def rows(self, rows: Index) -> Path:
+        """Some of the poses; where poses are left out a new stretch begins."""
+        begins = self.begins[rows].copy()
+        begins[1:] |= np.diff(rows) != 1
+        return Path(self.travel_mm[rows], self.travel_rad[rows], begins, self.pinned[rows], self.decided[rows])
+
+    def allowance(self, per_mm: float, per_rad: float) -> Array:
+        """By how much a correction may have changed since the first pose, (n,) rad, never descending."""
+        step = per_mm * self.travel_mm + per_rad * self.travel_rad
+        return np.cumsum(np.where(self.begins, APART, step))
+
+
+def limited(correction: Array, path: Path, per_mm: float, per_rad: float) -> Array:
+    """Rotary corrections (n, k) that change no faster along the path than allowed, near the given ones.
+
+    The mean of the largest function below and the smallest above the given values that keep the rate (McShane's
+    extensions): where the given values keep it, they come out as they are. Decided values are met exactly if they keep
+    the rate among themselves.
+    """
+    travel = path.allowance(per_mm, per_rad)[:, None]
+    smooth = (_lowest(correction, travel) - _lowest(-correction, travel)) / 2
+    pinned = path.pinned[:, None]
+    top = _lowest(np.where(pinned, path.decided, np.inf), travel)
+    bottom = -_lowest(np.where(pinned, -path.decided, np.inf), travel)
+    return np.where(pinned, path.decided, np.clip(smooth, np.minimum(bottom, top), top))
+
+
+def _lowest(values: Array, travel: Array) -> Array:
+    """The minimum over all j of values[j] + |travel - travel[j]|."""
+    before = np.minimum.accumulate(values - travel) + travel
+    after = np.minimum.accumulate((values + travel)[::-1])[::-1] - travel
+    return np.minimum(before, after)
+
+
+class Strategy(ABC):
+    """A way to correct poses.
+
+    name                  as in `--strategy`
+    leaves                one sentence: what error remains
+    corrects_orientation  the rotary axes are changed too
+    follows_path          motions may be split to keep the path between their ends
+    """
+
+    name: ClassVar[str]
+    leaves: ClassVar[str]
+    corrects_orientation: ClassVar[bool] = False
+    follows_path: ClassVar[bool] = True
+
+    @abstractmethod
+    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+        """Corrected axis positions for poses q (n, n_axes) [mm, rad] that were meant for a perfect machine.
+
+        `path` tells how the poses lie along the path, for strategies with limits on rates. The state broadcasts.
+        """
+
+    def correct(self, machine: Machine, q: Array, state: State) -> Array:
+        """Corrected axis positions (n, n_axes) such that the erroneous machine does what a perfect one does at q.
+
+        Raises `PoseError` NCF403 if a pose cannot be corrected, `RefusedError` NCF401 if the machine cannot be.
+        """
+        correction = self.solve(machine, q, state)
+        if not correction.converged.all():
+            text = f"no command found that brings the tool tip where it should be (strategy {self.name})"
+            raise pose_error("NCF403", text, ~correction.converged, "the error model may have a jump there")
+        return correction.q
+
+
+class Position(Strategy):
+    """The tool tip exactly, by Newton's method on the whole model; rotary axes keep their values."""
+
+    name = "position"
+    leaves = "The orientation of the tool is left as the machine makes it; rotary axes keep their values."
+
+    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+        """See `Strategy.solve`."""
+        return _position(machine, q, state)
+
+
+class RotaryThenLinear(Strategy):
+    """Ellingsdalen's order: the error of the rotary axes first, then the linear axes' error where that leads.
+
+    S. H. Ellingsdalen (NTNU, 2021), sections 3.5 and 3.6, with its signs put right. Pass 1: X Y Z are moved so that a
+    machine with the errors of its rotary axes only brings the tip to the intended point; the errors of all other
+    joints are read there and taken off. Later passes take off what the whole machine still leaves, until that is below
+    1 nm: the linear errors are then those at the commanded coordinates, and products of rotary and linear errors are
+    in. `passes = 1` stops after the first. Where later passes follow it does not matter how the first one began, so
+    they begin at the program's position. Works on any chain: it does not matter which side a rotary axis is on.
+    """
+
+    name = "rotary-then-linear"
+    leaves = "The orientation of the tool is left as the machine makes it; rotary axes keep their values."
+
+    def __init__(self, passes: int | None = None) -> None:
+        self.passes = passes
+
+    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+        """See `Strategy.solve`."""
+        if machine.is_perfect:
+            return untouched(q)
+        if self.passes != 1:
+            return _position(machine, q, state)
+        columns = linear_columns(machine)
+        turning, rest = parted(machine)
+        target = machine.tip(q, state.tool_length)
+        maps, fine = regular(affine_tip(machine, q, state.tool_length)[0])
+        shift = -solve(maps, turning.actual_tip(q, state) - target)
+        shifted = moved(q, columns, shift)
+        nominal = target + np.einsum("...ij,...j->...i", maps, shift)
+        first = moved(shifted, columns, -solve(maps, rest.actual_tip(shifted, state) - nominal))
+        return Correction(first, np.isfinite(first.sum(axis=1)) & fine, np.zeros(len(q), dtype=bool))
+
+
+def parted(machine: Machine) -> tuple[Machine, Machine]:
+    """The machine with the errors of its rotary axes only, and with all others (linear axes and spindle)."""
+    rotary = {axis.name for axis in machine.axes if axis.rotary}
+    turning = tuple(effect for effect in machine.effects if effect.joint in rotary)
+    rest = tuple(effect for effect in machine.effects if effect.joint not in rotary)
+    return machine.replace(effects=turning), machine.replace(effects=rest)
+
+
+def _position(machine: Machine, q: Array, state: State) -> Correction:
+    if machine.is_perfect:
+        return untouched(q)
+    return steered(machine, q, None, state)
+
+
+def untouched(q: Array) -> Correction:
+    """Nothing to correct: exactly the poses as they are."""
+    return Correction(q.copy(), np.isfinite(q.sum(axis=1)), np.ones(len(q), dtype=bool))
+
+
+def strategies() -> dict[str, Strategy]:
+    """All strategies by name, in the order in which the command line lists them."""
+
+    found: tuple[Strategy, ...] = (RotaryThenLinear(), Full(), Position(), Thesis())
+    return {strategy.name: strategy for strategy in found}
+
+
+def get_strategy(name: str) -> Strategy:
+    """The strategy of that name. Raises `UsageError` NCF411."""
+    found = strategies()
+    if name not in found:
+        raise UsageError.of("NCF411", f"there is no strategy {name!r}", hint=f"one of {', '.join(found)}")
+    return found[name]
+
+
+SETTLED = 1e-9
+"""rad; rotary corrections that change less from pass to pass are settled. 1e-9 rad is 1 nm at 1 m."""
+PASSES = 12
+CONE = 0.02
+"""Smallest singular value (rad of tilt per rad of rotary axis) below which it is always damped: about 1 degree."""
+GAIN = 1.2
+"""Just above 2 / sqrt(3), the largest correction per error times the bound (at a singular value of bound / sqrt(3))."""
+
+
+class Full(Strategy):
+    """Position exactly, tool direction by least squares, damped near singular poses, limited in size and in rate.
+
+    most      largest correction of a rotary axis, rad; None: the machine's `max_correction`
+    per_mm    how much a rotary correction may change per mm of the tip's way, rad/mm
+    per_rad   and per rad of the rotary axes' way
+
+    A correction never takes a rotary axis out of the travel that the program keeps to; the tip is held all the same.
+
+    Near a pose in which a rotary axis turns the tool about itself, a small tilt needs a large turn of that axis. Its
+    correction is damped there (Nakamura and Hanafusa 1986: the damping grows as the smallest singular value falls below
+    a bound), so that it fades to nothing in the pole and never exceeds the limit.
+    """
+
+    name = "full"
+    leaves = (
+        "The turn of the tool about its own axis is not corrected. Near poses in which a rotary axis turns the tool "
+        "about itself, and where corrections would be too large or too fast, its direction is not, or only partly."
+    )
+    corrects_orientation = True
+
+    def __init__(self, most: float | None = None, per_mm: float = 5e-5, per_rad: float = 0.02) -> None:
+        self.most = most
+        self.per_mm = per_mm
+        self.per_rad = per_rad
+
+    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+        """See `Strategy.solve`. Rates are limited only if `path` is given."""
+        if machine.is_perfect:
+            return untouched(q)
+        known = np.isfinite(q.sum(axis=1)) & np.isfinite(machine.tip(q, state.tool_length).sum(axis=1))
+        if not known.all():
+            return self._known_only(machine, q, state, path, known)
+        most = machine.max_correction[1] if self.most is None else self.most
+        corrected, free = self._tilted(machine, q, state, most)
+        rotary = machine.rotary
+        wanted = corrected[:, rotary] - q[:, rotary]
+        held = wanted if path is None or not rotary.any() else limited(wanted, path, self.per_mm, self.per_rad)
+        corrected[:, rotary] = _within_travel(machine, q[:, rotary], held)
+        free &= (np.abs(corrected[:, rotary] - q[:, rotary] - wanted) < SETTLED).all(axis=1)
+        target = machine.tip(q, state.tool_length)
+        corrected, arrived = steer(machine, corrected, target, state)
+        return Correction(corrected, arrived, free)
+
+    def _known_only(self, machine: Machine, q: Array, state: State, path: Path | None, known: Mask) -> Correction:
+        """Poses with numbers missing are left alone; they end a stretch of the path."""
+        rows = np.flatnonzero(known)
+        rest = None if path is None else path.rows(rows)
+        result = self.solve(machine, q[rows], rows_of(state, rows), rest)
+        corrected, converged, oriented = q.copy(), known.copy(), known.copy()
+        corrected[rows], converged[rows], oriented[rows] = result.q, result.converged, result.oriented
+        return Correction(corrected, converged, oriented)
+
+    def _tilted(self, machine: Machine, q: Array, state: State, most: float) -> tuple[Array, Mask]:
+        """Positions with the rotary axes corrected and X Y Z nearly so, and which poses are free of damping.
+
+        The damped step is taken from the error that would be there without it: repeated damped steps would add up to
+        an undamped one.
+        """
+        rotary, columns = machine.rotary, linear_columns(machine)
+        corrected, free = q.copy(), np.zeros(len(q), dtype=bool)
+        if not rotary.any():
+            return corrected, free
+        pose = machine.nominal(q, state.tool_length)
+        jacobian = machine.jacobians(q, state.tool_length).axes
+        across = _across(pose, machine)
+        tilts, swings = across @ jacobian[:, 3:, rotary], jacobian[:, :3, rotary]
+        maps = regular(jacobian[:, :3, columns])[0]
+        turn = np.zeros((len(q), int(rotary.sum())))
+        for _ in range(PASSES):
+            actual = machine.actual(corrected, state)
+            error = apply(across, small_turn(actual, pose)) - apply(tilts, turn)
+            before, (turn, free) = turn, damped(tilts, error, most)
+            corrected[:, rotary] = q[:, rotary] + turn
+            gap = actual[:, :3, 3] - pose[:, :3, 3] + apply(swings, turn - before)
+            corrected[:, columns] -= solve(maps, gap)
+            if np.max(np.abs(turn - before), initial=0.0) < SETTLED:
+                break
+        return corrected, free
+
+
+def _within_travel(machine: Machine, q: Array, turn: Array) -> Array:
+    """Corrected rotary positions (n, n_rotary), held at the end of the travel that the program keeps to, rad."""
+    low, high = machine.ranges[machine.rotary].T
+    return np.clip(q + turn, np.minimum(low, q), np.maximum(high, q))
+
+
+def apply(matrices: Array, vectors: Array) -> Array:
+    """Matrices (n, i, j) times vectors (n, j)."""
+    result: Array = (matrices @ vectors[..., None])[..., 0]
+    return result
+
+
+def damped(tilts: Array, error: Array, most: float) -> tuple[Array, Mask]:
+    """Rotary corrections that take off a tilt, by least squares with damping.
+
+    tilts  (n, 2, k) tilt of the tool per rad of each rotary axis
+    error  (n, 2) tilt to take off, rad
+    most   no rotary axis is corrected by more, rad
+
+    Returns (n, k) rad, and where nothing was damped (n,).
+    """
+    squares, ways = np.linalg.eigh(np.swapaxes(tilts, 1, 2) @ tilts)
+    size = np.sqrt(np.einsum("ij,ij->i", error, error))
+    bound = np.maximum(CONE, GAIN * size / most)[:, None]
+    values = np.sqrt(np.maximum(squares, 0.0))
+    damping = np.where(values < bound, (bound**2 - values**2) / 4, 0.0)
+    possible = np.arange(values.shape[1]) >= values.shape[1] - tilts.shape[1]
+    weight = np.where(possible, 1.0, 0.0) / np.maximum(squares + damping, 1e-300)
+    along = np.einsum("nji,nj->ni", ways, np.einsum("nij,ni->nj", tilts, error))
+    turn = -np.einsum("nij,nj->ni", ways, weight * along)
+    return turn, ((damping == 0) | ~possible).all(axis=1)
+
+
+def _across(nominal: Array, machine: Machine) -> Array:
+    """Two directions across the tool in the workpiece frame, as rows, (n, 2, 3)."""
+    tool = np.asarray(machine.tool.direction)
+    first = np.cross(tool, np.eye(3)[np.argmin(np.abs(tool))])
+    first /= np.linalg.norm(first)
+    pair = np.stack([first, np.cross(tool, first)])
+    result: Array = pair @ np.swapaxes(nominal[:, :3, :3], 1, 2)
+    return result
+
+
+def small_turn(actual: Array, nominal: Array) -> Array:
+    """The small rotation from nominal to actual in the workpiece frame, (n, 3) rad, to third order."""
+    relative = actual[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
+    return 0.5 * np.stack(
+        [
+            relative[:, 2, 1] - relative[:, 1, 2],
+            relative[:, 0, 2] - relative[:, 2, 0],
+            relative[:, 1, 0] - relative[:, 0, 1],
+        ],
+        axis=1,
+    )
+
+
+class Thesis(Strategy):
+    """Ellingsdalen's compensation as it is printed, to reproduce its numbers: one pass, points only.
+
+    For linear axes on the tool side and rotary axes under the workpiece. S. H. Ellingsdalen, "Improving the Accuracy of
+    a Five-Axis Machine Tool by Laser Tracker Calibration" (NTNU, 2021), sections 3.5 and 3.6 and listings 3.3 and 3.4.
+    What differs from a sound correction, on purpose:
+
+    - errors are read at the nearest whole millimetre or degree (halves to even), their value at zero taken off;
+    - angles of linear axes do nothing, squareness of Y and Z with X as datum is all that is known of their location;
+    - errors of the rotary axes act in base axes about the base origin, in whatever frame they were identified;
+    - the listing reads the positioning error E_C. of a rotary axis from the file of E_B., and turns about Y the wrong
+      way;
+    - the first point is never touched, arcs are not done, nothing is repeated and nothing rounded.
+    """
+
+    name = "thesis"
+    leaves = (
+        "Made to reproduce printed numbers, not to cut by: angles of linear axes, orientation, errors between points "
+        "and whatever rounding to whole millimetres and degrees misses are left."
+    )
+    follows_path = False
+
+    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+        """See `Strategy.solve`. Raises `UsageError` NCF412 for machines of another kind."""
+        if any(axis.workpiece_side is not axis.rotary for axis in machine.axes):
+            raise UsageError.of(
+                "NCF412",
+                "the thesis' procedure is for linear axes on the tool side and rotary axes under the workpiece",
+                hint="`--strategy rotary-then-linear` is the same idea for any machine",
+            )
+        still = np.where(machine.rotary, 0.0, q)
+        point = machine.tip(still, state.tool_length) + np.asarray(machine.workpiece_offset)
+        rotary = rotary_shift([motion_errors(machine, axis, q) for axis in turning_axes(machine)], point)
+        axes_from_base = affine_tip(machine, still[:1])[0]
+        shifted = q.copy()
+        shifted[:, linear_columns(machine)] += solve(axes_from_base, rotary)
+        corrected = shifted.copy()
+        corrected[:, linear_columns(machine)] -= solve(axes_from_base, linear_deviation(machine, shifted))
+        corrected[:1] = q[:1]
+        return Correction(corrected, np.isfinite(corrected.sum(axis=1)), np.zeros(len(q), dtype=bool))
+
+
+def turning_axes(machine: Machine) -> list[Axis]:
+    """The rotary axes from the foundation to the workpiece: B, then C."""
+    return [axis for axis in reversed(machine.axes) if axis.rotary]
+
+
+def motion_errors(machine: Machine, axis: Axis, q: Array) -> Array:
+    """The six error motions of an axis at the nearest whole millimetre or degree, (n, 6) mm and rad; none at zero."""
+    position = np.rint(q[:, machine.axis_names.index(axis.name)] / axis.unit)
+    errors = np.zeros((len(q), 6))
+    for effect in machine.effects:
+        if effect.joint == axis.name and not effect.location:
+            errors[:, effect.component] += _value(effect, position) - _value(effect, np.zeros(1))
+    return errors
+
+
+def linear_deviation(machine: Machine, q: Array) -> Array:
+    """What the translations of the linear axes and the squareness of Y and Z do to the tip, (n, 3) mm, base axes."""
+    linear = [axis for axis in machine.axes if not axis.rotary]
+    total: Array = sum((motion_errors(machine, axis, q)[:, :3] for axis in linear), np.zeros((len(q), 3)))
+    x_y, x_z, y_z = (squareness(machine, name) for name in ("EC0Y", "EB0Z", "EA0Z"))
+    _, y, z = linear_columns(machine)
+    total[:, 0] += -x_y * q[:, y] + x_z * q[:, z]
+    total[:, 1] -= y_z * q[:, z]
+    return total
+
+
+def squareness(machine: Machine, name: str) -> float:
+    """The location error of that name, rad; 0 if the machine has none."""
+    return sum(sum(effect.coefficients) for effect in machine.effects if effect.name == name)
+
+
+def rotary_shift(errors: list[Array], point: Array, as_printed: bool = True) -> Array:
+    """What to add to X Y Z for the errors of the rotary axes: actual minus ideal point, (n, 3) mm.
+
+    errors      (n, 6) of each rotary axis, from the foundation to the workpiece
+    point       (n, 3) the ideal point in the base frame
+    as_printed  with the two slips of listing 3.3 (E_C. read from E_B.'s file, the wrong way about Y)
+    """
+    actual = point
+    for each in reversed(errors):
+        actual = actual + each[:, :3]
+    for each in reversed(errors):
+        a, b, c = each[:, 3], each[:, 4], each[:, 5]
+        actual = _about(actual, 2, b if as_printed else c)
+        actual = _about(actual, 1, -b if as_printed else b)
+        actual = _about(actual, 0, a)
+    result: Array = actual - point
+    return result
+
+
+def _about(points: Array, axis: int, angle: Array) -> Array:
+    """Points turned about a base axis, right-handed, (n, 3)."""
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turned = points.copy()
+    turned[:, first] = np.cos(angle) * points[:, first] - np.sin(angle) * points[:, second]
+    turned[:, second] = np.sin(angle) * points[:, first] + np.cos(angle) * points[:, second]
+    return turned
+
+
+def _value(effect: Effect, position: Array) -> Array:
+    """An effect at axis positions in mm or degrees, (n,)."""
+    value: Array = effect.basis.design((position - effect.center) / effect.scale) @ np.asarray(effect.coefficients)
+    return value
