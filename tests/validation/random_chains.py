@@ -16,7 +16,7 @@ import numpy as np
 from machine import chains, oracle
 from ncfix.machine import Machine, State
 from ncfix.machine.symbolic import derive
-from ncfix.machine.symbolic.python import compiled
+from ncfix.machine.symbolic.printing import compiled
 
 LENGTH, POSES = 120.0, 5
 REVOLUTE = 4

@@ -17,7 +17,7 @@ import sympy as sp
 
 from ncfix.machine import load
 from ncfix.machine.symbolic import Derivation, derive
-from ncfix.machine.symbolic.python import compiled
+from ncfix.machine.symbolic.printing import compiled
 from validation.freeman_ford_head import (
     ARCSEC,
     DEGREE,

@@ -13,8 +13,8 @@ import pytest
 import sympy as sp
 
 from ncfix.machine.symbolic import Equation, derive, equations, identifiable, loads_chain, protocol
-from ncfix.machine.symbolic.protocol import simplest
-from ncfix.machine.symbolic.python import compiled
+from ncfix.machine.symbolic.identification import simplest
+from ncfix.machine.symbolic.printing import compiled
 from validation.freeman_ford_head import (
     ARCSEC,
     DEGREE,

@@ -75,13 +75,12 @@ def derive(
 
 
 def _written(derivation: Derivation, form: str | None, vary: list[str]) -> str:
-    from ncfix.machine.symbolic import measuring
 
-    if form == "latex":
-        return derivation.to_latex()
-    if form == "python":
-        return derivation.to_python()
-    return measuring(derivation, vary) if form == "protocol" else derivation.to_text()
+    from ncfix.machine.symbolic import measuring, to_latex, to_python, to_text
+
+    if form == "protocol":
+        return measuring(derivation, vary)
+    return {"latex": to_latex, "python": to_python}.get(form or "", to_text)(derivation)
 
 
 def _as_dict(derivation: Derivation) -> dict[str, Any]:

@@ -395,7 +395,8 @@ def units(machine: Machine, effect: Effect) -> tuple[Unit, ...]:
     """The units that people use for the coefficients of an effect: a gain in um/m, growth in um/K, play in um.
 
     A coefficient belongs to a power of u = (x - center) / scale. Where u is a share of an axis' travel it is said as it
-    stands, um at u = 1: the end of the travel. Where u counts mm, degrees, kelvins, hours or kilograms the unit says so.
+    stands, um at u = 1: the end of the travel. Where u counts mm, degrees, kelvins, hours or kilograms the unit says
+    so.
     """
     size, name = (URAD, "urad") if effect.rotational else (UM, "um")
     factor, times = _per(machine, effect.times, effect.times_scale or effect.scale)

@@ -12,7 +12,7 @@ from machine import chains, oracle
 from machine.chains import a_few_errors, arguments, near_axes
 from ncfix.machine import Axis, Machine, State
 from ncfix.machine.symbolic import derive
-from ncfix.machine.symbolic.python import compiled
+from ncfix.machine.symbolic.printing import compiled
 
 RELATIVE = 1e-12
 """Both sides are a few dozen products in double precision."""

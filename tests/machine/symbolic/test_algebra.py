@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ncfix.machine.symbolic.algebra import Algebra
-from ncfix.machine.symbolic.dependence import Columns, independent_columns
+from ncfix.machine.symbolic.identification import PolynomialColumns, independent_columns
 
 A, B, L, M = sp.symbols("A B L M", real=True)
 sin, cos = sp.sin, sp.cos
@@ -92,7 +92,7 @@ def test_combinations_in_symbols() -> None:
     """Column 3 is cos(A) times column 1 minus L times column 2; column 4 is zero."""
     columns = [{"x": sin(B), "y": M}, {"y": cos(B)}, {"x": cos(A) * sin(B), "y": M * cos(A) - L * cos(B)}, {}]
     algebra = Algebra(sp.expand(e) for column in columns for e in column.values())
-    table = Columns(algebra, [{row: algebra.poly(e) for row, e in column.items()} for column in columns])
+    table = PolynomialColumns(algebra, [{row: algebra.poly(e) for row, e in column.items()} for column in columns])
     p, q, r, s = sp.symbols("p q r s")
     found = table.combinations([p, q, r, s])
     assert table.invisible == [3]

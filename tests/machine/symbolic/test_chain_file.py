@@ -11,10 +11,9 @@ import pytest
 import sympy as sp
 
 from ncfix.diagnostics import ConfigError, UsageError
-from ncfix.machine.symbolic import derive, load_chain, loads_chain
-from ncfix.machine.symbolic.extra import require_sympy
-from ncfix.machine.symbolic.python import compiled
-from ncfix.machine.symbolic.steps import UNITS, Rotation, Translation
+from ncfix.machine.symbolic import derive, load_chain, loads_chain, require_sympy
+from ncfix.machine.symbolic.chain import UNITS, Rotation, Translation
+from ncfix.machine.symbolic.printing import compiled
 
 ROOT = Path(__file__).resolve().parents[3]
 GOOD = """
@@ -125,7 +124,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 
 def test_without_sympy_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sympy", None)
-    monkeypatch.setattr("ncfix.machine.symbolic.extra.find_spec", lambda name: None)
+    monkeypatch.setattr("ncfix.machine.symbolic.find_spec", lambda name: None)
     with pytest.raises(UsageError, match="NCF390") as caught:
         require_sympy()
     assert 'pip install "ncfix[symbolic]"' in str(caught.value)

@@ -13,8 +13,8 @@ from ncfix.diagnostics import UsageError
 from ncfix.machine import Axis, Effect, Machine, State, Tool
 from ncfix.machine.basis import Polynomial
 from ncfix.machine.symbolic import derive, from_machine
-from ncfix.machine.symbolic.exact import Constants
-from ncfix.machine.symbolic.python import compiled
+from ncfix.machine.symbolic.from_machine import Constants
+from ncfix.machine.symbolic.printing import compiled
 
 HALF = 0.7071067811865476
 X, Y, Z, C, B = sp.symbols("X Y Z C B", real=True)

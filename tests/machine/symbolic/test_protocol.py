@@ -10,8 +10,8 @@ import sympy as sp
 
 from ncfix.machine import Axis, Machine, Tool, load
 from ncfix.machine.symbolic import Derivation, derive, equations, identifiable, protocol
-from ncfix.machine.symbolic.protocol import Equation, report, simplest
-from ncfix.machine.symbolic.python import compiled
+from ncfix.machine.symbolic.identification import Equation, report, simplest
+from ncfix.machine.symbolic.printing import compiled
 
 ROOT = Path(__file__).resolve().parents[3]
 DIFFERENCES = (-1,)

@@ -9,9 +9,9 @@ import sympy as sp
 from ncfix.diagnostics import UsageError
 from ncfix.machine import se3
 from ncfix.machine.symbolic import Chain, Size, Variable, derive
-from ncfix.machine.symbolic.python import compiled
-from ncfix.machine.symbolic.series import Expansion
-from ncfix.machine.symbolic.steps import UNITS, Rotation, Screw, Step, Translation, inverse
+from ncfix.machine.symbolic.chain import UNITS, Rotation, Screw, Step, Translation, inverse
+from ncfix.machine.symbolic.derivation import Expansion
+from ncfix.machine.symbolic.printing import compiled
 
 a, b, t = (Variable(name, Size.SMALL).symbol for name in "abt")
 X, C = (Variable(name, axis=True).symbol for name in "XC")

@@ -4,20 +4,35 @@ After C. Freeman and D. G. Ford, Automated error analysis of serial manipulators
 (2003) 1077-1084. Importing this package without sympy raises `UsageError` NCF390.
 """
 
-from ncfix.machine.symbolic.extra import require_sympy
+from importlib.util import find_spec
+
+from ncfix.diagnostics import UsageError
+
+
+def require_sympy() -> None:
+    """Raise `UsageError` NCF390 unless sympy is installed."""
+    if find_spec("sympy") is None:
+        text = "symbolic formulas need sympy, which is not installed"
+        raise UsageError.of("NCF390", text, hint='pip install "ncfix[symbolic]"')
+
 
 require_sympy()
 
-from ncfix.machine.symbolic.api import derive  # noqa: E402
-from ncfix.machine.symbolic.chain import Chain  # noqa: E402
+from ncfix.machine.symbolic.chain import Chain, Size, Variable  # noqa: E402
 from ncfix.machine.symbolic.chain_file import load_chain, loads_chain  # noqa: E402
-from ncfix.machine.symbolic.derivation import Derivation  # noqa: E402
+from ncfix.machine.symbolic.derivation import Derivation, derive  # noqa: E402
 from ncfix.machine.symbolic.from_machine import from_machine  # noqa: E402
-from ncfix.machine.symbolic.identify import Identifiable, identifiable  # noqa: E402
+from ncfix.machine.symbolic.identification import (  # noqa: E402
+    Equation,
+    Identifiable,
+    Identification,
+    equations,
+    identifiable,
+    measuring,
+    protocol,
+)
 from ncfix.machine.symbolic.inverse import Inverse, inverse_nominal  # noqa: E402
-from ncfix.machine.symbolic.measuring import measuring  # noqa: E402
-from ncfix.machine.symbolic.protocol import Equation, Identification, equations, protocol  # noqa: E402
-from ncfix.machine.symbolic.variables import Size, Variable  # noqa: E402
+from ncfix.machine.symbolic.printing import to_latex, to_python, to_text  # noqa: E402
 
 __all__ = [
     "Chain",
@@ -37,4 +52,7 @@ __all__ = [
     "loads_chain",
     "measuring",
     "protocol",
+    "to_latex",
+    "to_python",
+    "to_text",
 ]

@@ -18,9 +18,7 @@ import sympy as sp
 from ncfix.diagnostics import ConfigError, NcfixError, Place
 from ncfix.inputs import MOST_SAID, taken
 from ncfix.machine.fields import Report, Section, did_you_mean
-from ncfix.machine.symbolic.chain import Chain
-from ncfix.machine.symbolic.steps import UNITS, Expr, Rotation, Step, Translation, Vector
-from ncfix.machine.symbolic.variables import Size, Variable
+from ncfix.machine.symbolic.chain import UNITS, Chain, Expr, Rotation, Size, Step, Translation, Variable, Vector
 from ncfix.toml_text import decoded, key_lines, parsed
 
 SCHEMA = 1

@@ -1,29 +1,38 @@
-"""A machine as a chain of elementary transformations.
+"""A machine as a chain of elementary transformations, with the errors that are asked for.
 
 Joint by joint it is what the fast engine composes, B = Lc L E M(q + offset) inverse(L): M nominal motion, E error
 motion about its reference point, L location errors of the axis line, Lc location errors that carry the body.
+
+Numbers of a machine file become exact constants: 0.7071067811865476 is sqrt(2)/2, a head's 50 degrees stay 50 degrees.
+What is not recognised, or what the reader wants to see as a letter, becomes a Large variable with a value.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from math import atan2, pi
 
 import sympy as sp
 
-from ncfix.machine.axes import SPINDLE, Axis
+from ncfix.diagnostics import NcfixError, UsageError
+from ncfix.machine.axes import COMPONENTS, SPINDLE, Axis, Effect, component_title
 from ncfix.machine.axes import Vector as Numbers
 from ncfix.machine.chain import columns, lies_on_axis
 from ncfix.machine.machine import Machine
-from ncfix.machine.symbolic.chain import Chain
-from ncfix.machine.symbolic.errors import DEFAULT, ErrorSymbol, chosen
-from ncfix.machine.symbolic.exact import Constants
-from ncfix.machine.symbolic.steps import (
+from ncfix.machine.symbolic.chain import (
     UNITS,
     ZERO,
+    Chain,
+    Expr,
     Rotation,
     Screw,
+    Size,
     Step,
     Translation,
+    Variable,
     Vector,
     added,
     cross,
@@ -33,7 +42,166 @@ from ncfix.machine.symbolic.steps import (
     rodrigues,
     scaled,
 )
-from ncfix.machine.symbolic.variables import Size, Variable
+
+CLOSE = 1e-14
+"""How near an exact constant a number must be: well below what the fast engine resolves."""
+STEPS_PER_DEGREE = 60
+"""Angles of whole minutes of arc are exact."""
+LARGEST_DENOMINATOR = 100
+"""Numbers whose squares are fractions with no larger denominator are exact."""
+
+
+class Constants:
+    """Turns numbers into exact constants or variables; keeps the variables."""
+
+    def __init__(self, lettered: bool = False) -> None:
+        """`lettered`: fixed angles become variables even where they are recognised."""
+        self.lettered = lettered
+        self.variables: dict[str, Variable] = {}
+        self._shared: dict[tuple[str, float], str] = {}
+
+    def point(self, values: Sequence[float], suffix: str, definition: str) -> Vector:
+        """A point, mm: zero is zero; every other coordinate a variable, the same one where points share it."""
+        x, y, z = (self._length(value, c, suffix, definition) for c, value in zip("xyz", values, strict=True))
+        return x, y, z
+
+    def _length(self, value: float, coordinate: str, suffix: str, definition: str) -> Expr:
+        if not value:
+            return sp.Integer(0)
+        name = self._shared.setdefault((coordinate, value), f"{coordinate}{suffix}")
+        if name in self.variables:
+            known = self.variables[name]
+            meaning = known.definition if definition in known.definition else f"{known.definition}, {definition}"
+            self.variables[name] = replace(known, definition=meaning)
+            return known.symbol
+        return self._variable(name, value, f"{coordinate} of {definition}")
+
+    def direction(self, values: Sequence[float], suffix: str, definition: str) -> Vector:
+        """A unit vector: along a coordinate axis, in a coordinate plane, or skew."""
+        inside = [k for k, value in enumerate(values) if abs(value) > CLOSE]
+        if len(inside) == 1:
+            return tuple(sp.Integer(round(value)) for value in values)
+        if len(inside) == 2:
+            return self._in_plane(values, inside, suffix, definition)
+        x, y, z = (_root(value) or sp.Rational(value) for value in values)
+        return x, y, z
+
+    def _in_plane(self, values: Sequence[float], inside: list[int], suffix: str, definition: str) -> Vector:
+        near, far = inside if 2 not in inside else reversed(inside)
+        size = atan2(abs(values[far]), abs(values[near]))
+        where = f"angle from {'xyz'[near]} towards {'xyz'[far]} of {definition}"
+        exact = None if self.lettered else _degrees(size)
+        angle = self._variable(f"phi{suffix}", size, where, rotary=True) if exact is None else exact
+        parts = {near: (sp.cos(angle), values[near]), far: (sp.sin(angle), values[far])}
+        total = ZERO
+        for k, (size_k, value) in parts.items():
+            total = added(total, scaled(size_k if value > 0 else -size_k, UNITS["xyz"[k]]))
+        return total
+
+    def _variable(self, name: str, value: float, definition: str, rotary: bool = False) -> Expr:
+        self.variables[name] = Variable(name, definition=definition, value=float(value), rotary=rotary)
+        return self.variables[name].symbol
+
+
+def _degrees(angle: float) -> Expr | None:
+    """The angle as a rational part of pi if it is a whole number of minutes of arc."""
+    minutes = round(angle * 180 / pi * STEPS_PER_DEGREE)
+    if abs(minutes / STEPS_PER_DEGREE * pi / 180 - angle) > CLOSE:
+        return None
+    return sp.pi * sp.Rational(minutes, 180 * STEPS_PER_DEGREE)
+
+
+def _root(value: float) -> Expr | None:
+    """The number as the square root of a simple fraction."""
+    square = sp.Rational(value * value).limit_denominator(LARGEST_DENOMINATOR)
+    root = sp.sqrt(square) * (1 if value > 0 else -1)
+    return root if abs(float(root) - value) < CLOSE else None
+
+
+DEFAULT = ("motions", "locations", "spindle")
+GROUPS = ("motions", "locations", "spindle", "machine")
+"""Error motions of the axes; location errors of the axes; location errors of the spindle; what the machine file has."""
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorSymbol:
+    """An error component of a joint as a variable, with what the machine file says of it.
+
+    reference  where its rotation causes no translation, base frame; None: the joint's own reference point
+    carried    a location error that carries the body
+    """
+
+    variable: Variable
+    joint: str
+    component: int
+    location: bool
+    reference: Numbers | None
+    carried: bool
+
+
+def chosen(machine: Machine, include: str | Iterable[str] = DEFAULT) -> list[ErrorSymbol]:
+    """The errors that `include` names: groups, names, patterns such as "E?C"; raises `UsageError` NCF393."""
+    everything = list(_names(machine))
+    wanted: set[str] = set()
+    for item in [include] if isinstance(include, str) else include:
+        found = _group(machine, item) if item in GROUPS else {n for n in everything if fnmatchcase(n, item)}
+        if not found and item != "machine":
+            raise _nothing(item, everything)
+        wanted |= found
+    return [_symbol(machine, name) for name in everything if name in wanted]
+
+
+def _names(machine: Machine) -> Iterable[str]:
+    for joint in (*machine.axis_names, SPINDLE):
+        yield from (f"E{component}{joint}" for component in COMPONENTS)
+        yield from (f"E{component}0{joint}" for component in COMPONENTS)
+
+
+def _group(machine: Machine, group: str) -> set[str]:
+    if group == "machine":
+        return {effect.name for effect in machine.effects if effect.active}
+    if group == "spindle":
+        return {f"E{component}0{SPINDLE}" for component in COMPONENTS}
+    zero = "0" if group == "locations" else ""
+    return {f"E{component}{zero}{axis}" for axis in machine.axis_names for component in COMPONENTS}
+
+
+def _nothing(item: str, names: Sequence[str]) -> NcfixError:
+    close = get_close_matches(item, (*GROUPS, *names), 1)
+    hint = f"did you mean {close[0]}? " if close else ""
+    text = f"{item!r} names no error of this machine"
+    return UsageError.of("NCF393", text, hint=f"{hint}{', '.join(GROUPS)}, a name or a pattern such as E?C")
+
+
+def _symbol(machine: Machine, name: str) -> ErrorSymbol:
+    same = [effect for effect in machine.effects if effect.name == name and effect.active] or [Effect(name, (0.0,))]
+    effect = same[0]
+    if len({(_reference(it), it.carried) for it in same}) > 1:
+        text = f"the effects {name} of this machine differ in reference or carried: one symbol cannot stand for them"
+        raise UsageError.of("NCF393", text, hint="leave it out, or give them one reference point")
+    axes = {axis.name: axis for axis in machine.axes}
+    title = component_title(name, axes.get(effect.joint))
+    return ErrorSymbol(
+        variable=Variable(name, Size.SMALL, title, rotary=effect.rotational, arguments=_arguments(same)),
+        joint=effect.joint,
+        component=effect.component,
+        location=effect.location,
+        reference=_reference(effect),
+        carried=effect.carried or (effect.location and effect.joint == SPINDLE),
+    )
+
+
+def _reference(effect: Effect) -> Numbers | None:
+    """Only a rotation needs one."""
+    return effect.reference if effect.rotational else None
+
+
+def _arguments(same: Sequence[Effect]) -> tuple[str, ...]:
+    effect = same[0]
+    own = () if effect.location or effect.joint == SPINDLE else (effect.joint,)
+    signals = (signal for it in same for signal in (it.signal, it.times) if signal is not None)
+    return tuple(dict.fromkeys((*own, *signals)))
+
 
 Carry = Callable[[Numbers, Vector], Vector]
 """Takes a reference point (numbers and symbols, all axes at zero) to where the joint has carried it."""

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ncfix.machine.symbolic.algebra import Algebra, Poly
-from ncfix.machine.symbolic.chain import Chain
+from ncfix.machine.symbolic.chain import Chain, Expr, Rotation, linear_part, rodrigues
 from ncfix.machine.symbolic.derivation import DIRECTION, POSITION, Derivation
-from ncfix.machine.symbolic.steps import Expr, Rotation, linear_part, rodrigues
 
 BRANCH = sp.Symbol("branch", real=True)
 """Which of two solutions: +1 or -1."""

@@ -1,0 +1,403 @@
+"""What can be identified: which errors only show up together, and a measurement protocol that isolates them one by one.
+
+Coefficients of the errors are polynomials in functions of what is varied (axis positions, perhaps tool length): two
+errors can be told apart if, and only if, their coefficients are linearly independent as such. This is exact: no grid
+of poses is chosen. Dependence is found in numbers at a generic point, and solved in symbols. It is what is missing in
+Freeman and Ford (2003), whose Tests 6 to 8 ask for two parameters where the formulas only have one.
+
+The protocol is their section 5, Table 4: sums and differences of readings at indexed poses. A reading is the position
+of the tool tip, nominal part included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from itertools import combinations, product
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from ncfix.machine.symbolic.algebra import Algebra, Poly
+from ncfix.machine.symbolic.derivation import POSITION, Derivation
+
+Array = NDArray[np.float64]
+NEGLIGIBLE = 1e-9
+"""Relative size below which a residual is rounding: entries are of order one and exact to 1e-15."""
+
+
+class PolynomialColumns:
+    """Columns of polynomials, one per unknown; a column is {row: polynomial}, what it has not is zero."""
+
+    def __init__(self, algebra: Algebra, columns: Sequence[Mapping[Hashable, Poly]]) -> None:
+        """All rows that occur are taken."""
+        self._algebra = algebra
+        self._columns = columns
+        self._rows = list(dict.fromkeys(row for column in columns for row in column))
+        point = _GenericPoint(algebra)
+        values = [[point.value(column.get(row)) for column in columns] for row in self._rows]
+        self.numbers: Array = np.array(values, dtype=np.float64).reshape(len(self._rows), len(columns))
+        self.pivots = independent_columns(self.numbers)
+
+    @property
+    def invisible(self) -> list[int]:
+        """The columns that are zero."""
+        return [index for index, column in enumerate(self.numbers.T) if not column.any()]
+
+    @property
+    def independent_rows(self) -> list[Hashable]:
+        """As many rows as the rank, from the first on."""
+        return [self._rows[index] for index in independent_columns(self.numbers.T)]
+
+    def combinations(self, unknowns: Sequence[sp.Expr]) -> dict[int, sp.Expr]:
+        """By pivot: the unknown itself plus what the dependent columns' unknowns add to it."""
+        found = {pivot: unknowns[pivot] for pivot in self.pivots}
+        for index in set(range(len(unknowns))) - set(self.pivots):
+            for pivot, factor in self._factors(index).items():
+                found[pivot] += factor * unknowns[index]
+        return found
+
+    def _factors(self, index: int) -> dict[int, sp.Expr]:
+        """The column as a combination of pivot columns."""
+        factors = np.linalg.lstsq(self.numbers[:, self.pivots], self.numbers[:, index], rcond=None)[0]
+        used = [pivot for pivot, factor in zip(self.pivots, factors, strict=True) if abs(factor) > NEGLIGIBLE]
+        rows = independent_columns(self.numbers[:, used].T)
+        square = [[self._entry(row, pivot) for pivot in used] for row in rows]
+        right = [self._entry(row, index) for row in rows]
+        whole = _determinant(self._algebra, square)
+        return {pivot: self._ratio(_replaced(square, k, right), whole) for k, pivot in enumerate(used)}
+
+    def _ratio(self, square: list[list[Poly]], whole: Poly) -> sp.Expr:
+        """Cramer's rule."""
+        above, below = _determinant(self._algebra, square).cancel(whole)
+        return self._algebra.expression(above) / self._algebra.expression(below)
+
+    def _entry(self, row: int, column: int) -> Poly:
+        return self._columns[column].get(self._rows[row], self._algebra.ring.zero)
+
+
+def _replaced(square: list[list[Poly]], column: int, right: list[Poly]) -> list[list[Poly]]:
+    return [[*row[:column], side, *row[column + 1 :]] for row, side in zip(square, right, strict=True)]
+
+
+def _determinant(algebra: Algebra, square: list[list[Poly]]) -> Poly:
+    """By minors of the last rows, each worked out once."""
+
+    @cache
+    def minor(columns: tuple[int, ...]) -> Poly:
+        if not columns:
+            return algebra.ring.one
+        row = square[len(square) - len(columns)]
+        total = algebra.ring.zero
+        for k, column in enumerate(columns):
+            if row[column]:
+                total += (-1) ** k * row[column] * minor((*columns[:k], *columns[k + 1 :]))
+        return algebra.reduced(total)
+
+    return minor(tuple(range(len(square))))
+
+
+class _GenericPoint:
+    """Numbers for the ring's generators as no coincidence would give them."""
+
+    def __init__(self, algebra: Algebra) -> None:
+        symbols = sorted(set().union(*(g.free_symbols for g in algebra.ring.symbols)), key=sp.default_sort_key)
+        numbers = np.random.default_rng(2003).uniform(0.4, 1.4, len(symbols))
+        point = {symbol: sp.Float(number) for symbol, number in zip(symbols, numbers, strict=True)}
+        self._values = np.array([float(g.subs(point)) for g in algebra.ring.symbols])
+
+    def value(self, poly: Poly | None) -> float:
+        terms = poly.items() if poly else ()
+        return float(sum(float(factor) * np.prod(self._values ** np.array(powers)) for powers, factor in terms))
+
+
+def independent_columns(matrix: Array) -> list[int]:
+    """The columns, from the left, that are not combinations of those before them."""
+    found: list[int] = []
+    basis = np.zeros((matrix.shape[0], 0))
+    for index, column in enumerate(matrix.T):
+        rest = column
+        for _ in range(2):
+            rest = rest - basis @ (basis.T @ rest)
+        if np.linalg.norm(rest) > NEGLIGIBLE * np.linalg.norm(column):
+            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+            found.append(index)
+    return found
+
+
+TIP = ("dx", "dy", "dz")
+
+
+@dataclass(frozen=True, slots=True)
+class Identifiable:
+    """What measurements of all poses can say.
+
+    unknowns      the errors asked for
+    combinations  as many as the rank: each an error, or a sum of errors that act as one
+    invisible     errors that no pose shows
+    """
+
+    unknowns: tuple[str, ...]
+    combinations: tuple[sp.Expr, ...]
+    invisible: tuple[str, ...]
+
+    @property
+    def rank(self) -> int:
+        """How many independent parameters there are."""
+        return len(self.combinations)
+
+    @property
+    def inseparable(self) -> tuple[sp.Expr, ...]:
+        """The combinations of more than one error."""
+        return tuple(combination for combination in self.combinations if combination.is_Add)
+
+    def to_text(self) -> str:
+        """In words."""
+        lines = [f"rank {self.rank} of {len(self.unknowns)}"]
+        lines += [f"only together: {combination}" for combination in self.inseparable]
+        lines += [f"no pose shows: {' '.join(self.invisible)}"] if self.invisible else []
+        return "\n".join(lines) + "\n"
+
+
+def identifiable(
+    derivation: Derivation,
+    varied: Sequence[str] | None = None,
+    components: Sequence[str] = TIP,
+    absolute: bool = True,
+) -> Identifiable:
+    """What can be identified when `varied` is varied; errors that depend on positions are left out.
+
+    varied      names of axes, and of dimensions that are varied too (a second tool length); None: all axes
+    components  what is measured: dx dy dz, rx ry rz
+    absolute    False: only changes are seen, since the origin of the measurement is unknown
+    """
+    names = set(varied) if varied is not None else {axis.name for axis in derivation.chain.axes}
+    wanted = {i: variable for i, variable in enumerate(derivation.chain.smalls) if not variable.arguments}
+    found = [{c: derivation.terms[c].get((i,), sp.Integer(0)) for c in components} for i in wanted]
+    algebra = Algebra(sp.expand(value) for column in found for value in column.values())
+    moving = np.array([any(str(symbol) in names for symbol in g.free_symbols) for g in algebra.ring.symbols])
+    columns = PolynomialColumns(algebra, [_split(algebra, column, moving, absolute) for column in found])
+    unknowns = list(wanted.values())
+    combinations = columns.combinations([variable.symbol for variable in unknowns])
+    invisible = tuple(unknowns[i].name for i in columns.invisible)
+    return Identifiable(tuple(v.name for v in unknowns), tuple(combinations.values()), invisible)
+
+
+def _split(
+    algebra: Algebra, column: Mapping[str, sp.Expr], moving: NDArray[np.bool_], absolute: bool
+) -> dict[Hashable, Poly]:
+    """Polynomials in what is fixed, by component and monomial of what is varied."""
+    found: dict[Hashable, Poly] = {}
+    for component, expression in column.items():
+        poly = algebra.poly(expression)
+        for powers, coefficient in poly.items():
+            varied = tuple(np.where(moving, powers, 0).tolist())
+            if absolute or any(varied):
+                term = poly.new({tuple(np.where(moving, 0, powers).tolist()): coefficient})
+                key = (component, varied)
+                found[key] = found[key] + term if key in found else term
+    return found
+
+
+RIGHT_ANGLES = (0, 90, 180, 270)
+Pose = tuple[int, ...]
+"""Degrees, one per rotary axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """A difference or sum of one coordinate at two poses, as a linear equation in the unknown errors.
+
+    sign          -1: first minus second; 1: first plus second
+    coefficients  per unknown that occurs
+    constant      what the nominal machine gives
+    """
+
+    algebra: Algebra
+    coordinate: str
+    first: Pose
+    second: Pose
+    sign: int
+    coefficients: Mapping[sp.Expr, Poly]
+    constant: Poly
+
+    @property
+    def unknowns(self) -> frozenset[sp.Expr]:
+        """The errors that occur."""
+        return frozenset(self.coefficients)
+
+    @cached_property
+    def expression(self) -> sp.Expr:
+        """The right-hand side."""
+        parts = [self.algebra.expression(poly) * symbol for symbol, poly in self.coefficients.items()]
+        return sp.Add(*parts, self.algebra.expression(self.constant))
+
+    @property
+    def measurement(self) -> str:
+        """What is measured, in degrees: `X(90, 0) - X(270, 180)`."""
+        letter, operator = self.coordinate.upper(), "-" if self.sign < 0 else "+"
+        return f"{letter}{_pose(self.first)} {operator} {letter}{_pose(self.second)}"
+
+    @property
+    def terms(self) -> int:
+        """How long it is."""
+        return sum(len(poly) for poly in self.coefficients.values()) + len(self.constant)
+
+
+def _pose(pose: Pose) -> str:
+    return f"({', '.join(map(str, pose))})"
+
+
+def equations(
+    derivation: Derivation,
+    angles: Sequence[int] = RIGHT_ANGLES,
+    zero: Iterable[str] = (),
+    signs: Sequence[int] = (-1, 1),
+) -> tuple[Equation, ...]:
+    """All differences (sign -1) and sums (1) of every coordinate over every pair of poses.
+
+    angles  degrees that each rotary axis takes
+    zero    names of errors assumed to be zero
+    An error that depends on a rotary axis is another unknown at each of its positions.
+    """
+    axes = [variable.symbol for variable in derivation.chain.axes if variable.rotary]
+    poses = list(product(angles, repeat=len(axes)))
+    readings = [_reading(derivation, dict(zip(axes, pose, strict=True)), set(zero)) for pose in poses]
+    algebra = Algebra(sp.expand(e) for reading in readings for linear in reading for e in linear.values())
+    polys = [[{key: algebra.poly(e) for key, e in linear.items()} for linear in reading] for reading in readings]
+    found = []
+    for sign, (first, second), k in product(signs, combinations(range(len(poses)), 2), range(len(POSITION))):
+        total = _combined(algebra, polys[first][k], polys[second][k], sign)
+        constant = total.pop(sp.S.One, algebra.ring.zero)
+        found.append(Equation(algebra, POSITION[k], poses[first], poses[second], sign, total, constant))
+    return tuple(found)
+
+
+def _reading(derivation: Derivation, pose: Mapping[sp.Expr, int], zero: set[str]) -> list[dict[sp.Expr, sp.Expr]]:
+    """Per coordinate: the nominal value under 1, and the coefficient of each error."""
+    values = {axis: sp.pi * sp.Rational(degrees, 180) for axis, degrees in pose.items()}
+    wanted = {i for i, variable in enumerate(derivation.chain.smalls) if variable.name not in zero}
+    found = []
+    for coordinate in POSITION:
+        linear = {sp.S.One: derivation.nominal[coordinate].subs(values)}
+        for key, coefficient in derivation.terms[f"d{coordinate}"].items():
+            if len(key) == 1 and key[0] in wanted:
+                linear[derivation.monomial(key).subs(values)] = coefficient.subs(values)
+        found.append(linear)
+    return found
+
+
+def _combined(
+    algebra: Algebra, first: Mapping[sp.Expr, Poly], second: Mapping[sp.Expr, Poly], sign: int
+) -> dict[sp.Expr, Poly]:
+    zero = algebra.ring.zero
+    total = {key: first.get(key, zero) + sign * second.get(key, zero) for key in {**first, **second}}
+    return {key: poly for key, poly in total.items() if poly}
+
+
+Choose = Callable[[Sequence[Equation]], Equation]
+
+
+def shortest(candidates: Sequence[Equation]) -> Equation:
+    """Of equations with equally many unknowns the one with the fewest terms; the first of those."""
+    return min(candidates, key=lambda equation: equation.terms)
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """A step of the protocol: measure, and find an error from those found before.
+
+    identifies  the error; or the errors that only show up together, as one expression
+    equations   one, or several that are solved together
+    """
+
+    identifies: sp.Expr
+    equations: tuple[Equation, ...]
+
+
+def simplest(
+    system: Iterable[Equation], wanted: sp.Expr | None = None, known: Iterable[sp.Expr] = ()
+) -> list[Equation]:
+    """The equations with the fewest unknowns that are not known yet; `wanted`: those that have this one."""
+    done = frozenset(known)
+    open_ones = [(equation.unknowns - done, equation) for equation in system]
+    useful = [(rest, equation) for rest, equation in open_ones if rest and (wanted is None or wanted in rest)]
+    fewest = min((len(rest) for rest, _ in useful), default=0)
+    return [equation for rest, equation in useful if len(rest) == fewest]
+
+
+def protocol(system: Sequence[Equation], choose: Choose = shortest) -> tuple[Identification, ...]:
+    """Identify one error after the other, each from the simplest equation that is left.
+
+    Errors that all these equations only have together are identified as one combination. Where no equation has a
+    single unknown, several are solved together.
+    """
+    unknowns = sorted(frozenset[sp.Expr]().union(*(equation.unknowns for equation in system)), key=sp.default_sort_key)
+    if not unknowns:
+        return ()
+    columns = _columns(system, unknowns)
+    titles = {unknowns[pivot]: combination for pivot, combination in columns.combinations(unknowns).items()}
+    known = set(unknowns) - titles.keys()
+    tests: list[Identification] = []
+    while candidates := simplest(system, known=known):
+        solved, used = _solvable(system, choose(candidates), known)
+        tests += [Identification(titles[unknown], used) for unknown in solved]
+        known |= set(solved)
+    return tuple(tests)
+
+
+def _columns(system: Sequence[Equation], unknowns: Sequence[sp.Expr]) -> PolynomialColumns:
+    """A column per unknown, a row per equation."""
+    columns: list[dict[Hashable, Poly]] = [{} for _ in unknowns]
+    for equation in system:
+        for column, unknown in zip(columns, unknowns, strict=True):
+            if unknown in equation.coefficients:
+                column[equation] = equation.coefficients[unknown]
+    return PolynomialColumns(system[0].algebra, columns)
+
+
+def _solvable(
+    system: Sequence[Equation], first: Equation, known: set[sp.Expr]
+) -> tuple[list[sp.Expr], tuple[Equation, ...]]:
+    """The fewest unknowns, with those of the first equation, for which there are as many independent equations."""
+    unknowns = sorted(first.unknowns - known, key=sp.default_sort_key)
+    if len(unknowns) == 1:
+        return unknowns, (first,)
+    useful = sorted((equation for equation in system if equation.unknowns - known), key=lambda equation: equation.terms)
+    while True:
+        fitting = [first, *(e for e in useful if e is not first and e.unknowns - known <= set(unknowns))]
+        rows = _columns(fitting, unknowns).independent_rows
+        if len(rows) == len(unknowns):
+            return unknowns, tuple(row for row in rows if isinstance(row, Equation))
+        more = min((e.unknowns - known - set(unknowns) for e in useful if e not in fitting), key=len)
+        unknowns = sorted({*unknowns, *more}, key=sp.default_sort_key)
+
+
+def report(tests: Iterable[Identification]) -> str:
+    """The protocol as text: what each test identifies, and its equations."""
+    lines = []
+    for number, test in enumerate(tests, 1):
+        lines.append(f"{number:3}. {test.identifies}")
+        lines += [f"       {equation.measurement} = {equation.expression}" for equation in test.equations]
+    return "\n".join(lines) + "\n"
+
+
+def measuring(derivation: Derivation, vary: Iterable[str] = ()) -> str:
+    """Rank and inseparable combinations, without and with lengths varied (`vary`), then a protocol of differences."""
+    return "".join(_parts(derivation, list(vary)))
+
+
+def _parts(derivation: Derivation, vary: list[str]) -> Iterator[str]:
+    chain = derivation.chain
+    axes = [axis.name for axis in chain.axes]
+    yield f"{chain.name}: what the position of the tool tip tells\n"
+    yield f"\nwith {', '.join(axes)} varied: {identifiable(derivation).to_text()}"
+    for name in vary:
+        if any(dimension.name == name for dimension in chain.dimensions):
+            yield f"\nwith {name} varied, too: {identifiable(derivation, [*axes, name]).to_text()}"
+    rotary = [axis.name for axis in chain.axes if axis.rotary]
+    if rotary:
+        yield f"\nDifferences of readings at ({', '.join(rotary)}), degrees, everything else standing still\n"
+        yield report(protocol(equations(derivation, signs=(-1,))))
