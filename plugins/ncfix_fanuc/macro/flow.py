@@ -9,14 +9,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ncfix.control.faults import Fault
+from ncfix.control.parts import NotInPartsError
 from ncfix_fanuc.macro import builder
 from ncfix_fanuc.macro.arithmetic import number
 from ncfix_fanuc.macro.outline import Outline
 from ncfix_iso.rs274.control import Control
 from ncfix_iso.rs274.flow import NO_SUBPROGRAM, TOO_DEEP
 from ncfix_iso.rs274.parameters import Store
-from ncfix_iso.rs274.plans import FlowLine, has_words
-from ncfix_iso.rs274.unit import Unit
+from ncfix_iso.rs274.plans import FlowLine, RS274Unit, has_words
 
 MAX_CALLS = 15
 """Calls that may be nested: ten of subprograms, five of macros."""
@@ -36,9 +36,9 @@ class Call:
     """
 
     label: str
-    unit: Unit
+    unit: RS274Unit
     block: int
-    entry: tuple[Unit, int]
+    entry: tuple[RS274Unit, int]
     remaining: int
     arguments: Store | None
 
@@ -49,11 +49,17 @@ class MacroFlow:
     unit, block  what is executed next
     passed       the condition of the last IF .. THEN held
     skipping     always None: nothing is looked for line by line here
+    in_parts     only a part of the text is known; `heads`: numbers and names of the program itself
+    looked       a subprogram has been looked for
     """
 
     skipping: str | None = None
 
-    def __init__(self, control: Control, main: Unit, find: Callable[[str], Unit | None]) -> None:
+    def __init__(
+        self, control: Control, main: RS274Unit, find: Callable[[str], RS274Unit | None], *, in_parts: bool = False
+    ) -> None:
+        self.in_parts, self.looked = in_parts, False
+        self.heads: frozenset[str] = frozenset()
         self.control = control
         self.main = main
         self.find = find
@@ -61,7 +67,6 @@ class MacroFlow:
         self.block = 0
         self.calls: list[Call] = []
         self.passed = False
-        self.skipping_from: tuple[Unit, int] = (main, 0)
         self.outlines: dict[int, Outline] = {}
         self.handlers: dict[str, Callable[[FlowLine], None]] = {
             "program": self.program,
@@ -77,17 +82,26 @@ class MacroFlow:
         """The outline of the text that is executed."""
         return self.outline_of(self.unit)
 
-    def outline_of(self, unit: Unit) -> Outline:
+    def outline_of(self, unit: RS274Unit) -> Outline:
         """The outline of a text."""
         if id(unit) not in self.outlines:
             self.outlines[id(unit)] = Outline(unit)
         return self.outlines[id(unit)]
 
+    def begin_at_heads(self, main: RS274Unit) -> None:
+        """Take the next part; raises `NotInPartsError` if another program begins in it."""
+        self.main = main
+        self.outlines.clear()
+        outline = self.outline_of(main)
+        if len(outline.starts) + len(self.heads) > 1:
+            raise NotInPartsError("the text holds several programs")
+        self.heads |= outline.programs.keys()
+
     # -- what the interpreter asks ------------------------------------------------------------------------------------
 
-    def next_flow(self) -> bool:
-        """Nothing is ever skipped line by line."""
-        return False
+    def arrive(self) -> bool:
+        """See `Interpreter`."""
+        return self.block < self.unit.stop
 
     def follow(self, flow: FlowLine) -> None:
         """Do what a statement says; `block` is already that of the next line."""
@@ -109,7 +123,7 @@ class MacroFlow:
         if self.calls:
             raise self.missing_end()
         if here != self.outline.starts[0]:
-            self.block = len(self.unit)
+            self.block = self.unit.stop
 
     def jump(self, flow: FlowLine) -> None:
         """GOTO n."""
@@ -183,8 +197,11 @@ class MacroFlow:
             self.control.parameters.scopes.append(fresh)
         self.unit, self.block = call.entry
 
-    def entry(self, label: str) -> tuple[Unit, int]:
+    def entry(self, label: str) -> tuple[RS274Unit, int]:
         """The text and block at which a program begins, after its O-word."""
+        self.looked = True
+        if label in self.heads:
+            raise NotInPartsError("the program calls itself")
         for unit in (self.unit, self.main):
             at = self.outline_of(unit).programs.get(label)
             if at is not None and has_words(unit.plan(at)):
@@ -192,6 +209,8 @@ class MacroFlow:
             if at is not None:
                 return unit, at + 1
         file = self.find(label)
+        if file is None and self.in_parts:
+            raise NotInPartsError("a subprogram may stand further down")
         if file is None:
             hint = "it is looked for in the file, in files beside it, and where --subprograms DIR says"
             raise Fault(NO_SUBPROGRAM, f"there is no program O{label}", hint)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z
 from ncfix.control.faults import Fault
+from ncfix.control.parts import NotInPartsError
 from ncfix.control.places import mask_of
+from ncfix.text.language import Run
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import dynamic, polar, scaling, system, vectors
 from ncfix_fanuc.macro.arithmetic import variable_number
@@ -23,10 +25,10 @@ from ncfix_fanuc.macro.rules import MACRO
 from ncfix_fanuc.macro.variables import POSITION_READ, is_system
 from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.control import Block
-from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
+from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, RS274Interpreter
 from ncfix_iso.rs274.order import MACHINE
 from ncfix_iso.rs274.parameters import Store
-from ncfix_iso.rs274.plans import Codes, Plan, plan_of
+from ncfix_iso.rs274.plans import Codes, Plan, RS274Unit, plan_of
 
 G20, G21, G90, G91 = 200, 210, 900, 910
 G65, G66_1, G67 = 650, 661, 670
@@ -56,20 +58,14 @@ class ModalCall:
     depth: int
 
 
-class MacroInterpreter(Interpreter):
+class MacroInterpreter(RS274Interpreter):
     """Follows one program."""
 
     control: MacroControl
     flow: MacroFlow
 
-    def __init__(
-        self,
-        control: MacroControl,
-        program: Program,
-        resolve: Callable[[str], bytes | None] | None,
-        max_blocks: int,
-    ) -> None:
-        super().__init__(control, program, resolve, max_blocks)
+    def __init__(self, control: MacroControl, program: Program, run: Run, *, in_parts: bool = False) -> None:
+        super().__init__(control, program, run, in_parts=in_parts)
         self.modal_calls: list[ModalCall] = []
         self.reduced: dict[tuple[int, frozenset[Span]], Plan] = {}
         self.moved = False
@@ -85,18 +81,28 @@ class MacroInterpreter(Interpreter):
         control.parameters.unset = self.not_set
         control.parameters.inherits = is_called(self.main.program)
         control.coming = self.coming
-        return MacroFlow(control, self.main, self.find)
+        flow = MacroFlow(control, self.main, self.find, in_parts=self.in_parts)
+        if self.in_parts:
+            flow.begin_at_heads(self.main)
+        return flow
+
+    def next_part(self, program: Program, blocks: int) -> None:
+        """See `Interpreter`."""
+        super().next_part(program, blocks)
+        self.flow.begin_at_heads(self.main)
 
     def coming(self) -> Iterator[Template]:
         """The shapes of the blocks that follow in the text."""
         unit = self.flow.unit
-        return (unit.program.templates[unit.program.template[block]] for block in range(self.flow.block, len(unit)))
+        yield from (unit.program.templates[unit.template[block]] for block in range(self.flow.block, unit.stop))
+        if unit is self.main and not self.last:
+            raise NotInPartsError("what follows a tool length is in the next part")
 
-    def takes_stretches(self) -> bool:
+    def lane_is_open(self, plan: Plan) -> bool:
         """Not while a macro is called after every motion, words are polar or directions, or a corner is put in."""
         control = self.control
         special = control.polar is not None or control.scaling is not None or control.vectors
-        return super().takes_stretches() and not (special or self.modal_calls or self.cornered)
+        return super().lane_is_open(plan) and not (special or self.modal_calls or self.cornered)
 
     def position_read(self, number: int) -> None:
         """The program reads where the machine stands, which compensation changes."""
@@ -110,14 +116,14 @@ class MacroInterpreter(Interpreter):
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
-    def execute(self, plan: Plan) -> bool:
-        """Execute the block before `flow.block`; True if the program ends there."""
-        block, self.flow.passed = self.flow.block, False
-        ended = super().execute(plan)
-        if plan.flow is None or self.flow.block != block:
+    def execute(self, plan: Plan, unit: RS274Unit, block: int) -> bool:
+        """Execute a block; True if the program ends there."""
+        self.flow.passed = False
+        ended = super().execute(plan, unit, block)
+        if plan.flow is None or self.flow.block != block + 1:
             return ended
         if plan.flow.keyword == "if then" and self.flow.passed:
-            return self.execute_words(plan, block - 1)
+            return self.execute_words(plan, block)
         return ended
 
     def execute_words(self, plan: Plan, index: int) -> bool:
@@ -311,6 +317,7 @@ class MacroInterpreter(Interpreter):
 
     def is_there(self, label: str) -> bool:
         """Whether there is a program of that number."""
+        self.flow.looked = True
         outline = self.flow.outline_of(self.main)
         return label in outline.programs or self.find(label) is not None
 

@@ -38,7 +38,7 @@ def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
 def following(program: Program, run: Run) -> MacroInterpreter:
     """The control's walk through a program, before its first step."""
     control = MacroControl(run, program.dialect)
-    return MacroInterpreter(control, program, run.resolve, run.budget(program))
+    return MacroInterpreter(control, program, run)
 
 
 def follow(program: Program, run: Run) -> Trace:

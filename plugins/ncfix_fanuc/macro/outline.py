@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.text.tree import Comment, Flow, Literal, Opaque, Span, Template
-from ncfix_iso.rs274.unit import Unit
+from ncfix_iso.rs274.plans import RS274Unit
 
 
-def named_programs(unit: Unit) -> dict[int, str]:
+def named_programs(unit: RS274Unit) -> dict[int, str]:
     """The blocks that begin a program with a name: `<NAME>` stands alone there."""
     program = unit.program
     heads = {shape: span for shape, t in enumerate(program.templates) if (span := head_of(t)) is not None}
@@ -37,7 +37,7 @@ class Outline:
     numbers   (n,) the N word of each block, NaN without
     """
 
-    unit: Unit
+    unit: RS274Unit
     programs: dict[str, int] = field(default_factory=dict)
     starts: list[int] = field(default_factory=list)
     partner: dict[int, int] = field(default_factory=dict)
@@ -78,7 +78,7 @@ class Outline:
         """The first block of the program that `block` stands in, and the one after its last."""
         at = bisect_right(self.starts, block)
         first = self.starts[at - 1] if at else 0
-        return first, self.starts[at] if at < len(self.starts) else len(self.unit)
+        return first, self.starts[at] if at < len(self.starts) else self.unit.stop
 
     def numbered(self, number: int, block: int) -> int | None:
         """The block with that N word in the program that `block` stands in: the next one, else the first."""

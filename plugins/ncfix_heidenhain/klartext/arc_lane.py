@@ -19,7 +19,7 @@ from ncfix.control.stage import words
 from ncfix_heidenhain.klartext.arcs import BAD_ARC, FLAT
 from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.targets import arm, pole_frame
-from ncfix_heidenhain.klartext.units import Unit
+from ncfix_heidenhain.klartext.units import KlartextUnit
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -38,7 +38,7 @@ class Arc(NamedTuple):
     pole: Point | None
 
 
-def turned(control: Control, unit: Unit, start: int, path: FloatArray, motion: IntArray) -> tuple[Circles, int]:
+def turned(control: Control, unit: KlartextUnit, start: int, path: FloatArray, motion: IntArray) -> tuple[Circles, int]:
     """The circles of the arcs of a stretch that begins with a block, and how many blocks run before one it cannot take.
 
     path    (n + 1, 9) commands before the first block and at the end of each; put right behind a CP, which says by an
@@ -65,7 +65,7 @@ def turned(control: Control, unit: Unit, start: int, path: FloatArray, motion: I
 
 
 def arcs_of(
-    control: Control, unit: Unit, start: int, shapes: NDArray[np.int32], rows: IntArray, motion: IntArray
+    control: Control, unit: KlartextUnit, start: int, shapes: NDArray[np.int32], rows: IntArray, motion: IntArray
 ) -> list[Arc]:
     """What the blocks of arcs `rows` (k,) say."""
     program, lanes, first = unit.program, unit.lanes, unit.program.first_number[start + rows]
@@ -86,7 +86,7 @@ def arcs_of(
 
 
 def poles_of(
-    control: Control, unit: Unit, start: int, shapes: NDArray[np.int32]
+    control: Control, unit: KlartextUnit, start: int, shapes: NDArray[np.int32]
 ) -> tuple[IntArray, tuple[FloatArray, FloatArray]]:
     """Which blocks of a stretch set a pole (CC), and where: mm along X and Y of the program's frame."""
     slots = unit.lanes.pole[shapes]
@@ -137,7 +137,7 @@ class Swung:
     path  (n + 1, 9) as in `turned`
     """
 
-    def __init__(self, unit: Unit, path: FloatArray, shapes: NDArray[np.int32]) -> None:
+    def __init__(self, unit: KlartextUnit, path: FloatArray, shapes: NDArray[np.int32]) -> None:
         self.path = path
         turning = (unit.lanes.arc == "cp")[shapes]
         told = [(unit.lanes.words.axes[shapes, axis] >= 0) | turning for axis in (X, Y)] if turning.any() else []
@@ -150,7 +150,7 @@ class Swung:
             self.path[row + 1 : stop + 1, axis] = end[axis]
 
 
-def keep_pole(control: Control, unit: Unit, start: int, shapes: NDArray[np.int32]) -> None:
+def keep_pole(control: Control, unit: KlartextUnit, start: int, shapes: NDArray[np.int32]) -> None:
     """The last pole that a stretch from block `start` on sets is in force behind it."""
     _, (x, y) = poles_of(control, unit, start, shapes)
     if len(x):

@@ -15,7 +15,7 @@ from ncfix_heidenhain.klartext.control import FREELY, Control
 from ncfix_heidenhain.klartext.free import Element, Leg, solved
 from ncfix_heidenhain.klartext.step import IN_PLANE, somewhere
 from ncfix_heidenhain.klartext.targets import command_of, here, pole_frame
-from ncfix_heidenhain.klartext.units import Unit
+from ncfix_heidenhain.klartext.units import KlartextUnit
 
 FREE_CONTOUR = "free contour programming (FK): the control works out the contour from what is known of it"
 WRITTEN_OUT = "a free contour (FK): --flatten writes it as lines and arcs"
@@ -36,22 +36,22 @@ OF_LINES, OF_ARCS = frozenset({"X", "Y", "AN", "LEN"}), frozenset({"X", "Y", "CC
 CORNERS = frozenset({"rnd", "chf"})
 
 
-def leg_of(control: Control, unit: Unit, block: int) -> Leg | None:
+def leg_of(control: Control, unit: KlartextUnit, block: int) -> Leg | None:
     """The element of a block, worked out from where the control stands; None if its contour is not certain."""
     known = control.path.free
-    if (unit.name, block) not in known:
+    if (unit.external, block) not in known:
         known.clear()
         known |= worked_out(control, unit, block)
-    return known[unit.name, block]
+    return known[unit.external, block]
 
 
-def follow_free(control: Control, unit: Unit, block: int) -> None:
+def follow_free(control: Control, unit: KlartextUnit, block: int) -> None:
     """An element of a free contour, which is refused: as for an arc, it matters where the motion before it ends.
 
     It lies in the working plane: only X and Y of the frame are not known after one that is not certain.
     """
     leg = leg_of(control, unit, block)
-    control.path.free.pop((unit.name, block))
+    control.path.free.pop((unit.external, block))
     where = here(control)
     if leg is None:
         where.unknown |= {X: FREELY, Y: FREELY}
@@ -66,10 +66,10 @@ def follow_free(control: Control, unit: Unit, block: int) -> None:
 # -- from blocks to elements ------------------------------------------------------------------------------------------
 
 
-def worked_out(control: Control, unit: Unit, first: int) -> dict[tuple[str, int], Leg | None]:
+def worked_out(control: Control, unit: KlartextUnit, first: int) -> dict[tuple[str, int], Leg | None]:
     """The contour that begins with a block."""
     blocks = list(blocks_of_contour(unit, first))
-    keys = [(unit.name, block) for block in blocks]
+    keys = [(unit.external, block) for block in blocks]
     control.settle((X, Y))
     lost = X in control.unknown or Y in control.unknown or changes_pole(control)
     if lost or control.cycle.modal or any(unit.plan(block).skip for block in blocks):
@@ -82,9 +82,9 @@ def worked_out(control: Control, unit: Unit, first: int) -> dict[tuple[str, int]
     return dict.fromkeys(keys) if legs is None else dict(zip(keys, legs, strict=True))
 
 
-def blocks_of_contour(unit: Unit, first: int) -> Iterator[int]:
+def blocks_of_contour(unit: KlartextUnit, first: int) -> Iterator[int]:
     """The elements of a contour: block after block, with corners between them."""
-    for block in range(first, len(unit)):
+    for block in range(first, unit.stop):
         plan = unit.plan(block)
         if plan.statement is not None and FUNCTION.match(statement_text(unit, block)):
             yield block
@@ -92,7 +92,7 @@ def blocks_of_contour(unit: Unit, first: int) -> Iterator[int]:
             return
 
 
-def statement_text(unit: Unit, block: int) -> str:
+def statement_text(unit: KlartextUnit, block: int) -> str:
     """What stands in a block without its number and remarks."""
     statement = unit.plan(block).statement
     assert statement is not None
@@ -165,7 +165,7 @@ def others_of(text: str) -> str:
 # -- written out ------------------------------------------------------------------------------------------------------
 
 
-def written_out(control: Control, unit: Unit, block: int, place: Callable[[complex], str]) -> list[str]:
+def written_out(control: Control, unit: KlartextUnit, block: int, place: Callable[[complex], str]) -> list[str]:
     """An element as plain blocks, which leave the pole as it was; none where it is not certain.
 
     place  a point as words

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from ncfix.control.faults import Fault
 from ncfix.control.recurrence import Budget
 from ncfix_heidenhain.klartext.calculate import Parameters
-from ncfix_heidenhain.klartext.units import Unit
+from ncfix_heidenhain.klartext.units import KlartextUnit
 
 NO_LABEL = "NCF276"
 NO_PROGRAM = "NCF231"
@@ -25,7 +25,7 @@ MOST_CALLS = 64
 class Call:
     """Where a call came from, whether it was to another program, and if so the QL parameters of the caller."""
 
-    unit: Unit
+    unit: KlartextUnit
     block: int
     outside: bool
     local: Mapping[str, tuple[float, bool]] = field(default_factory=dict)
@@ -43,14 +43,18 @@ class FlowControl:
     selected     the program that CALL SELECTED PGM calls; empty where it is chosen at run time
     """
 
-    unit: Unit
-    find: Callable[[str], Unit | None]
+    unit: KlartextUnit
+    find: Callable[[str], KlartextUnit | None]
     parameters: Parameters
     budget: Budget
     block: int = 0
     calls: list[Call] = field(default_factory=list)
     repeats: dict[tuple[int, int], int] = field(default_factory=dict)
     selected: str = ""
+
+    def arrive(self) -> bool:
+        """See `Interpreter`."""
+        return self.block < self.unit.stop
 
     def jump(self, label: str) -> None:
         """Go on at a label."""

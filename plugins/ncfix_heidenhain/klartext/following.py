@@ -9,7 +9,6 @@ next, is taken as a whole, too.
 from __future__ import annotations
 
 import math
-import re
 
 import numpy as np
 
@@ -20,16 +19,10 @@ from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix.text.tree import Command, Program, Template
 from ncfix_heidenhain.klartext.control import Control
-from ncfix_heidenhain.klartext.flow import FlowControl
-from ncfix_heidenhain.klartext.interpreter import Interpreter
+from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import axis_numbers, poles_move
-from ncfix_heidenhain.klartext.plans import Plan
 from ncfix_heidenhain.klartext.poles import relies_at_once
 from ncfix_heidenhain.klartext.turns import FULL
-
-ELSEWHERE = re.compile(r"CALL\b|SEL\s+PGM\b|F(LT?|CT?)(?=\s|$)", re.IGNORECASE)
-"""Statements that lead to other programs, or depend on what follows: elements of free contours (FK)."""
-
 
 POLES = frozenset({"c", "cc", "cp", "ctp", "lp"})
 """Path functions that set a pole or go by one; approaches and departures in polar words do, too."""
@@ -39,44 +32,6 @@ def has_to_do_with_poles(template: Template) -> bool:
     """Whether blocks of a shape set a pole or may go by one."""
     names = (item.name for item in template.items if isinstance(item, Command))
     return any(name in POLES or name.startswith(("appr p", "dep p")) for name in names)
-
-
-class PartInterpreter(Interpreter):
-    """An interpreter whose text ends where the next part begins.
-
-    last   this is the last part
-    ended  the program has ended
-    """
-
-    last = False
-    ended = False
-
-    def next_part(self, program: Program) -> None:
-        """Take the next part."""
-        assert self.flow is not None
-        self.program = program
-        self.flow.unit, self.flow.block = self.flow.unit.followed_by(program), 0
-
-    def run_part(self, last: bool, max_blocks: int) -> None:
-        """Follow the part to its end, or to that of the program."""
-        self.control.budget.left = max_blocks
-        self.last, self.ended = last, True
-        with self.stopping():
-            self.walk(self.flow or self.begun())
-
-    def at_end_of_text(self) -> None:
-        """The text is over; that of the program only if it was the last part."""
-        if self.last:
-            super().at_end_of_text()
-        else:
-            self.ended = False
-
-    def state(self, plan: Plan, flow: FlowControl) -> bool:
-        """A statement that is not taken apart."""
-        assert plan.statement is not None
-        if ELSEWHERE.match(flow.unit.program.slice(flow.block - 1, plan.statement[1])):
-            raise NotInPartsError("the program calls others, or has free contours")
-        return super().state(plan, flow)
 
 
 class KlartextFollower(PartFollower):
@@ -100,9 +55,9 @@ class KlartextFollower(PartFollower):
         """What stands behind the end of the program may be its labels."""
         return True
 
-    def begin(self, program: Program) -> PartInterpreter:
+    def begin(self, program: Program) -> KlartextInterpreter:
         """What goes through the program, of which this is the first part."""
-        return PartInterpreter(self.control, program, self.resolve, self.budget(program))
+        return KlartextInterpreter(self.control, program, self.run, in_parts=True)
 
     def follow(self, program: Program, last: bool) -> Moves:
         """The motions of the next part."""

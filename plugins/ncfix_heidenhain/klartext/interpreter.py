@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from typing import Protocol
 
 from ncfix.control.coordinates import INDEX
 from ncfix.control.faults import Fault
+from ncfix.control.interpreter import NO_END, Interpreter
+from ncfix.control.parts import NotInPartsError
 from ncfix.control.places import mask_of
-from ncfix.control.recurrence import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.diagnostics import Place, SourceError
-from ncfix.text.language import Resolve
+from ncfix.text.language import Run
 from ncfix.text.reach import UNREAD
-from ncfix.text.reader import read
-from ncfix.text.tree import Opaque, Program, Span
+from ncfix.text.tree import Opaque, Program
 from ncfix_heidenhain.klartext import cycles, lines, tilting, trans_cycles
 from ncfix_heidenhain.klartext.calculate import Evaluate
 from ncfix_heidenhain.klartext.codes import after_motion, before_motion
@@ -30,14 +29,16 @@ from ncfix_heidenhain.klartext.statements import statement
 from ncfix_heidenhain.klartext.step import Step, refuse
 from ncfix_heidenhain.klartext.targets import Words, axis_letters, set_pole
 from ncfix_heidenhain.klartext.tools import call_tool, define_tool
-from ncfix_heidenhain.klartext.units import Unit
+from ncfix_heidenhain.klartext.units import KlartextUnit
 from ncfix_heidenhain.klartext.unread import unread_line
 
-NO_END = "NCF234"
 WRITTEN_AT_RUN_TIME = "NCF237"
 AT_RUN_TIME = "NCF277"
 ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
 SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
+ELSEWHERE = re.compile(r"CALL\b|SEL\s+PGM\b|F(LT?|CT?)(?=\s|$)", re.IGNORECASE)
+"""Statements that lead to other programs, or depend on what follows: elements of free contours (FK)."""
+
 NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "NZ"})
 """Addresses in motion blocks that lead nowhere."""
 
@@ -45,119 +46,76 @@ NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "
 class Recorder(Protocol):
     """Takes note of blocks that are executed; see `unroll`."""
 
-    def note(self, unit: Unit, block: int, control: Control, row: int) -> None:
+    def note(self, unit: KlartextUnit, block: int, control: Control, row: int) -> None:
         """A block is about to be executed; `row` is the block of the main program that led to it."""
 
 
-class Interpreter:
+class KlartextInterpreter(Interpreter[KlartextUnit]):
     """Follows one program."""
 
-    def __init__(self, control: Control, program: Program, resolve: Resolve | None, max_blocks: int) -> None:
-        self.control = control
-        self.resolve = resolve
-        control.budget.left = max_blocks
-        self.recurrence = Recurrence()
-        self.files: dict[str, Unit | None] = {}
-        self.program = program
-        self.flow: FlowControl | None = None
-        self.recorder: Recorder | None = None
-        self.span: Span | None = None
+    control: Control
+    flow: FlowControl
+    recorder: Recorder | None
+
+    def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
+        super().__init__(control, program, run, in_parts=in_parts)
         self.axes = mask_of(control.machine)
-        self.no_lane: tuple[Unit | None, range] = None, range(0)
-        control.locate = self.place
-
-    def place(self) -> Place:
-        """Where in the program we are."""
-        if self.flow is None or self.flow.block == 0:
-            return Place(self.program.path, 1)
-        return self.flow.unit.program.place(self.flow.block - 1, self.span)
-
-    def find(self, name: str) -> Unit | None:
-        """The program of a call: beside this one, by its name without folders."""
-        if name not in self.files:
-            base = re.split(r"[\\/:]", name.strip().strip('"'))[-1]
-            tries = (base, SUFFIX.sub("", base), base + ".h", base + ".H", base.lower(), base.upper())
-            found = ((each, self.resolve(each)) for each in tries if self.resolve)
-            programs = ((each, read(text, each, self.program.dialect)) for each, text in found if text)
-            units = (Unit(program, self.axes, each) for each, program in programs)
-            self.files[name] = next(units, None)
-        return self.files[name]
-
-    def run(self) -> None:
-        """Follow the program to its end; raises SourceError where the control would stop."""
-        with self.stopping():
-            self.walk(self.begun())
-
-    @contextmanager
-    def stopping(self) -> Iterator[None]:
-        """What the control stops at is a SourceError with its place."""
+        self.no_lane: tuple[KlartextUnit | None, range] = None, range(0)
+        control.locate = lambda: Place(program.path, 1)
         try:
-            yield
+            self.main = KlartextUnit(program, self.axes)
         except Fault as fault:
-            self.span = fault.span or self.span
-            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+            raise SourceError.of(fault.code, fault.text, control.locate(), fault.hint) from None
+        self.flow = FlowControl(self.main, self.find, control.scope.parameters, control.budget, self.main.begin)
+        control.locate = self.place
+        control.unit = self.main.mm
+        control.recompose()
 
-    def begun(self) -> FlowControl:
-        """The program before its first block."""
-        main = Unit(self.program, self.axes)
-        self.flow = FlowControl(main, self.find, self.control.scope.parameters, self.control.budget, main.begin)
-        self.control.unit = main.mm
-        self.control.recompose()
-        return self.flow
+    def spellings(self, name: str) -> Iterable[str]:
+        """See `Interpreter`: beside this program, without folders."""
+        base = re.split(r"[\\/:]", name.strip().strip('"'))[-1]
+        return base, SUFFIX.sub("", base), base + ".h", base + ".H", base.lower(), base.upper()
 
-    def walk(self, flow: FlowControl) -> None:
-        """Block after block."""
-        control = self.control
-        while flow.block < len(flow.unit):
-            unit, block = flow.unit, flow.block
-            plan = unit.plan(block)
-            if self.takes_stretch(flow):
-                continue
-            flow.block += 1
-            if plan.empty:
-                continue
-            control.budget.spend(1)
-            control.scope.numbers, control.scope.first = unit.numbers, unit.first[block]
-            control.external = unit.name
-            if not unit.name:
-                control.row_block = block
-            if plan.skip is not None and control.is_deleted(plan.skip):
-                continue
-            if self.recorder is not None:
-                self.recorder.note(unit, block, control, control.row_block)
-            if self.execute(plan, flow):
-                return
-            if flow.unit is unit and flow.block <= block:
-                self.look_round(flow, block)
-        self.at_end_of_text()
+    def text_of_file(self, source: bytes, name: str, spelling: str) -> KlartextUnit:
+        """See `Interpreter`."""
+        return KlartextUnit(self.read(source, spelling), self.axes, spelling)
 
-    def look_round(self, flow: FlowControl, block: int) -> None:
-        """A block has led back: raises `Fault` if the program goes round for ever."""
-        jump = id(flow.unit), block, flow.block, *flow.under_way()
-        if self.recurrence.seen(jump, flow.parameters.changes):
-            flow.block = block + 1
-            raise Fault(ENDLESS, NEVER_ENDS)
+    @property
+    def changes(self) -> int:
+        """See `Interpreter`."""
+        return self.control.scope.parameters.changes
 
-    def at_end_of_text(self) -> None:
+    def end_of_text(self) -> bool:
         """The text is over without END PGM."""
         self.control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
+        return False
 
-    def takes_stretch(self, flow: FlowControl) -> bool:
-        """Take plain motions many at once; whether any were."""
+    def take_stretch(self, plan: Plan) -> bool:
+        """See `Interpreter`; blocks that do nothing are passed over, too."""
+        if super().take_stretch(plan):
+            return True
+        self.flow.block += plan.empty
+        return plan.empty
+
+    def lane_is_open(self, plan: Plan) -> bool:
+        """See `Interpreter`."""
         unit, closed = self.no_lane
-        if self.recorder is not None or (unit is flow.unit and flow.block in closed):
-            return False
-        done, worth = run_lane(self.control, flow.unit, flow.block)
-        self.no_lane = flow.unit, range(flow.block + done, worth)
-        flow.block += done
-        self.control.budget.spend(done)
-        return done > 0
+        return self.recorder is None and not (unit is self.flow.unit and self.flow.block in closed)
+
+    def run_lane(self, unit: KlartextUnit, block: int, plan: Plan) -> int:
+        """See `Interpreter`."""
+        done, worth = run_lane(self.control, unit, block)
+        self.no_lane = unit, range(block + done, worth)
+        return done
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
-    def execute(self, plan: Plan, flow: FlowControl) -> bool:
+    def execute(self, plan: Plan, unit: KlartextUnit, block: int) -> bool:
         """Execute a block; True if the program ends there."""
-        control = self.control
+        control, flow = self.control, self.flow
+        control.scope.numbers, control.scope.first = unit.numbers, unit.first[block]
+        if self.recorder is not None:
+            self.recorder.note(unit, block, control, control.row_block)
         if plan.statement is not None:
             return self.state(plan, flow)
         if plan.flow is not None:
@@ -183,6 +141,8 @@ class Interpreter:
         assert plan.statement is not None
         kind, span = plan.statement
         text = flow.unit.program.slice(flow.block - 1, span)
+        if self.in_parts and ELSEWHERE.match(text):
+            raise NotInPartsError("the program calls others, or has free contours")
         if kind == UNREAD:
             unread_line(self.control, flow.unit.program.text_of(flow.block - 1))
         elif kind == "program":

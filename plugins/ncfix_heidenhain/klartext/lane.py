@@ -26,7 +26,7 @@ from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.lane_tables import FEED, RAPID
 from ncfix_heidenhain.klartext.layout import CORNERS
 from ncfix_heidenhain.klartext.lines import FLAT
-from ncfix_heidenhain.klartext.units import Unit
+from ncfix_heidenhain.klartext.units import KlartextUnit
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -61,7 +61,7 @@ class Stage:
         )
 
 
-def run_lane(control: Control, unit: Unit, block: int) -> tuple[int, int]:
+def run_lane(control: Control, unit: KlartextUnit, block: int) -> tuple[int, int]:
     """Take the stretch that begins with a block.
 
     Returns how many blocks are taken, 0 for none, and the first block at which it is worth while to try again.
@@ -82,7 +82,7 @@ def run_lane(control: Control, unit: Unit, block: int) -> tuple[int, int]:
     return count, block + count
 
 
-def before_corner(unit: Unit, block: int, stop: int) -> int:
+def before_corner(unit: KlartextUnit, block: int, stop: int) -> int:
     """Where a stretch has to stop: the motion before a corner (RND, CHF) is no plain one."""
     following = unit.next_plan(stop)
     if following is None or following.name not in CORNERS:
@@ -102,7 +102,7 @@ def is_open(control: Control) -> bool:
     return known and plain and not (turned or special)
 
 
-def stage_of(control: Control, unit: Unit, start: int, stop: int) -> Stage:
+def stage_of(control: Control, unit: KlartextUnit, start: int, stop: int) -> Stage:
     """What the blocks of a stretch say, and where they lead."""
     program, tables = unit.program, unit.lanes
     shapes, first = program.template[start:stop], program.first_number[start:stop]
@@ -134,16 +134,16 @@ def count_beside(control: Control, stage: Stage) -> int:
     return int(np.argmax(ends)) if ends.any() else len(ends)
 
 
-def take(control: Control, stage: Stage, unit: Unit, block: int, circles: Circles) -> None:
+def take(control: Control, stage: Stage, unit: KlartextUnit, block: int, circles: Circles) -> None:
     """Add the motions of a stretch, `circles` those of its arcs, and leave the control as they leave it."""
     shapes = unit.program.template[block : block + len(stage.feed)]
     control.suspended.pop("M130", None)
-    control.external, control.tilted = unit.name, False
+    control.external, control.tilted = unit.external, False
     last = block + len(stage.feed) - 1
-    control.row_block = control.row_block if unit.name else last
+    control.row_block = control.row_block if unit.external else last
     moving = np.flatnonzero(stage.mask != 0)
     if len(moving):
-        blocks = np.full(len(moving), control.row_block) if unit.name else block + moving
+        blocks = np.full(len(moving), control.row_block) if unit.external else block + moving
         mask, starts, ends = stage.mask[moving], stage.path[:-1][moving], stage.path[1:][moving]
         styles = styles_of(control, stage.motion[moving], stage.side[moving], (unit.lanes.arc == "cp")[shapes[moving]])
         control.places.begun = True

@@ -14,7 +14,7 @@ from ncfix_heidenhain.klartext.blocks import parse_block
 from ncfix_heidenhain.klartext.bulk import in_bulk, one_by_one
 from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.following import KlartextFollower
-from ncfix_heidenhain.klartext.interpreter import Interpreter
+from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import layout_of, uses_comma
 from ncfix_heidenhain.klartext.numbering import renumbered
 from ncfix_heidenhain.klartext.render import render
@@ -22,10 +22,10 @@ from ncfix_heidenhain.klartext.shapes import scan, split
 from ncfix_heidenhain.klartext.unroll import unrolled
 
 
-def following(program: Program, run: Run) -> Interpreter:
+def following(program: Program, run: Run) -> KlartextInterpreter:
     """The control's walk through a program, before its first step."""
     control = Control(run, program.dialect)
-    return Interpreter(control, program, run.resolve, run.budget(program))
+    return KlartextInterpreter(control, program, run)
 
 
 def follow(program: Program, run: Run) -> Trace:

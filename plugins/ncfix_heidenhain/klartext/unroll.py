@@ -17,11 +17,11 @@ from ncfix_heidenhain.klartext.calculate import Scope, compiled
 from ncfix_heidenhain.klartext.contours import written_out
 from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING
-from ncfix_heidenhain.klartext.interpreter import Interpreter
+from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.number_text import Style
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
 from ncfix_heidenhain.klartext.plans import Plan
-from ncfix_heidenhain.klartext.units import Unit
+from ncfix_heidenhain.klartext.units import KlartextUnit
 
 LEAST = 4
 """Digits after the point of positions, as the control takes them; more where the least increment asks for it."""
@@ -54,16 +54,16 @@ class Recorder:
     style: Style
     out: FlatLines
 
-    def note(self, unit: Unit, block: int, control: Control, row: int) -> None:
+    def note(self, unit: KlartextUnit, block: int, control: Control, row: int) -> None:
         """Write down a block that is about to be executed; `row` is the block of the main program that led to it."""
         plan = unit.plan(block)
         if plan.flow is not None or (plan.statement is not None and self.is_left_out(unit, block)):
             return
         holes = self.holes(plan, control) or written_out(control, unit, block, self.point)
         text = "\n".join(holes) if holes else self.flat_text(unit.program, block, control.scope)
-        line = unit.program.line(block) if not unit.name else self.line_of_call(row)
+        line = unit.program.line(block) if not unit.external else self.line_of_call(row)
         for offset, part in enumerate(text.splitlines()):
-            self.out.write(part.rstrip(), line + (offset if not unit.name and not holes else 0))
+            self.out.write(part.rstrip(), line + (offset if not unit.external and not holes else 0))
 
     def holes(self, plan: Plan, control: Control) -> list[str]:
         """The holes of a pattern one by one; empty for other blocks, and where they are not known."""
@@ -106,7 +106,7 @@ class Recorder:
         """The line of the main program from which another one was called."""
         return self.main.line(row)
 
-    def is_left_out(self, unit: Unit, block: int) -> bool:
+    def is_left_out(self, unit: KlartextUnit, block: int) -> bool:
         """Whether a statement is not written: program ends, and what only makes sense with labels and calls."""
         statement = unit.plan(block).statement
         assert statement is not None
@@ -145,12 +145,14 @@ class Recorder:
         return [Change(*program.span(block, span), text)]
 
 
-def unrolled(interpreter: Interpreter, steps: Mapping[str, float], limit: int, comma: bool) -> Sequence[FlatLine]:
+def unrolled(
+    interpreter: KlartextInterpreter, steps: Mapping[str, float], limit: int, comma: bool
+) -> Sequence[FlatLine]:
     """Follow a program and write down its blocks; raises SourceError NCF237 and NCF238."""
-    recorder = Recorder(interpreter.program, steps, Style(comma), FlatLines(limit))
+    recorder = Recorder(interpreter.main.program, steps, Style(comma), FlatLines(limit))
     interpreter.recorder = recorder
     interpreter.run()
-    program = interpreter.program
+    program = interpreter.main.program
     first = next(block for block in program if "BEGIN" in program.text_of(block).upper())
     last = len(program) - 1
     names = [

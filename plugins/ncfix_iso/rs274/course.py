@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from ncfix.control.faults import Fault
-from ncfix_iso.rs274.plans import FlowLine
-from ncfix_iso.rs274.unit import Unit
+from ncfix_iso.rs274.plans import FlowLine, RS274Unit
 
 
 class Course(Protocol):
@@ -15,13 +14,11 @@ class Course(Protocol):
 
     unit, block    what is executed next
     skipping       the label that execution waits for; None while it does not skip
-    skipping_from  where that began
     """
 
-    unit: Unit
+    unit: RS274Unit
     block: int
     skipping: str | None
-    skipping_from: tuple[Unit, int]
 
     @property
     def calls(self) -> Sequence[object]:
@@ -30,17 +27,14 @@ class Course(Protocol):
     def under_way(self) -> tuple[object, ...]:
         """The calls that have not returned, and how often each is still to be made."""
 
-    def next_flow(self) -> bool:
-        """While skipping: go to the next flow-control line of this text; False if there is none."""
+    def arrive(self) -> bool:
+        """See `Interpreter`."""
 
     def follow(self, flow: FlowLine) -> None:
         """Do what a flow-control line says; `block` is already that of the next line."""
 
     def unfinished(self) -> Fault | None:
         """What is wrong if the text ends here."""
-
-    def missing_end(self) -> Fault:
-        """The fault of a text that ends while something is still looked for."""
 
     def call_by_code(self, label: str, times: int) -> None:
         """M98."""

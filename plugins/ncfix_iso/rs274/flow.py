@@ -17,9 +17,8 @@ from ncfix_iso.rs274.control import Control
 from ncfix_iso.rs274.expressions import Evaluate
 from ncfix_iso.rs274.labels import BAD_FLOW, Label, Labels, oword
 from ncfix_iso.rs274.parameters import Store
-from ncfix_iso.rs274.plans import FlowLine
+from ncfix_iso.rs274.plans import FlowLine, RS274Unit
 from ncfix_iso.rs274.settings import restore
-from ncfix_iso.rs274.unit import Unit
 
 MAX_CALLS = 10
 """How deep subprograms may be nested, the main program included (LinuxCNC)."""
@@ -42,7 +41,7 @@ class Call:
     """
 
     label: str
-    unit: Unit
+    unit: RS274Unit
     block: int
     by_code: bool = False
     saved: list[tuple[float, bool]] = field(default_factory=list)
@@ -59,7 +58,7 @@ class FlowControl:
     continuing       the same of a `continue`
     """
 
-    def __init__(self, control: Control, main: Unit, find: Callable[[str], Unit | None]) -> None:
+    def __init__(self, control: Control, main: RS274Unit, find: Callable[[str], RS274Unit | None]) -> None:
         self.control = control
         self.find = find
         self.unit = main
@@ -67,7 +66,7 @@ class FlowControl:
         self.calls: list[Call] = []
         self.skipping: str | None = None
         self.skipping_to_sub = False
-        self.skipping_from: tuple[Unit, int] = (main, 0)
+        self.skipping_from: tuple[RS274Unit, int] = (main, 0)
         self.defining: str | None = None
         self.labels = Labels()
         self.executed_if = False
@@ -126,13 +125,16 @@ class FlowControl:
 
     # -- the walk -----------------------------------------------------------------------------------------------------
 
-    def next_flow(self) -> bool:
-        """While skipping: go to the next o-word of this text; False if there is none."""
-        at = bisect_left(self.unit.flows, self.block)
-        if at == len(self.unit.flows):
-            return False
-        self.block = self.unit.flows[at]
-        return True
+    def arrive(self) -> bool:
+        """See `Interpreter`; while skipping: go to the next o-word of this text."""
+        if self.skipping is not None:
+            at = bisect_left(self.unit.flows, self.block)
+            if at == len(self.unit.flows):
+                fault = self.missing_end()
+                self.unit, self.block = self.skipping_from[0], self.skipping_from[1] + 1
+                raise fault
+            self.block = self.unit.flows[at]
+        return self.block < self.unit.stop
 
     def follow(self, flow: FlowLine) -> None:
         """Do what an o-word says; `block` is already that of the next line."""

@@ -4,56 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ncfix.control.following import PartFollower, Walk
+from ncfix.control.following import PartFollower
 from ncfix.control.parts import Remains
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix.text.tree import Program
 from ncfix_iso.rs274.control import Control
-from ncfix_iso.rs274.interpreter import Interpreter
+from ncfix_iso.rs274.interpreter import RS274Interpreter
 from ncfix_iso.rs274.parameters import Store
-
-
-class PartInterpreter(Interpreter):
-    """An interpreter whose text ends where the next part begins.
-
-    first  this is the first part
-    last   this is the last part
-    ended  the program has ended
-    """
-
-    first = True
-    last = False
-    ended = False
-
-    def next_part(self, program: Program) -> None:
-        """Take the next part."""
-        self.main = self.main.followed_by(program)
-        self.flow.unit, self.flow.block = self.main, 0
-        self.first = False
-
-    def run_part(self, last: bool, max_blocks: int) -> None:
-        """Follow the part to its end, or to that of the program."""
-        self.control.budget.left = max_blocks
-        self.last = last
-        self.ended = True
-        self.run()
-
-    def at_end_of_text(self) -> None:
-        """The text is over; that of the program only if it was the last part."""
-        if self.last:
-            super().at_end_of_text()
-        else:
-            self.ended = False
-
-    def at_tape(self, index: int) -> bool:
-        """`%` ends the tape, if it does not begin it."""
-        if self.first:
-            return super().at_tape(index)
-        if fault := self.flow.unfinished():
-            raise fault
-        return True
-
 
 PASSING = frozenset(
     {
@@ -73,9 +31,9 @@ class RS274Follower(PartFollower):
     def __init__(self, dialect: Dialect, run: Run) -> None:
         super().__init__(Control(run, dialect), run)
 
-    def begin(self, program: Program) -> Walk:
+    def begin(self, program: Program) -> RS274Interpreter:
         """What goes through the program, of which this is the first part."""
-        return PartInterpreter(self.control, program, self.resolve, self.budget(program))
+        return RS274Interpreter(self.control, program, self.run, in_parts=True)
 
     def lasting(self) -> str:
         """All that the control keeps."""

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from typing import TYPE_CHECKING
 
-from ncfix.control.arc_lane import turned
 from ncfix.control.coordinates import LETTERS, N_LETTERS
 from ncfix.control.faults import Fault
-from ncfix.control.lane import run_lane
-from ncfix.control.recurrence import ENDLESS, NEVER_ENDS, WAITS, Recurrence
-from ncfix.diagnostics import Place, SourceError
-from ncfix.text.dialect import Dialect
-from ncfix.text.reader import read
-from ncfix.text.tree import Constant, Program, Span, Word
+from ncfix.control.interpreter import NO_END, Interpreter
+from ncfix.control.places import mask_of
+from ncfix.control.recurrence import NEVER_ENDS, WAITS
+from ncfix.text.language import Run
+from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
 from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.choice import motion_of
@@ -24,15 +21,13 @@ from ncfix_iso.rs274.course import Course
 from ncfix_iso.rs274.flow import FlowControl
 from ncfix_iso.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix_iso.rs274.order import MACHINE, MOTIONS
-from ncfix_iso.rs274.plans import POLAR, Codes, Plan, grouped_codes, has_words
+from ncfix_iso.rs274.plans import POLAR, Codes, Plan, RS274Unit, grouped_codes, has_words
 from ncfix_iso.rs274.settings import unknown_code
-from ncfix_iso.rs274.unit import Unit
 from ncfix_iso.rs274.wordcheck import check_words
 
 if TYPE_CHECKING:
     from ncfix_iso.rs274.unroll import Recorder
 
-NO_END = "NCF234"
 CALL, RETURN = 980, 990
 PROGRAM_ENDS = (20, 300)
 LAST_PROGRAM = 9999
@@ -49,27 +44,17 @@ def may_increment(control: Control, letter: str) -> bool:
     return not control.rules.strict and letter in "UVW"
 
 
-class Interpreter:
+class RS274Interpreter(Interpreter[RS274Unit]):
     """Follows one program."""
 
-    def __init__(
-        self,
-        control: Control,
-        program: Program,
-        resolve: Callable[[str], bytes | None] | None,
-        max_blocks: int,
-    ) -> None:
-        self.control = control
-        self.resolve = resolve
-        control.budget.left = max_blocks
-        self.recurrence = Recurrence()
-        self.files: dict[str, Unit | None] = {}
-        self.axes = sum(1 << index for index in control.machine)
-        self.main = Unit(program, control.rules, self.axes)
+    control: Control
+    recorder: Recorder | None
+
+    def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
+        super().__init__(control, program, run, in_parts=in_parts)
+        self.axes = mask_of(control.machine)
+        self.main = RS274Unit(program, control.rules, self.axes)
         self.flow: Course = self.prepared()
-        self.span: Span | None = None
-        self.recorder: Recorder | None = None
-        control.locate = self.place
         systems.load_setup(control)
 
     def prepared(self) -> Course:
@@ -80,115 +65,56 @@ class Interpreter:
         predefined.install(control, flow)
         return flow
 
-    def place(self) -> Place:
-        """Where in the program we are."""
-        unit, block = self.flow.unit, self.flow.block - 1
-        return unit.program.place(block, self.span) if 0 <= block < len(unit) else Place(unit.program.path)
+    def spellings(self, name: str) -> Iterable[str]:
+        """See `Interpreter`."""
+        return (name, f"O{name:0>4}", f"O{name}") if name.isdigit() else (name,)
 
-    def find(self, name: str) -> Unit | None:
-        """The file of a subprogram."""
-        if name not in self.files:
-            names = (name, f"O{name:0>4}", f"O{name}") if name.isdigit() else (name,)
-            found = ((each, self.resolve(each)) for each in names if self.resolve)
-            dialect: Dialect = self.main.program.dialect
-            units = (self.unit_of(read(source, each, dialect), each) for each, source in found if source)
-            self.files[name] = next(units, None)
-        return self.files[name]
+    def text_of_file(self, source: bytes, name: str, spelling: str) -> RS274Unit:
+        """See `Interpreter`."""
+        return RS274Unit(self.read(source, spelling), self.control.rules, self.axes, spelling)
 
-    def unit_of(self, program: Program, name: str) -> Unit:
-        """The unit of a subprogram file."""
-        return Unit(program, self.control.rules, self.axes, name)
+    @property
+    def changes(self) -> int:
+        """See `Interpreter`."""
+        return self.control.parameters.changes
 
-    def run(self) -> None:
-        """Follow the program to its end; raises SourceError where the control would stop."""
-        try:
-            self.walk()
-        except Fault as fault:
-            self.span = fault.span or self.span
-            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+    @property
+    def why_endless(self) -> str:
+        """See `Interpreter`."""
+        return WAITS if self.control.refusal == RUNTIME_BRANCH else NEVER_ENDS
 
-    def walk(self) -> None:
-        """Block after block."""
-        flow = self.flow
-        while True:
-            if flow.skipping is not None and not flow.next_flow():
-                self.at_skipped_end()
-            if flow.block >= len(flow.unit):
-                self.at_end_of_text()
-                return
-            plan = flow.unit.plan(flow.block)
-            self.control.external = "" if flow.unit is self.main else flow.unit.name
-            if plan.lane is not None and self.takes_stretches() and self.take_stretch():
-                continue
-            unit, block = flow.unit, flow.block
-            flow.block += 1
-            self.span = None
-            self.control.budget.spend(1)
-            if self.execute(plan):
-                return
-            if flow.unit is unit and flow.block <= block:
-                self.look_round(block)
+    def lane_is_open(self, plan: Plan) -> bool:
+        """See `Interpreter`; not while something is done between motions."""
+        return plan.lane is not None and not self.control.unnamed
 
-    def take_stretch(self) -> bool:
-        """Follow the plain motions that begin here many at once; whether there are any."""
-        flow = self.flow
-        circles = partial(turned, self.control, flow.unit)
-        done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main, circles)
-        if done and self.recorder:
-            self.recorder.stretch(flow.unit, flow.block, done)
-        flow.block += done
-        self.control.budget.spend(done)
-        return done > 0
+    def note_stretch(self, unit: RS274Unit, block: int, done: int) -> None:
+        """See `Interpreter`."""
+        if self.recorder:
+            self.recorder.stretch(unit, block, done)
 
-    def look_round(self, block: int) -> None:
-        """A block has led back: raises `Fault` if the program goes round for ever."""
-        flow = self.flow
-        jump = id(flow.unit), block, flow.block, flow.under_way()
-        if self.recurrence.seen(jump, self.control.parameters.changes):
-            flow.block = block + 1
-            raise Fault(ENDLESS, WAITS if self.control.refusal == RUNTIME_BRANCH else NEVER_ENDS)
-
-    def takes_stretches(self) -> bool:
-        """Whether plain motions may be taken many at once: nothing is done between them."""
-        return not self.control.unnamed
-
-    def at_end_of_text(self) -> None:
+    def end_of_text(self) -> bool:
         """The text is over without M2, M30 or `%`."""
         fault = self.flow.unfinished()
         if fault is not None:
             raise fault
         self.control.warn(NO_END, "the program does not end with M2 or M30", "some controls refuse it")
-
-    def at_skipped_end(self) -> None:
-        """The text is over while something is looked for."""
-        fault = self.flow.missing_end()
-        unit, block = self.flow.skipping_from
-        self.flow.unit, self.flow.block = unit, block + 1
-        raise fault
+        return False
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
-    def execute(self, plan: Plan) -> bool:
-        """Execute the block before `flow.block`; True if the program ends there."""
-        control, unit, index = self.control, self.flow.unit, self.flow.block - 1
-        control.numbers, control.first = unit.numbers, unit.first[index]
-        if unit is self.main:
-            control.row_block = index
-        if plan.skip is not None and control.is_deleted(plan.skip):
-            return False
+    def execute(self, plan: Plan, unit: RS274Unit, block: int) -> bool:
+        """Execute a block; True if the program ends there."""
         if plan.tape:
             if self.recorder:
-                self.recorder.whole(unit, index)
-            return self.at_tape(index)
+                self.recorder.whole(unit, block)
+            return self.at_tape(unit, block)
         if plan.flow is not None:
             self.span = plan.flow.span
             if self.recorder and not self.flow.calls:
-                self.recorder.head(unit, index, plan.flow.keyword)
+                self.recorder.head(unit, block, plan.flow.keyword)
             self.flow.follow(plan.flow)
-            if self.flow.unit is not self.main and unit is self.main:
-                control.row_block = index
-            return self.beside_number(plan, index)
-        return self.execute_words(plan, index)
+            return self.beside_number(plan, block)
+        return self.execute_words(plan, block)
 
     def beside_number(self, plan: Plan, index: int) -> bool:
         """Execute the words that stand beside the number of a program, if it begins there (not in LinuxCNC)."""
@@ -201,15 +127,19 @@ class Interpreter:
         self.recorder = written
         return ended
 
-    def at_tape(self, index: int) -> bool:
-        """`%`: the first line of a tape, or its end."""
-        first = next(b for b in range(len(self.flow.unit)) if self.flow.unit.plan(b).tape)
-        if index == first and self.flow.unit.begins_with_tape():
+    def at_tape(self, unit: RS274Unit, block: int) -> bool:
+        """`%`: the first line of a tape, or its end; controls but LinuxCNC pass over comments before it."""
+        if self.first and all(self.may_lead(unit.plan(before)) for before in range(block)):
             return False
         fault = self.flow.unfinished()
         if fault is not None:
             raise fault
         return True
+
+    def may_lead(self, plan: Plan) -> bool:
+        """Whether a tape may begin behind a block of this shape."""
+        items = plan.template.items
+        return not items or (not self.control.rules.strict and all(isinstance(item, Comment) for item in items))
 
     def execute_words(self, plan: Plan, index: int) -> bool:
         """Execute a block of words and assignments."""

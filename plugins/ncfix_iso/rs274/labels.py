@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ncfix.control.faults import Fault
-from ncfix_iso.rs274.unit import Unit
+from ncfix_iso.rs274.plans import RS274Unit
 
 BAD_FLOW = "NCF230"
 
@@ -14,7 +14,7 @@ BAD_FLOW = "NCF230"
 class Label:
     """Where an o-word was first met, as what, and how many times a `repeat` is still to run."""
 
-    unit: Unit
+    unit: RS274Unit
     block: int
     keyword: str
     repeats: int = -1
@@ -30,7 +30,7 @@ class Labels:
         """Where a label stands, if it has been met."""
         return self.entries.get(name)
 
-    def enter(self, name: str, keyword: str, unit: Unit, block: int) -> Label:
+    def enter(self, name: str, keyword: str, unit: RS274Unit, block: int) -> Label:
         """Note where a label stands; raises `Fault` if it stands elsewhere too."""
         known = self.entries.setdefault(name, Label(unit, block, keyword))
         if known.block != block or known.unit is not unit:

@@ -19,16 +19,16 @@ from ncfix_iso.rs274.blocks import parse_block
 from ncfix_iso.rs274.control import Control
 from ncfix_iso.rs274.following import RS274Follower
 from ncfix_iso.rs274.groups import RULES
-from ncfix_iso.rs274.interpreter import Interpreter
+from ncfix_iso.rs274.interpreter import RS274Interpreter
 
 if TYPE_CHECKING:
     from ncfix.control.flatten import FlatLine
 
 
-def following(program: Program, run: Run) -> Interpreter:
+def following(program: Program, run: Run) -> RS274Interpreter:
     """The control's walk through a program, before its first step."""
     control = Control(run, program.dialect)
-    return Interpreter(control, program, run.resolve, run.budget(program))
+    return RS274Interpreter(control, program, run)
 
 
 def follow(program: Program, run: Run) -> Trace:

@@ -8,10 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ncfix.control.coordinates import INDEX
 from ncfix.control.faults import Fault
 from ncfix.control.lane_tables import Lane
 from ncfix.control.modal import NO_MOTION
+from ncfix.control.unit import TextUnit
 from ncfix.text.reach import UNREAD, Deletable, deletable
 from ncfix.text.tree import (
     Assignment,
@@ -22,6 +26,7 @@ from ncfix.text.tree import (
     NamedParameter,
     Opaque,
     Parameter,
+    Program,
     Span,
     Tape,
     Template,
@@ -129,6 +134,33 @@ class Plan:
     fault: Fault | None = None
     lane: Lane | None = None
     checked: set[int | None] = field(default_factory=set)
+
+
+class RS274Unit(TextUnit[Plan]):
+    """The text of a program, or of a subprogram file, on a machine with some axes (a bit mask of their letters).
+
+    flows  the blocks that are flow control, ascending
+    """
+
+    def __init__(self, program: Program, rules: Rules, axes: int, external: str = "") -> None:
+        self.rules, self.axes = rules, axes
+        super().__init__(program, self._planned, external)
+
+    def take(self, program: Program, begin: int, stop: int) -> None:
+        """See `TextUnit.take`."""
+        super().take(program, begin, stop)
+        leading = [any(isinstance(item, Flow) for item in template.items) for template in program.templates]
+        self.flows = self.blocks_of([shape for shape, leads in enumerate(leading) if leads])
+
+    def _planned(self, template: Template) -> Plan:
+        plan = plan_of(template, self.rules)
+        if plan.axes & ~self.axes:
+            plan.lane = None
+        return plan
+
+    def closed(self) -> NDArray[np.bool_]:
+        """See `TextUnit.closed`."""
+        return np.array([plan.lane is None for plan in self.all_plans()], dtype=np.bool_)
 
 
 def words_of(words: Sequence[Word], address: str) -> list[Word]:

@@ -21,11 +21,10 @@ from ncfix.diagnostics import SourceError
 from ncfix.text.number_style import decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Parameter, Word
 from ncfix_iso.rs274.control import RUNTIME_BRANCH, Block, Control
-from ncfix_iso.rs274.plans import POLAR, Codes, Plan
-from ncfix_iso.rs274.unit import Unit
+from ncfix_iso.rs274.plans import POLAR, Codes, Plan, RS274Unit
 
 if TYPE_CHECKING:
-    from ncfix_iso.rs274.interpreter import Interpreter
+    from ncfix_iso.rs274.interpreter import RS274Interpreter
 
 DROPPED_CODES = {"G": frozenset({150, 160, 670}), "M": frozenset({970, 980, 990, 1980})}
 """Codes, in tenths, that a flat program has no use for."""
@@ -64,26 +63,26 @@ class Recorder:
         """One line."""
         self.out.write(text, self.line)
 
-    def whole(self, unit: Unit, block: int) -> None:
+    def whole(self, unit: RS274Unit, block: int) -> None:
         """A block as it stands."""
-        self.line = unit.program.line(block) if not unit.name else self.line
+        self.line = unit.program.line(block) if not unit.external else self.line
         self.write(unit.program.text_of(block))
 
-    def head(self, unit: Unit, block: int, keyword: str) -> None:
+    def head(self, unit: RS274Unit, block: int, keyword: str) -> None:
         """The number of the main program; those of others, and all other flow control, fall away."""
-        if keyword == "program" and not self.headed and not unit.name:
+        if keyword == "program" and not self.headed and not unit.external:
             self.headed = True
             self.whole(unit, block)
 
-    def stretch(self, unit: Unit, start: int, count: int) -> None:
+    def stretch(self, unit: RS274Unit, start: int, count: int) -> None:
         """Blocks of plain words."""
         for block in range(start, start + count):
-            self.line = unit.program.line(block) if not unit.name else self.line
+            self.line = unit.program.line(block) if not unit.external else self.line
             self.put(unit, block, [self.removal(unit, block, word) for word in numbers_of(unit, block)])
 
-    def words(self, unit: Unit, index: int, plan: Plan, codes: Codes, block: Block) -> None:
+    def words(self, unit: RS274Unit, index: int, plan: Plan, codes: Codes, block: Block) -> None:
         """A block of words that has been executed."""
-        self.line = unit.program.line(index) if not unit.name else self.line
+        self.line = unit.program.line(index) if not unit.external else self.line
         self.check(plan, block)
         if self.control.left_out:
             words = [word for word in unit.program.templates[unit.template[index]].words if not is_setting(word)]
@@ -104,7 +103,7 @@ class Recorder:
         else:
             self.put(unit, index, made)
 
-    def polar(self, unit: Unit, index: int, block: Block, changes: list[Change]) -> None:
+    def polar(self, unit: RS274Unit, index: int, block: Block, changes: list[Change]) -> None:
         """A block with polar words: X and Y of where it leads, absolute."""
         incremental = self.control.modal.incremental
         written = unit.program.templates[unit.template[index]].words
@@ -134,7 +133,7 @@ class Recorder:
 
     # -- items --------------------------------------------------------------------------------------------------------
 
-    def of_item(self, unit: Unit, index: int, item: Item, codes: Codes, block: Block) -> Change | None:
+    def of_item(self, unit: RS274Unit, index: int, item: Item, codes: Codes, block: Block) -> Change | None:
         """What becomes of an item: None if it stays as it is."""
         match item:
             case Word():
@@ -147,7 +146,7 @@ class Recorder:
                 return self.removal(unit, index, item)
         return None
 
-    def of_assignment(self, unit: Unit, index: int, item: Assignment) -> Change:
+    def of_assignment(self, unit: RS274Unit, index: int, item: Assignment) -> Change:
         """An assignment falls away, unless the control does something with it (offsets, for one) or keeps it."""
         target, rules = item.target, self.control.rules
         if isinstance(target, Parameter) and isinstance(target.index, Literal):
@@ -165,7 +164,7 @@ class Recorder:
         value = parameters.numbered(number)
         return "#0" if math.isnan(value) else trimmed(value, VARIABLE_DECIMALS)
 
-    def of_word(self, unit: Unit, index: int, word: Word, codes: Codes, block: Block) -> Change | None:
+    def of_word(self, unit: RS274Unit, index: int, word: Word, codes: Codes, block: Block) -> Change | None:
         """What becomes of a word."""
         letter = word.address
         called = not DROPPED_CODES["M"].isdisjoint(codes.m.values())
@@ -180,13 +179,13 @@ class Recorder:
             return None
         return Change(*unit.program.span(index, word.value_span), self.number(letter, block.values[letter]))
 
-    def is_changed(self, unit: Unit, index: int, word: Word, block: Block) -> bool:
+    def is_changed(self, unit: RS274Unit, index: int, word: Word, block: Block) -> bool:
         """Whether a word with a plain number means another value than what is written (polar coordinates)."""
         if not isinstance(word.value, Literal) or word.value.pointless:
             return word.address in "XYZ" and "polar" in self.control.suspended
         return bool(unit.program.values_of(index)[word.value.slot] != block.values[word.address])
 
-    def of_code(self, unit: Unit, index: int, word: Word) -> Change | None:
+    def of_code(self, unit: RS274Unit, index: int, word: Word) -> Change | None:
         """What becomes of a G or M word."""
         if isinstance(word.value, Constant):
             dropped = round(10 * word.value.value) in DROPPED_CODES[word.address]
@@ -196,7 +195,7 @@ class Recorder:
             return self.removal(unit, index, word)
         return Change(*unit.program.span(index, word.value_span), f"{value:g}")
 
-    def removal(self, unit: Unit, index: int, item: Item) -> Change:
+    def removal(self, unit: RS274Unit, index: int, item: Item) -> Change:
         """Take an item out, with the blank before it."""
         start, stop = unit.program.span(index, item.span)
         first = int(unit.program.blocks[index, 0])
@@ -204,7 +203,7 @@ class Recorder:
             start -= 1
         return Change(start, stop)
 
-    def absent(self, unit: Unit, index: int, plan: Plan, block: Block) -> list[Change]:
+    def absent(self, unit: RS274Unit, index: int, plan: Plan, block: Block) -> list[Change]:
         """Words that a block means and does not have: the other coordinate of a polar one."""
         letters = [letter for letter in block.values if letter not in plan.letters and letter in INDEX]
         stop = end_of_words(unit, index)
@@ -230,7 +229,7 @@ class Recorder:
     # -- cycles -------------------------------------------------------------------------------------------------------
 
     def cycle(
-        self, unit: Unit, index: int, plan: Plan, block: Block, changes: list[Change], holes: list[Vector]
+        self, unit: RS274Unit, index: int, plan: Plan, block: Block, changes: list[Change], holes: list[Vector]
     ) -> None:
         """The holes of a block, one block each, in absolute coordinates."""
         drop = [word for word in plan.template.words if is_place(word, self.control)]
@@ -277,20 +276,20 @@ class Recorder:
 
     # -- lines --------------------------------------------------------------------------------------------------------
 
-    def without(self, unit: Unit, index: int, words: list[Word], changes: list[Change]) -> list[Change]:
+    def without(self, unit: RS274Unit, index: int, words: list[Word], changes: list[Change]) -> list[Change]:
         """The changes of a block from which some words fall away."""
         spans = {unit.program.span(index, word.span) for word in words}
         kept = [change for change in changes if not inside(change, spans)]
         return kept + [self.removal(unit, index, word) for word in words]
 
-    def put(self, unit: Unit, index: int, changes: list[Change]) -> None:
+    def put(self, unit: RS274Unit, index: int, changes: list[Change]) -> None:
         """Write a block with changes made; not if nothing is left of it."""
         text = changed(unit.program, index, changes)
         if text.strip() or not (changes or text):
             self.write(text.strip() if changes else text)
 
 
-def unrolled(interpreter: Interpreter, steps: Mapping[str, float], limit: int) -> list[FlatLine]:
+def unrolled(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int) -> list[FlatLine]:
     """Run an interpreter and write down what it executes; raises SourceError where no flat program can say it."""
     recorder = Recorder(interpreter.control, steps, FlatLines(limit))
     interpreter.recorder, interpreter.control.ends = recorder, []
@@ -313,12 +312,12 @@ def trimmed(value: float, decimals: int) -> str:
     return "0." if text in ("-0.", "-.") else text
 
 
-def numbers_of(unit: Unit, block: int) -> list[Word]:
+def numbers_of(unit: RS274Unit, block: int) -> list[Word]:
     """The N word of a block, if it has one."""
     return [word for word in unit.program.templates[unit.template[block]].words if word.address == "N"]
 
 
-def end_of_words(unit: Unit, index: int) -> int:
+def end_of_words(unit: RS274Unit, index: int) -> int:
     """Where further words of a block go: after its last word, before a comment."""
     items = unit.program.items_of(index)
     words = [unit.program.span(index, item.span)[1] for item in items if not isinstance(item, Comment)]

@@ -11,7 +11,7 @@ from ncfix_siemens.sinumerik.course import Course
 from ncfix_siemens.sinumerik.lettings import BY_THEMSELVES
 from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, Plan
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.unit import Unit
+from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.vocabulary import HARMLESS, OF_THE_CONTROL, PROBING, UNSEEN
 
 LOUD_M = frozenset({20, 60, 170, 300})
@@ -62,7 +62,7 @@ def is_quiet_step(step: object) -> bool:
     return False
 
 
-def unbalanced(unit: Unit, begin: int, end: int, *, alone: bool) -> bool:
+def unbalanced(unit: SinumerikUnit, begin: int, end: int, *, alone: bool) -> bool:
     """Whether a structure that begins between two blocks ends elsewhere."""
     inner = range(begin + (0 if alone else 1), end)
     return any(each in inner and not begin <= last <= end for each, last in unit.ends.items())

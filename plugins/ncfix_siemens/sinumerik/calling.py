@@ -10,12 +10,12 @@ from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE
 from ncfix_siemens.sinumerik.framing import into_spindle, set_length
 from ncfix_siemens.sinumerik.plans import Calling, plain_text
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.unit import Unit
+from ncfix_siemens.sinumerik.unit import SinumerikUnit
 
 if TYPE_CHECKING:
     from ncfix_siemens.sinumerik.statements import Turn
 
-Find = Callable[[str], Unit | None]
+Find = Callable[[str], SinumerikUnit | None]
 
 UNKNOWN_CYCLE = "NCF252"
 TRANSFORMING = ("traori", "transmit", "tracyl", "traang", "tracon", "trafoo")

@@ -12,7 +12,7 @@ from ncfix.text.tree import Expression, NamedParameter, Parameter
 from ncfix_siemens.sinumerik.modes import Frames, Modes
 from ncfix_siemens.sinumerik.plans import Branching, Letting
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.unit import BROKEN, CLOSING, Unit
+from ncfix_siemens.sinumerik.unit import BROKEN, CLOSING, SinumerikUnit
 from ncfix_siemens.sinumerik.values import Evaluate, Key, Value, compiled, number
 from ncfix_siemens.sinumerik.variables import Local
 
@@ -46,9 +46,9 @@ class Call:
     saved        what comes back when it returns, if it says SAVE
     """
 
-    unit: Unit
+    unit: SinumerikUnit
     block: int
-    entered: Unit
+    entered: SinumerikUnit
     left: int
     results: dict[str, Key]
     sections: list[Section]
@@ -60,7 +60,7 @@ class Course:
     """Where execution stands: the block that comes next, and where to return to."""
 
     control: Sinumerik
-    unit: Unit
+    unit: SinumerikUnit
     block: int
     calls: list[Call] = field(default_factory=list)
     sections: list[Section] = field(default_factory=list)
@@ -73,15 +73,16 @@ class Course:
 
     # -- repetitions --------------------------------------------------------------------------------------------------
 
-    def turn_back(self) -> None:
-        """At the end of a repeated section: once more, or on after the REPEAT."""
+    def arrive(self) -> bool:
+        """See `Interpreter`; at the end of a repeated section: once more, or on after the REPEAT."""
         while self.sections and self.block == self.sections[-1].stop:
             section = self.sections[-1]
             section.left -= 1
             if section.left > 0:
                 self.block = section.start
-                return
+                break
             self.block = self.sections.pop().back
+        return self.block < self.unit.stop
 
     def repeat(self, step: Branching, times: int) -> None:
         """`REPEAT label`, `REPEAT first last`, `REPEATB label`."""
@@ -92,7 +93,7 @@ class Course:
         elif step.values:
             stop = self.place_of(str(step.values[0](self.control)), here) + 1
         else:
-            ends = [block for block in self.unit.blocks_of("ENDLABEL") if block > start]
+            ends = [block for block in self.unit.labelled("ENDLABEL") if block > start]
             stop = ends[0] if ends else here
         self.control.budget.foresee(times)
         if times > 0 and stop > start:
@@ -180,7 +181,7 @@ class Course:
     def again_for(self, step: Branching) -> None:
         """`ENDFOR`: one more, and back."""
         begin = self.begin_of(step)
-        self.control.first = self.unit.text.first[begin]
+        self.control.first = self.unit.first[begin]
         loop = next(s for s in self.unit.branchings(begin) if s.keyword == "for")
         key, value = self.key_of(loop.written[0]), number(loop.values[0](self.control))
         if key is None or value is None:
@@ -269,7 +270,11 @@ class Course:
     # -- calls --------------------------------------------------------------------------------------------------------
 
     def call(
-        self, unit: Unit, arguments: tuple[Evaluate, ...], written: tuple[Expression | None, ...], times: int = 1
+        self,
+        unit: SinumerikUnit,
+        arguments: tuple[Evaluate, ...],
+        written: tuple[Expression | None, ...],
+        times: int = 1,
     ) -> None:
         """Enter a subprogram."""
         if len(self.calls) >= MAX_CALLS:
@@ -293,7 +298,7 @@ class Course:
         self.control.variables.scopes.append(local)
         self.unit, self.block, self.sections = unit, unit.begin, []
 
-    def saved(self, unit: Unit) -> tuple[Modal, Modes, Frames] | None:
+    def saved(self, unit: SinumerikUnit) -> tuple[Modal, Modes, Frames] | None:
         """What a subprogram with SAVE gives back."""
         control = self.control
         return (copy.copy(control.modal), copy.copy(control.modes), copy.copy(control.frames)) if unit.saves else None

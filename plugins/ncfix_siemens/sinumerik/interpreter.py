@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
-from functools import partial, reduce
+from collections.abc import Iterable
+from functools import reduce
 from operator import or_
 
 import numpy as np
 
-from ncfix.control.arc_lane import turned
-from ncfix.control.faults import Fault
 from ncfix.control.flatten import RUNTIME, FlatLine
-from ncfix.control.lane import run_lane
+from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Moves
+from ncfix.control.parts import NotInPartsError
 from ncfix.control.places import mask_of
-from ncfix.control.recurrence import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.diagnostics import Place, SourceError
-from ncfix.text.reader import read
-from ncfix.text.tree import Program, Span
+from ncfix.text.language import Run
+from ncfix.text.tree import Program
 from ncfix_siemens.sinumerik.bypass import bypassed
 from ncfix_siemens.sinumerik.calling import call_word, ran_elsewhere
 from ncfix_siemens.sinumerik.course import AtRuntimeError, Course
@@ -33,7 +31,7 @@ from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn, act, finish_block, say
 from ncfix_siemens.sinumerik.sweep import DECIDED_AT_RUNTIME, demoted, sweep
 from ncfix_siemens.sinumerik.synchronous import is_harmless
-from ncfix_siemens.sinumerik.unit import Unit, units_of
+from ncfix_siemens.sinumerik.unit import HEAD, PROCEDURE, SinumerikUnit, units_of
 from ncfix_siemens.sinumerik.unroll import Recorder
 from ncfix_siemens.sinumerik.vectors import run_vectors
 
@@ -50,153 +48,143 @@ def changes_tools(plans: Iterable[Plan], source: bytes) -> bool:
     return any(60 in plan.m for plan in plans) or bool(PERHAPS.search(source) and TOOL_CHANGE.search(source))
 
 
-class Interpreter:
-    """Follows one program."""
+def begins_a_program(unit: SinumerikUnit) -> bool:
+    """Whether a program or procedure begins in a text."""
+    shapes = [shape for shape, plan in enumerate(unit.all_plans()) if "program head" in plan.opaque]
+    texts = map(unit.program.text_of, unit.blocks_of(shapes))
+    return any(HEAD.match(text) or PROCEDURE.search(text) for text in texts)
 
-    def __init__(
-        self, control: Sinumerik, program: Program, resolve: Callable[[str], bytes | None] | None, max_blocks: int
-    ) -> None:
-        self.control = control
-        self.resolve = resolve
-        control.budget.left = max_blocks
-        self.recurrence = Recurrence()
-        self.units = units_of(program)
-        self.files: dict[str, Unit | None] = {unit.name: unit for unit in self.units[1:] if unit.name}
-        self.course = Course(control, self.units[0], self.units[0].begin)
-        self.span: Span | None = None
+
+class SinumerikInterpreter(Interpreter[SinumerikUnit]):
+    """Follows one program.
+
+    at_once  T by itself changes the tool; `called`: one has been called
+    again    the first block that may be executed again after a branch that is decided at run time
+    """
+
+    control: Sinumerik
+    flow: Course
+    recorder: Recorder | None
+
+    def __init__(self, control: Sinumerik, program: Program, run: Run, *, in_parts: bool = False) -> None:
+        super().__init__(control, program, run, in_parts=in_parts)
+        units = units_of(program)
+        if in_parts and len(units) > 1:
+            raise NotInPartsError("the text holds several programs")
+        self.main = units[0]
+        self.files |= {unit.name: unit for unit in units[1:] if unit.name}
+        self.flow = Course(control, self.main, self.main.begin)
         self.again: int | None = None
-        self.recorder: Recorder | None = None
-        control.locate = self.place
-        self.at_once = not changes_tools(self.units[0].text.plans, program.source)
-        control.solitary = frozenset(block for unit in self.units for block in unit.solitary())
-        for parameter in self.units[0].parameters:
+        self.at_once = not changes_tools(self.main.all_plans(), program.source)
+        self.called = False
+        control.solitary = frozenset(block for unit in units for block in unit.solitary())
+        for parameter in self.main.parameters:
             control.variables.scopes[0].kinds[parameter.name] = ""
 
     def place(self) -> Place:
         """Where in the program we are."""
-        unit, block = self.course.unit, self.course.block - 1
+        unit, block = self.flow.unit, self.flow.block - 1
         return unit.program.place(max(block, unit.begin), self.span)
 
-    def find(self, name: str) -> Unit | None:
+    def find(self, name: str) -> SinumerikUnit | None:
         """A subprogram: in this text, or in a file of its own."""
         key = name.upper()
-        if key not in self.files:
-            self.files[key] = None
-            spellings = dict.fromkeys((name, key, name.lower(), f"{key}.SPF", f"{name.lower()}.spf", f"{key}.MPF"))
-            sources = (source for each in spellings if self.resolve and (source := self.resolve(each)))
-            source = next(sources, None)
-            if source:
-                program = read(source, name, self.units[0].program.dialect)
-                self.files[key] = units_of(program, external=name)[0]
-        return self.files[key]
+        self.files[key] = found = self.files[key] if key in self.files else super().find(name)
+        return found
 
-    def run(self) -> Moves:
-        """Follow the program to its end; raises SourceError where the control would stop."""
+    def spellings(self, name: str) -> Iterable[str]:
+        """See `Interpreter`."""
+        upper, lower = name.upper(), name.lower()
+        return name, upper, lower, f"{upper}.SPF", f"{lower}.spf", f"{upper}.MPF"
+
+    def text_of_file(self, source: bytes, name: str, spelling: str) -> SinumerikUnit:
+        """See `Interpreter`."""
+        return units_of(self.read(source, name), external=name)[0]
+
+    @property
+    def changes(self) -> int:
+        """See `Interpreter`."""
+        return self.control.variables.changes
+
+    def end_of_text(self) -> bool:
+        """The end of a subprogram returns, too."""
+        if self.flow.calls:
+            self.flow.finish()
+            return True
+        return False
+
+    def next_part(self, program: Program, blocks: int) -> None:
+        """See `Interpreter`."""
+        super().next_part(program, blocks)
+        if begins_a_program(self.main):
+            raise NotInPartsError("the text holds several programs")
+        if self.control.modes.modal_cycle is not None:
+            raise NotInPartsError("a cycle (MCALL) goes on in the next part, whose motions are those of its block")
+        if self.at_once and changes_tools(self.main.all_plans(), program.source):
+            if self.called:
+                raise NotInPartsError("there is an M6 only further down")
+            self.at_once = False
+
+    def walk(self) -> bool:
+        """See `Interpreter`; what follows a branch that is decided at run time is refused."""
         try:
-            self.walk()
+            return super().walk()
         except AtRuntimeError:
-            self.again = sweep(self.course)
-        except Fault as fault:
-            raise self.error(fault) from None
-        return all_or_none(demoted(self.control.moves(), self.again), self.units[0].program)
+            if self.in_parts:
+                raise NotInPartsError("what is executed is decided at run time") from None
+            if self.recorder is not None:
+                raise SourceError.of(RUNTIME, DECIDED_AT_RUNTIME, self.place()) from None
+            self.again = sweep(self.flow)
+            return True
 
-    def error(self, fault: Fault) -> SourceError:
-        """What is wrong, with the place where it is."""
-        self.span = fault.span or self.span
-        return SourceError.of(fault.code, fault.text, self.place(), fault.hint)
+    def moves(self) -> Moves:
+        """The motions of the program, when it has been followed."""
+        return all_or_none(demoted(self.control.moves(), self.again), self.main.program)
 
     def unrolled(self, recorder: Recorder) -> list[FlatLine]:
         """The blocks of the program as they are executed; raises SourceError NCF237 where that is not known before."""
         self.recorder = recorder
-        try:
-            self.walk()
-        except AtRuntimeError:
-            raise SourceError.of(RUNTIME, DECIDED_AT_RUNTIME, self.place()) from None
-        except Fault as fault:
-            raise self.error(fault) from None
+        self.run()
         return recorder.out.lines
 
-    def walk(self) -> bool:
-        """Block after block; whether the program ends before its text does."""
-        course, control = self.course, self.control
-        while True:
-            course.turn_back()
-            if course.block >= course.unit.stop:
-                if not course.calls:
-                    return False
-                course.finish()
-                continue
-            plan, control.external = course.unit.plan(course.block), course.unit.external
-            if plan.lane is not None and self.lane_is_open() and self.take_stretch(plan):
-                continue
-            unit, block = course.unit, course.block
-            course.block += 1
-            control.budget.spend(1)
-            if self.execute(plan):
-                return True
-            if course.unit is unit and course.block <= block:
-                self.look_round(block)
-
-    def take_stretch(self, plan: Plan) -> bool:
-        """Follow the plain motions that begin with a block of this plan many at once; whether there are any."""
-        control, course = self.control, self.course
-        unit, main = course.unit, not course.unit.external
+    def run_lane(self, unit: SinumerikUnit, block: int, plan: Plan) -> int:
+        """See `Interpreter`; blocks that point the tool go in a lane of their own."""
         if plan.vector is None:
-            done = run_lane(control, unit, course.block, main, partial(turned, control, unit))
-        else:
-            done = run_vectors(control, unit, course.block, main)
-        if done:
-            self.stand(done)
-            course.block += done
-            note_stretch(control)
-            control.budget.spend(done)
-        return done > 0
+            return super().run_lane(unit, block, plan)
+        return run_vectors(self.control, unit, block, not unit.external)
 
-    def look_round(self, block: int) -> None:
-        """A block has led back: raises `Fault` if the program goes round for ever."""
-        course = self.course
-        jump = id(course.unit), block, course.block, *course.under_way()
-        if self.recurrence.seen(jump, self.control.variables.changes):
-            course.block = block + 1
-            raise Fault(ENDLESS, NEVER_ENDS)
-
-    def lane_is_open(self) -> bool:
-        """Whether plain motions may go many at a time."""
+    def lane_is_open(self, plan: Plan) -> bool:
+        """See `Interpreter`."""
         control = self.control
-        if self.recorder is not None or (control.modal.incremental and control.counted != control.footing):
+        if plan.lane is None or self.recorder is not None:
             return False
-        if control.cornered or control.modes.rounds:
+        if (control.modal.incremental and control.counted != control.footing) or control.cornered:
             return False
-        busy = control.at_start or control.modes.carried or control.modes.modal_cycle or self.course.sections
-        return not (busy or control.lost or control.over or control.modes.diameter == "DIAM90" or leads_along(control))
+        modes = control.modes
+        busy = control.at_start or modes.carried or modes.modal_cycle or modes.rounds or self.flow.sections
+        return not (busy or control.lost or control.over or modes.diameter == "DIAM90" or leads_along(control))
 
-    def stand(self, blocks: int) -> None:
-        """The axes that these blocks have named have been brought somewhere."""
-        control, unit, block = self.control, self.course.unit, self.course.block
+    def note_stretch(self, unit: SinumerikUnit, block: int, done: int) -> None:
+        """See `Interpreter`: the axes that these blocks have named have been brought somewhere."""
+        control = self.control
         control.fresh_tool = False
         if control.counted != control.footing:
-            shapes = np.unique(unit.program.template[block : block + blocks])
+            shapes = np.unique(unit.program.template[block : block + done])
             plans = [unit.plan_of_shape(shape) for shape in shapes.tolist()]
             named = reduce(or_, (plan.axes for plan in plans))
             if any(plan.vector is not None for plan in plans):
                 named |= mask_of(control.turning)
             stand(control, named, by_machine=False)
+        note_stretch(control)
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
-    def execute(self, plan: Plan) -> bool:
-        """Execute the block before `course.block`; True if the program ends there."""
-        control, course = self.control, self.course
-        unit, index = course.unit, course.block - 1
-        control.numbers, control.first = unit.text.numbers, unit.text.first[index]
-        self.span = None
-        if not unit.external:
-            control.row_block = index
-        if plan.skip is not None and control.is_deleted(plan.skip):
-            return False
+    def execute(self, plan: Plan, unit: SinumerikUnit, block: int) -> bool:
+        """Execute a block; True if the program ends there."""
+        control, flow = self.control, self.flow
         if plan.opaque:
-            self.opaque(plan, unit.program.text_of(index))
-        words = self.evaluate(plan, index)
+            self.opaque(plan, unit.program.text_of(block))
+        words = self.evaluate(plan, block)
         turn = Turn(words, plan, self.at_once)
         for step in plan.steps:
             self.span = step.span
@@ -205,7 +193,7 @@ class Interpreter:
                     let_axis_go(control, turn, step)
                 case Letting():
                     note_letting(control, turn, step)
-                    course.let(step)
+                    flow.let(step)
                 case Calling():
                     act(control, turn, step, self.find)
                 case Branching():
@@ -214,8 +202,8 @@ class Interpreter:
         if turn.subprogram is None:
             call_word(control, turn, self.find)
         if self.recorder is not None:
-            main, line = not course.calls, self.place().line
-            self.recorder.record(control, unit, index, turn, main=main, line=line)
+            main, line = not flow.calls, self.place().line
+            self.recorder.record(control, unit, block, turn, main=main, line=line)
         finish_block(control, turn)
         if turn.elsewhere:
             ran_elsewhere(control, turn.elsewhere, changes_tool=control.tools.selected != 0)
@@ -223,9 +211,9 @@ class Interpreter:
 
     def go_on(self, plan: Plan, turn: Turn) -> bool:
         """Where the block leads: into a subprogram, to the end, by a jump, or on. True if the program ends."""
-        course = self.course
+        flow = self.flow
         if turn.subprogram is not None:
-            course.call(turn.subprogram, turn.arguments, turn.written, turn.times)
+            flow.call(turn.subprogram, turn.arguments, turn.written, turn.times)
             return False
         branchings = [step for step in plan.steps if isinstance(step, Branching)]
         for step in branchings:
@@ -233,23 +221,23 @@ class Interpreter:
             if step.keyword in ("repeat", "repeatb") and step.label:
                 if turn.words.runtime("P"):
                     raise AtRuntimeError
-                course.repeat(step, round(turn.words.get("P", 1.0)))
+                flow.repeat(step, round(turn.words.get("P", 1.0)))
             else:
                 self.follow(step, plan)
             if step.keyword in ("if", "case"):
                 break
         if turn.ends or not PROGRAM_ENDS.isdisjoint(turn.m):
-            if not course.calls:
+            if not flow.calls:
                 return True
-            course.finish()
+            flow.finish()
         return False
 
     def follow(self, step: Branching, plan: Plan) -> None:
         """Do what a control structure says; raises `AtRuntimeError` where only the control knows, and it matters."""
         try:
-            self.course.follow(step, plan.steps)
+            self.flow.follow(step, plan.steps)
         except AtRuntimeError:
-            if self.recorder is not None or not bypassed(self.control, self.course, step, plan.steps):
+            if self.recorder is not None or not bypassed(self.control, self.flow, step, plan.steps):
                 raise
 
     def opaque(self, plan: Plan, text: str) -> None:
@@ -280,4 +268,5 @@ class Interpreter:
             if setting.form:
                 forms[address] = setting.form
         self.span = None
+        self.called |= "T" in values or "T" in texts
         return Words(index, values, forms, plan.axes, texts)

@@ -21,7 +21,7 @@ from ncfix.writer.pieces import Pieces
 from ncfix_siemens.sinumerik.blocks import parse_block
 from ncfix_siemens.sinumerik.following import SinumerikFollower, runs_straight_on
 from ncfix_siemens.sinumerik.hole_text import render
-from ncfix_siemens.sinumerik.interpreter import Interpreter
+from ncfix_siemens.sinumerik.interpreter import SinumerikInterpreter
 from ncfix_siemens.sinumerik.layout import SinumerikLayout, layout_of
 from ncfix_siemens.sinumerik.numbering import renumbered
 from ncfix_siemens.sinumerik.orientation import VECTOR
@@ -33,16 +33,17 @@ from ncfix_siemens.sinumerik.unroll import Recorder
 SPATIAL = frozenset("XYZ")
 
 
-def following(program: Program, run: Run) -> Interpreter:
+def following(program: Program, run: Run) -> SinumerikInterpreter:
     """The control's walk through a program, before its first step."""
     control = Sinumerik(run, program.dialect)
-    return Interpreter(control, program, run.resolve, run.budget(program))
+    return SinumerikInterpreter(control, program, run)
 
 
 def follow(program: Program, run: Run) -> Trace:
     """The motions of a program of this family; raises what `trace` does."""
     walk = following(program, run)
-    return finished(walk.control, program, walk.run())
+    walk.run()
+    return finished(walk.control, program, walk.moves())
 
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:

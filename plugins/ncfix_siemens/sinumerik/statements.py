@@ -19,7 +19,7 @@ from ncfix_siemens.sinumerik.orientation import ANGLES, NORMALS, OTHERS, VECTOR
 from ncfix_siemens.sinumerik.plans import LISTS, Calling, Plan, evaluates
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.swivel import swivel
-from ncfix_siemens.sinumerik.unit import Unit
+from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.values import Evaluate, number
 from ncfix_siemens.sinumerik.vocabulary import (
     DRILLING,
@@ -95,7 +95,7 @@ class Turn:
     at_once: bool
     special: set[str] = field(default_factory=set)
     frame: str = ""
-    subprogram: Unit | None = None
+    subprogram: SinumerikUnit | None = None
     called: Calling | None = None
     arguments: tuple[Evaluate, ...] = ()
     written: tuple[Expression | None, ...] = ()

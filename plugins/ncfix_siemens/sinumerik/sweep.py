@@ -16,7 +16,7 @@ from ncfix_siemens.sinumerik.destination import End, Leg, Words
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
 from ncfix_siemens.sinumerik.plans import Branching, Plan
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.unit import Unit
+from ncfix_siemens.sinumerik.unit import SinumerikUnit
 
 DECIDED_AT_RUNTIME = "which blocks are executed here is decided at run time"
 NO_MOTIONS = frozenset({40, 740, 750, 250, 260, 1100, 1110, 1120})
@@ -49,7 +49,7 @@ def refuse(control: Sinumerik, plan: Plan, block: int) -> None:
     control.go(Leg(Kind.RAPID, words, End(control.position[:], lost, dict(lost)), 0, passing=passing))
 
 
-def earliest(unit: Unit, block: int) -> int | None:
+def earliest(unit: SinumerikUnit, block: int) -> int | None:
     """The first block before `block` that something after it may lead back to."""
     found: list[int] = []
     for each in range(block, unit.stop):
@@ -60,7 +60,7 @@ def earliest(unit: Unit, block: int) -> int | None:
     return min((place for place in found if place < block), default=None)
 
 
-def targets(unit: Unit, step: Branching, block: int) -> list[int]:
+def targets(unit: SinumerikUnit, step: Branching, block: int) -> list[int]:
     """Where a jump or a repetition may lead."""
     if step.keyword == "gotos":
         return [unit.begin]
@@ -68,7 +68,7 @@ def targets(unit: Unit, step: Branching, block: int) -> list[int]:
         return []
     if not step.label:
         return [unit.begin] if "goto" in step.keyword else []
-    return unit.blocks_of(step.label)
+    return unit.labelled(step.label)
 
 
 def demoted(moves: Moves, first: int | None) -> Moves:

@@ -38,7 +38,7 @@ from ncfix_siemens.sinumerik.plans import ANY_PARAMETER, Calling, Letting, names
 from ncfix_siemens.sinumerik.render import FORM
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn
-from ncfix_siemens.sinumerik.unit import Unit
+from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.values import number
 from ncfix_siemens.sinumerik.variables import Variables, key_of
 from ncfix_siemens.sinumerik.vocabulary import FORMS, HARMLESS
@@ -64,7 +64,7 @@ class Recorder:
     steps: Mapping[str, float]
     out: FlatLines
 
-    def record(self, scope: Sinumerik, unit: Unit, block: int, turn: Turn, *, main: bool, line: int) -> None:
+    def record(self, scope: Sinumerik, unit: SinumerikUnit, block: int, turn: Turn, *, main: bool, line: int) -> None:
         """Write a block down as it is executed."""
         changes = []
         for item in unit.plan(block).template.items:

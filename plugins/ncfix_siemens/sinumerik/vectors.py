@@ -20,13 +20,13 @@ from ncfix.control.pointing_angles import nearest
 from ncfix.control.stage import IntArray, Stage, stage_of
 from ncfix_siemens.sinumerik.orientation import BY_AXES, FAR, ON_CURVES, is_choice
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.unit import Unit
+from ncfix_siemens.sinumerik.unit import SinumerikUnit
 
 LONGEST = 1 << 10
 """Blocks that are taken at once; where one ends the stretch, those behind it were taken in vain."""
 
 
-def run_vectors(control: Sinumerik, unit: Unit, block: int, main: bool) -> int:
+def run_vectors(control: Sinumerik, unit: SinumerikUnit, block: int, main: bool) -> int:
     """Take the stretch that begins with a block; the number of blocks taken, 0 for none."""
     stop = min(unit.vector_end(block), block + LONGEST)
     if stop - block < SHORTEST or not is_ready(control) or not is_open(control, unit, block):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ncfix.control import rollover
 from ncfix.control.control import Control
 from ncfix.control.finish import check_reach
+from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Kind, Moves
 from ncfix.control.parts import NotInPartsError, Remains
 from ncfix.diagnostics import Message
@@ -18,33 +19,17 @@ from ncfix.text.language import Run
 from ncfix.text.tree import Program
 
 
-class Walk(Protocol):
-    """An interpreter that takes one part after the other.
-
-    ended  the program has ended
-    """
-
-    ended: bool
-
-    def next_part(self, program: Program) -> None:
-        """Take the next part."""
-
-    def run_part(self, last: bool, max_blocks: int) -> None:
-        """Follow the part to its end, or to that of the program."""
-
-
 class PartFollower(ABC):
     """What the followers of all languages do alike; see `parts.Follower`."""
 
     def __init__(self, control: Control, run: Run) -> None:
         self.control = control
-        self.resolve = run.resolve
-        self.budget = run.budget
-        self.interpreter: Walk | None = None
+        self.run = run
+        self.interpreter: Interpreter[Any] | None = None
         self.watched = self.unchanged = False
 
     @abstractmethod
-    def begin(self, program: Program) -> Walk:
+    def begin(self, program: Program) -> Interpreter[Any]:
         """What goes through the program, of which this is the first part."""
 
     @property
@@ -63,9 +48,10 @@ class PartFollower(ABC):
         if self.interpreter is None:
             self.interpreter = self.begin(program)
         else:
-            self.interpreter.next_part(program)
+            self.interpreter.next_part(program, self.run.budget(program))
         self.control.builder.clear()
-        self.interpreter.run_part(last, self.budget(program))
+        self.interpreter.last = last
+        self.interpreter.run()
         if self.control.switches:
             raise NotInPartsError("blocks with / may be skipped, and all positions of block delete are looked at")
         moves = self.control.moves()

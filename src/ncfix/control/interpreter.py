@@ -1,0 +1,207 @@
+"""The walk of a control through a program, block after block, as its flow leads: the same for all languages.
+
+A language says what a block does (`execute`), under which names it looks for the files of subprograms, and what the
+end of a text means. Here is what surrounds that: where execution stands, the fast lane, block delete, how much may be
+executed, programs that go round for ever, where in the program a fault is, and programs that come in parts.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any, Generic, Protocol, TypeVar
+
+from ncfix.control.arc_lane import turned
+from ncfix.control.control import Control
+from ncfix.control.faults import Fault
+from ncfix.control.lane import run_lane
+from ncfix.control.recurrence import ENDLESS, NEVER_ENDS, Recurrence
+from ncfix.control.unit import TextUnit
+from ncfix.diagnostics import Place, SourceError
+from ncfix.text.language import Run
+from ncfix.text.reader import read
+from ncfix.text.tree import Program, Span
+
+NO_END = "NCF234"
+
+U = TypeVar("U", bound=TextUnit[Any])
+
+
+class Flow(Protocol[U]):
+    """Where execution stands, and where control structures and calls take it.
+
+    unit, block  what is executed next
+    """
+
+    unit: U
+    block: int
+
+    @property
+    def calls(self) -> Sequence[object]:
+        """Calls that have not returned."""
+
+    def arrive(self) -> bool:
+        """Settle what is executed next; whether the text has such a block."""
+
+    def under_way(self) -> tuple[object, ...]:
+        """The calls that have not returned, and how often each is still to be made."""
+
+
+class Interpreter(ABC, Generic[U]):
+    """Follows one program, or one that comes in parts.
+
+    main      the program itself
+    flow      where execution stands
+    files     the texts of subprograms, by their names
+    span      what of the block is looked at, for messages
+    recorder  writes blocks down as they are executed, if anybody wants that
+    in_parts  the text comes part by part; `first` and `last`: this is the first, the last of them
+    ended     the program has ended
+    """
+
+    main: U
+    flow: Any
+
+    def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
+        self.control: Any = control
+        self.dialect = program.dialect
+        self.resolve = run.resolve
+        self.in_parts = in_parts
+        self.files: dict[str, U | None] = {}
+        self.span: Span | None = None
+        self.recorder: Any = None
+        self.first = self.last = True
+        self.ended = False
+        self._recurrence = Recurrence()
+        control.budget.left = run.budget(program)
+        control.locate = self.place
+
+    # -- what a language says -----------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def execute(self, plan: Any, unit: U, block: int) -> bool:
+        """Execute a block, `flow.block` is already that of the next one; True if the program ends there."""
+
+    @abstractmethod
+    def spellings(self, name: str) -> Iterable[str]:
+        """The names under which the file of a subprogram is looked for."""
+
+    @abstractmethod
+    def text_of_file(self, source: bytes, name: str, spelling: str) -> U:
+        """The text of a subprogram that was found."""
+
+    @abstractmethod
+    def end_of_text(self) -> bool:
+        """The text is over, and the program has not ended; whether it goes on (in one that called)."""
+
+    @property
+    @abstractmethod
+    def changes(self) -> int:
+        """How often anything has changed that decides where the program goes on."""
+
+    @property
+    def why_endless(self) -> str:
+        """What is said of a program that goes round for ever."""
+        return NEVER_ENDS
+
+    def lane_is_open(self, plan: Any) -> bool:
+        """Whether plain motions that begin with this block may be taken many at once."""
+        return plan.lane is not None
+
+    def run_lane(self, unit: U, block: int, plan: Any) -> int:
+        """Take plain motions from a block on; how many blocks are taken, 0 for none."""
+        return run_lane(self.control, unit, block, not unit.external, partial(turned, self.control, unit))
+
+    def note_stretch(self, unit: U, block: int, done: int) -> None:
+        """Blocks from `block` on have been taken at once."""
+
+    # -- where we are -------------------------------------------------------------------------------------------------
+
+    def place(self) -> Place:
+        """Where in the program we are."""
+        unit, block = self.flow.unit, self.flow.block - 1
+        inside = unit.begin <= block < unit.stop
+        return unit.program.place(block, self.span) if inside else Place(unit.program.path)
+
+    def find(self, name: str) -> U | None:
+        """The text of a subprogram in a file of its own."""
+        if name not in self.files:
+            spellings = dict.fromkeys(self.spellings(name)) if self.resolve else ()
+            found = ((each, source) for each in spellings if self.resolve and (source := self.resolve(each)))
+            self.files[name] = next((self.text_of_file(source, name, each) for each, source in found), None)
+        return self.files[name]
+
+    def read(self, source: bytes, path: str) -> Program:
+        """The file of a subprogram."""
+        return read(source, path, self.dialect)
+
+    # -- the walk -----------------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def stopping(self) -> Iterator[None]:
+        """What the control stops at is a SourceError with its place."""
+        try:
+            yield
+        except Fault as fault:
+            self.span = fault.span or self.span
+            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+
+    def run(self) -> None:
+        """Follow the program, or the part, to its end; raises SourceError where the control would stop."""
+        with self.stopping():
+            self.ended = self.walk() or self.last
+
+    def next_part(self, program: Program, blocks: int) -> None:
+        """Take the next part; so many blocks may be executed."""
+        self.main = self.main.followed_by(program)
+        self.flow.unit, self.flow.block = self.main, 0
+        self.first = False
+        self.control.budget.left = blocks
+
+    def walk(self) -> bool:
+        """Block after block; whether the program ends before its text does."""
+        control, flow = self.control, self.flow
+        while True:
+            if not flow.arrive():
+                if (self.last or flow.calls) and self.end_of_text():
+                    continue
+                return False
+            unit, block = flow.unit, flow.block
+            plan = unit.plan(block)
+            control.external = unit.external
+            if self.take_stretch(plan):
+                continue
+            flow.block = block + 1
+            self.span = None
+            control.budget.spend(1)
+            control.numbers, control.first = unit.numbers, unit.first[block]
+            if not unit.external:
+                control.row_block = block
+            if plan.skip is not None and control.is_deleted(plan.skip):
+                continue
+            if self.execute(plan, unit, block):
+                return True
+            if flow.unit is unit and flow.block <= block:
+                self._look_round(block)
+
+    def take_stretch(self, plan: Any) -> bool:
+        """Follow the plain motions that begin here many at once; whether there are any."""
+        if not self.lane_is_open(plan):
+            return False
+        unit, block = self.flow.unit, self.flow.block
+        done = self.run_lane(unit, block, plan)
+        if done:
+            self.note_stretch(unit, block, done)
+            self.flow.block += done
+            self.control.budget.spend(done)
+        return done > 0
+
+    def _look_round(self, block: int) -> None:
+        """A block has led back: raises `Fault` if the program goes round for ever."""
+        flow = self.flow
+        jump = id(flow.unit), block, flow.block, flow.under_way()
+        if self._recurrence.seen(jump, self.changes):
+            flow.block = block + 1
+            raise Fault(ENDLESS, self.why_endless)
