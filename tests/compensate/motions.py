@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.compensate.assembly import Plan
+from ncfix.compensate.plan.path import Plan
 from ncfix.control.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.machine import Machine, State
 

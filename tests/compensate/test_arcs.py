@@ -7,9 +7,8 @@ import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions, sweep_of
-from ncfix.compensate.arcs import Closure, turns_begun
-from ncfix.compensate.assembly import Plan
-from ncfix.compensate.path import plan
+from ncfix.compensate.plan.arcs import Closure, turns_begun
+from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Effect, Machine

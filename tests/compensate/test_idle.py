@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ncfix.compensate.fix import fix_program
-from ncfix.compensate.idle import idle, without_idle
+from ncfix.compensate.plan.written import idle, without_idle
 from ncfix.control.setup import Setup
 from ncfix.machine import loads
 from ncfix.text.reader import read

@@ -12,18 +12,16 @@ import pytest
 from compensate.motions import motions
 from compensate.test_stream import OPTIONS, program, whole
 from ncfix import fast
-from ncfix.compensate.ends import corrected
 from ncfix.compensate.figures.curve import Curve, Samples, arc_lengths
 from ncfix.compensate.figures.nearest import Search
-from ncfix.compensate.judge import bounds, deviations_seen, uneasy_starts
-from ncfix.compensate.known import Known
-from ncfix.compensate.path import plan
+from ncfix.compensate.plan.deviation import bounds, deviations_seen, path_error, samples, uneasy_starts
+from ncfix.compensate.plan.ends import corrected
 from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.segments import Segments
+from ncfix.compensate.plan.splitting import STRETCH, Grid, fewest
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.split import STRETCH, Grid, fewest
-from ncfix.compensate.verify import path_error, samples
-from ncfix.compensate.written import Written
+from ncfix.compensate.plan.written import Known, Written
 from ncfix.machine import Machine, State, load
 from ncfix.machine.se3 import Array
 

@@ -9,10 +9,9 @@ import pytest
 
 from compensate.machines_at_random import STROKE, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, interpolated, motions
-from ncfix.compensate.assembly import Plan
-from ncfix.compensate.limits import FUZZ, findings
-from ncfix.compensate.path import plan
 from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.plan.limits import FUZZ, findings
+from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Place

@@ -7,14 +7,13 @@ import pytest
 
 from compensate.machines_at_random import perfect
 from compensate.motions import Arc, dense_errors, motions
-from ncfix.compensate.assembly import Plan
 from ncfix.compensate.figures.simulation import samples
-from ncfix.compensate.limits import findings
-from ncfix.compensate.path import plan
 from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.limits import findings
+from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.sampling import MOST_SHOWN
+from ncfix.compensate.plan.splitting import STRETCH, Grid, fewest
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.split import STRETCH, Grid, fewest
 from ncfix.control.moves import Moves
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Polynomial

@@ -7,7 +7,7 @@ import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions
-from ncfix.compensate.path import plan
+from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Effect, Machine, State

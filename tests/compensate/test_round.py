@@ -9,11 +9,11 @@ import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, dense_errors, motions
-from ncfix.compensate.arcs import Closure
 from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.path import plan
+from ncfix.compensate.plan.arcs import Closure
+from ncfix.compensate.plan.path import plan
+from ncfix.compensate.plan.splitting import SHORTEST, WIDEST
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.round import SHORTEST, WIDEST
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Setup
 from ncfix.machine import Effect, Machine, load

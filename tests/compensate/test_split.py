@@ -9,9 +9,9 @@ import pytest
 
 from compensate.machines_at_random import perfect
 from compensate.motions import Arc, changed, dense_errors, motions
-from ncfix.compensate.path import plan
+from ncfix.compensate.plan.path import plan
+from ncfix.compensate.plan.splitting import Grid, fewest
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.split import Grid, fewest
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash, Polynomial
 from ncfix.machine.piecewise import Table
@@ -75,7 +75,7 @@ def test_a_circle_that_has_to_be_straightened_has_the_pieces_of_its_arrow() -> N
     """Where the control accepts no arc: chords that leave a circle of 50 mm by the tolerance."""
     machine = x_axis(Effect("EXX", (0.05,), Polynomial((1,)), 0.0, 250.0))
     moves = motions(machine, (50, 0, 0), [(50, 0, 0), Arc((0, 0, 0), (0, 0, 1), 2 * np.pi)])
-    from ncfix.compensate.arcs import Closure
+    from ncfix.compensate.plan.arcs import Closure
 
     pieces = plan(machine, moves, get_strategy("position"), TOLERANCE, Closure(-1.0, 0.0)).pieces
     angle = 2 * np.arccos(1 - USED / 50)

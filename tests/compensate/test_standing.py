@@ -6,8 +6,8 @@ import numpy as np
 
 from compensate.machines_at_random import TOPOLOGIES, perfect
 from compensate.motions import changed, motions
+from ncfix.compensate.plan.ends import Standing, standing
 from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
-from ncfix.compensate.standing import Standing, standing
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine
 

@@ -7,9 +7,9 @@ import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import motions
-from ncfix.compensate import ends
-from ncfix.compensate.path import plan
+from ncfix.compensate.plan import ends
 from ncfix.compensate.plan.findings import PoseError
+from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.strategies import RotaryThenLinear, Strategy, get_strategy, parted, strategies
 from ncfix.control.moves import Kind
 from ncfix.diagnostics import UsageError

@@ -9,11 +9,10 @@ import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions
-from ncfix.compensate.assembly import untouched
 from ncfix.compensate.fix import fix_program
-from ncfix.compensate.path import plan
+from ncfix.compensate.plan.deviation import FigureTally, Samples, path_error
+from ncfix.compensate.plan.path import plan, untouched
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.verify import FigureTally, Samples, path_error
 from ncfix.control.moves import Kind, Rule
 from ncfix.control.setup import Setup
 from ncfix.machine import Effect, Machine, load

@@ -159,7 +159,7 @@ class Pair:
 
     def _side_by_side(self) -> SideBySide:
         from ncfix.compensate.figures.comparison import SideBySide
-        from ncfix.compensate.rounding import rounding
+        from ncfix.compensate.plan.written import rounding
 
         assert self.following.machine is not None
         return SideBySide(self.tolerance_um / 1e3, rounding(self.following.machine))

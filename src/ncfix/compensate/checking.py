@@ -9,13 +9,13 @@ from functools import partial
 import numpy as np
 
 from ncfix.compensate.account import FixReport
-from ncfix.compensate.assembly import untouched
 from ncfix.compensate.block_delete import Position, messages_of, most_moves, positions_of
 from ncfix.compensate.fix import fix_program, place_of
 from ncfix.compensate.following import Resolve, follow, placed
-from ncfix.compensate.limits import findings
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.plan.limits import findings
+from ncfix.compensate.plan.path import untouched
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace

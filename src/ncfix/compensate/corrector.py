@@ -11,18 +11,18 @@ from ncfix import fast
 from ncfix.compensate.before import Before, Round
 from ncfix.compensate.crew import Read, Share
 from ncfix.compensate.fix import stamp_of, strays
-from ncfix.compensate.offset import is_offset
 from ncfix.compensate.partition import Part
 from ncfix.compensate.plain import Course, Planner
 from ncfix.compensate.plain_figures import figures
 from ncfix.compensate.plain_text import largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
+from ncfix.compensate.plan.deviation import PathError, path_error
+from ncfix.compensate.plan.offset import is_offset
 from ncfix.compensate.proof import SelfCheckError, differences
 from ncfix.compensate.settle import Agreed, Settled, agree, increments, settle
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Unit, Units
-from ncfix.compensate.verify import PathError, path_error
 from ncfix.control.moves import Moves
 from ncfix.control.parts import NotInPartsError, PartReader
 from ncfix.diagnostics import NcfixError

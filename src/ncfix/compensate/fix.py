@@ -36,12 +36,12 @@ from ncfix.compensate.following import Resolve, placed, traced, with_tool_length
 from ncfix.compensate.left import either, left_by_motion, left_where_they_stand
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.plan.arrays import Mask, lengths
+from ncfix.compensate.plan.deviation import Figures, PathError, path_error
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.strategies import get_strategy
+from ncfix.compensate.plan.written import rounding_along
 from ncfix.compensate.proof import SelfCheckError, proven
-from ncfix.compensate.rounding import rounding_along
 from ncfix.compensate.settle import Settled, increments
-from ncfix.compensate.verify import Figures, PathError, path_error
 from ncfix.control.knowledge import PROBED
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
@@ -246,12 +246,17 @@ def _report(
         strategy=options.strategy,
         leaves=get_strategy(options.strategy).leaves,
         left=left,
-        rounding_um=max(rounding_along(Intent(machine, each.moves, State()), each.plan) for each in every) * 1e3,
+        rounding_um=max(_rounding(machine, each) for each in every) * 1e3,
         block_delete=tuple(sorted(each.on) for each in positions if each.on is not None),
         passed_by_rule=Counter(account.rules.values()),
         no_figure=no_figure,
     )
     return with_what_is_left(report, options.tolerance_um)
+
+
+def _rounding(machine: Machine, settled: Settled) -> float:
+    """What rounded numbers may do along the path, mm."""
+    return rounding_along(Intent(machine, settled.moves, State()), settled.plan.pieces, settled.plan.corners)
 
 
 def refusals(program: Program, account: Account) -> list[Refusal]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.compensate.split import STRETCH
+from ncfix.compensate.plan.splitting import STRETCH
 from ncfix.kernel import Library
 
 Array = NDArray[np.float64]

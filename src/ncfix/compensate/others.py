@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.compensate.arcs import Closure, fitted, full_circles
 from ncfix.compensate.options import FixOptions
+from ncfix.compensate.plan.arcs import Closure, fitted, full_circles
 from ncfix.compensate.plan.arrays import Index, Mask, distinct
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import Segments, arcs_within

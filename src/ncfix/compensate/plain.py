@@ -14,17 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix import fast
-from ncfix.compensate.arcs import Closure
-from ncfix.compensate.assembly import Plan
-from ncfix.compensate.digits import on_digits
-from ncfix.compensate.grids import Split
-from ncfix.compensate.judge import CORNER, SURE, led_bounds, looked_at, straight_bounds
-from ncfix.compensate.limits import FUZZ, JUMP
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.others import Others, planned, together
 from ncfix.compensate.partition import Part
-from ncfix.compensate.path import Budget, Demands, in_pieces, not_split
 from ncfix.compensate.plain_poses import Poses
+from ncfix.compensate.plan.arcs import Closure
 from ncfix.compensate.plan.arrays import (
     Array,
     Index,
@@ -38,13 +32,17 @@ from ncfix.compensate.plan.arrays import (
     places,
     some,
 )
+from ncfix.compensate.plan.deviation import CORNER, SURE, led_bounds, looked_at, straight_bounds
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import REST, matters
+from ncfix.compensate.plan.limits import FUZZ, JUMP
+from ncfix.compensate.plan.path import Budget, Demands, Plan, in_pieces, not_split
 from ncfix.compensate.plan.sampling import passed
 from ncfix.compensate.plan.segments import Segments
+from ncfix.compensate.plan.splitting import Split
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
-from ncfix.compensate.rounding import rounding
+from ncfix.compensate.plan.written import on_digits, rounding
 from ncfix.compensate.settle import Settled
 from ncfix.compensate.units import Unit
 from ncfix.control.moves import FeedMode, Kind, Moves, Rule
@@ -92,7 +90,7 @@ class Course:
 
     @property
     def uneasy(self) -> Mask:
-        """(n,) motions whose starts no figure of the one before shows: as `verify.uneasy`."""
+        """(n,) motions whose starts no figure of the one before shows: as `deviation.uneasy`."""
         kind = self.part.moves.kind[:-1]
         return np.append(self.behind_rapid, (kind == Kind.DWELL) | (kind == Kind.RAPID))
 

@@ -1,8 +1,8 @@
 """The tip errors of a part of plain motions, before and after: mostly from what is known of their ends.
 
 What the tip is off at an end was found when the end was corrected, and what is left is what the numbers that were
-written differ from those that were meant (see `known`). Motions over which the error may bend are looked at inside,
-too, in the places at which `verify` would look; the few that are made of pieces, or pass a kink, it looks at itself.
+written differ from those that were meant (see `written.Known`). Motions over which the error may bend are looked at inside,
+too, in the places at which `deviation` would look; the few that are made of pieces, or pass a kink, it looks at itself.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix import fast
-from ncfix.compensate.known import TURNED, Known
 from ncfix.compensate.plain import Course
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, greatest, lengths, owners, picked, places, totals
+from ncfix.compensate.plan.deviation import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
 from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends_closely, even, features, passed
 from ncfix.compensate.plan.segments import Segments
-from ncfix.compensate.verify import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
-from ncfix.compensate.written import Written
+from ncfix.compensate.plan.written import TURNED, Known, Written
 from ncfix.control.moves import Kind
 from ncfix.writer.emit import Emission
 from ncfix.writer.pieces import Pieces

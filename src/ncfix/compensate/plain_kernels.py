@@ -62,12 +62,12 @@ def bounds(
     close: float,
     bound: Array,
 ) -> None:
-    """What the deviation of the tip from pose to pose (n + 1, axes) does not exceed: as `judge.straight_bounds`.
+    """What the deviation of the tip from pose to pose (n + 1, axes) does not exceed: as `deviation.straight_bounds`.
 
     linear     1 for a linear axis, 0 for others
     bends      slopes and curvatures (2, axes) of `bow.Bow`
     constants  its `shift` and `turn`, the arm with all axes at zero, mm, a factor for products of errors, and
-               `judge.CORNER`
+               `deviation.CORNER`
     """
     (slopes, curvatures), (moved, turned, least_arm, more, corner) = bends, constants
     arm = least_arm + reached(done, linear)
@@ -114,7 +114,7 @@ def at_ends(
              piece of each motion (n + 1,)
     known    commands at which the tip is where it should be (n, axes), and how far off it is without correction (n,) mm
     machine  ways over which errors bend (axes,), the ways of X, Y and Z as columns, their columns, linear axes
-    limits   `verify.STRAIGHT`, `known.TURNED`, and how many places inside: per bend, at most
+    limits   `deviation.STRAIGHT`, `written.TURNED`, and how many places inside: per bend, at most
     masks    motions that figures are of, those not to be counted here (`apart`), and those to be looked at inside
     found    way, squares times way and largest error before and after, mm; how many ends, and where the largest are;
              at how many places inside each motion has to be looked at (n,)

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.compensate.ends import led_as_commands
-from ncfix.compensate.limits import FUZZ, excess
 from ncfix.compensate.plan.arrays import Array, Index, lengths
+from ncfix.compensate.plan.ends import led_as_commands
 from ncfix.compensate.plan.kinematics import moves_as_one, reached_joints
+from ncfix.compensate.plan.limits import FUZZ, excess
 from ncfix.compensate.plan.segments import Segments, accelerations, skew, stays_within
 from ncfix.machine import Machine
 
@@ -55,7 +55,7 @@ class Poses:
         return led_as_commands(self.machine, self.commands, (self.meant, done), tcp, self.tool_length)
 
     def accelerations(self, segments: Segments, begin: Array, end: Array) -> Array:
-        """What no linear axis exceeds along motions under TCP, (k,) mm per motion squared, see `excursion`.
+        """What no linear axis exceeds along motions under TCP, (k,) mm per motion squared, see `segments`.
 
         begin, end  (k, n_axes) axis positions there
         """

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.idle import standing_still
 from ncfix.compensate.plain import Course
 from ncfix.compensate.plan.arrays import Array, squares
+from ncfix.compensate.plan.written import standing_still
 from ncfix.text.language import Language
 from ncfix.writer.bulk import Bulk
 from ncfix.writer.emit import Emission, emit

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.arcs import across
 from ncfix.compensate.block_delete import Readings, Together
+from ncfix.compensate.plan.arcs import across
 from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked
 from ncfix.compensate.settle import Settled
 from ncfix.control.moves import Moves, Trace

@@ -14,21 +14,18 @@ from types import MappingProxyType
 import numpy as np
 
 from ncfix.compensate.account import Reason
-from ncfix.compensate.arcs import Closure
-from ncfix.compensate.assembly import Plan
 from ncfix.compensate.before import Before, Round
 from ncfix.compensate.coverage import at_measured_places
-from ncfix.compensate.digits import on_digits
 from ncfix.compensate.following import kinematics_of
-from ncfix.compensate.idle import without_idle
-from ncfix.compensate.limits import findings, led_astray
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.path import plan
+from ncfix.compensate.plan.arcs import Closure
 from ncfix.compensate.plan.arrays import Array, Index, Mask, picked
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.limits import findings, led_astray
+from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.rounding import rounding
+from ncfix.compensate.plan.written import on_digits, rounding, without_idle
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.text.dialect import Dialect

@@ -15,11 +15,11 @@ from ncfix.compensate.fix import largest_correction, refusals
 from ncfix.compensate.left import Left, joined, left_by_motion, left_where_they_stand
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.plan.arrays import Mask
+from ncfix.compensate.plan.deviation import Figures, PathError
 from ncfix.compensate.plan.findings import Notes
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.rounding import rounding_along
+from ncfix.compensate.plan.written import rounding_along
 from ncfix.compensate.settle import Settled, increments
-from ncfix.compensate.verify import Figures, PathError
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
@@ -88,7 +88,8 @@ class Tally:
     def add(self, program: Program, settled: Settled, own: Mask, machine: Machine) -> None:
         """Take in a part; `own` (n,) motions that were not the last of the part before."""
         moves = settled.moves
-        self.rounding = max(self.rounding, rounding_along(Intent(machine, moves, State()), settled.plan, own))
+        plan, intent = settled.plan, Intent(machine, moves, State())
+        self.rounding = max(self.rounding, rounding_along(intent, plan.pieces, plan.corners, own))
         lacking = left_by_motion(settled, increments(machine), own)
         self.left = joined(self.left, left_where_they_stand(program, moves, lacking))
         self.unseen += without_figure(moves, settled.kept, lacking.axes if lacking else None, own)
@@ -111,7 +112,7 @@ class Tally:
 
         largest  shift of a linear command, mm
         """
-        self.rounding = max(self.rounding, rounding_along(intent, settled.plan))
+        self.rounding = max(self.rounding, rounding_along(intent, settled.plan.pieces, settled.plan.corners))
         self.moves += len(settled.moves)
         self.compensated += int(np.count_nonzero(~settled.kept))
         self.inserted += settled.emission.added_blocks

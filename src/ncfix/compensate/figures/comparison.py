@@ -31,7 +31,7 @@ from ncfix.compensate.figures.simulation import Along, actual_tip, lines_of
 from ncfix.compensate.plan.arrays import Array, Index
 from ncfix.compensate.plan.intent import Intent, left_in_cuts
 from ncfix.compensate.plan.kinematics import Signs, matters
-from ncfix.compensate.rounding import rounding_of_arcs
+from ncfix.compensate.plan.written import rounding_of_arcs
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
 from ncfix.control.moves import Moves

@@ -10,7 +10,7 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask, distinct, finite, g
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import Segments, arcs_within, surely_within
-from ncfix.compensate.written import Written
+from ncfix.compensate.plan.written import Written
 from ncfix.control.moves import Moves
 from ncfix.machine import Machine, State
 from ncfix.writer.pieces import Pieces

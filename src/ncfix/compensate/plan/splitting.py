@@ -1,0 +1,486 @@
+"""Splitting motions at the fewest places: from each emitted point as far as a piece stays within tolerance.
+
+Each motion has a fine grid of nodes with the exactly corrected command of each. A straight piece from node a to node b
+is judged at the nodes between them: there the tip is off by the difference between the command on the piece and the
+exact command, times how the tip follows commands; the error model need not be evaluated again. Differences are of the
+order of the tolerance, so what is left out is smaller by the gradient of the errors (under a thousandth). Where the
+pieces come out short the grid is made finer.
+
+Going as far as possible from each point gives the fewest pieces that can be had with ends on the exact path. All
+motions are worked on at once, and all stretches of those with very many nodes: a round tries one end for each of them.
+The first one tried is as far as the piece before went, then ends ever farther on from there, or back, until the
+farthest is between two that were tried; then the gap is halved.
+
+Arcs may be made of arcs. A corrected arc need not be an arc: scales that differ make an ellipse of it, play a step
+where an axis reverses. Short arcs follow it with far fewer blocks than straight pieces, and as smoothly. The centre of
+a piece lies on the perpendicular bisector of its ends, so that the radii agree; where along the bisector is found by
+least squares over the nodes between. Pieces too short for a control to tell their centre are straight, and so are those
+that bend the other way than the arc turns: a control would go the long way round.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from ncfix import fast
+from ncfix.compensate.plan.arcs import APART, NUDGE, Closure, across
+from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, largest, offsets, owners, picked, places, sums
+from ncfix.compensate.plan.ends import as_commands, path_of, with_rotary_held
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import regular
+from ncfix.compensate.plan.sampling import MOST, bends, crossed, merged, reversals
+from ncfix.compensate.plan.segments import Segments, sweep_between
+from ncfix.compensate.plan.strategies import Strategy
+from ncfix.writer.target import TANGENTIAL
+
+STRETCH = 1024
+"""Nodes of a motion after which a piece ends in any case."""
+
+
+class Cuttable(Protocol):
+    """Motions with nodes between which there may be pieces."""
+
+    @property
+    def counts(self) -> Index:
+        """(g,) nodes of each motion, its start and end included; at least 2."""
+
+    def deviations(self, first: Index, last: Index) -> Array:
+        """The largest deviation of pieces from nodes `first` to nodes `last` (flat indices), (p,) mm."""
+
+    def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
+        """Which pieces are arcs (p,), and their centres (p, 3)."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Nodes of motions, flat, all nodes of a motion next to each other.
+
+    counts    (g,) nodes of each motion, its start and end included; at least 2
+    fraction  (k,) ascending from 0 to 1 in each motion
+    command   (k, n_axes) exactly corrected command; at the start where the machine really stands
+    follow    (k or 1, 3, n_axes) how the tip follows the command there, mm per mm and mm per rad
+    """
+
+    counts: Index
+    fraction: Array
+    command: Array
+    follow: Array
+
+    def deviations(self, first: Index, last: Index) -> Array:
+        """The largest deviation of straight pieces from nodes `first` to nodes `last` (flat indices), (p,) mm."""
+        inner, fraction, (commands, follows) = last - first - 1, self.fraction, self._columns
+        begun, ended = np.repeat(first, inner), np.repeat(last, inner)
+        node = begun + 1 + places(inner)
+        share = (fraction[node] - fraction[begun]) / (fraction[ended] - fraction[begun])
+        start = commands.take(begun, axis=1)
+        short = start + share * (commands.take(ended, axis=1) - start) - commands.take(node, axis=1)
+        off = np.zeros((3, len(node)))
+        for axis, row, follow in follows:
+            off[row] += (follow[node] if len(follow) > 1 else follow) * short[axis]
+        square: Array = largest(off[0] * off[0] + off[1] * off[1] + off[2] * off[2], inner)
+        return np.sqrt(square)
+
+    @cached_property
+    def _columns(self) -> tuple[Array, list[tuple[int, int, Array]]]:
+        """Commands (n_axes, k), and axis, direction and how the tip follows (k or 1,), wherever it follows at all."""
+        axes, rows = np.nonzero(self.follow.any(axis=0).T)
+        follows = [(j, i, self.follow[:, i, j].copy()) for j, i in zip(axes.tolist(), rows.tolist(), strict=True)]
+        return np.ascontiguousarray(self.command.T), follows
+
+    def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
+        """No piece is an arc."""
+        return np.zeros(len(first), dtype=bool), np.full((len(first), 3), np.nan)
+
+
+def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
+    """Which nodes end a piece (k,), and the largest deviation of each motion's pieces (g,) mm.
+
+    A piece from one node to the next is always allowed: it has no nodes between.
+    """
+    if fast.engaged() and isinstance(grid, Grid):
+        from ncfix.compensate import kernels
+
+        nodes, motions = np.zeros(len(grid.fraction), dtype=bool), np.zeros(len(grid.counts))
+        follow = np.ascontiguousarray(grid.follow)
+        kernels.fewest(grid.counts, grid.fraction, grid.command, follow, tolerance, nodes, motions)
+        return nodes, motions
+    stretches, at, stop = _stretches(grid.counts)
+    ends = np.zeros(int(grid.counts.sum()), dtype=bool)
+    worst = np.zeros(len(at))
+    near, far, reached = at + 1, stop + 1, np.zeros(len(at))
+    usual = np.ones(len(at), dtype=np.intp)
+    step, fresh = usual.copy(), np.ones(len(at), dtype=bool)
+    active = np.arange(len(at))
+    while active.size:
+        trial = _next_trial(at[active], near[active], far[active], stop[active], step[active])
+        settled = (trial <= near[active]) | (near[active] >= stop[active])
+        trying, trial = active[~settled], trial[~settled]
+        off = grid.deviations(at[trying], trial)
+        good = off <= tolerance
+        near[trying[good]], reached[trying[good]] = trial[good], off[good]
+        far[trying[~good]] = trial[~good]
+        step[trying] = np.where(fresh[trying], 1, 2 * step[trying])
+        fresh[trying] = False
+        done = active[settled]
+        ends[near[done]] = True
+        worst[done] = np.maximum(worst[done], reached[done])
+        usual[done] = np.maximum(near[done] - at[done] - 1, 1)
+        at[done], reached[done], far[done], step[done], fresh[done] = near[done], 0.0, stop[done] + 1, usual[done], True
+        near[done] = np.minimum(at[done] + 1, stop[done])
+        active = active[at[active] < stop[active]]
+    return ends, largest(worst, stretches)
+
+
+def _stretches(counts: Index) -> tuple[Index, Index, Index]:
+    """How many stretches motions with `counts` (g,) nodes have; the first and the last node of each stretch."""
+    many = np.maximum((counts - 1) // STRETCH, 1)
+    begin = offsets(counts)[:-1][owners(many)] + places(many) * STRETCH
+    end = begin + STRETCH
+    end[offsets(many)[1:] - 1] = offsets(counts)[1:] - 1
+    return many, begin, end
+
+
+def _next_trial(at: Index, near: Index, far: Index, stop: Index, step: Index) -> Index:
+    """The next end to be tried, where `near` is good and `far` is not, or has not been tried if it is behind `stop`."""
+    half = (near + far) // 2
+    back = np.where(near > at + 1, half, np.maximum(far - step, half))
+    trial: Index = np.where(far > stop, np.minimum(near + step, stop), back)
+    return trial
+
+
+WIDEST = 0.95 * np.pi
+"""A piece turns by less than this: ends on opposite sides of a circle would not tell where its centre is."""
+SHORTEST = 0.05
+"""mm between the ends of the shortest arc that is written."""
+
+JUMP = 2.0
+"""Times the way along the arc: a piece that is longer only takes up a jump (play, a step), which is no circle."""
+
+
+OTHER_CODES = 1000
+"""Motion codes in tenths from here on are no G codes."""
+
+
+def may_be_round(intent: Intent, rows: Index, closure: Closure, rounding: float) -> Mask:
+    """Motions `rows` (k,) that may be made of arcs: radii off by rounding are within half of what the control takes.
+
+    Arcs that are not given by a centre or radius (CIP, whose code is none of G0 to G99) stay whole or become straight,
+    unless they are written as others.
+    """
+    moves, radius = intent.moves, radii(intent, rows)
+    allowed = np.maximum(closure.mm, closure.relative * radius) / 2
+    enough: Mask = intent.segments.arc[rows] & (radius > SHORTEST) & (4 * rounding <= allowed)
+    enough &= (moves.modal[rows] < OTHER_CODES) | np.isin(moves.modal[rows], list(TANGENTIAL))
+    return enough if APART * rounding < SHORTEST else np.zeros(len(rows), dtype=bool)
+
+
+def radii(intent: Intent, rows: Index) -> Array:
+    """The radius of each arc (k,), mm."""
+    moves = intent.moves
+    spoke = moves.end[rows[:, None], intent.columns] - moves.centre[rows]
+    radius: Array = np.linalg.norm(across(spoke, moves.normal[rows]), axis=1)
+    return radius
+
+
+@dataclass(frozen=True, slots=True)
+class RoundGrid:
+    """Nodes of arcs, as `Grid` has them, between which pieces are arcs.
+
+    normal   (k, 3) of each node's motion
+    sweep    (k,) of each node's motion, rad
+    radius   (k,) of each node's motion, mm
+    columns  (3,) of X, Y and Z
+    """
+
+    grid: Grid
+    normal: Array
+    sweep: Array
+    radius: Array
+    columns: Index
+
+    @classmethod
+    def of(cls, grid: Grid, intent: Intent, rows: Index) -> RoundGrid:
+        """Nodes of motions `rows`, which are arcs."""
+        move, moves = rows[owners(grid.counts)], intent.moves
+        return cls(grid, moves.normal[move], moves.sweep[move], radii(intent, move), intent.columns)
+
+    @property
+    def counts(self) -> Index:
+        """Nodes of each motion."""
+        return self.grid.counts
+
+    def deviations(self, first: Index, last: Index) -> Array:
+        """The largest deviation of pieces from nodes `first` to nodes `last`, (p,) mm; infinite for too wide a turn."""
+        inner = last - first - 1
+        arcs, share = self._between(first, last)
+        off = self._off(arcs, first + 1, inner, share)
+        straight = np.sqrt(np.einsum("ki,ki->k", off, off))
+        worst = largest(straight, inner)
+        wide = np.abs(self._turn(first, last)) > WIDEST
+        return np.where(wide & (inner > 0), np.inf, worst)
+
+    def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
+        """Which pieces are arcs (p,), and their centres (p, 3)."""
+        arcs, _ = self._between(first, last)
+        return arcs.arc, arcs.centre
+
+    def _turn(self, first: Index, last: Index) -> Array:
+        turn: Array = self.sweep[first] * (self.grid.fraction[last] - self.grid.fraction[first])
+        return turn
+
+    def _between(self, first: Index, last: Index) -> tuple[Segments, Array]:
+        """The pieces, and the shares (flat) of each at which its inner nodes are."""
+        command, fraction = self.grid.command, self.grid.fraction
+        inner = last - first - 1
+        piece = owners(inner)
+        node = first[piece] + 1 + places(inner)
+        share = (fraction[node] - fraction[first[piece]]) / (fraction[last[piece]] - fraction[first[piece]])
+        start, end, normal = command[first], command[last], self.normal[first]
+        turn = self._turn(first, last)
+        ends = start[:, self.columns], end[:, self.columns]
+        chord = across(ends[1] - ends[0], normal)
+        length = np.linalg.norm(chord, axis=1)
+        arc = (length >= SHORTEST) & (np.abs(turn) <= WIDEST) & (length < JUMP * self.radius[first] * np.abs(turn))
+        way = np.cross(normal, chord) / np.maximum(length, 1e-300)[:, None]
+        height = length / 2 / np.tan(np.where(arc, turn, 1.0) / 2)
+        pieces = _on_bisector(Segments(start, end, arc, ends[0], normal, turn, self.columns), way, height)
+        here = pieces.at(piece, share)
+        nudged = _on_bisector(pieces, way, height + NUDGE).at(piece, share)
+        slope = (nudged - here)[:, self.columns] / NUDGE
+        squares = sums(np.einsum("ki,ki->k", slope, slope), inner)
+        miss = (command[node] - here)[:, self.columns]
+        amount = sums(np.einsum("ki,ki->k", slope, miss), inner) / np.maximum(squares, 1e-12)
+        best = _on_bisector(pieces, way, height + np.where(squares > 0, amount, 0.0))
+        same = best.sweep * turn > 0
+        return replace(best, arc=best.arc & same, centre=np.where(same[:, None], best.centre, np.nan)), share
+
+    def _off(self, pieces: Segments, first: Index, inner: Index, share: Array) -> Array:
+        piece = owners(inner)
+        node = first[piece] + places(inner)
+        command = pieces.at(piece, share) - self.grid.command[node]
+        follow = self.grid.follow
+        off: Array = np.einsum("kij,kj->ki", follow[node] if len(follow) > 1 else follow, command)
+        return off
+
+
+def _on_bisector(pieces: Segments, way: Array, height: Array) -> Segments:
+    """Pieces with the centre so far (p,) mm from the middle of the chord along `way` (p, 3), unit vectors."""
+    start, end = pieces.start[:, pieces.columns], pieces.end[:, pieces.columns]
+    rise = np.einsum("ij,ij->i", end - start, pieces.normal)[:, None] * pieces.normal
+    centre = (start + end - rise) / 2 + height[:, None] * way
+    sweep = sweep_between(start, end, centre, pieces.normal, pieces.sweep)
+    return Segments(
+        pieces.start,
+        pieces.end,
+        pieces.arc,
+        np.where(pieces.arc[:, None], centre, np.nan),
+        pieces.normal,
+        sweep,
+        pieces.columns,
+    )
+
+
+PER_BEND = 8
+"""Nodes for each time that the error may bend."""
+PER_PIECE = 32
+"""Nodes to each piece expected; a piece is longest to one part in so many."""
+FEW = 14
+"""Pieces with fewer nodes on average are worth a finer grid."""
+SPARSE = 4
+"""Pieces with fewer have not been looked at in between."""
+REFINEMENTS = 3
+INSTANT = 1e-7
+"""Fraction of a motion from one side of a jump or reversal to the other."""
+BATCH = 100_000
+"""Nodes worked on at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """Motions made of pieces, flat, the pieces of a motion next to each other.
+
+    counts    (g,) pieces of each motion
+    fraction  (p,) where each ends on its motion
+    end       (p, n_axes) commands
+    arc       (p,) the piece is an arc
+    centre    (p, 3) its centre then, mm
+    worst     (g,) largest deviation of the tip found, mm
+    """
+
+    counts: Index
+    fraction: Array
+    end: Array
+    arc: Mask
+    centre: Array
+    worst: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Cutter:
+    """What motions are cut for.
+
+    tolerance  how far the tip may be off between the ends of a piece, mm
+    round      pieces are arcs (all motions are, then), not straight
+    """
+
+    strategy: Strategy
+    tolerance: float
+    round: bool = False
+
+
+def split(intent: Intent, real: Segments, rows: Index, pieces: Array, cutter: Cutter) -> Split:
+    """Split motions `rows` (g,) at the fewest places.
+
+    real    where all motions really start and end
+    pieces  (g,) about how many pieces to expect
+
+    Of motions that are too long to be looked at between so many pieces the largest deviation is infinite.
+    """
+    if not rows.size:
+        empty = np.empty(0)
+        ends = np.empty((0, intent.moves.end.shape[1]))
+        return Split(rows, empty, ends, np.empty(0, dtype=bool), np.empty((0, 3)), empty)
+    wished = np.maximum(PER_BEND * bends(intent, rows), PER_PIECE * pieces)
+    nodes = np.clip(np.ceil(wished), 2 * PER_PIECE, MOST).astype(np.intp)
+    parts = [_split(intent, real, rows[part], nodes[part], cutter) for part in batches(nodes, BATCH)]
+    for _ in range(REFINEMENTS):
+        result = joined(parts)
+        short = np.flatnonzero((nodes < FEW * result.counts) & (nodes < MOST))
+        if not short.size:
+            break
+        nodes[short] = np.minimum(2 * PER_PIECE * result.counts[short], MOST)
+        chosen = [short[part] for part in batches(nodes[short], BATCH)]
+        finer = [_split(intent, real, rows[each], nodes[each], cutter) for each in chosen]
+        parts = [_replaced(result, short, joined(finer))]
+    result = joined(parts)
+    result.worst[(nodes >= MOST) & (nodes < SPARSE * result.counts)] = np.inf
+    return result
+
+
+def joined(parts: list[Split]) -> Split:
+    """Splits of different motions as one."""
+    return (
+        parts[0]
+        if len(parts) == 1
+        else Split(
+            np.concatenate([part.counts for part in parts]),
+            np.concatenate([part.fraction for part in parts]),
+            np.concatenate([part.end for part in parts]),
+            np.concatenate([part.arc for part in parts]),
+            np.concatenate([part.centre for part in parts]),
+            np.concatenate([part.worst for part in parts]),
+        )
+    )
+
+
+def _replaced(result: Split, which: Index, finer: Split) -> Split:
+    """`result` with the motions `which` taken from `finer`."""
+    order = np.arange(len(result.counts))
+    order[which] = len(result.counts) + np.arange(len(which))
+    return taken(joined([result, finer]), order)
+
+
+def taken(parts: Split, order: Index) -> Split:
+    """The motions of `parts` in another order."""
+    counts = parts.counts[order]
+    take = np.repeat(offsets(parts.counts)[order], counts) + places(counts)
+    ends, centres = (parts.fraction[take], picked(parts.end, take)), (parts.arc[take], parts.centre[take])
+    return Split(counts, *ends, *centres, parts.worst[order])
+
+
+def _split(intent: Intent, real: Segments, rows: Index, nodes: Index, cutter: Cutter) -> Split:
+    grid = _grid(intent, real, rows, nodes, cutter.strategy)
+    cut = RoundGrid.of(grid, intent, rows) if cutter.round else grid
+    ends, worst = fewest(cut, cutter.tolerance)
+    counts = sums(ends.astype(np.intp), grid.counts).astype(np.intp)
+    last = np.flatnonzero(ends)
+    first = np.append(0, last[:-1])
+    opens = offsets(counts)[:-1]
+    first[opens] = offsets(grid.counts)[:-1]
+    return Split(counts, grid.fraction[last], picked(grid.command, last), *cut.shape(first, last), worst)
+
+
+def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: Strategy) -> Grid:
+    """Exactly corrected commands of motions at nodes; at both ends where the machine really stands."""
+    counts, fraction = _fractions(intent, real, rows, nodes)
+    move = rows[owners(counts)]
+    ends = offsets(counts)
+    first, last = ends[:-1], ends[1:] - 1
+    bounds = np.zeros(len(move), dtype=bool)
+    bounds[first] = bounds[last] = True
+    programmed = intent.segments.at(move, fraction)
+    q = intent.joints(move, programmed)
+    path = None
+    if strategy.corrects_orientation:
+        decided = np.where(bounds[:, None], real.at(move, fraction) - programmed, 0.0)
+        path = path_of(intent, q, intent.machine.tip(q, intent.lengths(move)), fraction == 0, bounds, decided)
+    found = strategy.solve(intent.machine, q, intent.states(move, fraction), path)
+    result = with_rotary_held(intent, strategy, move, fraction, q, found)
+    command = as_commands(intent, move, programmed, q, result.q)
+    command[first], command[last] = real.start[rows], real.end[rows]
+    command = _as_they_stand(intent, real, move, fraction, command)
+    use = result.converged | bounds
+    counts = sums(use.astype(np.intp), counts).astype(np.intp)
+    if not use.all():
+        move, fraction, command = move[use], fraction[use], command[use]
+    return Grid(counts, fraction, command, _follow(intent, move, command, strategy))
+
+
+def _as_they_stand(intent: Intent, real: Segments, move: Index, fraction: Array, command: Array) -> Array:
+    """Corrected commands (k, n_axes) with the axes that get no word as `real` has them, X Y Z for such rotary axes."""
+    if intent.wordless is None:
+        return command
+    stand, idle = real.at(move, fraction), intent.wordless[move]
+    result = np.where(idle, stand, command)
+    turned = np.flatnonzero((idle & intent.machine.rotary & (stand != command)).any(axis=1))
+    if turned.size:
+        found, arrived = intent.aimed(move[turned], fraction[turned], result[turned])
+        result[turned[arrived]] = np.where(idle[turned], result[turned], found)[arrived]
+    return result
+
+
+def _fractions(intent: Intent, real: Segments, rows: Index, nodes: Index) -> tuple[Index, Array]:
+    """Fractions of the nodes of motions, both ends included: counts and flat fractions.
+
+    Nodes stand evenly, behind the start, and on both sides of wherever the corrected axes pass a kink or a jump, or
+    reverse if that matters.
+    """
+    counts = nodes + 3
+    fraction = (places(counts) - 1) / np.repeat(nodes + 1, counts)
+    first = offsets(counts)[:-1]
+    fraction[first], fraction[first + 1] = 0.0, INSTANT
+    found = [reversals(intent, rows, counts, fraction)]
+    if intent.kinks:
+        owner = owners(counts)
+        q = intent.joints(rows[owner], intent.guessed(real, rows[owner], fraction))
+        found.append(crossed(intent, owner, fraction, q))
+    if not any(len(at) for _, at in found):
+        return counts, fraction
+    sides = [(owner, np.clip(at + side, INSTANT, 1.0)) for owner, at in found for side in (-INSTANT / 2, INSTANT / 2)]
+    return merged(len(rows), (owners(counts), fraction), *sides)
+
+
+def _follow(intent: Intent, rows: Index, commands: Array, strategy: Strategy) -> Array:
+    """How the tip follows commands (k, n_axes) of motions `rows`, (k or 1, 3, n_axes) mm per mm and mm per rad.
+
+    As seen from where is all the same to the size of a deviation. Where X, Y and Z turn together and nothing else is
+    corrected, that is from where they move, so that one is for all. With tool-centre-point control the tip stays where
+    it is when only rotary commands change.
+    """
+    together = intent.machine.linear_ways
+    if together is not None and not strategy.corrects_orientation:
+        follow = np.zeros((1, 3, commands.shape[1]))
+        follow[0, :, intent.columns] = regular(together[None])[0][0].T
+        return follow
+    follow = np.zeros((len(rows), 3, commands.shape[1]))
+    follow[:, :, intent.columns] = intent.follows(rows, commands)
+    plain = np.flatnonzero(~intent.moves.tcp[rows])
+    if strategy.corrects_orientation and plain.size:
+        turning = np.flatnonzero(intent.machine.rotary)
+        jacobian = intent.machine.jacobians(commands[plain], intent.lengths(rows[plain])).axes
+        follow[plain[:, None, None], np.arange(3)[:, None], turning] = jacobian[:, :3, turning]
+    return follow
