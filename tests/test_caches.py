@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ncfix import caches
+from ncfix.host import cache_folders
 from ncfix.text import grammar
 
 
@@ -21,12 +21,12 @@ def homeless(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_beside_a_module_then_in_the_cache_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert list(caches.folders("/some/where/module.py")) == [Path("/some/where/__pycache__"), tmp_path / "ncfix"]
+    assert list(cache_folders("/some/where/module.py")) == [Path("/some/where/__pycache__"), tmp_path / "ncfix"]
 
 
 @pytest.mark.usefixtures("homeless")
 def test_without_a_home_beside_a_module_alone() -> None:
-    assert list(caches.folders("/some/where/module.py")) == [Path("/some/where/__pycache__")]
+    assert list(cache_folders("/some/where/module.py")) == [Path("/some/where/__pycache__")]
 
 
 @pytest.mark.usefixtures("homeless")

@@ -25,8 +25,7 @@ from typing import IO, Any, TypeVar
 
 import numpy as np
 
-from ncfix import caches
-from ncfix.processors import processors
+from ncfix.host import cache_folders, processors
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Argument = Any
@@ -260,7 +259,7 @@ def _lock() -> IO[bytes]:
 def places(source: str, kind: str) -> Iterator[Path]:
     """Where something about a module may be kept: beside what Python keeps of it, or in the user's own cache."""
     name = f"{Path(source).stem}.{environment()[:12]}.{kind}"
-    beside, *elsewhere = caches.folders(source)
+    beside, *elsewhere = cache_folders(source)
     yield beside / name
     yield from (folder / f"{Path(source).parent.name}-{name}" for folder in elsewhere)
 

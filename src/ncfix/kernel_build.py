@@ -19,8 +19,8 @@ from importlib import import_module
 from itertools import chain
 from typing import Any
 
+from ncfix.host import tie_to
 from ncfix.kernel import Argument, Kernel, Library, binding, target
-from ncfix.tied import tie_to
 
 OPTIONS: dict[str, Any] = {
     "error_model": "numpy",

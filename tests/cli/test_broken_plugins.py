@@ -206,7 +206,7 @@ def met(case: Case, tmp_path: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch)
     point = EntryPoint("third", "third_party_broken", hookspecs.GROUP)._for(Distribution())  # type: ignore[attr-defined]
     found = plugins.collect([*plugins.installed(), point])
     monkeypatch.setattr(plugins, "load_plugins", lambda: found)
-    monkeypatch.setattr("ncfix.plugin_faults.load_plugins", lambda: found)
+    monkeypatch.setattr("ncfix.plugins.load_plugins", lambda: found)
     plugins.leave.cache_clear()
     kinds.cache_clear()
     places = {name: str(tmp_path / name) for name in ("machine", "wavy", "program", "second", "data", "out")}

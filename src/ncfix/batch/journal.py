@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from ncfix import files, ways
+from ncfix import files
 
 NAME = ".ncfix-journal.jsonl"
 SCHEMA = 1
@@ -98,7 +98,7 @@ class Journal:
 
     def check(self) -> None:
         """Refuse to write into what is not the journal itself: NCF005."""
-        ways.check_own(self.path)
+        files.check_own(self.path)
 
     def finish(self) -> None:
         """Take it away: the batch came to its end."""

@@ -11,9 +11,8 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from ncfix.diagnostics import UsageError
-from ncfix.plugin_faults import called
-from ncfix.plugins import nearest, registry
-from ncfix.tied import tie
+from ncfix.host import tie
+from ncfix.plugins import called, nearest, registry
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future

@@ -13,8 +13,7 @@ from ncfix.cli import console
 from ncfix.cli.completion import OneOf
 from ncfix.cli.options import json_option
 from ncfix.diagnostics import Code, UsageError
-from ncfix.plugin_faults import called
-from ncfix.plugins import registry
+from ncfix.plugins import called, registry
 
 FLOORS = (
     "cli",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ncfix import files, ways
+from ncfix import files
 from ncfix.cli import console
 from ncfix.cli.completion import CONTROL, FOLDER, PATH
 from ncfix.cli.following import Following
@@ -74,7 +74,7 @@ def export(
     The figures are those of the files: they are read back and run as the control would, over 20000 random poses.
     """
     from ncfix.cli.tabled import along, rewritten_file
-    from ncfix.plugin_faults import called
+    from ncfix.plugins import called
     from ncfix.tables.control import Request, Written, get_control
     from ncfix.tables.export import export as exported
     from ncfix.tables.poses import ranges_of
@@ -151,7 +151,7 @@ def write_folder(folder: str, made: Exported | Written, force: bool) -> None:
     check_folder(folder)
     paths = {os.path.join(folder, name): content for name, content in made.files.items()}
     for path in paths:
-        ways.check_output(path, folder, force)
+        files.check_output(path, folder, force)
         if os.path.lexists(path) and not force:
             raise files.exists_already(path)
     fresh = [path for path in paths if not os.path.lexists(path)]

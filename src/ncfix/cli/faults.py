@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from ncfix.cli import console
 from ncfix.diagnostics import FaultError, NcfixError, PluginError
 from ncfix.files import unwritable
-from ncfix.plugin_faults import blamed
+from ncfix.plugins import blamed
 
 DEBUG = "NCFIX_DEBUG"
 """The environment variable that asks for tracebacks; workers inherit it."""

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ncfix.cli.targets import STREAM, Target
-from ncfix.processors import processors
+from ncfix.host import processors
 
 AUTO = 0
 """`--jobs auto` as a number: as many as pay."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import IO
 from weakref import WeakSet
 
-from ncfix import files, inputs, ways
+from ncfix import files, inputs
 from ncfix.batch.gathering import Gathered, gathered
 from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
@@ -200,7 +200,7 @@ def _check_clash(found: Sequence[Target]) -> None:
     """Refuse outputs that are one file, here or on a computer that does not tell large letters from small ones."""
     same: dict[object, list[Target]] = {}
     for target in found:
-        same.setdefault((target.in_place and _file(target.path)) or ways.alike(target.path), []).append(target)
+        same.setdefault((target.in_place and _file(target.path)) or files.alike(target.path), []).append(target)
     for group in same.values():
         if len(group) > 1:
             sources = ", ".join(target.source for target in group)
@@ -216,7 +216,7 @@ def _check_in_place(target: Target) -> None:
     place = Place(target.path)
     if target.path == STREAM:
         raise UsageError.of("NCF005", "standard input cannot be changed in place", hint="-o FILE")
-    ways.check_output(target.path)
+    files.check_output(target.path)
     if os.path.lexists(target.backup):
         hint = "remove it, or bring it back and fix that"
         raise UsageError.of("NCF008", f"was fixed in place before: {target.backup} exists", place, hint)
@@ -224,7 +224,7 @@ def _check_in_place(target: Target) -> None:
 
 def _check_output(target: Target, inputs: Collection[tuple[int, int]]) -> None:
     place = Place(target.path)
-    ways.check_output(target.path, target.root, target.force)
+    files.check_output(target.path, target.root, target.force)
     if _file(target.path) in inputs:
         raise UsageError.of("NCF005", "is an input too, and inputs are not changed", place, "--in-place, or another -o")
     if os.path.lexists(target.path) and not (target.force or target.resume):

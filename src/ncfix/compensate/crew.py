@@ -23,8 +23,8 @@ from typing import Any, Generic, Protocol, TypeVar
 from ncfix.compensate.before import Before
 from ncfix.compensate.passage import Passage
 from ncfix.compensate.post import GoneError, Post, lines_between, own_lines
-from ncfix.plugin_faults import blamed
-from ncfix.tied import tie
+from ncfix.host import tie
+from ncfix.plugins import blamed
 
 Result = TypeVar("Result")
 Made = TypeVar("Made", bound="Done", covariant=True)

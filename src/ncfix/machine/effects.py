@@ -22,8 +22,7 @@ from ncfix.machine.linear import dependence_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State, flatten
-from ncfix.plugin_faults import called, handed
-from ncfix.plugins import registry
+from ncfix.plugins import called, handed, registry
 
 WARM = 20.0
 """Degree C at which thermal effects are zero."""

@@ -42,7 +42,7 @@ from ncfix.machine.effects import PhysicalEffect, at_the_ends, library
 from ncfix.machine.fields import Report, Section, did_you_mean
 from ncfix.machine.machine import DEFAULT_CORRECTION, DEFAULT_INCREMENT, Machine
 from ncfix.machine.piecewise import kinds
-from ncfix.plugin_faults import working
+from ncfix.plugins import working
 from ncfix.toml_text import decoded, key_lines, parsed
 
 SCHEMA = 1

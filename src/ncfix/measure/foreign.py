@@ -20,8 +20,7 @@ from ncfix.measure import checks
 from ncfix.measure import renishaw as rtl
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.renishaw import number_of
-from ncfix.plugin_faults import called
-from ncfix.plugins import registry
+from ncfix.plugins import called, registry
 
 LINEAR = "XYZ"
 SLANTED = 1e-6

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from ncfix.diagnostics import Place, UsageError
-from ncfix.plugin_faults import called
-from ncfix.plugins import registry
+from ncfix.plugins import called, registry
 from ncfix.report import html, markdown
 from ncfix.report.document import Document
 

@@ -15,8 +15,7 @@ from typing import Any, ClassVar
 
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
-from ncfix.plugin_faults import called
-from ncfix.plugins import registry
+from ncfix.plugins import called, registry
 from ncfix.tables.classes import of_terms
 from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Compensation, Tables

@@ -11,7 +11,7 @@ import numpy as np
 from ncfix import __version__
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
-from ncfix.plugin_faults import called, handed
+from ncfix.plugins import called, handed
 from ncfix.tables import manifest as side
 from ncfix.tables.control import Control, Files, Least, Request, Written
 from ncfix.tables.grid import Array

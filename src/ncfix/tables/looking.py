@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from ncfix.diagnostics import Message, Place
-from ncfix.plugin_faults import called
+from ncfix.plugins import called
 from ncfix.tables import forms
 from ncfix.tables.control import Control, Files, controls, get_control
 from ncfix.tables.export import SHEET, linted

@@ -6,8 +6,7 @@ import re
 from pathlib import PurePath
 
 from ncfix.diagnostics import UsageError
-from ncfix.plugin_faults import working
-from ncfix.plugins import nearest, registry
+from ncfix.plugins import nearest, registry, working
 from ncfix.text.content import beginning_without_comments
 from ncfix.text.dialect import Dialect
 

@@ -16,8 +16,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ncfix import caches
-from ncfix.plugin_faults import working
+from ncfix.host import cache_folders
+from ncfix.plugins import working
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree
@@ -76,7 +76,7 @@ def place_of_tables(grammar: Path) -> str | None:
     and version of Lark.
     """
     name = f"{grammar.stem}.{sha256(str(grammar).encode()).hexdigest()[:12]}.{sys.implementation.cache_tag}.tables"
-    for folder in caches.folders(__file__):
+    for folder in cache_folders(__file__):
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
             if (folder / name).exists() or os.access(folder, os.W_OK):

@@ -12,8 +12,7 @@ from functools import lru_cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ncfix.plugin_faults import called, useless
-from ncfix.plugins import nearest
+from ncfix.plugins import called, nearest, useless
 from ncfix.text.reach import runs_straight_on
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from ncfix.diagnose.catalogue import linear, location, rotary, thermal, weight
 from ncfix.diagnose.catalogue.candidate import Candidate, Reach
-from ncfix.plugin_faults import called, handed
-from ncfix.plugins import registry
+from ncfix.plugins import called, handed, registry
 
 
 def catalogue(reach: Reach) -> tuple[Candidate, ...]:

@@ -1,0 +1,74 @@
+"""The computer that ncfix runs on: its processors, where it keeps what can be made again, processes that end together.
+
+A process that is killed cannot end others. So those that it starts look after themselves, and none works on, or holds a
+pipe open, when the one that started it is gone, whatever ended that one: the kernel of Linux is asked to kill them
+(`prctl`), also while they are deep in compiled code; and anywhere a thread waits for the far end of a pipe that closes
+then, which multiprocessing keeps for that, or asks now and then who the process is that started this one.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from threading import Thread
+from time import sleep
+
+
+def processors() -> int:
+    """So many may run this process, whether they are free or not."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def cache_folders(source: str) -> Iterator[Path]:
+    """Beside what Python keeps of a module, by its file; then the user's own cache, if there is a home for it.
+
+    They need not be there, nor be such that they can be written to.
+    """
+    yield Path(source).parent / "__pycache__"
+    with suppress(RuntimeError):  # no HOME, and a user whom the system does not know
+        yield Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ncfix"
+
+
+GONE = 1
+"""Exit code of a process that ends because the one that started it has."""
+PR_SET_PDEATHSIG = 1
+"""Linux, `prctl(2)`: the signal that a process gets when the thread that started it ends."""
+SIGKILL = 9
+EVERY_S = 0.2
+"""How often is asked who started a process, where there is no pipe."""
+
+
+def tie() -> None:
+    """Tie this process to the one that started it by multiprocessing, whose starting thread waits for it to end."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is None:
+        return
+    if sys.platform == "linux":
+        with suppress(ImportError, OSError, AttributeError):
+            import ctypes
+
+            ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, SIGKILL, 0, 0, 0)
+
+    def watch() -> None:
+        parent.join()
+        os._exit(GONE)
+
+    Thread(target=watch, daemon=True).start()
+
+
+def tie_to(parent: int) -> None:
+    """Tie this process to the one with this number, which has started it in whatever way."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            sleep(EVERY_S)
+        os._exit(GONE)
+
+    Thread(target=watch, daemon=True).start()
