@@ -1,11 +1,11 @@
 import numpy as np
 
 from ncfix.hookspecs import hookimpl
+from ncfix.tables.axis_tables import positioning
+from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Control, Properties, Written
 from ncfix.tables.forms import BY_NAME, read
 from ncfix.tables.grid import Grid
-from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.positioning import positioning
 
 FILE, FORM = "axeserr.dat", BY_NAME["weihong"]
 

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.tables.control import Assumption, Files, Option, Request
+from ncfix.tables.axis_tables import reversals
+from ncfix.tables.compensation import Compensation, Term
+from ncfix.tables.control import Assumption, Files, Option, Request, SettingForm, one_of
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.reversal import reversals
-from ncfix.tables.settings import Form, one_of
+from ncfix.tables.table_files import Remarks
 from ncfix_fanuc.pitch_text import parameter_text, read_records
 
 NAME = "backlash.txt"
@@ -36,7 +35,7 @@ ASSUMPTION = Assumption(
     "Parameter 1006#5 (ZMI) is the direction of the return. Turn an axis round under a dial gauge with 1851 at zero, "
     "and as written: the play must have gone, not doubled.",
 )
-HOMING = Form(
+HOMING = SettingForm(
     "axes of X, Y and Z, like XY",
     lambda text: set(text.upper()) <= set(AXES) and len(set(text.upper())) == len(text),
 )

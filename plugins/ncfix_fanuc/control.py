@@ -11,10 +11,20 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ncfix.diagnostics import Message
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.settings import Form, one_of, whole
+from ncfix.tables.compensation import Compensation, Term
+from ncfix.tables.control import (
+    Assumption,
+    Control,
+    Files,
+    Option,
+    Properties,
+    Request,
+    SettingForm,
+    Written,
+    one_of,
+    whole,
+)
+from ncfix.tables.table_files import Remarks
 from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
 from ncfix_fanuc.filling import AXES, FITS, SAID, TEMPLATE, GridFilling
 from ncfix_fanuc.placing import OPTIONS as PLACES
@@ -34,7 +44,7 @@ from ncfix_fanuc.records import (
 )
 from ncfix_fanuc.units import UNITS, sign_option
 
-ORDER = Form("XYZ, ZYX, ...: each axis once", lambda text: sorted(text) == list(AXES))
+ORDER = SettingForm("XYZ, ZYX, ...: each axis once", lambda text: sorted(text) == list(AXES))
 
 
 class Fanuc(Control):

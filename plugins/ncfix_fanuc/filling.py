@@ -9,13 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix.diagnostics import RefusedError
-from ncfix.tables.control import Least, Request
+from ncfix.tables.axis_tables import reversal_note
+from ncfix.tables.control import Least, Request, wrong_setting
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.least import of_even_nodes, of_functions
-from ncfix.tables.mesh import AIM, Mesh, search
-from ncfix.tables.reversal import reversal_note
-from ncfix.tables.settings import wrong
-from ncfix.tables.volume import Volume
+from ncfix.tables.lower_bounds import least_of_even_nodes, least_of_functions
+from ncfix.tables.volume import AIM, Mesh, Volume, search
 from ncfix_fanuc.backlash import Backlash
 from ncfix_fanuc.placing import Placing, anchors
 from ncfix_fanuc.records import MOST_MAGNIFICATION, SIDE, TEXT, Style, Volc, check_template
@@ -108,14 +106,14 @@ class GridFilling:
     def least(self) -> Least:
         """What no grid over X, Y and Z could do better."""
         request, play = self.request, any(self.backlash.amounts)
-        return of_functions(request.machine, request.space, request.tool_length, AXES, play)
+        return least_of_functions(request.machine, request.space, request.tool_length, AXES, play)
 
     def _even(self, mesh: Mesh) -> Iterator[str]:
         """Of a target that is not reached, why, if it is for want of points."""
         covered = np.array([[line[0], line[-1]] for line in mesh.grid.nodes])
         for index, count in enumerate(mesh.grid.counts):
             if count == SIDE:
-                yield of_even_nodes(replace(self._volume(), covered=covered), index, SIDE).sentence
+                yield least_of_even_nodes(replace(self._volume(), covered=covered), index, SIDE).sentence
 
     def notes(self, volc: Volc, mesh: Mesh) -> Iterator[str]:
         """What was made, and what is left."""
@@ -163,5 +161,5 @@ def _style(settings: Mapping[str, str]) -> Style:
         if template:
             check_template(template)
     except (ValueError, KeyError, IndexError) as error:
-        raise wrong(settings, "template", f"like {TEMPLATE}; {error}") from error
+        raise wrong_setting(settings, "template", f"like {TEMPLATE}; {error}") from error
     return Style(first, settings["order"], largest, template, "".join(sorted(settings["home_minus"].upper())))

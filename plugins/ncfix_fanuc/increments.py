@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import RefusedError
+from ncfix.tables.axis_tables import positioning
 from ncfix.tables.control import Request
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.positioning import positioning
 from ncfix_fanuc.pitch_text import LARGEST, MOST, Pitch
 
 MOST_MAGNIFICATION = 100

@@ -10,11 +10,10 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ncfix.diagnostics import Message
-from ncfix.tables.axes import DEGREE, TURNING, in_order
+from ncfix.tables.compensation import Compensation
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
-from ncfix.tables.least import of_own_axis
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Compensation
+from ncfix.tables.lower_bounds import least_of_own_axis
+from ncfix.tables.table_files import DEGREE, TURNING, Remarks, in_order
 from ncfix_fanuc.increments import at_zero, curves, pitch_of
 from ncfix_fanuc.pitch_reading import PARAMETERS, SETTINGS, read_pitches
 from ncfix_fanuc.pitch_text import (
@@ -108,7 +107,7 @@ class FanucPitch(Control):
         files[SETTINGS] = (" ".join(words) + "\n").encode()
         notes.append("The way back needs a table of its own (3605#0); what is written is the mean of both ways.")
         notes.append(f"{SETTINGS} is for ncfix emulate only; the control does not read it.")
-        least = of_own_axis(request.machine, request.space, request.tool_length)
+        least = least_of_own_axis(request.machine, request.space, request.tool_length)
         return Written(files, tuple(notes), least)
 
     def read(self, files: Files) -> Compensation:

@@ -7,11 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.tables.axes import TURNING, unit_of
+from ncfix.tables.compensation import Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks, as_number
-from ncfix.tables.neutral import Term
+from ncfix.tables.table_files import TURNING, Remarks, as_number, unit_of
 from ncfix_fanuc.pitch_text import NUMBERS, Pitch, read_increments, read_records
 from ncfix_fanuc.units import SIGNS, sense_of
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import Remarks
 
 LARGEST = 7
 MOST = 128

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from ncfix.diagnostics import UsageError
-from ncfix.tables.control import Assumption, Option, Request
-from ncfix.tables.lines import Remarks
-from ncfix.tables.settings import Form
+from ncfix.tables.control import Assumption, Option, Request, SettingForm
+from ncfix.tables.table_files import Remarks
 from ncfix_fanuc import json_values
 
 ENTRY = re.compile(r"([XYZABC])=?([+-]?(?:\d+\.?\d*|\.\d+))")
@@ -31,7 +30,7 @@ def _entries(text: str) -> list[tuple[str, float]] | None:
     return pairs if len(pairs) == len(found) == len({letter for letter, _ in pairs}) else None
 
 
-FORM = Form("axes with their positions, like X0,Y0,Z-10.5", lambda text: _entries(text) is not None)
+FORM = SettingForm("axes with their positions, like X0,Y0,Z-10.5", lambda text: _entries(text) is not None)
 
 
 def assumption(name: str) -> Assumption:

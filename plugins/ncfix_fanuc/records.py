@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Grid
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import Remarks
 from ncfix_fanuc import json_values
 from ncfix_fanuc.json_values import SMALLEST
 from ncfix_fanuc.placing import Placing, placed

@@ -17,16 +17,13 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.machine import Machine
-from ncfix.tables.axes import DEGREE, in_order
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.axis_tables import reversal_note
+from ncfix.tables.compensation import NOTHING, Compensation, Tables
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
+from ncfix.tables.correction import corners, residual
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks
-from ncfix.tables.mesh import Mesh
-from ncfix.tables.neutral import NOTHING, Compensation, Tables
-from ncfix.tables.poses import corners
-from ncfix.tables.residual import residual
-from ncfix.tables.reversal import reversal_note
-from ncfix.tables.settings import one_of, whole
+from ncfix.tables.table_files import DEGREE, Remarks, in_order
+from ncfix.tables.volume import Mesh
 from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
 from ncfix_fanuc.placing import OPTIONS as PLACES
 from ncfix_fanuc.placing import STEP as PLACING

@@ -14,10 +14,9 @@ import numpy as np
 
 from ncfix.machine import Machine, State
 from ncfix.tables.control import Request
-from ncfix.tables.exact import exact_correction, linear_axes
+from ncfix.tables.correction import exact_correction, linear_axes
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.mesh import AIM, Mesh, search
-from ncfix.tables.volume import Volume, inputs_that_matter
+from ncfix.tables.volume import AIM, Mesh, Volume, inputs_that_matter, search
 from ncfix_fanuc.backlash import Backlash
 from ncfix_fanuc.filling import LEVEL
 from ncfix_fanuc.placing import anchors

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import RefusedError
-from ncfix.tables.axes import DEGREE, unit_of
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import DEGREE, Remarks, unit_of
 from ncfix_fanuc import json_values
 from ncfix_fanuc.json_values import SMALLEST
 from ncfix_fanuc.placing import Placing, placed

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ncfix.tables.axes import DEGREE
-from ncfix.tables.control import Option
-from ncfix.tables.settings import number, one_of
+from ncfix.tables.control import Option, number, one_of
+from ncfix.tables.table_files import DEGREE
 
 SIGNS = ("correction", "error")
 SIGNED = "correction: values are added to the command; error: they are taken off it"

@@ -16,11 +16,11 @@ import numpy as np
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State, dumps, loads
+from ncfix.tables.compensation import Tables
 from ncfix.tables.control import Control, Files, Option, Properties, Request, Written
-from ncfix.tables.exact import exact_correction
+from ncfix.tables.correction import exact_correction
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Tables
+from ncfix.tables.table_files import Remarks
 
 MACHINE, HOW = "machine.toml", "fix.toml"
 

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.tables.axes import TURNING, unit_of
+from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.table_files import TURNING, Remarks, unit_of
 from ncfix_heidenhain.table_text import Column, TextTable, number, read_table
 
 KEYS = ("Trans", "MachAxis", "MachBase")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ncfix.tables.axes import ORDER
 from ncfix.tables.control import Files
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import ORDER, Remarks
 from ncfix_heidenhain.table_text import Column, TextTable, read_table
 
 ACTIVE = "ACTIVE"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.tables.grid import Array
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import Remarks
 from ncfix_heidenhain.table_text import Column, TextTable, number, read_table
 
 BACKLASH = "BACKLASH"

@@ -13,14 +13,12 @@ from typing import ClassVar
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
-from ncfix.tables.additive import Line, additive
-from ncfix.tables.axes import DEGREE, ORDER, in_order, unit_of
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.axis_tables import AxisTables, additive
+from ncfix.tables.compensation import Compensation, Term
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.least import of_sums
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.settings import one_of, whole
+from ncfix.tables.lower_bounds import least_of_sums
+from ncfix.tables.table_files import DEGREE, ORDER, Remarks, in_order, unit_of
 from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
 from ncfix_heidenhain.com import Com, nck_text, old_text, read_com
 
@@ -131,7 +129,7 @@ class Heidenhain(Control):
             files[tables[line.input]] = text(tables[line.input], com, 4)
         files[CONFIG] = cma_text(axes, tables)
         files[SIGN] = f"{settings['sign']}\n".encode()
-        least = of_sums(machine, request.space, request.tool_length)
+        least = least_of_sums(machine, request.space, request.tool_length)
         return Written(files, _notes(lines, most, both), least)
 
     def read(self, files: Files) -> Compensation:
@@ -219,16 +217,16 @@ def _letter(name: str, axes: tuple[str, ...], remarks: Remarks | None) -> str | 
     return None
 
 
-def _rounded(line: Line) -> Line:
+def _rounded(line: AxisTables) -> AxisTables:
     """What is left of a line when its values have four decimals: columns of zeros go."""
     units = np.array([unit_of(name) for name in line.outputs])
     values = np.round(line.values / units, 4) * units
     kept = [i for i, name in enumerate(line.outputs) if values[:, i].any() or name == line.input]
     reverse = np.round(line.reverse / unit_of(line.input), 4) * unit_of(line.input)
-    return Line(line.input, line.nodes, tuple(line.outputs[i] for i in kept), values[:, kept], reverse)
+    return AxisTables(line.input, line.nodes, tuple(line.outputs[i] for i in kept), values[:, kept], reverse)
 
 
-def _as_file(line: Line, sense: float, numbered: tuple[str, ...] | None, both: bool) -> Com:
+def _as_file(line: AxisTables, sense: float, numbered: tuple[str, ...] | None, both: bool) -> Com:
     columns = {
         (str(numbered.index(name) + 1) if numbered else name): sense * line.values[:, i] / unit_of(name)
         for i, name in sorted(enumerate(line.outputs), key=lambda pair: ORDER.index(pair[1]))
@@ -252,7 +250,7 @@ def sign_of(text: str) -> float:
     return 1.0 if text == "correction" else -1.0
 
 
-def _notes(lines: tuple[Line, ...], most: int, both: bool) -> tuple[str, ...]:
+def _notes(lines: tuple[AxisTables, ...], most: int, both: bool) -> tuple[str, ...]:
     notes = [
         "A sum of tables over one axis each cannot follow angular errors, whose lever changes as another axis moves: "
         "that part of the error is left, unless the control has KinematicsComp (heidenhain-kinematics)."

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.machine import Axis, Machine, State
-from ncfix.tables.axes import DEGREE
-from ncfix.tables.fit import projector
-from ncfix.tables.grid import Array
-from ncfix.tables.poses import even_poses
-from ncfix.tables.positioning import nodes_needed
+from ncfix.tables.axis_tables import nodes_needed
+from ncfix.tables.correction import even_poses
+from ncfix.tables.grid import Array, projector
+from ncfix.tables.table_files import DEGREE
 from ncfix_heidenhain.chain import LETTERS, Row
 
 FINE = 361

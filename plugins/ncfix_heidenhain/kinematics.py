@@ -10,13 +10,11 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.machine import Machine
-from ncfix.tables.axes import DEGREE, in_order, unit_of
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.axis_tables import reversal_note
+from ncfix.tables.compensation import Compensation, Tables, Term
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Compensation, Tables, Term
-from ncfix.tables.reversal import reversal_note
-from ncfix.tables.settings import one_of, whole
+from ncfix.tables.table_files import DEGREE, Remarks, in_order, unit_of
 from ncfix_heidenhain.chain import LETTERS, Kinematics, Row, kinematics_text, over_limits, read_rows
 from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
 from ncfix_heidenhain.com import LARGE, Com, old_text, read_com

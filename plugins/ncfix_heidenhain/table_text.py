@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from ncfix.tables.lines import Remarks, as_number
+from ncfix.tables.table_files import Remarks, as_number
 
 END = "[END]"
 NAME = re.compile(r"\S+")

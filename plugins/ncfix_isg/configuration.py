@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ncfix.tables.control import Files
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import Remarks
 from ncfix_isg.leadscrew import MARK, bare
 
 LETTERS = "XYZABC"

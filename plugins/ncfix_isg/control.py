@@ -14,16 +14,25 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from ncfix.diagnostics import Message, RefusedError
-from ncfix.tables.axes import in_order
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
-from ncfix.tables.faces import faces, searched
+from ncfix.tables.axis_tables import Reversal, reversal_note, reversals
+from ncfix.tables.compensation import Compensation, Term
+from ncfix.tables.control import (
+    Assumption,
+    Control,
+    Files,
+    Option,
+    Properties,
+    Request,
+    SettingForm,
+    Written,
+    one_of,
+    whole,
+    wrong_setting,
+)
 from ncfix.tables.grid import Grid
-from ncfix.tables.lines import Remarks
-from ncfix.tables.mesh import AIM, search
-from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.reversal import Reversal, reversal_note, reversals
-from ncfix.tables.settings import Form, one_of, whole, wrong
-from ncfix.tables.volume import Volume, inputs_that_matter
+from ncfix.tables.grid_sums import faces, searched
+from ncfix.tables.table_files import Remarks, in_order
+from ncfix.tables.volume import AIM, Volume, inputs_that_matter, search
 from ncfix_isg.configuration import LETTERS, config_text, is_list, read_configuration
 from ncfix_isg.csv_file import grid_text, is_grid, parameters, read_grids
 from ncfix_isg.leadscrew import MARK, MOST, NAME, list_text, read_leadscrews
@@ -32,7 +41,9 @@ TABLE = "volcomp{}.csv"
 CONFIG = "volcomp.lis"
 LINEAR = "XYZ"
 MOST_NODES = 1_000_000
-AXES = Form("axes of X, Y and Z, each once", lambda text: sorted(text.upper()) == sorted({*text.upper()} & {*LINEAR}))
+AXES = SettingForm(
+    "axes of X, Y and Z, each once", lambda text: sorted(text.upper()) == sorted({*text.upper()} & {*LINEAR})
+)
 ONE = 3
 """Up to so many inputs a single grid does."""
 
@@ -232,7 +243,7 @@ def _numbers(request: Request, given: str) -> dict[str, int]:
     pairs = [pair.strip().split(":") for pair in given.split(",")]
     odd = any(len(pair) != 2 or not pair[1].isdecimal() for pair in pairs)
     if odd or sorted(pair[0] for pair in pairs) != sorted(names):
-        raise wrong({"axes": given}, "axes", "LETTER:NUMBER for each axis, separated by commas")
+        raise wrong_setting({"axes": given}, "axes", "LETTER:NUMBER for each axis, separated by commas")
     return {name: int(number) for name, number in sorted(pairs, key=lambda pair: LETTERS.index(pair[0]))}
 
 

@@ -7,10 +7,9 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from ncfix.tables.axes import unit_of
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks, as_number
+from ncfix.tables.table_files import Remarks, as_number, unit_of
 from ncfix_isg.configuration import LETTERS
 
 PARAMETER = re.compile(r"E[XYZABC]0?[XYZABC]")

@@ -15,11 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from ncfix.tables.axis_tables import Reversal
+from ncfix.tables.compensation import Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Grid
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Term
-from ncfix.tables.reversal import Reversal
+from ncfix.tables.table_files import Remarks
 
 UNIT = 1e-4
 """mm: of positions and values."""

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.tables.axes import ORDER, TURNING, unit_of
+from ncfix.tables.compensation import Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import ALONE, Remarks
-from ncfix.tables.neutral import Term
+from ncfix.tables.table_files import ALONE, ORDER, TURNING, Remarks, unit_of
 
 MOST = 256
 """EMCMOT_COMP_SIZE of LinuxCNC."""

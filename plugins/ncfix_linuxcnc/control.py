@@ -11,12 +11,22 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ncfix.diagnostics import Message
-from ncfix.tables.axes import DEGREE, in_order, unit_of
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
-from ncfix.tables.least import of_own_axis
-from ncfix.tables.neutral import Compensation
-from ncfix.tables.positioning import positioning
-from ncfix.tables.settings import one_of, whole, wrong
+from ncfix.tables.axis_tables import positioning
+from ncfix.tables.compensation import Compensation
+from ncfix.tables.control import (
+    Assumption,
+    Control,
+    Files,
+    Option,
+    Properties,
+    Request,
+    Written,
+    one_of,
+    whole,
+    wrong_setting,
+)
+from ncfix.tables.lower_bounds import least_of_own_axis
+from ncfix.tables.table_files import DEGREE, in_order, unit_of
 from ncfix_linuxcnc.comp_file import MOST, Joint, comp_text, ini_text, is_ini, is_table, look_at, read_joints
 
 
@@ -81,7 +91,7 @@ class LinuxCnc(Control):
         joints = _joints(tables, letters)
         files = {joint.file: comp_text(joint, int(kind)) for joint in joints}
         files["comp.ini"] = ini_text(joints, letters, int(kind))
-        return Written(files, _notes(), of_own_axis(request.machine, request.space, request.tool_length))
+        return Written(files, _notes(), least_of_own_axis(request.machine, request.space, request.tool_length))
 
     def read(self, files: Files) -> Compensation:
         """As LinuxCNC loads them. Raises `ConfigError` NCF491."""
@@ -120,7 +130,7 @@ def _coordinates(request: Request, given: str) -> str:
     names = "".join(in_order(request.machine))
     letters = given.replace(" ", "").upper() or names
     if sorted(letters) != sorted(names):
-        raise wrong({"coordinates": given}, "coordinates", f"the axes of the machine: {' '.join(names)}")
+        raise wrong_setting({"coordinates": given}, "coordinates", f"the axes of the machine: {' '.join(names)}")
     return letters
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix.tables.grid import Array
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import Remarks
 from ncfix_siemens.syntax import Assignment
 
 WHOLE = 1e-6

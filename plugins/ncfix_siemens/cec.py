@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import Remarks
 from ncfix_siemens.assigned import Assigned
 from ncfix_siemens.syntax import Assignment, Line, assignments
 from ncfix_siemens.table import PLACES, Table, number

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.tables.axes import unit_of
+from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.table_files import unit_of
 from ncfix_siemens.table import BOTH, DIGITS, PLACES, Table
 
 TERMS = ("only", "plus_multiplier", "plus_base", "plus_both")

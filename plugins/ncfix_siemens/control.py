@@ -16,13 +16,12 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import State
+from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Assumption, Control, Files, Least, Option, Properties, Request, Written
+from ncfix.tables.correction import orientation_error, random_poses
 from ncfix.tables.grid import Array
-from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.poses import random_poses
-from ncfix.tables.scheme import Job, Scheme, automatic
+from ncfix.tables.scheme import Scheme, SchemeTask, automatic
 from ncfix.tables.scheme_fixed import fixed
-from ncfix.tables.scheme_rotary import orientation_error
 from ncfix_siemens.cec import cec_text
 from ncfix_siemens.combine import Reading, tables_of
 from ncfix_siemens.eec import eec_text
@@ -123,7 +122,7 @@ class Siemens(Control):
 
 def _scheme(request: Request, settings: Settings) -> Scheme:
     """The tables that the settings ask for."""
-    job = Job(request.machine, request.space, request.tool_length, request.target, settings.limits)
+    job = SchemeTask(request.machine, request.space, request.tool_length, request.target, settings.limits)
     if settings.scheme != "auto":
         return fixed(job, settings.scheme)
     if settings.rotary != "auto" or not request.machine.rotary.any():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import Remarks
 from ncfix_siemens.assigned import Assigned
 from ncfix_siemens.syntax import Assignment, Line, assignments
 from ncfix_siemens.table import PLACES, Table, number

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ncfix.tables.axes import DEGREE
 from ncfix.tables.control import Assumption, Properties
+from ncfix.tables.table_files import DEGREE
 
 PROPERTIES = Properties(
     value_sign="CEC: as --set value_sign says; EEC: error",

@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ncfix.machine import Machine
-from ncfix.tables.axes import in_order
-from ncfix.tables.control import Option
+from ncfix.tables.control import Option, one_of, whole, wrong_setting
 from ncfix.tables.scheme import Limits
-from ncfix.tables.settings import one_of, whole, wrong
+from ncfix.tables.table_files import in_order
 from ncfix_siemens.cec import Style
 from ncfix_siemens.combine import TERMS
 
@@ -92,5 +91,5 @@ def machine_axes(given: str, machine: Machine) -> dict[str, str]:
     found = {letter.strip().upper(): axis.strip().upper() for letter, axis in pairs}
     fine = all(AXIS.fullmatch(axis) for axis in found.values()) and len(set(found.values())) == len(pairs)
     if not fine or sorted(found) != sorted(names):
-        raise wrong({"axes": given}, "axes", f"LETTER:AXIS for each of {' '.join(names)}, separated by commas")
+        raise wrong_setting({"axes": given}, "axes", f"LETTER:AXIS for each of {' '.join(names)}, separated by commas")
     return {name: found[name] for name in ordered}

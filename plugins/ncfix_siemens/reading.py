@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ncfix.tables.compensation import Compensation
 from ncfix.tables.control import Files
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Compensation
+from ncfix.tables.table_files import Remarks
 from ncfix_siemens.cec import read_cec
 from ncfix_siemens.combine import TERMS, Reading, compensation
 from ncfix_siemens.eec import read_eec

@@ -14,8 +14,8 @@ from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Effect, Machine, loads
 from ncfix.machine.basis import Polynomial
 from ncfix.tables.control import Control, Request
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
-from ncfix.tables.poses import ranges_of
 
 AXES = """
 ncfix = 1

@@ -7,8 +7,8 @@ import pytest
 from ncfix.diagnose.carriers import carriers
 from ncfix.machine import loads
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
-from ncfix.tables.poses import ranges_of
 
 MACHINE = """
 ncfix = 1

@@ -14,9 +14,9 @@ from ncfix.diagnostics import ConfigError, RefusedError
 from ncfix.machine import Effect, load, loads
 from ncfix.machine.basis import Polynomial
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
-from ncfix.tables.lines import Remarks
-from ncfix.tables.poses import ranges_of
+from ncfix.tables.table_files import Remarks
 from ncfix.testing import AXES, check_control, single_error
 from ncfix_fanuc.increments import diffused
 from ncfix_fanuc.pitch_text import Pitch, Record, pitch_text, read_increments, read_records

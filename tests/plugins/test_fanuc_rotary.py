@@ -11,9 +11,8 @@ import pytest
 from ncfix.diagnostics import ConfigError, RefusedError
 from ncfix.machine import Effect, Tool, loads
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of, residual
 from ncfix.tables.export import export
-from ncfix.tables.poses import ranges_of
-from ncfix.tables.residual import residual
 from ncfix.testing import check_control, single_error
 
 CONTROL = get_control("fanuc-rotary")

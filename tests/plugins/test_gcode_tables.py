@@ -13,7 +13,7 @@ from ncfix.control.setup import Setup
 from ncfix.diagnostics import ConfigError, UsageError
 from ncfix.machine import load
 from ncfix.tables.control import Request, get_control
-from ncfix.tables.poses import random_poses, ranges_of
+from ncfix.tables.correction import random_poses, ranges_of
 from ncfix.testing import check_control, single_error
 from ncfix.text.reader import read
 

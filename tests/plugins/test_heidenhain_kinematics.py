@@ -12,9 +12,9 @@ from ncfix.diagnostics import ConfigError, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, load, loads
 from ncfix.machine.basis import Backlash
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import random_poses, ranges_of
 from ncfix.tables.export import Exported, export
-from ncfix.tables.lines import Remarks
-from ncfix.tables.poses import random_poses, ranges_of
+from ncfix.tables.table_files import Remarks
 from ncfix.testing import check_control, single_error
 from ncfix_heidenhain.chain import Row, kinematics_text, over_limits, read_rows
 from ncfix_heidenhain.table_text import read_table

@@ -13,9 +13,9 @@ from ncfix.diagnostics import ConfigError, RefusedError, UsageError
 from ncfix.machine import Effect, dumps, loads
 from ncfix.machine.basis import Polynomial
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
-from ncfix.tables.lines import Remarks
-from ncfix.tables.poses import ranges_of
+from ncfix.tables.table_files import Remarks
 from ncfix.testing import check_control, single_error
 from ncfix_heidenhain.com import read_com
 from ncfix_heidenhain.table_text import read_table

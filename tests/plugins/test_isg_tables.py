@@ -11,8 +11,8 @@ import pytest
 from ncfix.diagnostics import ConfigError, UsageError
 from ncfix.machine import Effect, loads
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
-from ncfix.tables.poses import ranges_of
 from ncfix.testing import single_error
 
 CONTROL = get_control("isg")

@@ -10,8 +10,8 @@ import pytest
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import loads
 from ncfix.tables.control import Request, controls, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
-from ncfix.tables.poses import ranges_of
 
 MACHINE = """
 ncfix = 1

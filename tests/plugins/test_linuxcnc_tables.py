@@ -12,8 +12,8 @@ from ncfix.diagnostics import ConfigError
 from ncfix.machine import Effect
 from ncfix.machine.basis import Polynomial
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
-from ncfix.tables.poses import ranges_of
 from ncfix.testing import single_error
 
 INI = b"[TRAJ]\nCOORDINATES = X Y Z\nLINEAR_UNITS = mm\n\n[JOINT_0]\nCOMP_FILE = x.comp\nCOMP_FILE_TYPE = 1\n"

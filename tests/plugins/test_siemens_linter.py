@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ncfix.diagnostics import ConfigError
-from ncfix.tables.lines import Remarks
+from ncfix.tables.table_files import Remarks
 from ncfix_siemens.eec import read_eec
 from ncfix_siemens.syntax import parsed, written
 from tables.siemens_files import CONTROL, EEC, GOOD, HEAD, ONE, PAIR, at

@@ -13,9 +13,9 @@ from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import Backlash, Polynomial
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import Exported, export
-from ncfix.tables.lines import Remarks
-from ncfix.tables.poses import ranges_of
+from ncfix.tables.table_files import Remarks
 from ncfix.testing import check_control, single_error
 from ncfix_siemens.cec import Style, cec_text, read_cec
 from ncfix_siemens.combine import TERMS, Reading, compensation

@@ -17,14 +17,11 @@ import pytest
 
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, State, loads
+from ncfix.tables.compensation import Compensation
 from ncfix.tables.control import Control, Request, get_control
-from ncfix.tables.exact import exact_correction
+from ncfix.tables.correction import exact_correction, random_poses, ranges_of, residual, rotary_correction
 from ncfix.tables.export import export
-from ncfix.tables.faces import interactions
-from ncfix.tables.neutral import Compensation
-from ncfix.tables.poses import random_poses, ranges_of
-from ncfix.tables.residual import residual
-from ncfix.tables.scheme_rotary import rotary_correction
+from ncfix.tables.grid_sums import interactions
 
 TARGET = 0.005
 """mm: coarse, so that the tables are small; errors up to twice as large may be left."""

@@ -15,8 +15,8 @@ from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, loads
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.tables.control import Control, Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.forms import FORMS, read
-from ncfix.tables.poses import ranges_of
 
 SETTINGS: dict[str, dict[str, str]] = {
     "fanuc": {"sign": "error", "template": "N{no}A1P{dx}A2P{dy}A3P{dz};"},

@@ -11,8 +11,8 @@ import pytest
 
 from ncfix.machine import load
 from ncfix.tables.control import Control, Request
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
-from ncfix.tables.poses import ranges_of
 from ncfix.testing import check_control
 
 

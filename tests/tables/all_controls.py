@@ -15,9 +15,8 @@ from pathlib import Path
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
 from ncfix.tables.control import Request, controls
+from ncfix.tables.correction import POSES, ranges_of
 from ncfix.tables.export import export
-from ncfix.tables.poses import ranges_of
-from ncfix.tables.residual import POSES
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "controllers.md"

@@ -9,10 +9,9 @@ import pytest
 
 from ncfix.machine import Effect, load
 from ncfix.machine.basis import Polynomial
-from ncfix.tables.additive import additive
-from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.poses import even_poses, ranges_of
-from ncfix.tables.residual import residual
+from ncfix.tables.axis_tables import additive
+from ncfix.tables.compensation import Compensation, Term
+from ncfix.tables.correction import even_poses, ranges_of, residual
 from ncfix.testing import single_error
 
 

@@ -11,8 +11,8 @@ from ncfix.diagnostics import ConfigError, NcfixError, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, loads
 from ncfix.machine.basis import Fourier
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import Exported, emulate, export
-from ncfix.tables.poses import ranges_of
 from ncfix.testing import single_error
 
 SETTINGS = {

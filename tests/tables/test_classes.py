@@ -9,8 +9,8 @@ import pytest
 
 from ncfix.machine import load, loads
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import emulate, export
-from ncfix.tables.poses import ranges_of
 
 CASES = {
     "linuxcnc": ("three_axis", {}, "L-POS"),

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.tables.fit import between, fitted, hats, projector
-from ncfix.tables.grid import Grid
+from ncfix.tables.grid import Grid, between, fitted, hats, projector
 
 NODES = np.array([-10.0, -4.0, 1.0, 12.0])
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.grid import Grid
-from ncfix.tables.neutral import Compensation, Term
 
 EIGHT = np.arange(24.0).reshape(2, 2, 2, 3) ** 1.5
 CUBE = Grid(("X", "Y", "Z"), (np.array([0.0, 10.0]),) * 3, ("X", "Y", "Z"), EIGHT)

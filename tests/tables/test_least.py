@@ -8,11 +8,10 @@ import pytest
 from ncfix.machine import Effect, Machine, loads
 from ncfix.machine.basis import Fourier
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of, residual
 from ncfix.tables.export import export
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.least import of_even_nodes, of_functions, of_own_axis, of_sums
-from ncfix.tables.poses import ranges_of
-from ncfix.tables.residual import residual
+from ncfix.tables.lower_bounds import least_of_even_nodes, least_of_functions, least_of_own_axis, least_of_sums
 from ncfix.tables.volume import Volume
 from ncfix.testing import single_error
 
@@ -33,7 +32,7 @@ def turning() -> Machine:
 
 
 def test_a_grid_in_space_cannot_follow_c() -> None:
-    found = of_functions(turning(), ranges_of(turning()), 0.0, "XYZ", ways=True)
+    found = least_of_functions(turning(), ranges_of(turning()), 0.0, "XYZ", ways=True)
     assert found.value == pytest.approx(0.01, rel=1e-9)  # from +10 to -10 um where X, Y and Z stand
     assert "can leave less than 10.00 um" in found.sentence
 
@@ -57,7 +56,7 @@ def test_the_grid_in_the_middle_comes_near_to_it() -> None:
 def test_a_table_of_one_axis_over_itself_does_not_see_the_others() -> None:
     """A turn of the X slide about Z shifts the tip along X by the angle times Y: 40 um at Y250, -24 at Y-150."""
     machine = single_error("EXX").replace(effects=(Effect("EC0X", (0.0,)), Effect("EC0Y", (80e-6,))))
-    found = of_own_axis(machine, ranges_of(machine), 0.0)
+    found = least_of_own_axis(machine, ranges_of(machine), 0.0)
     assert found.value == pytest.approx(80e-6 * 400 / 2, rel=1e-7)  # the angle squared is 6e-9
     assert "X" in found.why
 
@@ -65,7 +64,7 @@ def test_a_table_of_one_axis_over_itself_does_not_see_the_others() -> None:
 def test_sums_cannot_say_a_product() -> None:
     """u times v over a square leaves a quarter of what it spans: the corners alternate in sign."""
     machine = single_error("ECX", 40e-6)
-    found = of_sums(machine, ranges_of(machine), 0.0)
+    found = least_of_sums(machine, ranges_of(machine), 0.0)
     made = export(
         get_control("heidenhain"),
         Request(machine, ranges_of(machine), 0.0, 0.001, get_control("heidenhain").settings({"sign": "error"})),
@@ -80,15 +79,15 @@ def wavy(positions: Array) -> Array:
 
 def test_even_nodes_that_are_too_few_cannot_follow_a_wave() -> None:
     volume = Volume(("X",), np.array([[0.0, 100.0]]), (1.0,), ("X",), wavy)
-    found = of_even_nodes(volume, 0, 3)
+    found = least_of_even_nodes(volume, 0, 3)
     assert found.value == pytest.approx(0.001, rel=0.05)  # the very ends of the line may be met
-    assert of_even_nodes(volume, 0, 200).value < 2e-6
+    assert least_of_even_nodes(volume, 0, 200).value < 2e-6
 
 
 @pytest.mark.parametrize("count", [4, 8, 16])
 def test_no_fit_is_better_than_the_bound(count: int) -> None:
     volume = Volume(("X",), np.array([[0.0, 100.0]]), (1.0,), ("X",), wavy, area=True)
-    bound = of_even_nodes(volume, 0, count).value
+    bound = least_of_even_nodes(volume, 0, count).value
     fit = volume.grid([count])
     assert bound <= volume.left(fit) * 1.001
     rng = np.random.default_rng(5)

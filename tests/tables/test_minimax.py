@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ncfix.tables.grid import Array
-from ncfix.tables.minimax import least_worst
+from ncfix.tables.lower_bounds import least_worst
 
 LINES = [np.linspace(-1, 1, 6), np.linspace(-1, 1, 5), np.linspace(0, 1, 7)]
 X, Y, Z = np.meshgrid(*LINES, indexing="ij")

@@ -7,10 +7,10 @@ import pytest
 
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Backlash
+from ncfix.tables.axis_tables import reversal_note, reversals
 from ncfix.tables.control import Request, get_control
+from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import Exported, export
-from ncfix.tables.poses import ranges_of
-from ncfix.tables.reversal import reversal_note, reversals
 from ncfix.testing import single_error
 
 CONTROLS = {"isg": {}, "fanuc": {"sign": "error"}, "fanuc-rotary": {"sign": "correction"}}

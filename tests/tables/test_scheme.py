@@ -9,11 +9,9 @@ import pytest
 
 from ncfix.machine import Effect, Machine, State, load
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
-from ncfix.tables.poses import random_poses, ranges_of
-from ncfix.tables.residual import Residual, residual
-from ncfix.tables.scheme import Job, Limits, Scheme, automatic
-from ncfix.tables.scheme_nodes import Line
-from ncfix.tables.scheme_rotary import orientation_error, rotary_correction
+from ncfix.tables.correction import Residual, orientation_error, random_poses, ranges_of, residual, rotary_correction
+from ncfix.tables.scheme import Limits, Scheme, SchemeTask, automatic
+from ncfix.tables.scheme_tables import AxisPositions
 from ncfix.testing import single_error
 
 MACHINES = Path(__file__).resolve().parents[2] / "examples" / "machines"
@@ -27,7 +25,7 @@ def solved(
     machine: Machine, target: float = 1e-4, limits: Limits = PLENTY, rotary: bool = True
 ) -> tuple[Scheme, Residual]:
     space = ranges_of(machine)
-    found = automatic(Job(machine, space, 120.0, target, limits), rotary)
+    found = automatic(SchemeTask(machine, space, 120.0, target, limits), rotary)
     return found, residual(machine, found.tables, space, 120.0, 1000)
 
 
@@ -150,7 +148,7 @@ def test_the_same_machine_gives_the_same_tables() -> None:
 
 @pytest.mark.parametrize(("low", "high"), [(-200.0, 300.0), (0.0, 457.3), (-0.00005, 33.33333)])
 def test_positions_have_four_decimals_and_cover_the_range(low: float, high: float) -> None:
-    line = Line.over("X", low, high, 1.0, np.inf, False)
+    line = AxisPositions.over("X", low, high, 1.0, np.inf, False)
     fine = line.fine
     assert np.allclose(fine * 1e4, np.round(fine * 1e4), atol=1e-6)
     assert fine[0] <= low
@@ -160,7 +158,7 @@ def test_positions_have_four_decimals_and_cover_the_range(low: float, high: floa
 
 
 def test_strides_are_the_widest_that_do() -> None:
-    line = Line.over("X", 0.0, 120.0, 1.0, np.inf, False)
+    line = AxisPositions.over("X", 0.0, 120.0, 1.0, np.inf, False)
     assert line.stride(2 * line.fine, 100, 1e-9) == line.steps
     kinked = np.abs(line.fine - 40.0)
     assert line.steps // line.stride(kinked, 100, 1e-9) == 3

@@ -9,9 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ncfix.tables.scheme_layout import Layout, absorbed, arranged, tables_of
-from ncfix.tables.scheme_parts import Selection, needed
-from ncfix.tables.separable import Parts, taken_apart, taken_apart_along
+from ncfix.tables.scheme import PartSelection, needed
+from ncfix.tables.separable import (
+    Separation,
+    TableLayout,
+    absorbed,
+    arranged,
+    tables_of,
+    taken_apart,
+    taken_apart_along,
+)
 
 NODES = (np.linspace(-1, 1, 7), np.linspace(0.5, 2, 7), np.linspace(-2, 2.2, 7))
 GX, GY, GA = np.meshgrid(*NODES, indexing="ij")
@@ -19,7 +26,7 @@ PLACES = np.indices(GX.shape).reshape(3, -1).T
 TINY = 1e-9
 
 
-def layout(values: np.ndarray) -> Layout:
+def layout(values: np.ndarray) -> TableLayout:
     found = taken_apart(values)
     assert found.rest < TINY
     return absorbed(arranged(found.parts, found.constant, None, TINY), TINY)
@@ -78,9 +85,9 @@ def test_scaling_scales_the_function() -> None:
     assert found.scaled(3.0).at(PLACES) == pytest.approx(3 * found.at(PLACES))
 
 
-def selection(values: np.ndarray, **more: frozenset[int]) -> Selection:
-    faces: dict[tuple[int, int | None], Parts] = {(0, None): taken_apart(values)}
-    return Selection(faces, TINY, **more)
+def selection(values: np.ndarray, **more: frozenset[int]) -> PartSelection:
+    faces: dict[tuple[int, int | None], Separation] = {(0, None): taken_apart(values)}
+    return PartSelection(faces, TINY, **more)
 
 
 def test_small_parts_go_first_and_together_stay_below_the_budget() -> None:

@@ -11,10 +11,8 @@ import pytest
 
 from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import State, load, loads
-from ncfix.tables.exact import exact_correction, linear_axes
-from ncfix.tables.mesh import search
-from ncfix.tables.poses import corners, even_poses, random_poses, ranges_of
-from ncfix.tables.volume import Volume, inputs_that_matter
+from ncfix.tables.correction import corners, even_poses, exact_correction, linear_axes, random_poses, ranges_of
+from ncfix.tables.volume import Volume, inputs_that_matter, search
 from ncfix.testing import single_error
 from tables import table_4_2
 

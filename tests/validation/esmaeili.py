@@ -12,10 +12,9 @@ import numpy as np
 
 from ncfix.machine import Axis, Effect, Machine, State, Tool
 from ncfix.machine.basis import Polynomial
-from ncfix.tables.exact import exact_correction
-from ncfix.tables.scheme import Job, Limits
+from ncfix.tables.correction import exact_correction, rotary_correction
+from ncfix.tables.scheme import Limits, SchemeTask
 from ncfix.tables.scheme_fixed import fixed
-from ncfix.tables.scheme_rotary import rotary_correction
 
 Array = np.ndarray
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -154,7 +153,7 @@ def by_kinematics(known: Machine, q: Array, length: float) -> Array:
 
 def by_tables(known: Machine, q: Array, length: float, name: str, room: Sequence[tuple[float, float]]) -> Array:
     """The correction of one of her schemes, its tables fitted over this room (mm, rad)."""
-    job = Job(known, np.array(room), length, 1e-4, Limits(100, 100_000))
+    job = SchemeTask(known, np.array(room), length, 1e-4, Limits(100, 100_000))
     return fixed(job, name).tables.at(known.axis_names, q, np.zeros_like(q))
 
 

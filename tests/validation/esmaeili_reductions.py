@@ -12,7 +12,7 @@ from ncfix.measure.ball_bar import BallBarFigures, figures
 from ncfix.measure.lengths import BallBar
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.observe import observe
-from ncfix.tables.exact import exact_correction
+from ncfix.tables.correction import exact_correction
 from validation.esmaeili import (
     HU40,
     HURON_LENGTH,

@@ -16,12 +16,11 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests")]
 
 from ncfix.machine import Machine, State, load  # noqa: E402
+from ncfix.tables.compensation import Compensation  # noqa: E402
 from ncfix.tables.control import Request, get_control  # noqa: E402
+from ncfix.tables.correction import ranges_of, residual  # noqa: E402
 from ncfix.tables.export import export  # noqa: E402
-from ncfix.tables.neutral import Compensation  # noqa: E402
-from ncfix.tables.poses import ranges_of  # noqa: E402
-from ncfix.tables.residual import residual  # noqa: E402
-from ncfix.tables.scheme import Job, Limits, automatic  # noqa: E402
+from ncfix.tables.scheme import Limits, SchemeTask, automatic  # noqa: E402
 from ncfix.tables.scheme_fixed import fixed  # noqa: E402
 from validation import esmaeili as work  # noqa: E402
 
@@ -51,7 +50,7 @@ def within(machine: Machine, ranges: dict[str, tuple[float, float]]) -> Machine:
     return machine.replace(axes=axes)
 
 
-def tables_for(job: Job, scheme: str) -> Compensation:
+def tables_for(job: SchemeTask, scheme: str) -> Compensation:
     """The tables of a scheme."""
     return (automatic(job) if scheme == "auto" else fixed(job, scheme)).tables
 
@@ -75,7 +74,7 @@ def ten_cases() -> list[Case]:
     for name in TABLE_6_6:
         machine = within(work.kolibri({name: SIZES.get(name, ANGLE)}), STROKES)
         space = ranges_of(machine)
-        job = Job(machine, space, 0.0, 1e-4, PLENTY)
+        job = SchemeTask(machine, space, 0.0, 1e-4, PLENTY)
         lefts = {scheme: residual(machine, tables_for(job, scheme), space, 0.0, POSES) for scheme in SCHEMES}
         after = {scheme: 1e3 * float(left.after.mean()) for scheme, left in lefts.items()}
         found.append(Case(name, 1e3 * float(lefts["auto"].before.mean()), after))
@@ -89,7 +88,7 @@ def all_ten() -> dict[str, tuple[float, float]]:
     The tables are fitted where the ball was probed.
     """
     real, q = work.kolibri(work.TABLE_6_5), work.validation()
-    job = Job(work.kolibri(work.TABLE_6_4), np.array(work.room_of(q)), work.KOLIBRI_LENGTH, 1e-3, PLENTY)
+    job = SchemeTask(work.kolibri(work.TABLE_6_4), np.array(work.room_of(q)), work.KOLIBRI_LENGTH, 1e-3, PLENTY)
     corrections = {scheme: tables_for(job, scheme).at(real.axis_names, q) for scheme in SCHEMES}
     return {name: _explained(real, q, value) for name, value in {"before": np.zeros_like(q), **corrections}.items()}
 
@@ -121,7 +120,7 @@ def thirteen(scheme: str, target: float = 1e-4, limits: Limits = PLENTY) -> Run:
     """The thirteen errors of Table 7-2 together."""
     machine = within(work.huron({name: value for name, (value, _) in work.TABLE_7_2.items()}), ROOM)
     space = ranges_of(machine)
-    tables = tables_for(Job(machine, space, work.HURON_LENGTH, target, limits), scheme)
+    tables = tables_for(SchemeTask(machine, space, work.HURON_LENGTH, target, limits), scheme)
     left = residual(machine, tables, space, work.HURON_LENGTH)
     sizes = (1e3 * float(value) for value in (left.before.mean(), left.after.mean(), left.after.max()))
     return Run(scheme, len(tables.grids), tables.points, *sizes)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from ncfix.diagnostics import RefusedError
-from ncfix.tables.poses import ranges_of
-from ncfix.tables.scheme import Job, Limits
+from ncfix.tables.correction import ranges_of
+from ncfix.tables.scheme import Limits, SchemeTask
 from ncfix.tables.scheme_fixed import fixed
 from validation import esmaeili as work
 from validation import table_schemes as study
@@ -63,14 +63,14 @@ def test_forward_inverse_tables_are_for_their_chain_only() -> None:
     moved = tuple(replace(axis, workpiece_side=axis.name in "CA") for axis in work.KOLIBRI.axes)
     for machine in (work.HU40, work.KOLIBRI.replace(axes=moved, topology="w C A F Y X Z t")):
         with pytest.raises(RefusedError) as caught:
-            fixed(Job(machine, ranges_of(machine), 0.0, 1e-3, Limits(40, 500)), "fik20")
+            fixed(SchemeTask(machine, ranges_of(machine), 0.0, 1e-3, Limits(40, 500)), "fik20")
         assert caught.value.code == "NCF484"
 
 
 def test_trigonometric_tables_need_a_rotary_axis() -> None:
     machine = work.HU40.replace(axes=tuple(axis for axis in work.HU40.axes if not axis.rotary), topology="w X F Z Y t")
     with pytest.raises(RefusedError) as caught:
-        fixed(Job(machine, ranges_of(machine), 0.0, 1e-3, Limits(40, 500)), "trigo23")
+        fixed(SchemeTask(machine, ranges_of(machine), 0.0, 1e-3, Limits(40, 500)), "trigo23")
     assert caught.value.code == "NCF484"
 
 

@@ -44,8 +44,8 @@ def emulate(
     """
     from ncfix.cli.tabled import along
     from ncfix.tables.control import get_control
+    from ncfix.tables.export import SIDE_FILE, read_manifest
     from ncfix.tables.export import emulate as emulated
-    from ncfix.tables.manifest import NAME, loads
 
     chosen = get_control(control)
     following = Following.of(machine_path, dialect, given)
@@ -58,7 +58,7 @@ def emulate(
         except ConfigError as error:
             raise ConfigError.collected(_below(folder, error.messages, content)) from error
         if program is not None:
-            made = loads(content[NAME], NAME)
+            made = read_manifest(content[SIDE_FILE], SIDE_FILE)
             more["program"] = along(following, chosen, found.tables, made.settings, program, made.tool_length)
     found = replace(found, messages=_below(folder, found.messages, content))
     console.tell_some(found.messages)

@@ -76,8 +76,8 @@ def export(
     from ncfix.cli.tabled import along, rewritten_file
     from ncfix.plugins import called
     from ncfix.tables.control import Request, Written, get_control
+    from ncfix.tables.correction import ranges_of
     from ncfix.tables.export import export as exported
-    from ncfix.tables.poses import ranges_of
 
     chosen = get_control(control)
     check_folder(output)

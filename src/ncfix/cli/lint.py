@@ -17,7 +17,7 @@ from ncfix.cli.targets import shown
 from ncfix.diagnostics import ExitCode, Message
 
 if TYPE_CHECKING:
-    from ncfix.tables.looking import Looked
+    from ncfix.tables.forms import Linted
 
 
 @click.command()
@@ -30,11 +30,11 @@ def lint(paths: tuple[str, ...], control: str, as_json: bool) -> int:
     Files of one control that lie in one folder are looked at together. Exit code 1 with findings, 3 if a file is of no
     known form.
     """
-    from ncfix.tables.looking import look
+    from ncfix.tables.forms import lint_files
 
     worst, entries = int(ExitCode.DONE), []
     for folder, content in _gathered(paths):
-        for name, looked in sorted(look(content, control).items()):
+        for name, looked in sorted(lint_files(content, control).items()):
             path = os.path.join(folder, name)
             messages = [_placed(message, folder, content) for message in looked.messages]
             console.tell_some(messages)
@@ -67,12 +67,12 @@ def _placed(message: Message, folder: str, names: dict[str, bytes]) -> Message:
     return replace(message, place=replace(message.place, path=os.path.join(folder, message.place.path)))
 
 
-def _code(looked: Looked) -> int:
+def _code(looked: Linted) -> int:
     if not looked.owner:
         return ExitCode.UNREADABLE
     return ExitCode.FINDINGS if looked.messages else ExitCode.DONE
 
 
-def _entry(path: str, looked: Looked, messages: Sequence[Message]) -> dict[str, Any]:
+def _entry(path: str, looked: Linted, messages: Sequence[Message]) -> dict[str, Any]:
     found = [message.as_dict() for message in messages]
     return {"path": shown(path), "form": looked.owner or None, "title": looked.title or None, "findings": found}

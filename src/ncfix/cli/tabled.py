@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from ncfix.compensate.fix import Fixed
     from ncfix.compensate.following import Followed
+    from ncfix.tables.compensation import Tables
     from ncfix.tables.control import Control
-    from ncfix.tables.neutral import Tables
     from ncfix.text.tree import Program
 
 

@@ -3,26 +3,61 @@
 A reader turns the files into `Tables`, with the control's own signs, digits, limits and rules outside the
 range worked in; running that is the emulation. A plugin registers a function that returns its `Control` with the hook
 `register_controls`, so that nothing numeric is imported before tables are asked for.
-`ncfix.testing.check_control` is the contract that any plugin must pass.
+`ncfix.testing.check_control` is the contract that any plugin must pass. What `--set` gives is text, of a form that its
+`Option` states.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.plugins import called, registry
-from ncfix.tables.classes import of_terms
+from ncfix.tables.compensation import Compensation, Tables, class_of
 from ncfix.tables.grid import Array
-from ncfix.tables.neutral import Compensation, Tables
-from ncfix.tables.settings import Form
 
 Files = Mapping[str, bytes]
 """File name (no folder) -> content."""
+
+
+@dataclass(frozen=True, slots=True)
+class SettingForm:
+    """What the text of a setting may be: `fits` decides, `hint` says it."""
+
+    hint: str
+    fits: Callable[[str], bool]
+
+
+def one_of(*words: str, hint: str = "") -> SettingForm:
+    """One of some words."""
+    return SettingForm(hint or f"one of {', '.join(words)}", lambda text: text in words)
+
+
+def whole(low: int, high: int) -> SettingForm:
+    """A whole number within limits."""
+    hint = f"a whole number from {low} to {high}"
+    return SettingForm(hint, lambda text: text.isascii() and text.isdigit() and low <= int(text) <= high)
+
+
+def number(low: float, high: float) -> SettingForm:
+    """A number within limits."""
+
+    def fits(text: str) -> bool:
+        try:
+            return low <= float(text) <= high
+        except ValueError:
+            return False
+
+    return SettingForm(f"from {low:g} to {high:g}", fits)
+
+
+def wrong_setting(settings: Mapping[str, str], key: str, hint: str) -> UsageError:
+    """The error for a setting that cannot be, which its form alone does not show."""
+    return UsageError.of("NCF485", f"{key}={settings[key]}", hint=hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +111,7 @@ class Option:
 
     default: str | None
     text: str
-    form: Form | None = None
+    form: SettingForm | None = None
     settled: str = ""
 
     def odd(self, text: str) -> bool:
@@ -169,7 +204,7 @@ class Control(ABC):
     def reached(self, machine: Machine, tables: Tables) -> str:
         """The class of what was written: of sums and products of tables it shows in them, of others it is `reaches`."""
         rotary = [axis.name for axis in machine.axes if axis.rotary]
-        return of_terms(tables, rotary) if isinstance(tables, Compensation) else self.reaches
+        return class_of(tables, rotary) if isinstance(tables, Compensation) else self.reaches
 
     def knows(self, name: str, content: bytes) -> bool:
         """Whether a file from elsewhere is of a form of this control, by what it holds; see `look`."""
@@ -195,8 +230,7 @@ class Control(ABC):
 
         All that are unknown, of another form or, if `complete`, missing are named in one `UsageError` NCF485.
         """
-        faults = [*self._strange(given), *(self._missing(given) if complete else ())]
-        if faults:
+        if faults := [*self._strange(given), *(self._missing(given) if complete else ())]:
             raise UsageError.collected(faults)
         return {key: given.get(key, option.default or "") for key, option in self.options.items()}
 
@@ -234,14 +268,11 @@ def get_control(name: str) -> Control:
     """The control of that name; raises `UsageError` NCF480."""
     found = registry("controls")
     if name not in found:
-        raise UsageError.of("NCF480", f"there are no tables for a control {name!r}", hint=f"one of {_listed(found)}")
+        hint = f"one of {', '.join(sorted(found))}"
+        raise UsageError.of("NCF480", f"there are no tables for a control {name!r}", hint=hint)
     return _made(name, found[name])
 
 
 def _made(name: str, factory: Callable[[], Control]) -> Control:
     control: Control = called("controls", name, factory, gives=Control)
     return control
-
-
-def _listed(names: Sequence[str] | Mapping[str, object]) -> str:
-    return ", ".join(sorted(names))

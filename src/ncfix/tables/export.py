@@ -1,7 +1,12 @@
-"""Tables made, written, read back from what was written, and run: the residual is always that of the files."""
+"""Tables made, written, read back from what was written, and run: the residual is always that of the files.
+
+The side file beside them says which machine they are for, which files they are, and under which settings.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,15 +17,14 @@ from ncfix import __version__
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
 from ncfix.plugins import called, handed
-from ncfix.tables import manifest as side
+from ncfix.tables.compensation import Tables
 from ncfix.tables.control import Control, Files, Least, Request, Written
+from ncfix.tables.correction import POSES, Residual, random_poses, ranges_of, residual
 from ncfix.tables.grid import Array
-from ncfix.tables.manifest import Manifest
-from ncfix.tables.neutral import Tables
-from ncfix.tables.poses import random_poses, ranges_of
-from ncfix.tables.residual import POSES, Residual, residual
 from ncfix.tables.sheet import as_html, as_markdown
 
+SIDE_FILE = "ncfix-tables.json"
+SCHEMA = 1
 SHEET = "hand-over"
 CLOSE = 1e-9
 """mm, rad: ends nearer to each other than that are the same."""
@@ -31,6 +35,84 @@ TURNED = 64
 """Poses at which an endless axis is turned once more."""
 LEVER = 100.0
 """mm: at which an angle counts as a length."""
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """What is known of a set of files.
+
+    control      the plugin that wrote them
+    machine      its name, and the hash of everything that matters to its correction
+    ranges       axis -> lowest and highest position covered, mm or degree
+    tool_length  the length that they hold for, mm
+    settings     the control's options
+    files        name -> SHA-256 of the content
+    """
+
+    control: str
+    machine: str
+    hash: str
+    ranges: Mapping[str, tuple[float, float]]
+    tool_length: float
+    settings: Mapping[str, str]
+    files: Mapping[str, str]
+
+    def as_bytes(self, **more: Any) -> bytes:
+        """The file, with more that people may want to know."""
+        fields = {name: getattr(self, name) for name in Manifest.__slots__}
+        return (json.dumps({"ncfix-tables": SCHEMA, **fields, **more}, indent=1) + "\n").encode()
+
+    def changed(self, files: Mapping[str, bytes], folder: str) -> tuple[Message, ...]:
+        """Remarks on files that are not as they were written (NCF488)."""
+        return tuple(
+            Message("NCF488", "was changed since it was exported", Place(f"{folder}/{name}"), "export again")
+            for name, expected in self.files.items()
+            if name in files and digest(files[name]) != expected
+        )
+
+
+def digest(content: bytes) -> str:
+    """SHA-256 in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def read_manifest(data: bytes, path: str) -> Manifest:
+    """Read the side file; raises `ConfigError` NCF486."""
+    try:
+        found = json.loads(data)
+        if found["ncfix-tables"] != SCHEMA:
+            raise ValueError(f"schema {found['ncfix-tables']!r}, not {SCHEMA}")
+        ranges = {str(axis): (float(low), float(high)) for axis, (low, high) in found["ranges"].items()}
+        texts = (str(found["control"]), str(found["machine"]), str(found["hash"]))
+        return Manifest(*texts, ranges, float(found["tool_length"]), _texts(found["settings"]), _texts(found["files"]))
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        text = f"is not the side file of exported tables: {error}"
+        raise ConfigError.of("NCF486", text, Place(path), "export again") from error
+
+
+def remarks_of(data: bytes) -> tuple[tuple[str, ...], Least | None]:
+    """What export remarked on the tables, and how little such tables could leave; nothing where it does not say so."""
+    found = json.loads(data)
+    notes, least = found.get("notes"), found.get("least_um")
+    texts = tuple(str(note) for note in notes) if isinstance(notes, list) else ()
+    try:
+        return texts, Least(float(least["max"]) / 1e3, str(least["why"])) if least else None
+    except (KeyError, TypeError, ValueError):
+        return texts, None
+
+
+def _texts(record: Mapping[str, Any]) -> dict[str, str]:
+    return {str(name): str(value) for name, value in record.items()}
+
+
+def check_origin(manifest: Manifest, control: str, machine: Machine | None, path: str) -> None:
+    """Refuse tables of another control, or of another machine if one is given: raises `RefusedError` NCF487."""
+    place = Place(path)
+    if manifest.control != control:
+        raise RefusedError.of("NCF487", f"these are tables for {manifest.control}, not {control}", place)
+    if machine is not None and manifest.hash != machine.hash:
+        text = f"these tables were made for another machine, or for other errors of it: {manifest.machine}"
+        raise RefusedError.of("NCF487", text, place, "export them again for this machine file, or say --other-machine")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +163,7 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     if written.least:
         said["least_um"] = {"max": 1e3 * written.least.value, "why": written.least.why}
     more = {
-        side.NAME: made.as_bytes(**said),
+        SIDE_FILE: made.as_bytes(**said),
         f"{SHEET}.md": sheet.encode(),
         f"{SHEET}.html": as_html(sheet).encode(),
     }
@@ -102,11 +184,11 @@ def emulate(
 
     Raises `ConfigError` for files that the control would not load, `RefusedError` NCF487 for those of another machine.
     """
-    if side.NAME not in files:
-        raise ConfigError.of("NCF486", f"has no {side.NAME}", Place(folder), "give the folder that export wrote")
-    path = f"{folder}/{side.NAME}"
-    made = side.loads(files[side.NAME], path)
-    side.check(made, control.name, None if any_machine else machine, path)
+    if SIDE_FILE not in files:
+        raise ConfigError.of("NCF486", f"has no {SIDE_FILE}", Place(folder), "give the folder that export wrote")
+    path = f"{folder}/{SIDE_FILE}"
+    made = read_manifest(files[SIDE_FILE], path)
+    check_origin(made, control.name, None if any_machine else machine, path)
     native = {name: files[name] for name in made.files if name in files}
     missing = [name for name in made.files if name not in files]
     if missing:
@@ -119,7 +201,7 @@ def emulate(
     left = residual(machine, tables, space, made.tool_length, poses)
     messages = (*made.changed(native, folder), *linted(control, native))
     same = made.hash == machine.hash and not made.changed(native, folder)
-    notes, least = side.said(files[side.NAME]) if same else ((), None)
+    notes, least = remarks_of(files[SIDE_FILE]) if same else ((), None)
     return Exported(native, files, tables, left, notes, messages, least, control.reached(machine, tables))
 
 
@@ -202,7 +284,7 @@ def _manifest(control: Control, request: Request, files: Files) -> Manifest:
         axis.name: (round(float(low) / axis.unit, 9), round(float(high) / axis.unit, 9))
         for axis, (low, high) in zip(machine.axes, request.space, strict=True)
     }
-    hashes = {name: side.digest(content) for name, content in files.items()}
+    hashes = {name: digest(content) for name, content in files.items()}
     return Manifest(
         control.name, machine.name, machine.hash, ranges, request.tool_length, dict(request.settings), hashes
     )

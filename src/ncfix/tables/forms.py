@@ -1,17 +1,145 @@
-"""The forms that are known: what lines each kind of file has, and what must hold between them."""
+"""Tables from elsewhere: which control's they are, by what they hold, and what its linter has to say of them.
+
+Of controls that ncfix makes no tables for, the forms of their files are known: a form is a list of the lines that it
+may have, and what must hold between them. A file is read line by line, and written again to the byte: a line is kept as
+its words and its numbers; a number keeps its decimals, its sign and its place, so that it may be changed and the file
+written again as its control likes it.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from decimal import Decimal
 from itertools import pairwise
 
-from ncfix.tables.form import GAP, Check, Document, Form, N, read
-from ncfix.tables.lines import Remarks
+from ncfix.diagnostics import Message, Place
+from ncfix.plugins import called
+from ncfix.tables.control import Control, Files, controls, get_control
+from ncfix.tables.export import SHEET, SIDE_FILE, linted, read_manifest
+from ncfix.tables.table_files import AGAIN, BYTE_ORDER, Remarks
 
-__all__ = ["BY_NAME", "FORMS", "read", "recognised"]
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+N = f"({NUMBER})"
+GAP = r"[ \t]+"
+END = re.compile(rb"\r\n|\n")
+BLANK = r"[ \t]*"
+NOTES = {"comment": rf"{BLANK}(?:;|//|#).*", "blank": BLANK}
+"""Lines that say nothing, where a form may have them."""
+ASIDE = r"(?:#.*|/\*.*\*/[ \t]*)?"
+LIST = {"entry": rf"[\w.\[\]]+{GAP}{N}{BLANK}{ASIDE}", "word": rf"[\w.\[\]]+{GAP}\S+{BLANK}{ASIDE}"}
+
+
+@dataclass(frozen=True, slots=True)
+class FileLine:
+    """A line: what it is, its text with a slot for every number, and the numbers with the width of their slots."""
+
+    kind: str
+    text: str
+    numbers: tuple[Decimal, ...] = ()
+    plus: tuple[bool, ...] = ()
+
+    def written(self) -> str:
+        """The line."""
+        words = (f"{'+' if plus else ''}{number}" for number, plus in zip(self.numbers, self.plus, strict=True))
+        return "".join(part for pair in zip(self.text.split("\0"), [*words, ""], strict=True) for part in pair)
+
+
+@dataclass(frozen=True, slots=True)
+class TableFile:
+    """A file of a known form. `eol` after each line; `last` whether also after the last; `start` a byte order mark."""
+
+    form: str
+    lines: tuple[FileLine, ...]
+    eol: str = "\n"
+    last: bool = True
+    start: str = ""
+
+    def content(self) -> bytes:
+        """The file."""
+        text = self.eol.join(line.written() for line in self.lines)
+        return (self.start + text + (self.eol if self.last else "")).encode("latin-1")
+
+    def rows(self, kind: str) -> list[tuple[float, ...]]:
+        """The numbers of all lines of a kind."""
+        return [tuple(map(float, line.numbers)) for line in self.lines if line.kind == kind]
+
+    def sections(self, kind: str) -> dict[str, list[tuple[float, ...]]]:
+        """The numbers of the lines after each line of a kind, `[X]`, under what that has between its brackets."""
+        found: dict[str, list[tuple[float, ...]]] = {}
+        rows: list[tuple[float, ...]] = []
+        for line in self.lines:
+            if line.kind == kind:
+                rows = found.setdefault(line.text.strip().strip("[]"), [])
+            elif line.numbers:
+                rows.append(tuple(map(float, line.numbers)))
+        return found
+
+    def with_numbers(self, index: int, *numbers: Decimal) -> TableFile:
+        """With other numbers in one line."""
+        line = replace(self.lines[index], numbers=numbers)
+        return replace(self, lines=(*self.lines[:index], line, *self.lines[index + 1 :]))
+
+
+Check = Callable[[TableFile, Remarks], None]
+
+
+@dataclass(frozen=True, slots=True)
+class FileForm:
+    """What lines a kind of file has: name -> pattern, whose groups are numbers; and what must hold between them.
+
+    needs  the kinds of lines that tell it: no file of the form is without one of each
+    """
+
+    name: str
+    title: str
+    kinds: Mapping[str, str]
+    check: Check = lambda document, remarks: None
+    needs: tuple[str, ...] = ()
+
+
+def read(form: FileForm, path: str, content: bytes) -> tuple[TableFile, Remarks]:
+    """A file of a form, with remarks on lines that the form does not have."""
+    remarks = Remarks.of(path, content)
+    eol = "\r\n" if b"\r\n" in content else "\n"
+    lines = [_line(form, remarks, number, row) for number, row in enumerate(remarks.rows, 1)]
+    start = BYTE_ORDER if content.startswith(BYTE_ORDER.encode("latin-1")) else ""
+    document = TableFile(form.name, tuple(lines), eol, bool(END.search(content[-2:])), start)
+    if not lines:
+        remarks.refuse(0, "is empty")
+    for kind in {*form.needs} - {line.kind for line in lines}:
+        remarks.refuse(0, f"no line of the sort {kind!r}")
+    if not remarks.wrong:
+        form.check(document, remarks)
+    return document, remarks
+
+
+def _line(form: FileForm, remarks: Remarks, number: int, row: str) -> FileLine:
+    for kind, pattern in form.kinds.items():
+        match = re.fullmatch(pattern, row)
+        if match:
+            return _slotted(kind, row, match)
+    comma = re.search(r"\d,\d", row)
+    remarks.refuse(number, "a decimal comma" if comma else f"is no line of {form.title}", "see docs/controllers.md")
+    return FileLine("?", row)
+
+
+def _slotted(kind: str, row: str, match: re.Match[str]) -> FileLine:
+    spans = [match.span(group) for group in range(1, match.re.groups + 1) if match[group] is not None]
+    text, at = "", 0
+    for start, stop in spans:
+        text += row[at:start] + "\0"
+        at = stop
+    words = [row[start:stop] for start, stop in spans]
+    numbers = tuple(Decimal(word) for word in words)
+    if any(str(value) != word.lstrip("+") for value, word in zip(numbers, words, strict=True)):
+        return FileLine(kind, row)  # a way of writing that a number does not keep: such a line stays as it is
+    return FileLine(kind, text + row[at:], numbers, tuple(word.startswith("+") for word in words))
 
 
 def _ascending(kind: str) -> Check:
-    def check(document: Document, remarks: Remarks) -> None:
+    def check(document: TableFile, remarks: Remarks) -> None:
         rows = [(n, line.numbers) for n, line in enumerate(document.lines, 1) if line.kind == kind and line.numbers]
         for (_, before), (number, after) in pairwise(rows):
             if after[0] <= before[0]:
@@ -20,7 +148,7 @@ def _ascending(kind: str) -> Check:
     return check
 
 
-def _elmo(document: Document, remarks: Remarks) -> None:
+def _elmo(document: TableFile, remarks: Remarks) -> None:
     if not any(line.kind == "mark" for line in document.lines):
         remarks.refuse(0, "no [header] and no [table]")
     sizes = document.rows("dimensions")
@@ -34,7 +162,7 @@ def _elmo(document: Document, remarks: Remarks) -> None:
 
 
 def _framed(first: str, last: str) -> Check:
-    def check(document: Document, remarks: Remarks) -> None:
+    def check(document: TableFile, remarks: Remarks) -> None:
         kinds = [line.kind for line in document.lines if line.kind not in ("blank", "comment")]
         if not kinds or kinds[0] != first or kinds[-1] != last:
             remarks.refuse(0, f"should begin with the line of {first} and end with that of {last}")
@@ -42,7 +170,7 @@ def _framed(first: str, last: str) -> Check:
     return check
 
 
-def _runs(document: Document, remarks: Remarks) -> None:
+def _runs(document: TableFile, remarks: Remarks) -> None:
     targets, runs = document.rows("target-count"), document.rows("run-count")
     starts = [index for index, line in enumerate(document.lines) if line.text.startswith("Run Target Data")]
     if targets and runs and starts:
@@ -52,7 +180,7 @@ def _runs(document: Document, remarks: Remarks) -> None:
             remarks.refuse(0, f"{found} deviations, {expected} expected of targets and runs")
 
 
-def _united(document: Document, remarks: Remarks) -> None:
+def _united(document: TableFile, remarks: Remarks) -> None:
     if [line.kind for line in document.lines].count("unit") != 1 or document.lines[0].kind != "unit":
         remarks.refuse(0, "should begin with the line of the unit")
     for axis, rows in document.sections("axis").items():
@@ -60,12 +188,12 @@ def _united(document: Document, remarks: Remarks) -> None:
             remarks.refuse(0, f"axis {axis} needs two positions or more, and they must ascend")
 
 
-def _defined(document: Document, remarks: Remarks) -> None:
+def _defined(document: TableFile, remarks: Remarks) -> None:
     if not any(line.kind == "define" for line in document.lines):
         remarks.refuse(0, "no line DEFINE COMP")
 
 
-def _headed(document: Document, remarks: Remarks) -> None:
+def _headed(document: TableFile, remarks: Remarks) -> None:
     lines = [line for line in document.lines if line.kind not in ("blank", "comment")]
     if not lines or lines[0].kind != "head":
         remarks.refuse(0, "should begin with a line of names")
@@ -79,14 +207,9 @@ def _headed(document: Document, remarks: Remarks) -> None:
             remarks.refuse(number, f"{count} numbers under {names} names")
 
 
-BLANK = r"[ \t]*"
-NOTES = {"comment": rf"{BLANK}(?:;|//|#).*", "blank": BLANK}
-"""Lines that say nothing, where a form may have them."""
-ASIDE = r"(?:#.*|/\*.*\*/[ \t]*)?"
-LIST = {"entry": rf"[\w.\[\]]+{GAP}{N}{BLANK}{ASIDE}", "word": rf"[\w.\[\]]+{GAP}\S+{BLANK}{ASIDE}"}
 FORMS = (
-    Form("comp", "LinuxCNC's .comp", {"row": rf"{BLANK}{N}{GAP}{N}{GAP}{N}{BLANK}"}, _ascending("row"), ("row",)),
-    Form(
+    FileForm("comp", "LinuxCNC's .comp", {"row": rf"{BLANK}{N}{GAP}{N}{GAP}{N}{BLANK}"}, _ascending("row"), ("row",)),
+    FileForm(
         "ini",
         "an ini file",
         {
@@ -98,7 +221,7 @@ FORMS = (
         },
         needs=("section",),
     ),
-    Form(
+    FileForm(
         "tnc306",
         "the TNC 306",
         {
@@ -110,7 +233,7 @@ FORMS = (
         },
         _framed("rule", "row"),
     ),
-    Form(
+    FileForm(
         "g10",
         "programmable parameter input",
         {
@@ -122,7 +245,7 @@ FORMS = (
         },
         _framed("begin", "end"),
     ),
-    Form(
+    FileForm(
         "isg-csv",
         "ISG_CSV",
         {
@@ -134,13 +257,13 @@ FORMS = (
         },
         _headed,
     ),
-    Form(
+    FileForm(
         "isg-list",
         "an ISG list",
         {**LIST, "comment": rf"{BLANK}(?:#.*|/\*.*\*/{BLANK})", "blank": BLANK},
         needs=("entry",),
     ),
-    Form(
+    FileForm(
         "etalon",
         "the Etalon exchange format",
         {
@@ -154,7 +277,7 @@ FORMS = (
         },
         needs=("section",),
     ),
-    Form(
+    FileForm(
         "elmo",
         "the Elmo Maestro",
         {
@@ -171,7 +294,7 @@ FORMS = (
         },
         _elmo,
     ),
-    Form(
+    FileForm(
         "pmac",
         "PMAC",
         {
@@ -182,7 +305,7 @@ FORMS = (
         },
         _defined,
     ),
-    Form(
+    FileForm(
         "weihong",
         "NcStudio's axeserr.dat",
         {
@@ -193,7 +316,7 @@ FORMS = (
         },
         _united,
     ),
-    Form(
+    FileForm(
         "hexagon",
         "COMP.ERR",
         {
@@ -204,8 +327,8 @@ FORMS = (
         },
         _framed("start", "end"),
     ),
-    Form("centroid", "Centroid's .tab", {"row": BLANK + GAP.join([N] * 5) + BLANK, "blank": BLANK}, needs=("row",)),
-    Form(
+    FileForm("centroid", "Centroid's .tab", {"row": BLANK + GAP.join([N] * 5) + BLANK, "blank": BLANK}, needs=("row",)),
+    FileForm(
         "rtl",
         "Renishaw's .rtl",
         {
@@ -220,13 +343,85 @@ FORMS = (
         ("section",),
     ),
 )
+
+
 BY_NAME = {form.name: form for form in FORMS}
 
 
-def recognised(path: str, content: bytes) -> Document | None:
+def recognised(path: str, content: bytes) -> TableFile | None:
     """The file as the first form that has all of its lines; None if there is none."""
     for form in FORMS:
         document, remarks = read(form, path, content)
         if not remarks.wrong:
             return document
     return None
+
+
+@dataclass(frozen=True, slots=True)
+class Linted:
+    """What was said of one file.
+
+    owner     the control, or the form of a control that ncfix makes no tables for; "" if nobody knows it
+    title     the same for people
+    messages  what is wrong or doubtful, with places in this file
+    """
+
+    owner: str
+    title: str
+    messages: tuple[Message, ...]
+
+
+def lint_files(files: Files, control: str = "") -> Mapping[str, Linted]:
+    """What is said of files that lie together, each by its name; those of a control are looked at together.
+
+    Of a folder that `export` wrote, its side file says whose they are; that and the hand-over sheet are left out.
+    control: whose all of them are, if that is known. Raises `UsageError` NCF480.
+    """
+    tables = {
+        name: content for name, content in files.items() if name != SIDE_FILE and not name.startswith(f"{SHEET}.")
+    }
+    made = read_manifest(files[SIDE_FILE], SIDE_FILE) if SIDE_FILE in files else None
+    if control or made is not None:
+        chosen = get_control(control or (made.control if made is not None else ""))
+        return _shared(chosen, tables, linted(chosen, tables) if made is not None else _look(chosen, tables))
+    found: dict[str, Linted] = {}
+    known = controls()
+    owners = {name: _owner(known.values(), name, content) for name, content in tables.items()}
+    for chosen in known.values():
+        own = {name: tables[name] for name, owner in owners.items() if owner is chosen}
+        if own:
+            found |= _shared(chosen, own, _look(chosen, own))
+    return {name: found[name] if name in found else _of_form(name, tables[name]) for name in tables}
+
+
+def _owner(known: Iterable[Control], name: str, content: bytes) -> Control | None:
+    return next((each for each in known if called("controls", each.name, each.knows, name, content, gives=bool)), None)
+
+
+def _look(control: Control, files: Files) -> tuple[Message, ...]:
+    found: tuple[Message, ...] = called("controls", control.name, control.look, files, gives=tuple)
+    return tuple(replace(message, hint="") if message.hint == AGAIN else message for message in found)
+
+
+def _shared(control: Control, files: Files, messages: Iterable[Message]) -> dict[str, Linted]:
+    """Each message with its file; one of a file that is not there is said of the first that is."""
+    parts: dict[str, list[Message]] = {name: [] for name in files}
+    first = next(iter(files))
+    for message in messages:
+        path = message.place.path if message.place is not None else ""
+        parts[path if path in parts else first].append(message)
+    return {name: Linted(control.name, control.title, tuple(part)) for name, part in parts.items()}
+
+
+def _of_form(name: str, content: bytes) -> Linted:
+    """A file that no control of a plugin knows: of a form that is known, or of none."""
+    document = recognised(name, content)
+    if document is None:
+        return Linted("", "", (unknown(name),))
+    return Linted(document.form, BY_NAME[document.form].title, ())
+
+
+def unknown(name: str) -> Message:
+    """The remark on a file that is of no form that is known: NCF509."""
+    hint = "ncfix lint --control NAME says whose it is; ncfix plugins lists the controls"
+    return Message("NCF509", "is no table of a form that ncfix or a plugin knows", Place(name), hint)

@@ -3,17 +3,46 @@
 One input makes an ordinary compensation table, three make the three-dimensional grid of a control; between the nodes
 the values are multilinear. That is Fanuc's formula for eight vertices (Series 30i three-dimensional error compensation,
 A-79351E) in any number of dimensions.
+
+Values: a node that holds the exact value leaves an error of one sign in both cells beside it; the node that is fitted
+to what lies around it (least squares) shares that error out, and leaves about half of the largest.
+
+Nodes: `Bending` looks at the correction on some random lines along an axis, in steps so fine that what lies between
+them does not matter. From those the miss of any number of evenly spaced nodes is read; or, where a format does not want
+even steps, nodes are put as far apart as the bending allows: on the kinks of a table, and close together where a screw
+turns.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+WITHIN = 4
+"""Places looked at in each cell along each axis."""
+STEPS = (128, 256, 512, 1024)
+"""Fine steps over the range: as many as it takes, or the most."""
+TRIED = 40
+"""Positions in between at which it is seen whether there are enough."""
+RIGHT = 2e-5
+"""mm: what fine steps may miss there."""
+SAME = 1e-7
+"""Of the range: places nearer to each other than that are one."""
+BETWEEN = 4
+"""Points looked at between two nodes of a line."""
+GOLDEN = 0.6180339887498949
+"""Of a cell, by which those points move on from cell to cell, lest they keep step with the pitch of a screw."""
+FINER = 0.8
+"""From one choice of uneven nodes to the next, what they may miss."""
+LEAST = 2e-5
+"""mm: they need not miss less."""
+MANY = 200
+"""Uneven nodes, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,3 +106,149 @@ class Grid:
         cell = np.clip(np.searchsorted(line, column, side="right") - 1, 0, len(line) - 2)
         part = (column - line[cell]) / (line[cell + 1] - line[cell])
         return cell, np.clip(part, 0.0, 1.0)
+
+
+def full_grid(lines: Sequence[Array]) -> Array:
+    """Every combination of the positions on some lines, the last one fastest, (n, n_lines)."""
+    return np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
+
+
+def on_full_grid(function: Callable[[Array], Array], lines: Sequence[Array]) -> Array:
+    """The values of a function of positions (n, n_lines) on a full grid, (*counts, n_outputs)."""
+    return function(full_grid(lines)).reshape(*map(len, lines), -1)
+
+
+def hats(places: Array, nodes: Array) -> Array:
+    """The weight of every node (m) at every place (n), linear between nodes and held beyond the ends: (n, m)."""
+    found: Array = np.stack([np.interp(places, nodes, row) for row in np.eye(len(nodes))], axis=1)
+    return found
+
+
+def projector(places: Array, nodes: Array) -> Array:
+    """What turns values at places (n) into the values at nodes (m) that come nearest to them in all: (m, n)."""
+    found: Array = np.asarray(np.linalg.pinv(hats(places, nodes)), dtype=np.float64)
+    return found
+
+
+def between(nodes: Array, within: int = WITHIN) -> Array:
+    """Nodes (n,) and evenly spaced places in the cells between them, ascending: (within (n - 1) + 1,)."""
+    share = np.arange(within) / within
+    inner = nodes[:-1, None] + share * np.diff(nodes)[:, None]
+    found: Array = np.append(inner.reshape(-1), nodes[-1])
+    return found
+
+
+def fitted(values: Array, places: Sequence[Array], nodes: Sequence[Array]) -> Array:
+    """Least squares over a regular grid of places: values (*places, k) -> (*nodes, k).
+
+    The weights of a multilinear table are products of those along its axes, so that one axis after another will do.
+    """
+    for axis, (line, knots) in enumerate(zip(places, nodes, strict=True)):
+        summed = np.tensordot(projector(line, knots), values, axes=(1, axis))
+        values = np.moveaxis(summed, 0, axis)
+    return values
+
+
+@dataclass(slots=True)
+class Bending:
+    """Corrections along random lines over one axis.
+
+    places  ascending, (n_places,)
+    values  (n_lines, n_places, n_outputs) mm
+    """
+
+    places: Array
+    values: Array
+    _uneven: dict[int, tuple[Array, float]] = field(default_factory=dict)
+
+    @classmethod
+    def over(cls, low: float, high: float, kinks: Array, along: Callable[[Array], Array]) -> Bending:
+        """From a function that gives the corrections at positions (n,): (n_lines, n, n_outputs).
+
+        kinks  positions at which they may have a corner
+        """
+        tried = low + (high - low) * np.mod(GOLDEN * np.arange(1, TRIED + 1), 1.0)
+        meant = along(tried)
+        gap = SAME * (high - low)
+        inner = kinks[(kinks > low + gap) & (kinks < high - gap)]
+        for steps in STEPS:
+            places = np.union1d(np.linspace(low, high, steps + 1), inner)
+            places = places[np.append(np.diff(places) > gap, True)]
+            found = cls(places, along(places))
+            if np.abs(found.at(tried) - meant).max() < RIGHT:
+                break
+        return found
+
+    def at(self, positions: Array) -> Array:
+        """The corrections at positions (n,), (n_lines, n, n_outputs)."""
+        cell = np.clip(np.searchsorted(self.places, positions, side="right") - 1, 0, len(self.places) - 2)
+        part = ((positions - self.places[cell]) / np.diff(self.places)[cell])[:, None]
+        found: Array = self.values[:, cell] * (1 - part) + self.values[:, cell + 1] * part
+        return found
+
+    def missed(self, nodes: Array) -> float:
+        """The largest correction that evenly spaced nodes (n,) miss, mm; the outermost may lie beyond the ends."""
+        count = len(nodes)
+        part = np.mod(np.arange(BETWEEN) / BETWEEN + GOLDEN * np.arange(count - 1)[:, None], 1.0)
+        inside = (nodes[:-1, None] + part * (nodes[1] - nodes[0])).reshape(-1)
+        ends, values = self.at(nodes), self.at(inside)
+        share = part.reshape(-1)[:, None]
+        chord = np.repeat(ends[:, :-1], BETWEEN, axis=1) * (1 - share) + np.repeat(ends[:, 1:], BETWEEN, axis=1) * share
+        seen = (inside >= self.places[0]) & (inside <= self.places[-1])
+        return float(np.linalg.norm(values - chord, axis=2)[:, seen].max(initial=0.0))
+
+    def ends(self, allowed: float) -> tuple[float, float]:
+        """The places between which corrections change: before and after them by no more than is allowed, mm."""
+        low, high = (self._level(values, allowed) for values in (self.values, self.values[:, ::-1]))
+        if low + high >= len(self.places) - 1:
+            return float(self.places[0]), float(self.places[-1])
+        return float(self.places[low]), float(self.places[len(self.places) - 1 - high])
+
+    @staticmethod
+    def _level(values: Array, allowed: float) -> int:
+        """The last place up to which corrections are as they are there, but for what is allowed."""
+        last = 0
+        for place in range(1, values.shape[1]):
+            change = np.linalg.norm(values[:, :place] - values[:, place : place + 1], axis=2)
+            if change.max() > allowed:
+                break
+            last = place
+        return last
+
+    def uneven(self) -> dict[int, tuple[Array, float]]:
+        """Number n of nodes -> where they are best put, (n,), and the largest correction that they miss then, mm."""
+        if not self._uneven:
+            ends = np.array([0, len(self.places) - 1])
+            allowed = self._chord(0, len(self.places) - 1)
+            self._uneven[2] = self.places[ends], allowed
+            while allowed > LEAST and len(ends) < MANY:
+                allowed *= FINER
+                ends = self._as_far_as(allowed)
+                self._uneven[len(ends)] = self.places[ends], allowed
+        return self._uneven
+
+    def _as_far_as(self, allowed: float) -> Array:
+        """Places, each as far from the one before as straight lines miss no more than what is allowed."""
+        last = len(self.places) - 1
+        chosen = [0]
+        while chosen[-1] < last:
+            start, step = chosen[-1], 1
+            while start + 2 * step <= last and self._chord(start, start + 2 * step) <= allowed:
+                step *= 2
+            low, high = start + step, min(start + 2 * step, last)
+            while low < high:
+                middle = (low + high + 1) // 2
+                if self._chord(start, middle) <= allowed:
+                    low = middle
+                else:
+                    high = middle - 1
+            chosen.append(low)
+        return np.array(chosen)
+
+    def _chord(self, start: int, stop: int) -> float:
+        if stop - start < 2:
+            return 0.0
+        inner = slice(start + 1, stop)
+        part = ((self.places[inner] - self.places[start]) / (self.places[stop] - self.places[start]))[:, None]
+        chord = self.values[:, start, None] * (1 - part) + self.values[:, stop, None] * part
+        return float(np.sqrt(((self.values[:, inner] - chord) ** 2).sum(axis=2).max()))

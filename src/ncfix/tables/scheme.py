@@ -1,31 +1,44 @@
 """The automatic scheme: which one-input tables, sums and products of pairs a machine's correction takes.
 
-Any chain, any errors: the exact correction is taken apart on a grid (`separable`), the parts that matter are kept
-(`scheme_parts`) and put into as few tables as possible (`scheme_layout`), whose functions are then followed along every
-axis (`scheme_curves`). Rotary axes come first; the linear axes then correct what is left where that leads, so that the
-tip is right whatever the rotary tables miss. What changes with the way an axis moves becomes tables for one way each.
+Any chain, any errors: the exact correction is taken apart on a grid and put into as few tables as possible
+(`separable`); of its parts all are kept that matter, or those that matter most if tables are few (`PartSelection`).
+Their functions are then followed along every axis (`scheme_tables`). Rotary axes come first; the linear axes then
+correct what is left where that leads, so that the tip is right whatever the rotary tables miss. What changes with the
+way an axis moves becomes tables for one way each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix.machine import Machine, State
-from ncfix.tables.exact import exact_correction, linear_axes
-from ncfix.tables.grid import Array
-from ncfix.tables.minimax import Remainder, least_worst
-from ncfix.tables.neutral import Compensation
-from ncfix.tables.scheme_curves import Evaluate, Sample, followed
-from ncfix.tables.scheme_layout import Layout, absorbed
-from ncfix.tables.scheme_nodes import Line
-from ncfix.tables.scheme_parts import Face, Selection, needed
-from ncfix.tables.scheme_rotary import rotary_correction
-from ncfix.tables.scheme_tables import Corrections, Stage, by_way
-from ncfix.tables.separable import Parts, taken_apart, taken_apart_along
+from ncfix.tables.compensation import Compensation
+from ncfix.tables.correction import exact_correction, linear_axes, rotary_correction
+from ncfix.tables.grid import Array, full_grid, on_full_grid
+from ncfix.tables.lower_bounds import Remainder, least_worst
+from ncfix.tables.scheme_tables import AxisPositions, Corrections, Sample, StagedTables, by_way, followed
+from ncfix.tables.separable import (
+    Part,
+    Separation,
+    TableLayout,
+    absorbed,
+    arranged,
+    tables_of,
+    taken_apart,
+    taken_apart_along,
+)
 
+MANY_MORE = 12
+"""Tables than there are: down to so many, parts are left out by their size alone."""
+TRIED = 12
+"""Of the parts that are left out, how many are tried in place of others."""
+OutputWay = tuple[int, int | None]
+"""(output, way): the correction of an axis, and the axis with whose direction it changes sign, or None."""
+Key = tuple[OutputWay, int]
+"""A part: the face, and its number there, the largest first."""
 NODES = 8
 """Positions of each axis at which the correction is taken apart; fewer if there are more than five axes."""
 PROVEN = 10
@@ -46,6 +59,154 @@ AGAINST_REST = 0.15
 """So are parts that are below this share of what cannot be said anyway."""
 MERGED = 0.25
 """Share of what may be left out that may be lost each time by writing a function as a multiple of others."""
+
+
+@dataclass(slots=True)
+class PartSelection:
+    """The parts that are kept of each face, and the layouts that say them.
+
+    faces      what each face consists of
+    tolerance  rms that a layout may be off by when it merges tables
+    free       axes whose sum over themselves takes no table of this kind (it goes into another one)
+    kept       the parts that are kept
+    silent     faces of which not even the constant is kept
+    beside     tables more for each that multiplies others, and for each that is multiplied
+    """
+
+    faces: Mapping[OutputWay, Separation]
+    tolerance: float
+    free: frozenset[int] = frozenset()
+    kept: frozenset[Key] = frozenset()
+    silent: frozenset[OutputWay] = frozenset()
+    beside: tuple[int, int] = (0, 0)
+    _known: dict[tuple[OutputWay, bool, tuple[int, ...]], tuple[TableLayout, TableLayout]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.kept = frozenset((face, n) for face, parts in self.faces.items() for n in range(len(parts.parts)))
+
+    @property
+    def outputs(self) -> list[int]:
+        """The axes that are corrected."""
+        return list(dict.fromkeys(output for output, _ in self.faces))
+
+    def part(self, key: Key) -> Part:
+        """The part with this key."""
+        face, number = key
+        return self.faces[face].parts[number]
+
+    def layouts(self, output: int) -> list[TableLayout]:
+        """The layouts of an axis, not absorbed, that without direction first; empty ones left out."""
+        found = [self._layouts(face)[0] for face in self.faces if face[0] == output]
+        return [layout for layout in found if layout.axes or layout.constant]
+
+    def tables(self, output: int) -> int:
+        """How many tables an axis takes."""
+        layouts = [self._layouts(face)[1] for face in self.faces if face[0] == output]
+        return needed(output, layouts, self.free, self.beside)
+
+    @property
+    def total(self) -> int:
+        """How many tables all of it takes."""
+        return sum(self.tables(output) for output in self.outputs)
+
+    @property
+    def lost(self) -> float:
+        """Rms of the parts that were left out."""
+        gone = (part.size**2 for face in self.faces for n, part in self._numbered(face) if (face, n) not in self.kept)
+        return float((sum(gone) + sum(self.faces[face].constant ** 2 for face in self.silent)) ** 0.5)
+
+    def drop_small(self, budget: float) -> None:
+        """Leave out the smallest parts as long as they are below `budget` (rms) together."""
+        total = 0.0
+        for key in sorted(self.kept, key=lambda key: self.part(key).size):
+            total += self.part(key).size ** 2
+            if total > budget**2:
+                return
+            self.kept -= {key}
+
+    def fit_into(self, tables: int) -> None:
+        """Keep what takes off most with no more than `tables`.
+
+        Parts are taken away, cheapest first, and put together, most worth first; then the largest that are left out are
+        tried in the better of the two, in place of others.
+        """
+        self._leave_smallest(tables + MANY_MORE)
+        whole = self.kept
+        self._thin(tables)
+        best = self.kept, self.silent, self.lost
+        if best[0] == whole:
+            return
+        self._grow(whole, tables)
+        best = min(best, (self.kept, self.silent, self.lost), key=lambda found: found[2])
+        for key in sorted(whole - best[0], key=lambda key: -self.part(key).size)[:TRIED]:
+            self.kept, self.silent = best[0] | {key}, best[1]
+            self._thin(tables)
+            best = min(best, (self.kept, self.silent, self.lost), key=lambda found: found[2])
+        self.kept, self.silent, _ = best
+
+    def _leave_smallest(self, tables: int) -> None:
+        """Leave out the smallest parts until no more than `tables` are taken: they will not come back."""
+        for key in sorted(self.kept, key=lambda key: self.part(key).size):
+            if self.total <= tables:
+                return
+            self.kept -= {key}
+
+    def _thin(self, tables: int) -> None:
+        """Leave out what costs least for the tables that it frees, until no more than `tables` are taken."""
+        while self.total > max(tables, 0):
+            if not self.kept:
+                order = sorted(self.faces, key=lambda face: -abs(self.faces[face].constant))
+                self.silent = frozenset(order[max(tables, 0) :])
+                return
+            self.kept -= {min(sorted(self.kept, key=str), key=self._price)}
+
+    def _price(self, key: Key) -> tuple[bool, float]:
+        """What a part costs for each table that it frees; parts that free none come last."""
+        saved = self._change(key, self.kept - {key})
+        return saved >= 0, self.part(key).size ** 2 / max(-saved, 1)
+
+    def _grow(self, whole: frozenset[Key], tables: int) -> None:
+        """Begin with nothing, and add what takes off most for the tables that it takes."""
+        self.kept = frozenset()
+        self._thin(tables)
+        room = tables - self.total
+        while True:
+            costs = {key: self._change(key, self.kept | {key}) for key in sorted(whole - self.kept, key=str)}
+            allowed = [key for key, cost in costs.items() if cost <= room]
+            if not allowed:
+                return
+            best = max(allowed, key=lambda key: self.part(key).size ** 2 / max(costs[key], 0.1))
+            self.kept |= {best}
+            room -= costs[best]
+
+    def _change(self, key: Key, kept: frozenset[Key]) -> int:
+        """How many tables more the axis takes if other parts are kept."""
+        output, before = key[0][0], self.kept
+        now = self.tables(output)
+        self.kept = kept
+        then = self.tables(output)
+        self.kept = before
+        return then - now
+
+    def _layouts(self, face: OutputWay) -> tuple[TableLayout, TableLayout]:
+        """The layout of a face, and the same absorbed."""
+        numbers = tuple(n for n, _ in self._numbered(face) if (face, n) in self.kept)
+        key = (face, face in self.silent, numbers)
+        if key not in self._known:
+            constant = 0.0 if face in self.silent else self.faces[face].constant
+            parts = [self.part((face, n)) for n in numbers]
+            layout = arranged(parts, constant, face[1], self.tolerance)
+            self._known[key] = layout, absorbed(layout, self.tolerance)
+        return self._known[key]
+
+    def _numbered(self, face: OutputWay) -> Iterator[tuple[int, Part]]:
+        return iter(enumerate(self.faces[face].parts))
+
+
+def needed(output: int, layouts: Sequence[TableLayout], free: frozenset[int], beside: tuple[int, int] = (0, 0)) -> int:
+    """How many tables these layouts of an axis take, without that over the axis itself if that is free."""
+    ways = {layout.way for layout in layouts if output in layout.sums or layout.constant}
+    return tables_of(layouts, beside) - int(output in free and ways == {None})
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +243,7 @@ class Scheme:
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class SchemeTask:
     """A machine, where its tables are to hold, for which tool, how well (mm), and in which limits."""
 
     machine: Machine
@@ -92,29 +253,29 @@ class Job:
     limits: Limits
 
 
-def automatic(job: Job, rotary: bool = True) -> Scheme:
+def automatic(task: SchemeTask, rotary: bool = True) -> Scheme:
     """The tables of a machine; `rotary`: correct the rotary axes, too, as far as they can put the orientation right."""
-    columns = np.flatnonzero(job.machine.rotary).tolist() if rotary else []
-    most = job.limits.tables
+    columns = np.flatnonzero(task.machine.rotary).tolist() if rotary else []
+    most = task.limits.tables
     done = Scheme(Compensation(()), 0.0, 0.0, 0.0)
     if columns:
-        done, used = _rotary(job, columns)
+        done, used = _rotary(task, columns)
         most -= used
-    moved, _ = _staged(job, linear_axes(job.machine), moving(job, done.tables), 1.0, most)
+    moved, _ = _staged(task, linear_axes(task.machine), moving(task, done.tables), 1.0, most)
     tables = Compensation((*done.tables.terms, *moved.tables.terms))
     bound = moved.bound
-    if bound > SMALL * job.target:
-        bound = max(bound, _bound(job, done, PROVEN))
+    if bound > SMALL * task.target:
+        bound = max(bound, _bound(task, done, PROVEN))
     return Scheme(tables, moved.missed, moved.rest, moved.dropped, bound)
 
 
-def _rotary(job: Job, columns: Sequence[int]) -> tuple[Scheme, int]:
+def _rotary(task: SchemeTask, columns: Sequence[int]) -> tuple[Scheme, int]:
     """The tables of the rotary axes, as many as leave the linear axes with least that no pair can say."""
-    allowed = max(1, job.limits.tables // ROTARY_SHARE)
+    allowed = max(1, task.limits.tables // ROTARY_SHARE)
     tried: list[tuple[float, Scheme, int]] = []
     for most in sorted({min(each, allowed) for each in (*FEWER, allowed)}):
-        done, used = _staged(job, columns, turning(job), LEVER, most)
-        tried.append((max(_bound(job, done), SMALL * job.target), done, used))
+        done, used = _staged(task, columns, turning(task), LEVER, most)
+        tried.append((max(_bound(task, done), SMALL * task.target), done, used))
         if used < most and [each[-1] for each in tried[-2:]] == [used, used]:
             break
     least = min(bound for bound, _, _ in tried)
@@ -122,42 +283,39 @@ def _rotary(job: Job, columns: Sequence[int]) -> tuple[Scheme, int]:
     return done, used
 
 
-def _bound(job: Job, done: Scheme, count: int = NODES) -> float:
+def _bound(task: SchemeTask, done: Scheme, count: int = NODES) -> float:
     """How little the linear axes can leave at the worst where the rotary axes are corrected so, mm."""
-    turns = [line.modulo for line in lines_of(job)]
-    nodes = coarse_nodes(job.space, turns, count)
-    values = _values(nodes, by_way(moving(job, done.tables)), None)
-    return least_worst(nodes, turns, values, SMALL * job.target).bound
+    turns = [line.modulo for line in lines_of(task)]
+    nodes = coarse_nodes(task.space, turns, count)
+    evaluate = by_way(moving(task, done.tables))
+    values = on_full_grid(lambda q: evaluate(q, None), nodes)
+    return least_worst(nodes, turns, values, SMALL * task.target).bound
 
 
-def _values(nodes: Sequence[Array], evaluate: Evaluate, way: int | None) -> Array:
-    """Corrections on a full grid, (*counts, n_outputs)."""
-    q = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, len(nodes))
-    return evaluate(q, way).reshape(*map(len, nodes), -1)
-
-
-def turning(job: Job) -> Corrections:
+def turning(task: SchemeTask) -> Corrections:
     """Corrections of the rotary axes, rad."""
-    return lambda q, direction: rotary_correction(job.machine, q, State(job.tool_length, direction))
+    return lambda q, direction: rotary_correction(task.machine, q, State(task.tool_length, direction))
 
 
-def moving(job: Job, done: Compensation) -> Corrections:
+def moving(task: SchemeTask, done: Compensation) -> Corrections:
     """Corrections of the linear axes where the tables of the rotary axes have been at work, mm."""
-    columns = linear_axes(job.machine)
+    columns = linear_axes(task.machine)
 
     def corrections(q: Array, direction: Array) -> Array:
         ways = np.broadcast_to(direction, q.shape)
-        turned = done.at(job.machine.axis_names, q, ways) * job.machine.rotary
-        return exact_correction(job.machine, q, State(job.tool_length, ways), turned)[:, columns]
+        turned = done.at(task.machine.axis_names, q, ways) * task.machine.rotary
+        return exact_correction(task.machine, q, State(task.tool_length, ways), turned)[:, columns]
 
     return corrections
 
 
-def _staged(job: Job, outputs: Sequence[int], correct: Corrections, scale: float, most: int) -> tuple[Scheme, int]:
+def _staged(
+    task: SchemeTask, outputs: Sequence[int], correct: Corrections, scale: float, most: int
+) -> tuple[Scheme, int]:
     """The tables of some axes, and how many of the `most` they take."""
-    lines = lines_of(job)
-    nodes = coarse_nodes(job.space, [line.modulo for line in lines])
-    selection, left = _parts(job, outputs, correct, scale, nodes)
+    lines = lines_of(task)
+    nodes = coarse_nodes(task.space, [line.modulo for line in lines])
+    selection, left = _parts(task, outputs, correct, scale, nodes)
     selection.drop_small(selection.tolerance / MERGED)
     allowed, used = most, most + 1
     while used > most:
@@ -166,14 +324,14 @@ def _staged(job: Job, outputs: Sequence[int], correct: Corrections, scale: float
         used = sum(needed(output, each, selection.free, selection.beside) for output, each in layouts.items())
         allowed -= used - most
     unscaled = {output: [one.scaled(1 / scale) for one in each] for output, each in layouts.items()}
-    stage = Stage(lines, unscaled, correct, scale)
-    tables, missed = stage.settled(max(job.target, AGAINST_REST * left.rms), job.limits.points, left.largest)
+    stage = StagedTables(lines, unscaled, correct, scale)
+    tables, missed = stage.settled(max(task.target, AGAINST_REST * left.rms), task.limits.points, left.largest)
     return Scheme(tables, missed, left.rms, selection.lost, left.bound), used
 
 
 def _followed(
-    selection: Selection, left: Remainder, lines: Sequence[Line], correct: Corrections, scale: float
-) -> dict[int, list[Layout]]:
+    selection: PartSelection, left: Remainder, lines: Sequence[AxisPositions], correct: Corrections, scale: float
+) -> dict[int, list[TableLayout]]:
     """The layouts with their functions over all positions of the axes; what they need may show there only."""
     known = {output: selection.layouts(output) for output in selection.outputs}
     fine = [line.fine for line in lines]
@@ -183,24 +341,24 @@ def _followed(
 
 
 def _parts(
-    job: Job, outputs: Sequence[int], correct: Corrections, scale: float, nodes: Sequence[Array]
-) -> tuple[Selection, Remainder]:
+    task: SchemeTask, outputs: Sequence[int], correct: Corrections, scale: float, nodes: Sequence[Array]
+) -> tuple[PartSelection, Remainder]:
     """The corrections of some axes, taken apart, and what no pair can say of them, left where it hurts least."""
-    enough = np.inf if job.machine.rotary[list(outputs)].any() else SMALL * job.target
+    enough = np.inf if task.machine.rotary[list(outputs)].any() else SMALL * task.target
     evaluate = by_way(correct)
-    found: dict[Face, Parts] = {}
-    for way in (None, *ways_that_matter(job.machine)):
-        values = scale * _values(nodes, evaluate, way)
+    found: dict[OutputWay, Separation] = {}
+    for way in (None, *ways_that_matter(task.machine)):
+        values = scale * evaluate(full_grid(nodes), way).reshape(*map(len, nodes), -1)
         if way is None:
-            left = least_worst(nodes, [line.modulo for line in lines_of(job)], values, enough)
+            left = least_worst(nodes, [line.modulo for line in lines_of(task)], values, enough)
             values = values - left.values
         for number, output in enumerate(outputs):
-            face: Face = (output, way)
+            face: OutputWay = (output, way)
             one = values[..., number]
             found[face] = taken_apart(one) if way is None else taken_apart_along(one, way)
-    free = frozenset(outputs) if job.limits.own_free else frozenset[int]()
-    tolerance = MERGED * max(SMALL * job.target, AGAINST_REST * left.rms)
-    return Selection(found, tolerance, free, beside=job.limits.beside), left
+    free = frozenset(outputs) if task.limits.own_free else frozenset[int]()
+    tolerance = MERGED * max(SMALL * task.target, AGAINST_REST * left.rms)
+    return PartSelection(found, tolerance, free, beside=task.limits.beside), left
 
 
 def ways_that_matter(machine: Machine) -> list[int]:
@@ -229,12 +387,12 @@ def coarse_nodes(space: Array, turns: Sequence[bool], most: int = NODES) -> list
     ]
 
 
-def lines_of(job: Job) -> tuple[Line, ...]:
+def lines_of(task: SchemeTask) -> tuple[AxisPositions, ...]:
     """The positions that tables of each axis cover; those of an endless axis over a whole turn repeat."""
     found = []
-    features = job.machine.feature_lengths().tolist()
-    for axis, (low, high), feature in zip(job.machine.axes, job.space.tolist(), features, strict=True):
+    features = task.machine.feature_lengths().tolist()
+    for axis, (low, high), feature in zip(task.machine.axes, task.space.tolist(), features, strict=True):
         turn = axis.endless and high - low > 2 * np.pi - 1e-9
         ends = (low / axis.unit, high / axis.unit)
-        found.append(Line.over(axis.name, *ends, axis.unit, feature / axis.unit, turn))
+        found.append(AxisPositions.over(axis.name, *ends, axis.unit, feature / axis.unit, turn))
     return tuple(found)

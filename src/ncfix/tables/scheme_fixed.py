@@ -21,13 +21,12 @@ import numpy as np
 
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
-from ncfix.tables.exact import linear_axes
+from ncfix.tables.compensation import Compensation
+from ncfix.tables.correction import linear_axes, random_poses
 from ncfix.tables.grid import Array
-from ncfix.tables.neutral import Compensation
-from ncfix.tables.poses import random_poses
-from ncfix.tables.scheme import LEVER, Job, Scheme, lines_of, moving, turning
-from ncfix.tables.scheme_layout import Layout, Star
-from ncfix.tables.scheme_tables import Corrections, Stage
+from ncfix.tables.scheme import LEVER, Scheme, SchemeTask, lines_of, moving, turning
+from ncfix.tables.scheme_tables import Corrections, StagedTables
+from ncfix.tables.separable import Star, TableLayout
 
 POSES = 6000
 CHAIN = ("C", "A", "Y", "X", "Z")
@@ -38,11 +37,9 @@ FORWARD_INVERSE_40: Mapping[str, Mapping[str, str]] = {
     "Z": {"cos^2": "XY", "sin 2": "XY", "sin": "Y", "cos": "X", "": "XYZ"},
 }
 """Output -> function of A -> the axes whose linear tables are multiplied by it; "": added."""
-
 Function = Callable[[Array], Array]
 Basis = Callable[[Array], Array]
 """Positions (n,) -> functions (n, k)."""
-
 TURNS: Mapping[str, Function] = {
     "sin": np.sin,
     "cos": np.cos,
@@ -89,12 +86,12 @@ Form = Callable[[int], Sequence[Piece]]
 """The tables that correct an axis (its column)."""
 
 
-def fixed(job: Job, name: str) -> Scheme:
+def fixed(task: SchemeTask, name: str) -> Scheme:
     """The tables of a scheme: "poly25", "trigo23", "fik40" or "fik20". Raises `RefusedError` NCF484."""
     if name == "trigo23":
-        tried = [_made(job, _trigo(job.machine, pivot)) for pivot in _rotary(job.machine, name)]
+        tried = [_made(task, _trigo(task.machine, pivot)) for pivot in _rotary(task.machine, name)]
         return min(tried, key=lambda scheme: scheme.rest)
-    return _made(job, _poly(job.machine) if name == "poly25" else _forward_inverse(job.machine, name))
+    return _made(task, _poly(task.machine) if name == "poly25" else _forward_inverse(task.machine, name))
 
 
 def _poly(machine: Machine) -> Form:
@@ -151,24 +148,24 @@ def _rotary(machine: Machine, name: str) -> list[int]:
     return found
 
 
-def _made(job: Job, form: Form) -> Scheme:
+def _made(task: SchemeTask, form: Form) -> Scheme:
     """Rotary axes first; the linear ones then correct what is left where that leads."""
-    done = _fitted(job, np.flatnonzero(job.machine.rotary).tolist(), form, turning(job), LEVER)
-    moved = _fitted(job, linear_axes(job.machine), form, moving(job, done.tables), 1.0)
+    done = _fitted(task, np.flatnonzero(task.machine.rotary).tolist(), form, turning(task), LEVER)
+    moved = _fitted(task, linear_axes(task.machine), form, moving(task, done.tables), 1.0)
     tables = Compensation((*done.tables.terms, *moved.tables.terms))
     count = len({id(grid) for grid in tables.grids})
-    if count > job.limits.tables:
-        text = f"this scheme takes {count} tables, and the control has {job.limits.tables}"
+    if count > task.limits.tables:
+        text = f"this scheme takes {count} tables, and the control has {task.limits.tables}"
         raise RefusedError.of("NCF484", text, hint="scheme=auto makes do with what there is")
     return Scheme(tables, moved.missed, moved.rest, 0.0)
 
 
-def _fitted(job: Job, outputs: Sequence[int], form: Form, correct: Corrections, scale: float) -> Scheme:
+def _fitted(task: SchemeTask, outputs: Sequence[int], form: Form, correct: Corrections, scale: float) -> Scheme:
     """The tables of some axes."""
     if not outputs:
         return Scheme(Compensation(()), 0.0, 0.0, 0.0)
-    q = random_poses(job.space, POSES, seed=21)
-    values, lines = correct(q, np.zeros(q.shape[1])), lines_of(job)
+    q = random_poses(task.space, POSES, seed=21)
+    values, lines = correct(q, np.zeros(q.shape[1])), lines_of(task)
     layouts, missed = {}, 0.0
     for output, target in zip(outputs, values.T, strict=True):
         pieces = list(form(output))
@@ -179,11 +176,11 @@ def _fitted(job: Job, outputs: Sequence[int], form: Form, correct: Corrections, 
         parts = np.split(shares, np.cumsum([column.shape[1] for column in columns])[:-1])
         layouts[output] = [_layout(pieces, parts, [line.fine for line in lines])]
     rest = scale * float(np.sqrt(missed))
-    tables, left = Stage(lines, layouts, correct, scale).settled(max(job.target, rest), job.limits.points)
+    tables, left = StagedTables(lines, layouts, correct, scale).settled(max(task.target, rest), task.limits.points)
     return Scheme(tables, left, rest, 0.0)
 
 
-def _layout(pieces: Sequence[Piece], shares: Sequence[Array], fine: Sequence[Array]) -> Layout:
+def _layout(pieces: Sequence[Piece], shares: Sequence[Array], fine: Sequence[Array]) -> TableLayout:
     sums: dict[int, Array] = {}
     stars: dict[tuple[int, Function], dict[int, Array]] = {}
     for piece, share in zip(pieces, shares, strict=True):
@@ -193,4 +190,4 @@ def _layout(pieces: Sequence[Piece], shares: Sequence[Array], fine: Sequence[Arr
         else:
             stars.setdefault(piece.centre, {})[piece.axis] = values
     made = [Star(axis, function(fine[axis]), leaves) for (axis, function), leaves in stars.items()]
-    return Layout(dict(sorted(sums.items())), tuple(made))
+    return TableLayout(dict(sorted(sums.items())), tuple(made))

@@ -1,4 +1,12 @@
-"""From the functions of a scheme to its tables: as few nodes as keep the lines between them near the function."""
+"""From a layout that is known at a few nodes to tables: its functions at any position, at as few nodes as will do.
+
+At a new position of one axis the correction is linear in the values there of all functions of that axis, with factors
+that are known from the nodes of the others: a least-squares problem with a handful of unknowns and one matrix for all
+positions. The functions so found are the exact ones where the layout is exact, and the best there are where it is not.
+
+Functions are looked at in many fine steps; a table takes a number of steps that divides them, so that its nodes are
+among the positions that are known. A file can say them exactly: the first one, the step, and a whole number of steps.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +14,164 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
 
+from ncfix.tables.compensation import Compensation, Term
+from ncfix.tables.correction import poses_along, random_poses, random_ways
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.poses import random_poses, random_ways
-from ncfix.tables.scheme_curves import Evaluate
-from ncfix.tables.scheme_layout import Layout, Star
-from ncfix.tables.scheme_nodes import Line
+from ncfix.tables.separable import Star, TableLayout
 
+SCALE = 10**4
+"""Positions and steps have four decimals, mm or degree."""
+STEPS = ((120, 160, 200), (240, 320, 400), (720, 800, 640), (1440, 1600, 1280))
+"""How many fine steps, from coarse to fine: numbers with many divisors. The first that divides the range is taken."""
+PER_FEATURE = 3
+"""Steps for each length within which the errors may bend."""
+SAMPLES = 7
+"""Two to this power combinations of nodes of the other axes are looked at for each position."""
+Slot = tuple[int, int | None]
+"""A function of one axis in a layout: (star, leaf axis), (star, None) its centre, or (-1, axis) a sum."""
+Curves = dict[Slot, Array]
+Evaluate = Callable[[Array, int | None], Array]
+"""Corrections of all outputs at poses (n, n_axes), (n, n_outputs): without direction, or what changes with a way."""
+TableLayouts = Mapping[int, Sequence[TableLayout]]
+"""Output -> its layouts. The outputs are in the order in which `Evaluate` has them."""
+Left = Callable[[int, Array, NDArray[np.intp]], Array]
+"""What no layout is to say, without direction, at positions of an axis and nodes of the others: `Remainder.along`."""
 ROUNDS = 6
 CHECKS = 1000
 GAIN = 0.95
 """A round of smaller steps that leaves more than this share of what was missed is the last."""
-
 Corrections = Callable[[Array, Array], Array]
 """What to add to some axes at commands (n, n_axes) reached in directions (n, n_axes) or (n_axes,): (n, n_outputs)."""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisPositions:
+    """The positions of an axis that tables cover, in its file unit (mm, degree).
+
+    unit    mm or rad per file unit
+    steps   into how many it is divided
+    modulo  they repeat
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: float
+    steps: int
+    modulo: bool
+
+    @classmethod
+    def over(cls, name: str, low: float, high: float, unit: float, feature: float, modulo: bool) -> AxisPositions:
+        """With steps small enough for errors that may bend within the length `feature` (file unit)."""
+        wanted = PER_FEATURE * (high - low) / feature
+        choices = next((some for some in STEPS if some[0] >= wanted), STEPS[-1])
+        whole = round((high - low) * SCALE)
+        steps = next((some for some in choices if whole % some == 0), choices[0])
+        return cls(name, low, high, unit, steps, modulo)
+
+    @property
+    def fine(self) -> Array:
+        """All positions (steps + 1,), from low to high or less than one part in a thousand beyond it, mm or rad."""
+        first = np.floor(self.low * SCALE + 1e-6)
+        step = np.ceil((self.high * SCALE - first) / self.steps - 1e-6)
+        positions: Array = (first + step * np.arange(self.steps + 1)) / SCALE * self.unit
+        return positions
+
+    def stride(self, curve: Array, most: int, limit: float) -> int:
+        """The widest step, in fine ones, with which straight lines stay within `limit` of a curve over `fine`.
+
+        No more than `most` nodes. What repeats takes two steps at least.
+        """
+        strides = [s for s in range(self.steps, 0, -1) if self.steps % s == 0 and self.steps // s < most]
+        for stride in strides[1:] if self.modulo else strides:
+            if self._missed(curve, stride) <= limit:
+                return stride
+        return strides[-1]
+
+    @staticmethod
+    def _missed(curve: Array, stride: int) -> float:
+        place = np.arange(len(curve))
+        return float(np.abs(np.interp(place, place[::stride], curve[::stride]) - curve).max())
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Where functions of one axis are looked for: combinations of nodes of all axes, (m, n_axes), their numbers."""
+
+    nodes: Sequence[Array]
+    places: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, nodes: Sequence[Array]) -> Sample:
+        """Spread evenly over pairs and triples of axes (a Sobol net)."""
+        unit = qmc.Sobol(len(nodes), scramble=False).random_base2(SAMPLES)
+        counts = np.array([len(line) for line in nodes])
+        return cls(nodes, np.floor(unit * counts).astype(np.intp))
+
+    def poses(self, axis: int, positions: Array) -> Array:
+        """The poses with one axis at positions (n,): (n * m, n_axes)."""
+        rest = np.stack([line[column] for line, column in zip(self.nodes, self.places.T, strict=True)], axis=1)
+        return poses_along(axis, positions, rest)
+
+    def curves(self, layout: TableLayout, axis: int, values: Array) -> Curves:
+        """All functions of the layout over this axis, from its values (n, m) at `poses`: slot -> (n,)."""
+        slots, known = self._columns(layout, axis)
+        if not slots:
+            return {}
+        design = np.stack(list(slots.values()), axis=1)
+        found = np.linalg.lstsq(design, (values - known).T, rcond=None)[0]
+        return dict(zip(slots, found, strict=True))
+
+    def _columns(self, layout: TableLayout, axis: int) -> tuple[Curves, Array]:
+        """The factors of the unknown functions, and the sum of all that does not depend on the axis, (m,) each."""
+        slots: Curves = {}
+        known = np.full(len(self.places), layout.constant)
+        for other, values in layout.sums.items():
+            if other == axis:
+                slots[-1, axis] = np.ones(len(self.places))
+            else:
+                known += values[self.places[:, other]]
+        for number, star in enumerate(layout.stars):
+            leaves = {leaf: values[self.places[:, leaf]] for leaf, values in star.leaves.items() if leaf != axis}
+            together = sum(leaves.values(), np.zeros(len(self.places)))
+            if star.axis == axis:
+                slots[number, None] = together
+                continue
+            centre = star.centre[self.places[:, star.axis]]
+            known += centre * together
+            if axis in star.leaves:
+                slots[number, axis] = centre
+        return slots, known
+
+
+def followed(
+    sample: Sample, layouts: TableLayouts, fine: Sequence[Array], evaluate: Evaluate, left: Left | None = None
+) -> dict[int, list[TableLayout]]:
+    """The same layouts with their functions at the positions `fine` of each axis."""
+    curves: dict[tuple[int, int | None], Curves] = {}
+    for axis, positions in enumerate(fine):
+        concerned = [(output, one) for output, each in layouts.items() for one in each if axis in one.axes]
+        for way in dict.fromkeys(layout.way for _, layout in concerned):
+            values = evaluate(sample.poses(axis, positions), way).reshape(len(positions), len(sample.places), -1)
+            if left is not None and way is None:
+                values = values - left(axis, positions, sample.places)
+            for column, output in enumerate(layouts):
+                for layout in (one for key, one in concerned if key == output and one.way == way):
+                    found = sample.curves(layout, axis, values[:, :, column])
+                    curves[output, way] = {**curves.get((output, way), {}), **found}
+    return {output: [_with(one, curves.get((output, one.way), {})) for one in each] for output, each in layouts.items()}
+
+
+def _with(layout: TableLayout, curves: Curves) -> TableLayout:
+    """The layout with other values."""
+    stars = [
+        Star(star.axis, curves[number, None], {leaf: curves[number, leaf] for leaf in star.leaves})
+        for number, star in enumerate(layout.stars)
+    ]
+    return TableLayout({axis: curves[-1, axis] for axis in layout.sums}, tuple(stars), layout.way, layout.constant)
 
 
 def by_way(corrections: Corrections) -> Evaluate:
@@ -37,7 +188,7 @@ def by_way(corrections: Corrections) -> Evaluate:
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class StagedTables:
     """Axes that are corrected together.
 
     lines    all axes of the machine
@@ -46,8 +197,8 @@ class Stage:
     scale    how much one unit of them counts, mm
     """
 
-    lines: Sequence[Line]
-    layouts: Mapping[int, Sequence[Layout]]
+    lines: Sequence[AxisPositions]
+    layouts: Mapping[int, Sequence[TableLayout]]
     correct: Corrections
     scale: float = 1.0
 
@@ -90,7 +241,7 @@ class Stage:
                     terms += self._star(output, layout.way, star, limit, points)
         return Compensation(tuple(terms))
 
-    def _sums(self, output: int, layouts: Sequence[Layout], limit: float, points: int) -> Iterator[Term]:
+    def _sums(self, output: int, layouts: Sequence[TableLayout], limit: float, points: int) -> Iterator[Term]:
         """A table for each axis, or one for either way; what changes with the way is joined to what does not."""
         plain: dict[int, Array] = {}
         for layout in layouts:

@@ -1,17 +1,21 @@
-"""A function of several axes, taken apart: a constant, functions of one axis, products of two of them, and a rest.
+"""A function of several axes as tables: taken apart, and put into the fewest sums and pairwise products.
 
 A chain of axes turns and shifts one after the other, so that a correction is a sum of products of functions of one axis
 each (sines, cosines, positions, errors). Which they are need not be known: on a full grid of positions the mean over
 the other axes leaves what depends on one axis, or on two; and of two axes the singular value decomposition finds the
 fewest products. The parts are orthogonal: leaving one out costs exactly its own size, and what is kept is the best fit
 in the mean square that sums and products of pairs can make. What is left over is the rest: it needs three axes at once.
+
+A control that multiplies tables by pairs lets many of them point at the same other one. A product therefore is a leaf
+of a star: the centre is the table that is pointed at, and each leaf a table that points. Sharing a centre, writing it
+as a multiple of another, and hiding a sum in a factor, (a + f(q)) g(p) = a g(p) + f(q) g(p), all save tables.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, product
 
 import numpy as np
 
@@ -19,6 +23,10 @@ from ncfix.tables.grid import Array
 
 NOISE = 2e-6
 """mm: below what is solved for, and far below what any control resolves."""
+EXHAUSTIVE = 6
+"""Up to so many pairs of axes every way of choosing the centres is tried."""
+ALIKE = 0.05
+"""Functions whose difference is below this share of themselves are not told apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +64,7 @@ Part = Single | Product
 
 
 @dataclass(frozen=True, slots=True)
-class Parts:
+class Separation:
     """What a function consists of, largest first; `rest` is the rms of what no pair of axes can say."""
 
     constant: float
@@ -64,38 +72,33 @@ class Parts:
     rest: float
 
 
-def taken_apart(values: Array, noise: float = NOISE) -> Parts:
+def taken_apart(values: Array, noise: float = NOISE) -> Separation:
     """The parts of a function on a full grid, values (m_1, ..., m_n); those below `noise` (rms) belong to the rest."""
     constant = float(values.mean())
-    left = values - constant
-    parts: list[Part] = []
-    for axis in range(values.ndim):
-        single = Single(axis, _mean_over_others(left, (axis,)))
-        left = left - _spread(single.values, (axis,), values.ndim)
-        parts.append(single)
-    for pair in combinations(range(values.ndim), 2):
-        both = _mean_over_others(left, pair)
-        left = left - _spread(both, pair, values.ndim)
-        parts += products(both, pair)
-    return _sorted(constant, parts, left, noise)
+    axes = range(values.ndim)
+    return _peeled(constant, values - constant, [*((axis,) for axis in axes), *combinations(axes, 2)], noise)
 
 
-def taken_apart_along(values: Array, axis: int, noise: float = NOISE) -> Parts:
+def taken_apart_along(values: Array, axis: int, noise: float = NOISE) -> Separation:
     """The same, with every part a function of `axis` at least: what changes sign with the way that axis moves.
 
     A function of another axis alone becomes a product with a constant.
     """
-    left = values.copy()
-    own = _mean_over_others(left, (axis,))
-    left -= _spread(own, (axis,), values.ndim)
-    parts: list[Part] = [Single(axis, own)]
-    for other in range(values.ndim):
-        if other != axis:
-            pair = (min(axis, other), max(axis, other))
-            both = _mean_over_others(left, pair)
-            left = left - _spread(both, pair, values.ndim)
-            parts += products(both, pair)
-    return _sorted(0.0, parts, left, noise)
+    pairs = [(min(axis, other), max(axis, other)) for other in range(values.ndim) if other != axis]
+    return _peeled(0.0, values, [(axis,), *pairs], noise)
+
+
+def _peeled(constant: float, left: Array, sets: Sequence[tuple[int, ...]], noise: float) -> Separation:
+    """Take off what depends on each of some axes or pairs of axes in turn: the mean over the others."""
+    found: list[Part] = []
+    for kept in sets:
+        mean = left.mean(axis=tuple(axis for axis in range(left.ndim) if axis not in kept), keepdims=True)
+        left = left - mean
+        part = mean.reshape([left.shape[axis] for axis in kept])
+        found += [Single(kept[0], part)] if len(kept) == 1 else products(part, (kept[0], kept[1]))
+    lost = sum(part.size**2 for part in found if part.size <= noise)
+    kept_parts = sorted((part for part in found if part.size > noise), key=lambda part: -part.size)
+    return Separation(constant, tuple(kept_parts), float(np.sqrt(np.mean(left**2) + lost)))
 
 
 def products(both: Array, pair: tuple[int, int]) -> list[Product]:
@@ -110,21 +113,201 @@ def products(both: Array, pair: tuple[int, int]) -> list[Product]:
     return found
 
 
-def _sorted(constant: float, parts: Sequence[Part], left: Array, noise: float) -> Parts:
-    kept = [part for part in parts if part.size > noise]
-    lost = sum(part.size**2 for part in parts if part.size <= noise)
-    rest = float(np.sqrt(np.mean(left**2) + lost))
-    return Parts(constant, tuple(sorted(kept, key=lambda part: -part.size)), rest)
+@dataclass(frozen=True, slots=True)
+class Star:
+    """A table over `axis` that others are multiplied by: centre (m,), no unit; leaves: axis -> values, mm or rad."""
+
+    axis: int
+    centre: Array
+    leaves: Mapping[int, Array]
 
 
-def _mean_over_others(values: Array, kept: tuple[int, ...]) -> Array:
-    mean: Array = values.mean(axis=tuple(axis for axis in range(values.ndim) if axis not in kept))
-    return mean
+@dataclass(frozen=True, slots=True)
+class TableLayout:
+    """A function as tables: a constant, sums (axis -> values) and stars.
+
+    way  the axis with whose direction of motion all of it changes sign; None for what does not
+    """
+
+    sums: Mapping[int, Array] = field(default_factory=dict)
+    stars: tuple[Star, ...] = ()
+    way: int | None = None
+    constant: float = 0.0
+
+    @property
+    def axes(self) -> frozenset[int]:
+        """The axes that it looks up."""
+        centres = {star.axis for star in self.stars}
+        return frozenset({*self.sums, *centres, *(axis for star in self.stars for axis in star.leaves)})
+
+    def scaled(self, factor: float) -> TableLayout:
+        """The layout of a multiple of the function."""
+        stars = [
+            Star(star.axis, star.centre, {axis: factor * leaf for axis, leaf in star.leaves.items()})
+            for star in self.stars
+        ]
+        sums = {axis: factor * values for axis, values in self.sums.items()}
+        return TableLayout(sums, tuple(stars), self.way, factor * self.constant)
+
+    def at(self, places: Array) -> Array:
+        """Its values where axis j stands at its node places[:, j], (n,); whole numbers."""
+        total = np.full(len(places), self.constant)
+        for axis, values in self.sums.items():
+            total += values[places[:, axis]]
+        for star in self.stars:
+            leaves = sum(values[places[:, axis]] for axis, values in star.leaves.items())
+            total += star.centre[places[:, star.axis]] * leaves
+        return total
 
 
-def _spread(values: Array, axes: tuple[int, ...], ndim: int) -> Array:
-    """A function of some axes, shaped to broadcast over all of them."""
-    shape = [1] * ndim
-    for axis, size in zip(axes, values.shape, strict=True):
-        shape[axis] = size
-    return values.reshape(shape)
+def tables_of(layouts: Sequence[TableLayout], beside: tuple[int, int] = (0, 0)) -> int:
+    """How many tables absorbed layouts take to correct one axis: that without direction, and those for ways of axes.
+
+    A constant without sums is a table, too. What changes with the way takes a table for either way; a sum shares the
+    pair with the table that is there anyway. beside: tables more for each table that multiplies others, and for each
+    that is multiplied, where the control adds these by themselves too and that must be taken off again.
+    """
+    multiplier, multiplied = beside
+    plain = {axis for layout in layouts if layout.way is None for axis in layout.sums}
+    count = 0
+    for layout in layouts:
+        both = 1 if layout.way is None else 2
+        count += int(layout.constant != 0.0)
+        count += sum(1 if layout.way is None or axis in plain else 2 for axis in layout.sums)
+        count += sum(1 + multiplier + (1 + multiplied) * both * len(star.leaves) for star in layout.stars)
+    return count
+
+
+def arranged(parts: Sequence[Part], constant: float, way: int | None, tolerance: float) -> TableLayout:
+    """The layout that takes the fewest tables once it is `absorbed`; it is not, yet.
+
+    What changes with the way of an axis has that axis as the leaf of every product.
+    tolerance  rms that may be lost by writing a factor as a combination of others
+    """
+    singles = {part.axis: part.values for part in parts if isinstance(part, Single)}
+    pairs = [part for part in parts if isinstance(part, Product)]
+    choices = _choices(pairs) if way is None else iter([{part.axes: part.across(way) for part in pairs}])
+    layouts = [TableLayout(singles, tuple(_stars(pairs, centres, tolerance)), way, constant) for centres in choices]
+    return min(layouts, key=lambda layout: tables_of([absorbed(layout, tolerance)]))
+
+
+def _choices(pairs: Sequence[Product]) -> Iterator[dict[tuple[int, int], int]]:
+    """Which axis of each pair is the centre: all ways, or the obvious ones if there are too many."""
+    axes = list(dict.fromkeys(part.axes for part in pairs))
+    if len(axes) <= EXHAUSTIVE:
+        for sides in product((0, 1), repeat=len(axes)):
+            yield {pair: pair[side] for pair, side in zip(axes, sides, strict=True)}
+        return
+    involved = sorted({axis for pair in axes for axis in pair})
+    for favoured in product((False, True), repeat=len(involved)):
+        rank = dict(zip(involved, favoured, strict=True))
+        yield {pair: max(pair, key=lambda axis: rank[axis]) for pair in axes}
+
+
+def _stars(pairs: Sequence[Product], centres: Mapping[tuple[int, int], int], tolerance: float) -> list[Star]:
+    """Products put together, largest first: into the centres that are there if that takes no more tables."""
+    stars: list[Star] = []
+    for part in pairs:
+        axis = centres[part.axes]
+        leaf = part.across(axis)
+        known = [index for index, star in enumerate(stars) if star.axis == axis]
+        shares = _shares(part, axis, [stars[index].centre for index in known], tolerance)
+        used = [] if shares is None else [(i, a) for i, a in zip(known, shares, strict=True) if a]
+        if shares is None or sum(leaf not in stars[index].leaves for index, _ in used) > 2:
+            stars.append(Star(axis, part.on(axis), {leaf: part.size * part.on(leaf)}))
+            continue
+        for index, share in used:
+            added = share * part.size * part.on(leaf) + stars[index].leaves.get(leaf, 0.0)
+            stars[index] = Star(axis, stars[index].centre, {**stars[index].leaves, leaf: added})
+    return stars
+
+
+def _shares(part: Product, axis: int, centres: Sequence[Array], tolerance: float) -> list[float] | None:
+    """The factor as a combination of centres, if it is one to within the tolerance; shares that do not matter are 0."""
+    if not centres:
+        return None
+    columns = np.stack(centres, axis=1)
+    shares = np.linalg.lstsq(columns, part.on(axis), rcond=None)[0]
+    shares[np.abs(shares) * part.size * _rms(columns) <= tolerance] = 0.0
+    missed = _rms(columns @ shares - part.on(axis)) * part.size
+    return shares.tolist() if missed <= tolerance else None
+
+
+def absorbed(layout: TableLayout, tolerance: float) -> TableLayout:
+    """The same function with fewer tables: sums hidden in the factors of products, where they are multiples of them.
+
+    The values may be those at the nodes or at any other positions. The constant goes into a sum, if there is one.
+    """
+    sums, stars, constant = dict(layout.sums), list(layout.stars), layout.constant
+    if layout.way is None:
+        for axis in layout.sums:
+            constant = _hide_in_leaves(sums, stars, constant, axis, tolerance)
+        for axis in layout.sums:
+            if axis in sums:
+                constant = _hide_in_centres(sums, stars, constant, axis, tolerance)
+        if sums:
+            home = min(sums)
+            sums[home], constant = sums[home] + constant, 0.0
+        elif abs(constant) <= tolerance:
+            constant = 0.0
+    return TableLayout(dict(sorted(sums.items())), tuple(stars), layout.way, constant)
+
+
+def _hide_in_leaves(sums: dict[int, Array], stars: list[Star], constant: float, axis: int, tolerance: float) -> float:
+    """A sum that is a combination of centres over the same axis: each share is added to a leaf of that centre."""
+    own = [index for index, star in enumerate(stars) if star.axis == axis]
+    fit = _combination(sums[axis], [stars[index].centre for index in own], tolerance)
+    if fit is None:
+        return constant
+    del sums[axis]
+    for index, share in zip(own, fit[1:], strict=True):
+        leaf, values = next(iter(stars[index].leaves.items()))
+        stars[index] = Star(axis, stars[index].centre, {**stars[index].leaves, leaf: values + share})
+    return constant + fit[0]
+
+
+def _hide_in_centres(sums: dict[int, Array], stars: list[Star], constant: float, axis: int, tolerance: float) -> float:
+    """A sum that is a combination of leaves over the same axis: the centres are shifted, if that saves a table."""
+    own = [index for index, star in enumerate(stars) if axis in star.leaves]
+    fit = _combination(sums[axis], [stars[index].leaves[axis] for index in own], tolerance)
+    if fit is None:
+        return constant
+    changed, shifted = dict(sums), constant
+    for index, share in zip(own, fit[1:], strict=True):
+        for leaf, values in stars[index].leaves.items():
+            changed[leaf] = changed.get(leaf, np.zeros_like(values)) - share * values
+    for leaf in list(changed):
+        mean = float(changed[leaf].mean())
+        if _rms(changed[leaf] - mean) <= tolerance:
+            shifted += mean
+            del changed[leaf]
+    if len(changed) >= len(sums):
+        return constant
+    sums.clear()
+    sums.update(changed)
+    for index, share in zip(own, fit[1:], strict=True):
+        stars[index] = Star(stars[index].axis, stars[index].centre + share, stars[index].leaves)
+    return shifted
+
+
+def _combination(values: Array, columns: Sequence[Array], tolerance: float) -> list[float] | None:
+    """Constant and shares of the columns that make up the values to within the tolerance.
+
+    Columns that are nearly the same count as one, lest large shares cancel.
+    """
+    if not columns:
+        return None
+    means, sizes = [float(column.mean()) for column in columns], [_rms(column - column.mean()) for column in columns]
+    if min(sizes) == 0.0:
+        return None
+    design = np.stack([(c - mean) / size for c, mean, size in zip(columns, means, sizes, strict=True)], axis=1)
+    scaled = np.linalg.lstsq(design, values - values.mean(), rcond=ALIKE)[0]
+    if _rms(design @ scaled - values + values.mean()) > tolerance:
+        return None
+    shares = (scaled / sizes).tolist()
+    constant = float(values.mean()) - sum(share * mean for share, mean in zip(shares, means, strict=True))
+    return [constant, *shares]
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -8,11 +8,10 @@ from html import escape
 import numpy as np
 
 from ncfix import __version__
+from ncfix.tables.compensation import Tables
 from ncfix.tables.control import Control, Request, Written
+from ncfix.tables.correction import Residual, corners, residual
 from ncfix.tables.grid import Array
-from ncfix.tables.neutral import Tables
-from ncfix.tables.poses import corners
-from ncfix.tables.residual import Residual, residual
 
 CLASSES = {
     "L-POS": "how far each linear axis goes, along itself.",

@@ -1,4 +1,10 @@
-"""Grids over several axes: the exact correction at every node, or what comes nearest to it all around."""
+"""Grids over several axes: the exact correction at every node, or what comes nearest to it all around.
+
+`search` finds how many nodes along each axis a grid takes. A grid that is linear between nodes misses about the sum of
+what it misses along each axis alone, and that is quickly looked up on random lines. So for every number of nodes in all
+the best way to share them out among the axes is known beforehand; the fewest that really are within the target are then
+looked for among those.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +12,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.machine import Machine, State
-from ncfix.tables.bending import Bending
-from ncfix.tables.exact import exact_correction, linear_axes
-from ncfix.tables.fit import WITHIN, between, fitted
-from ncfix.tables.grid import Array, Grid
-from ncfix.tables.poses import corners, even_poses, random_poses
+from ncfix.tables.correction import corners, even_poses, exact_correction, linear_axes, random_poses
+from ncfix.tables.grid import WITHIN, Array, Bending, Grid, between, fitted, on_full_grid
 
 LINES = 32
 """Random lines along an axis on which its bending is judged."""
@@ -41,11 +45,13 @@ CLOSE = 48
 FAR = 130
 GROWTH = 1.15
 """Most nodes that are looked at, and by which factor their count grows to there."""
-
-
-def as_it_is(grid: Grid) -> Grid:
-    """A file that keeps every digit."""
-    return grid
+FINE = 1 / 8
+"""Share of the target from which an axis alone is good enough."""
+AIM = 0.95
+"""Share of a target that is aimed at: poses that were not looked at may miss a little more than those that were."""
+LAST = 3
+"""Of the largest grids, how many are tried."""
+Counts = NDArray[np.intp]
 
 
 @dataclass(slots=True)
@@ -59,7 +65,7 @@ class Volume:
     exact    their corrections at positions of the inputs: (n, n_inputs) -> (n, n_outputs) mm
     area     values at nodes are those that come nearest to the corrections all around (least squares), not those of the
              nodes themselves
-    written  what a file makes of a grid: it is judged after that
+    written  what a file makes of a grid, which is judged after that: as it is where the file keeps every digit
     kinks    of each input, positions at which the corrections may have a corner
     uneven   nodes need not be evenly spaced
     covered  (n_inputs, 2) where nodes are, mm and rad; beyond, but within the ranges, the values at the ends hold
@@ -73,7 +79,7 @@ class Volume:
     outputs: tuple[str, ...]
     exact: Callable[[Array], Array]
     area: bool = False
-    written: Callable[[Grid], Grid] = as_it_is
+    written: Callable[[Grid], Grid] = lambda grid: grid
     kinks: tuple[Array, ...] = ()
     uneven: bool = False
     covered: Array = field(default_factory=lambda: np.zeros((0, 2)))
@@ -132,7 +138,13 @@ class Volume:
             middle: Array = (low + high) / 2 - meant
             return middle
 
-        grid = _followed(added, inputs, found.ranges, found.outputs)
+        seen = random_poses(found.ranges, SEEN, seed=19)
+        meant = added(seen)
+        for count in COARSE:
+            nodes = tuple(np.linspace(low, high, count) for low, high in found.ranges.tolist())
+            grid = Grid(inputs, nodes, found.outputs, on_full_grid(added, nodes))
+            if np.abs(grid.at(seen) - meant).max() < NEARLY:
+                break
         return replace(found, exact=lambda positions: found.exact(positions) + grid.at(positions))
 
     def grid(self, counts: Sequence[int]) -> Grid:
@@ -140,8 +152,7 @@ class Volume:
         nodes = tuple(self._nodes(index, count) for index, count in enumerate(counts))
         within = WITHIN if len(nodes) <= 3 else WITHIN // 2
         looked_at = tuple(self._around(index, line, within) for index, line in enumerate(nodes)) if self.area else nodes
-        places = np.stack(np.meshgrid(*looked_at, indexing="ij"), axis=-1)
-        values = self._at(places.reshape(-1, len(nodes))).reshape(*places.shape[:-1], len(self.outputs))
+        values = on_full_grid(self._at, looked_at)
         return Grid(self.inputs, nodes, self.outputs, fitted(values, looked_at, nodes) if self.area else values)
 
     def _at(self, places: Array) -> Array:
@@ -170,16 +181,17 @@ class Volume:
             line = self._bends(index).uneven()[count][0] / self.units[index]
         else:
             low, high = (self.covered[index] / self.units[index]).tolist()
-            line = even_line(low, high, count, self._anchor(index))
+            line = even_line(low, high, count, self.anchor(index))
         nodes: Array = np.round(line, DIGITS) * self.units[index]
         return nodes
 
-    def _anchor(self, index: int) -> float | None:
+    def anchor(self, index: int) -> float | None:
+        """The position at which one input must have a node, in its unit of the file."""
         return self.anchors[index] if self.anchors else None
 
     def least(self, index: int) -> int:
         """The fewest nodes along one input: a node at its anchor that is not at an end makes them three."""
-        anchor = self._anchor(index)
+        anchor = self.anchor(index)
         return 2 if anchor is None or np.abs(self.covered[index] / self.units[index] - anchor).min() < END else 3
 
     def left(self, grid: Grid) -> float:
@@ -212,7 +224,7 @@ class Volume:
         """Nodes of one input only where the corrections change: at either end by no more than is allowed, mm."""
         covered = self.covered.copy()
         covered[index] = self._bends(index).ends(allowed)
-        anchor = self._anchor(index)
+        anchor = self.anchor(index)
         if anchor is not None:
             place = anchor * self.units[index]
             covered[index] = min(covered[index, 0], place), max(covered[index, 1], place)
@@ -231,22 +243,6 @@ class Volume:
         positions = np.repeat(spread, len(line), axis=0)
         positions[:, axis] = np.tile(line, len(spread))
         return self.exact(positions).reshape(len(spread), len(line), -1)
-
-
-def _followed(
-    function: Callable[[Array], Array], inputs: tuple[str, ...], ranges: Array, outputs: Sequence[str]
-) -> Grid:
-    """A function of positions (n, n_inputs) on even nodes, as many as keep it near, or the most."""
-    seen = random_poses(ranges, SEEN, seed=19)
-    meant = function(seen)
-    for count in COARSE:
-        nodes = tuple(np.linspace(low, high, count) for low, high in ranges.tolist())
-        places = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1)
-        values = function(places.reshape(-1, len(nodes))).reshape(*places.shape[:-1], len(outputs))
-        grid = Grid(inputs, nodes, tuple(outputs), values)
-        if np.abs(grid.at(seen) - meant).max() < NEARLY:
-            break
-    return grid
 
 
 def even_line(low: float, high: float, count: int, anchor: float | None) -> Array:
@@ -280,3 +276,109 @@ def inputs_that_matter(machine: Machine, space: Array, tool_length: float) -> tu
         if not machine.rotary[axis] or changed > MATTERS:
             found.append(name)
     return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """A grid that was searched for.
+
+    grid     the table
+    left     largest correction that it misses at random poses, mm
+    reached  whether that is within the target
+    """
+
+    grid: Grid
+    left: float
+    reached: bool
+
+
+def search(volume: Volume, target: float, most: Sequence[int], points: int, equal: bool = False) -> Mesh:
+    """The grid with the fewest nodes found that misses at most `target` (mm) of the correction anywhere.
+
+    At most `most` nodes along each input and `points` in all. `equal` adds one along every input at a time, from two
+    on, as Esmaeili (2021), Fig. 4.4.
+    """
+    if equal:
+        side = int(min(min(most), np.floor(points ** (1 / len(most)) + 1e-9)))
+        fewest = max(volume.least(axis) for axis in range(len(most)))
+        ladder = np.repeat(np.arange(fewest, side + 1)[:, None], len(most), axis=1)
+        return _first(volume, target, ladder)
+    found = _bisected(
+        volume, target, _frontier([_along(volume, axis, target, n) for axis, n in enumerate(most)], points)
+    )
+    return _thinned(volume, found, target) if found.reached else found
+
+
+def _along(volume: Volume, axis: int, target: float, most: int) -> tuple[Counts, Array]:
+    """Counts along one input, and what each misses there."""
+    counts, missed = [], []
+    for count in volume.counts(axis, most):
+        counts.append(count)
+        missed.append(volume.bending(axis, count))
+        if missed[-1] <= FINE * target:
+            break
+    return np.array(counts, dtype=np.intp), np.array(missed)
+
+
+def _frontier(axes: Sequence[tuple[Counts, Array]], points: int) -> Counts:
+    """The counts (k, n_inputs) of which none has more nodes and misses more than another, by their number of nodes."""
+    counts, missed = np.zeros((1, 0), dtype=np.intp), np.zeros(1)
+    for index, (line, part) in enumerate(axes):
+        rest = int(np.prod([line[0] for line, _ in axes[index + 1 :]]))
+        grown = np.concatenate([np.repeat(counts, len(line), axis=0), np.tile(line, len(counts))[:, None]], axis=1)
+        total = (missed[:, None] + part).reshape(-1)
+        allowed = grown.prod(axis=1) * rest <= points
+        counts, missed = _undominated(grown[allowed], total[allowed])
+    return counts
+
+
+def _undominated(counts: Counts, missed: Array) -> tuple[Counts, Array]:
+    order = np.lexsort((missed, counts.prod(axis=1)))
+    sorted_missed = missed[order]
+    before = np.minimum.accumulate(np.concatenate([[np.inf], sorted_missed[:-1]]))
+    kept = order[sorted_missed < before]
+    return counts[kept], missed[kept]
+
+
+def _at(volume: Volume, counts: Counts, target: float) -> Mesh:
+    grid = volume.grid(counts.tolist())
+    left = volume.left(grid)
+    return Mesh(grid, left, left <= target)
+
+
+def _first(volume: Volume, target: float, ladder: Counts) -> Mesh:
+    """The first of a ladder that is good enough, or the best of them."""
+    best = _at(volume, ladder[0], target)
+    for counts in ladder[1:]:
+        if best.reached:
+            break
+        best = min(_at(volume, counts, target), best, key=lambda mesh: mesh.left)
+    return best
+
+
+def _bisected(volume: Volume, target: float, ladder: Counts) -> Mesh:
+    """The first of a ladder that is good enough, if they get better and better; or the best of the last few."""
+    low, high = 0, len(ladder) - 1
+    best = min((_at(volume, counts, target) for counts in ladder[-LAST:]), key=lambda mesh: mesh.left)
+    while best.reached and low < high:
+        middle = (low + high) // 2
+        found = _at(volume, ladder[middle], target)
+        if found.reached:
+            best, high = found, middle
+        else:
+            low = middle + 1
+    return best
+
+
+def _thinned(volume: Volume, mesh: Mesh, target: float) -> Mesh:
+    """Take nodes away as long as the target still holds."""
+    counts = np.array(mesh.grid.counts, dtype=np.intp)
+    for axis in np.argsort(counts):
+        while counts[axis] > volume.least(int(axis)):
+            fewer = counts.copy()
+            fewer[axis] = volume.fewer(int(axis), int(counts[axis]))
+            found = _at(volume, fewer, target)
+            if not found.reached:
+                break
+            counts, mesh = fewer, found
+    return mesh

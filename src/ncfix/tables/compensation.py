@@ -2,17 +2,22 @@
 
 Everything here is a correction: what is ADDED to the command of an axis, mm or rad. Signs, units and digits of a
 control's own files are the business of its plugin, which turns them into this and back.
+
+The class (ISO/TR 16907) of tables says which errors they hold, by the axes that each of them looks up and corrects: not
+what a control could hold, but what was written. One table of X over itself is L-POS, whatever else there might be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from ncfix.tables.grid import Array, Grid
+
+LINEAR = ("X", "Y", "Z")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,17 +38,13 @@ class Term:
 
     def at(self, names: Sequence[str], q: Array, direction: Array) -> Array:
         """Its contribution to its outputs, (n, n_outputs)."""
-        value = self._weight(names, direction)
+        value = np.ones((len(direction), 1))
+        if self.way is not None:
+            axis, sense = self.way
+            value = (1 + sense * direction[:, [names.index(axis)]]) / 2
         for grid in self.factors:
             value = value * grid.at(q[:, [names.index(name) for name in grid.inputs]])
         return value
-
-    def _weight(self, names: Sequence[str], direction: Array) -> Array:
-        if self.way is None:
-            return np.ones((len(direction), 1))
-        axis, sense = self.way
-        weight: Array = (1 + sense * direction[:, [names.index(axis)]]) / 2
-        return weight
 
 
 @runtime_checkable
@@ -109,3 +110,56 @@ class Compensation:
 
 NOTHING = Compensation(())
 """No tables at all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lookup:
+    """An axis that a table or a product of tables corrects, over these."""
+
+    output: str
+    inputs: frozenset[str]
+    product: bool
+
+
+def class_of(tables: Compensation, rotary: Collection[str]) -> str:
+    """The class of sums and products of tables; rotary: the rotary axes of the machine."""
+    lines = [line for term in tables.terms for line in _lines(term)]
+    linear = [line for line in lines if line.output not in rotary]
+    found = list(_linear([line for line in linear if line.inputs.isdisjoint(rotary)], linear))
+    if any(not line.inputs.isdisjoint(rotary) for line in linear):
+        together = any(len(line.inputs) > 2 and not line.inputs.isdisjoint(rotary) for line in linear)
+        found.append("the position part of R-VOL" if together and _reach(linear, rotary) else "part of R-VOL")
+    if any(line.output in rotary and line.output in line.inputs for line in lines):
+        found.append("R-RAX")
+    *head, last = found or ["none"]
+    return f"{', '.join(head)} and {last}" if head else last
+
+
+def _linear(lines: Sequence[Lookup], all_lines: Sequence[Lookup]) -> Iterator[str]:
+    """What tables of linear axes over linear axes are: all of it, or which parts."""
+    if any(len(line.inputs) > 1 for line in all_lines) and _reach(all_lines, ()):
+        yield "L-VOL"
+        return
+    if any(line.output in line.inputs and not line.product for line in lines):
+        yield "L-POS"
+    if any(line.inputs - {line.output} and not line.product for line in lines):
+        yield from ("L-STR", "L-SQR")
+    if any(line.inputs - {line.output} for line in lines):
+        yield "part of L-ANG"
+
+
+def _reach(lines: Sequence[Lookup], rotary: Collection[str]) -> bool:
+    """Whether each axis that is corrected is so over X, Y and Z, and over a rotary axis if there are some."""
+    for output in {line.output for line in lines}:
+        reached = {name for line in lines if line.output == output for name in line.inputs}
+        if not reached >= {*LINEAR} or (rotary and reached.isdisjoint(rotary)):
+            return False
+    return bool(lines)
+
+
+def _lines(term: Term) -> Iterator[Lookup]:
+    inputs = frozenset(name for factor in term.factors for name in factor.inputs)
+    if all(factor.values.any() for factor in term.factors):
+        for index, name in enumerate(term.outputs):
+            if term.factors[0].values[..., index].any():
+                yield Lookup(name, inputs, len(term.factors) > 1)

@@ -1,4 +1,8 @@
-"""Faults in table files, with their places: what the linters of the plugins say it with."""
+"""What the table files of controls have in common: axes by their letters, numbers, and faults with their places.
+
+A letter tells whether a position is in millimetres or degree. The linters of the plugins say what is wrong in a file
+with `Remarks`.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,10 @@ import math
 import re
 from dataclasses import dataclass, field
 
-from ncfix.diagnostics import ConfigError, Message, Place
+import numpy as np
+
+from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
+from ncfix.machine import Machine
 
 AGAIN = "export again"
 """What helps with a file that ncfix has written."""
@@ -14,6 +21,10 @@ NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 ALONE = re.compile(r"\r(?!\n)")
 BYTE_ORDER = "\u00ef\u00bb\u00bf"
 """The mark at the beginning of some UTF-8 files, taken as Latin-1."""
+ORDER = "XYZABCUVW"
+"""In which order controls count them."""
+TURNING = "ABC"
+DEGREE = np.pi / 180
 
 
 def as_number(text: str) -> float | None:
@@ -76,3 +87,19 @@ def _rows(text: str) -> list[str]:
     """The lines, whether they end in LF, CR LF or CR."""
     rows = re.split("\r\n|\n|\r", text)
     return rows if rows[-1] else rows[:-1]
+
+
+def unit_of(letter: str) -> float:
+    """mm or rad per unit of a file."""
+    return DEGREE if letter in TURNING else 1.0
+
+
+def in_order(machine: Machine, known: str = ORDER) -> tuple[str, ...]:
+    """The axes of a machine as its control counts them; raises `RefusedError` NCF484 for one that it cannot have."""
+    odd = [axis.name for axis in machine.axes if axis.name not in known or (axis.name in TURNING) != axis.rotary]
+    if odd:
+        lengths = " ".join(letter for letter in known if letter not in TURNING)
+        text = f"axes {' '.join(odd)}: linear axes are {lengths} here, rotary axes {' '.join(TURNING)}"
+        hint = "name them so in the machine file, or correct its programs: ncfix fix"
+        raise RefusedError.of("NCF484", text, hint=hint)
+    return tuple(letter for letter in known if letter in machine.axis_names)

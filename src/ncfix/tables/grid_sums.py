@@ -16,10 +16,9 @@ from itertools import combinations, product
 
 import numpy as np
 
-from ncfix.tables.grid import Array, Grid
-from ncfix.tables.mesh import search
-from ncfix.tables.poses import random_poses
-from ncfix.tables.volume import CHECKS, Volume
+from ncfix.tables.correction import random_poses
+from ncfix.tables.grid import Array, Grid, on_full_grid
+from ncfix.tables.volume import CHECKS, Volume, search
 
 COARSE = 6
 """Positions of each axis at which the correction is taken apart."""
@@ -36,7 +35,6 @@ EVEN = 0.3
 """Power of its number of nodes by which a face gets more of what may be missed: that saves nodes where many are."""
 MANY = 8
 """More sets than these are not shared out among faces."""
-
 Set = frozenset[int]
 """Axes by their number among the inputs."""
 
@@ -89,8 +87,7 @@ def faces(volume: Volume, owners: Sequence[int], target: float) -> tuple[Face, .
     Each belongs to an owner, one of the inputs, which is among its own inputs.
     """
     lines = [_coarse(low, high, number) for number, (low, high) in enumerate(volume.ranges.tolist())]
-    places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
-    values = volume.exact(places.reshape(-1, len(lines))).reshape(*places.shape[:-1], -1)
+    values = on_full_grid(volume.exact, lines)
     sizes = interactions(values, len(lines))
     found: dict[tuple[int, Set], list[int]] = {}
     for output in range(values.shape[-1]):

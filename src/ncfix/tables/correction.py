@@ -1,0 +1,214 @@
+"""The correction that tables are made from, the working space in which they hold, and what they leave there.
+
+The correction is exact, at any pose, by the forward model of the machine: of the linear axes that of the tool tip, of
+the rotary axes what they can do for the orientation of the tool, spin about its axis included. What tables leave is the
+error of the tool tip over random poses, with the tables off and with them on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnostics import RefusedError, UsageError
+from ncfix.machine import Machine, State
+from ncfix.tables.compensation import Tables
+from ncfix.tables.grid import Array, full_grid
+
+ARRIVED = 1e-7
+"""mm: nearer to the intended tip than any control can resolve."""
+NEWTON_PASSES = 20
+ANEW = 5
+"""Passes for which a Jacobian is good: each takes the gap down by the gradient of the errors, a thousandth or so."""
+ROTARY_PASSES = 2
+Ranges = Mapping[str, tuple[float, float]]
+"""Axis -> lowest and highest position, mm or rad."""
+POSES = 20_000
+"""Random poses at which is looked what tables leave."""
+
+
+def linear_axes(machine: Machine) -> list[int]:
+    """The columns of the three linear axes; raises `RefusedError` NCF481 if there are not exactly three."""
+    found = np.flatnonzero(~machine.rotary).tolist()
+    if len(found) != 3:
+        text = f"tables need exactly three linear axes, this machine has {len(found)}"
+        raise RefusedError.of("NCF481", text, hint="correct its programs instead: ncfix fix")
+    return found
+
+
+def exact_correction(machine: Machine, q: Array, state: State, start: Array | None = None) -> Array:
+    """What to add to commands q (n, n_axes) so that the tip goes where a perfect machine has it at q, (n, n_axes).
+
+    The linear axes are solved for by Newton's method; the rotary axes keep `start`, the correction that they have
+    already (none if not given). Raises `RefusedError` NCF482 where no such command is found.
+    """
+    columns = linear_axes(machine)
+    correction = np.zeros_like(q) if start is None else start.copy()
+    target = machine.tip(q, state.tool_length)
+    jacobian = np.empty((0, 3, 3))
+    for number in range(NEWTON_PASSES):
+        gap = target - machine.actual_tip(q + correction, state)
+        if not np.isfinite(gap).all():
+            break
+        if np.abs(gap).max(initial=0.0) < ARRIVED:
+            return correction
+        if number % ANEW == 0:
+            jacobian = machine.axis_jacobian(q + correction, state.tool_length)[..., :3, columns]
+        correction[:, columns] += np.linalg.solve(jacobian, gap[..., None])[..., 0]
+    text = "no correction found that brings the tip where it should be"
+    raise RefusedError.of("NCF482", text, hint="the error model may have a jump")
+
+
+def own_rotary_correction(machine: Machine, q: Array, state: State) -> Array:
+    """What takes off the angular positioning error of every rotary axis about its own line, (n, n_axes) rad."""
+    correction = np.zeros_like(q)
+    for axis in np.flatnonzero(machine.rotary).tolist():
+        described = machine.axes[axis]
+        along = np.asarray(described.error_axes) @ np.asarray(described.direction)
+        correction[:, axis] = -(machine.joint_errors(q, state)[..., axis, 3:] @ along)
+    return correction
+
+
+def rotary_correction(machine: Machine, q: Array, state: State) -> Array:
+    """What to add to the rotary axes at commands q (n, n_axes), (n, n_rotary) rad.
+
+    The least squares of the three angles that the tool is then wrong by: two axes cannot take off three. As in S.
+    Esmaeili Marzdashti (Polytechnique Montreal, 2021), Eq. 27 and 32, of which it is the angular part: the linear axes
+    can take off any displacement that is left.
+    """
+    columns = np.flatnonzero(machine.rotary)
+    meant = machine.nominal(q, state.tool_length)
+    solver = np.linalg.pinv(machine.axis_jacobian(q, state.tool_length)[..., 3:, columns])
+    correction = np.zeros((len(q), len(columns)))
+    for _ in range(ROTARY_PASSES):
+        corrected = q.copy()
+        corrected[:, columns] += correction
+        correction -= np.einsum("nij,jn->ni", solver, _turn(machine.actual(corrected, state), meant))
+    return correction
+
+
+def orientation_error(machine: Machine, q: Array, correction: Array, state: State) -> Array:
+    """By what angle the tool is wrong at commands q that are corrected, (n,) rad."""
+    turn = _turn(machine.actual(q + correction, state), machine.nominal(q, state.tool_length))
+    angle: Array = np.linalg.norm(turn, axis=0)
+    return angle
+
+
+def _turn(actual: Array, meant: Array) -> Array:
+    """The small rotation from frames (n, 4, 4) that are meant to the actual ones, (3, n) rad."""
+    turn = actual[..., :3, :3] @ np.swapaxes(meant[..., :3, :3], -1, -2)
+    half: Array = (turn[:, [2, 0, 1], [1, 2, 0]] - turn[:, [1, 2, 0], [2, 0, 1]]).T / 2
+    return half
+
+
+def ranges_of(machine: Machine, given: Ranges | None = None) -> Array:
+    """The space that the tables cover, (n_axes, 2) mm and rad: that given, else the travel; one turn where endless.
+
+    Raises `UsageError` NCF483 for an axis that the machine does not have, a range that is empty or beyond the travel,
+    or a linear axis whose range is nowhere given.
+    """
+    space = np.array(machine.ranges)
+    endless = machine.rotary & ~np.isfinite(space).all(axis=1)
+    space[endless] = (-np.pi, np.pi)
+    for name, limits in (given or {}).items():
+        if name not in machine.axis_names:
+            raise _wrong_range(f"the machine has no axis {name!r}", f"one of {', '.join(machine.axis_names)}")
+        index = machine.axis_names.index(name)
+        low, high = machine.ranges[index]
+        if not limits[0] < limits[1]:
+            raise _wrong_range(f"the range of {name} is empty", "LOW,HIGH, the lower first")
+        if limits[0] < low - 1e-9 or limits[1] > high + 1e-9:
+            raise _wrong_range(f"the range of {name} goes beyond its travel", "the machine file has the travel")
+        space[index] = limits
+    for name, limits in zip(machine.axis_names, space, strict=True):
+        if not np.isfinite(limits).all():
+            raise _wrong_range(f"the machine file gives no range of {name}", f"--range {name}=LOW,HIGH")
+    return space
+
+
+def _wrong_range(text: str, hint: str) -> UsageError:
+    return UsageError.of("NCF483", text, hint=hint)
+
+
+def random_poses(space: Array, count: int, seed: int = 0) -> Array:
+    """Poses spread evenly over the space, (count, n_axes); the same for the same seed."""
+    return np.random.default_rng(seed).uniform(space[:, 0], space[:, 1], size=(count, len(space)))
+
+
+def random_ways(n_axes: int, count: int, seed: int = 1) -> Array:
+    """Directions of motion at random, (count, n_axes), -1 or 1."""
+    return np.random.default_rng(seed).choice([-1.0, 1.0], size=(count, n_axes))
+
+
+def even_poses(space: Array, count: int) -> Array:
+    """Poses that fill the space more evenly than those at random, (count, n_axes): a lattice of irrational steps."""
+    dimensions = len(space)
+    ratio = 2.0
+    for _ in range(40):
+        ratio = (1 + ratio) ** (1 / (dimensions + 1))
+    steps = ratio ** -np.arange(1.0, dimensions + 1)
+    share = np.mod(0.5 + np.arange(1, count + 1)[:, None] * steps, 1.0)
+    poses: Array = space[:, 0] + share * (space[:, 1] - space[:, 0])
+    return poses
+
+
+def corners(space: Array) -> Array:
+    """The corners of the space, (2 ** n_axes, n_axes)."""
+    return full_grid(list(space))
+
+
+def poses_along(axis: int, positions: Array, rest: Array) -> Array:
+    """One axis at positions (n,), each with the other axes as in poses `rest` (m, n_axes): (n * m, n_axes)."""
+    q = np.repeat(rest[None], len(positions), axis=0)
+    q[:, :, axis] = positions[:, None]
+    return q.reshape(-1, rest.shape[-1])
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """Tip errors at poses q (n, n_axes), before and after (n,), mm; `largest` correction per axis (n_axes,)."""
+
+    names: tuple[str, ...]
+    rotary: NDArray[np.bool_]
+    q: Array
+    before: Array
+    after: Array
+    largest: Array
+
+    def figures(self) -> dict[str, dict[str, Any]]:
+        """As `--json` has it, um; `at` is the pose with the most left, mm and degree."""
+        worst = int(np.argmax(self.after))
+        pose = np.where(self.rotary, np.degrees(self.q[worst]), self.q[worst])
+        at = {name: round(float(value), 3) for name, value in zip(self.names, pose, strict=True)}
+        return {"before": _size(self.before), "after": {**_size(self.after), "at": at}}
+
+
+def _size(error: Array) -> dict[str, float]:
+    rms = float(np.sqrt(np.mean(error**2)))
+    return {"max": 1e3 * float(error.max()), "rms": 1e3 * rms, "mean": 1e3 * float(error.mean())}
+
+
+def residual(
+    machine: Machine, tables: Tables, space: Array, tool_length: float, count: int = POSES, seed: int = 7
+) -> Residual:
+    """Run the machine with the tables active over `count` random poses of the space (n_axes, 2).
+
+    The tables see the commanded position, as controls do with setpoint inputs; every axis comes from either side.
+    """
+    q = random_poses(space, count, seed)
+    ways = random_ways(len(space), count, seed + 1)
+    state = State(tool_length, ways)
+    correction = tables.for_tool(tool_length).at(machine.axis_names, q, ways)
+    meant = machine.tip(q, tool_length)
+    return Residual(
+        machine.axis_names,
+        machine.rotary,
+        q,
+        np.linalg.norm(machine.actual_tip(q, state) - meant, axis=-1),
+        np.linalg.norm(machine.actual_tip(q + correction, state) - meant, axis=-1),
+        np.abs(correction).max(axis=0),
+    )
