@@ -95,12 +95,12 @@ def test_arrays_of_another_type_are_refused() -> None:
     ends, worst, nodes = np.zeros(3, dtype=bool), np.zeros(1), np.linspace(0, 1, 3)
     commands, follow = np.zeros((3, 3)), np.zeros((3, 3, 3))
     counts = np.array([3])
-    fewest(counts, nodes, commands, follow, 1e-3, ends, worst)
+    fewest(counts, nodes, commands, follow, (1e-3, 1024), ends, worst)
     assert ends.tolist() == [False, False, True]
     with pytest.raises(TypeError, match="int32"):
-        fewest(counts.astype(np.int32), nodes, commands, follow, 1e-3, ends, worst)
+        fewest(counts.astype(np.int32), nodes, commands, follow, (1e-3, 1024), ends, worst)
     with pytest.raises(TypeError, match="instead of f8"):
-        fewest(counts, nodes, commands.T, follow, 1e-3, ends, worst)
+        fewest(counts, nodes, commands.T, follow, (1e-3, 1024), ends, worst)
 
 
 def test_numbers_from_elsewhere_that_have_changed(tmp_path: Path) -> None:

@@ -13,8 +13,6 @@ from importlib.util import find_spec
 
 KERNELS = (
     "ncfix.compensate.kernels",
-    "ncfix.compensate.nearest_kernels",
-    "ncfix.compensate.plain_kernels",
     "ncfix.machine.kernels",
     "ncfix.control.lane_kernel",
     "ncfix.text.kernels",

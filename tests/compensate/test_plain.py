@@ -128,7 +128,7 @@ def test_arcs_are_planned_with_plain_motions(machine: Machine, monkeypatch: pyte
         return course
 
     with monkeypatch.context() as patched:
-        patched.setattr(plain, "planned", None)
+        patched.setattr(plain, "by_the_long_way", None)
         patched.setattr(Planner, "plan", watched)
         found = streamed(source, machine, 8220)
     assert all(planned for planned, _ in begun[1:])

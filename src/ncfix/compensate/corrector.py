@@ -12,9 +12,8 @@ from ncfix.compensate.before import Before, Round
 from ncfix.compensate.crew import Read, Share
 from ncfix.compensate.fix import stamp_of, strays
 from ncfix.compensate.partition import Part
-from ncfix.compensate.plain import Course, Planner
+from ncfix.compensate.plain import Course, Planner, largest_shift, written
 from ncfix.compensate.plain_figures import figures
-from ncfix.compensate.plain_text import largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import PathError, path_error
 from ncfix.compensate.plan.offset import is_offset

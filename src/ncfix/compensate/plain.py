@@ -1,10 +1,17 @@
-"""Parts of plain straight motions, which is what long programs are made of: planned in few passes.
+"""Parts of plain straight motions, which is what long programs are made of: planned and written in few passes.
 
-The same plan that `path` and `settle` make, with all left out that such a part cannot need: there are no cycles in it,
+The same plan that `path` and `solve` make, with all left out that such a part cannot need: there are no cycles in it,
 no axes without words, nothing that is refused, tool-centre-point control (TCP) is on in all of it or nowhere, and every
-motion begins where the one before ended. For the few arcs, dwells and turns in it see `others`.
-Whatever turns out to need more than that, or comes near to a limit, is for the long way. Both ways write the same
-bytes; a test holds them together.
+motion begins where the one before ended. Whatever turns out to need more than that, or comes near to a limit, is for
+the long way. Both ways write the same bytes; a test holds them together.
+
+With TCP X Y Z of a command are the tip's, the linear axes follow it and do not go straight from one end to the other; a
+bound of how far they stray tells whether they may leave their travel on the way.
+
+The few arcs, dwells and turns of rotary axes among plain motions are mostly planned with these: an arc that stays one,
+a dwell between motions that end where they shall, a turn. What is more than that is planned by the long way, as a short
+program of its own: each with the motion before it, so that it begins where it shall, and the one behind it, which may
+have to begin somewhere else than it would behind a plain motion.
 """
 
 from __future__ import annotations
@@ -15,10 +22,8 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.others import Others, planned, together
 from ncfix.compensate.partition import Part
-from ncfix.compensate.plain_poses import Poses
-from ncfix.compensate.plan.arcs import Closure
+from ncfix.compensate.plan.arcs import Closure, fitted, full_circles
 from ncfix.compensate.plan.arrays import (
     Array,
     Index,
@@ -31,26 +36,160 @@ from ncfix.compensate.plan.arrays import (
     picked,
     places,
     some,
+    squares,
 )
 from ncfix.compensate.plan.deviation import CORNER, SURE, led_bounds, looked_at, straight_bounds
+from ncfix.compensate.plan.ends import led_as_commands
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.kinematics import REST, matters
-from ncfix.compensate.plan.limits import FUZZ, JUMP
+from ncfix.compensate.plan.kinematics import REST, matters, moves_as_one, reached_joints
+from ncfix.compensate.plan.limits import FUZZ, JUMP, excess
 from ncfix.compensate.plan.path import Budget, Demands, Plan, in_pieces, not_split
 from ncfix.compensate.plan.sampling import passed
-from ncfix.compensate.plan.segments import Segments
+from ncfix.compensate.plan.segments import Segments, accelerations, arcs_within, skew, stays_within
 from ncfix.compensate.plan.splitting import Split
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
-from ncfix.compensate.plan.written import on_digits, rounding
-from ncfix.compensate.settle import Settled
+from ncfix.compensate.plan.written import on_digits, rounding, standing_still
+from ncfix.compensate.settle import Settled, agree
 from ncfix.compensate.units import Unit
 from ncfix.control.moves import FeedMode, Kind, Moves, Rule
+from ncfix.control.parts import taken
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import MORE
-from ncfix.writer.emit import Emission
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import Language
+from ncfix.writer.bulk import Bulk
+from ncfix.writer.emit import Emission, emit
 from ncfix.writer.pieces import Pieces
+
+
+@dataclass(frozen=True, slots=True)
+class Poses:
+    """Axis positions and commands at the ends of motions that go on from each other, (n + 1, n_axes) each.
+
+    machine      with the workpiece in its place
+    tool_length  mm
+    led          under TCP
+    commands     of the program
+    meant        axis positions of the program
+    """
+
+    machine: Machine
+    tool_length: float
+    led: bool
+    commands: Array
+    meant: Array
+
+    @classmethod
+    def of(cls, machine: Machine, tool_length: float, commands: Array, led: bool) -> Poses | None:
+        """From the commands of a program; None where axes under TCP may not reach every point, or stray by no bound."""
+        if led and not (moves_as_one(machine) and skew(machine) is not None):
+            return None
+        poses = cls(machine, tool_length, led, commands, commands)
+        return replace(poses, meant=poses.joints(commands)) if led else poses
+
+    def joints(self, commands: Array) -> Array:
+        """The axis positions that follow from commands (k, n_axes)."""
+        return reached_joints(self.machine, commands, np.full(len(commands), self.led), self.tool_length)[0]
+
+    def corrected(self, done: Array) -> Array:
+        """The commands that lead to corrected axis positions, (n + 1, n_axes)."""
+        if not self.led:
+            return done
+        tcp = np.ones(len(done), dtype=bool)
+        return led_as_commands(self.machine, self.commands, (self.meant, done), tcp, self.tool_length)
+
+    def accelerations(self, segments: Segments, begin: Array, end: Array) -> Array:
+        """What no linear axis exceeds along motions under TCP, (k,) mm per motion squared, see `segments`.
+
+        begin, end  (k, n_axes) axis positions there
+        """
+        way = lengths((segments.end - segments.start) @ self.machine.at_zero[1])
+        found = accelerations(self.machine, begin, end, self.tool_length, way)
+        assert found is not None
+        return found
+
+    def leave_travel(self, segments: Segments, begin: Array, end: Array, acceleration: Array) -> bool:
+        """Whether an axis leaves its travel along motions under TCP: looked at where it is not sure that none does."""
+        rows = np.flatnonzero(~stays_within(self.machine, begin, end, acceleration))
+
+        def joints(rows: Index, fraction: Array) -> Array:
+            return self.joints(segments.at(rows, fraction))
+
+        return bool((excess(self.machine, joints, rows, np.ones(len(rows), dtype=bool)) > FUZZ).any())
+
+
+FEW = 16
+"""Of so many motions at most one may be other than plain."""
+
+
+@dataclass(frozen=True, slots=True)
+class Others:
+    """What is to be written of some motions.
+
+    rows    (k,) which motions, in order
+    counts  (k,) how many pieces each has
+    pieces  these pieces
+    """
+
+    rows: Index
+    counts: Index
+    pieces: Pieces
+
+
+def arcs_and_dwells(
+    intent: Intent, real: Segments, plain: Mask, dialect: Dialect, rounding: float
+) -> tuple[Segments, Others] | None:
+    """Motions as they are really done, with the circles of the arcs among them, and these arcs and dwells.
+
+    real      where they really start and end
+    plain     (n,) those that are straight; of the others a turn is as one of them
+    rounding  how far a point may move when it is rounded to the control's digits, mm
+
+    None if there are many arcs, or some that do not surely stay arcs within the travels.
+    """
+    moves, arc = intent.moves, intent.segments.arc
+    dwell, turn = moves.kind == Kind.DWELL, (moves.kind == Kind.FEED) & (moves.modal == 10)
+    arcs, dwells = np.flatnonzero(arc), np.flatnonzero(dwell)
+    if FEW * len(arcs) > len(plain) or not (plain | arc | dwell | turn).all():
+        return None
+    if (real.start[dwells] != real.end[dwells]).any() or full_circles(intent, arcs).any():
+        return None
+    if arcs.size:
+        fit = fitted(intent, real, arcs, Closure(dialect.closure_mm, dialect.closure_relative), rounding)
+        centre, sweep = real.centre.copy(), real.sweep.copy()
+        centre[arcs], sweep[arcs] = fit.centre, fit.sweep
+        real = replace(real, centre=centre, sweep=sweep)
+        within = (arcs_within(intent.machine, each.rows(arcs)).all() for each in (intent.segments, real))
+        if not (fit.sound.all() and all(within)):
+            return None
+    rows = np.flatnonzero(arc | dwell)
+    ones = np.ones(len(rows), dtype=np.intp)
+    centre = np.where(arc[rows, None], real.centre[rows], np.nan)
+    return real, Others(rows, ones, Pieces(rows, ones.astype(float), real.end[rows], arc[rows], centre, ~arc[rows]))
+
+
+def by_the_long_way(
+    machine: Machine, dialect: Dialect, options: FixOptions, moves: Moves, plain: Mask
+) -> Others | None:
+    """The motions that are not `plain` (n,), and those behind them; None if more has to be said of them than that."""
+    odd = np.flatnonzero(~plain)
+    if FEW * len(odd) > len(moves) or odd[0] == 0 or odd[-1] + 2 >= len(moves):
+        return None
+    near = distinct(np.concatenate([odd - 1, odd, odd + 1]))
+    few = taken(moves, near)
+    agreed = agree(few, machine, dialect, options)
+    still = few.kind == Kind.DWELL
+    if agreed.reasons or agreed.plan.findings or (agreed.kept != still).any():
+        return None
+    pieces = agreed.plan.pieces
+    own = ~(plain[near] & plain[near - 1])
+    chosen = own[pieces.move]
+    columns = {name: getattr(pieces, name)[chosen] for name in ("fraction", "end", "arc", "centre", "kept")}
+    move = near[pieces.move[chosen]]
+    return Others(near[own], np.bincount(pieces.move, minlength=len(near))[own], Pieces(move=move, **columns))
+
 
 Looked = tuple[Index, Split | None, tuple[Finding, ...]]
 """Motions that must be split, their pieces, and what there is to say; see `Planner._split`."""
@@ -150,7 +289,7 @@ class Planner:
         others, alone, looked = None, plain, None
         if not plain.all():
             others, looked = self._in_one_look(unit, intent, real, bound, plain)
-            others = others or planned(self.machine, part.program.dialect, self.options, moves, plain)
+            others = others or by_the_long_way(self.machine, part.program.dialect, self.options, moves, plain)
             if others is None:
                 return None
             alone = np.ones_like(plain)
@@ -196,7 +335,7 @@ class Planner:
         moves = intent.moves
         found = None
         if not moves.tcp[0]:
-            found = together(intent, real, plain, unit.part.program.dialect, self.demands.budget.rounding)
+            found = arcs_and_dwells(intent, real, plain, unit.part.program.dialect, self.demands.budget.rounding)
         if found is None or moves.kind[-1] == Kind.DWELL:
             return None, None
         turned, others = found
@@ -246,11 +385,11 @@ class Planner:
         if not fast.engaged():
             shift = (done - meant)[:, linear]
             return straight_bounds(bow, done[:-1], done[1:], (shift[:-1], shift[1:]), tool_length, linear)
-        from ncfix.compensate import plain_kernels
+        from ncfix.compensate import kernels
 
         constants = bow.shift, bow.turn, bow.arm(np.zeros(len(linear)), float(tool_length), ~linear), MORE, CORNER
         bound = np.empty(len(done) - 1)
-        plain_kernels.bounds(meant, done, self._linear, (bow.slopes, bow.curvatures), constants, CLOSE, bound)
+        kernels.bounds(meant, done, self._linear, (bow.slopes, bow.curvatures), constants, CLOSE, bound)
         return bound
 
     @property
@@ -262,11 +401,11 @@ class Planner:
         """Whether corrected poses, and those of the program, come near no limit: as `limits`. Arrays as for bounds."""
         low, high = self.machine.ranges.T
         if fast.engaged():
-            from ncfix.compensate import plain_kernels
+            from ncfix.compensate import kernels
 
             linear, rotary = (NEARLY * most for most in self.machine.max_correction)
             axes = low.copy(), high.copy(), np.where(self.machine.rotary, rotary, np.inf), self._linear
-            return bool(plain_kernels.within_limits(meant, done, axes, (linear, NEARLY * JUMP, FUZZ)))
+            return bool(kernels.within_limits(meant, done, axes, (linear, NEARLY * JUMP, FUZZ)))
         for least, most in (extent(meant), extent(done)):
             if not ((low - least <= FUZZ).all() and (most - high <= FUZZ).all()):
                 return False
@@ -370,3 +509,24 @@ def _pieces_at(first: Index, rows: Index, counts: Index) -> Index:
     """The pieces of motions `rows` (k,), of which there are so many."""
     at: Index = np.repeat(first[:-1][rows], counts) + places(counts)
     return at
+
+
+def written(language: Language, course: Course, position: Array, steps: Array) -> Emission | None:
+    """Write a part; None if any of it cannot be written, or would not move.
+
+    position  (n_axes,) the command at which the control stands
+    steps     (n_axes,) what the control can resolve, mm and rad
+    """
+    program, moves, pieces = course.part.program, course.part.moves, course.pieces
+    bulk = Bulk.among(language, program, moves, pieces, course.first, course.plain)
+    if bulk is None:
+        return None
+    emission = emit(program, moves, pieces, steps, done=position, bulk=bulk)
+    idle = not course.single and standing_still(pieces, emission.end, emission.start).any()
+    return None if emission.conflicts or idle else emission
+
+
+def largest_shift(course: Course, emission: Emission) -> float:
+    """The largest shift of the linear axes at the end of a motion, mm."""
+    moves = course.part.moves
+    return float(np.sqrt(squares((course.last(emission.end) - moves.end)[:, ~moves.rotary]).max()))

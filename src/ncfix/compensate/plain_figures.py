@@ -1,8 +1,9 @@
 """The tip errors of a part of plain motions, before and after: mostly from what is known of their ends.
 
 What the tip is off at an end was found when the end was corrected, and what is left is what the numbers that were
-written differ from those that were meant (see `written.Known`). Motions over which the error may bend are looked at inside,
-too, in the places at which `deviation` would look; the few that are made of pieces, or pass a kink, it looks at itself.
+written differ from those that were meant (see `written.Known`). Motions over which the error may bend are looked at
+inside, too, in the places at which `deviation` would look; the few that are made of pieces, or pass a kink, it looks at
+itself.
 """
 
 from __future__ import annotations
@@ -65,14 +66,14 @@ def _by_columns(
 
 def _compiled(course: Course, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally) -> Index:
     """As `_by_columns`."""
-    from ncfix.compensate import plain_kernels
+    from ncfix.compensate import kernels
 
     moves, machine, sums, places = course.part.moves, course.intent.machine, np.zeros(5), np.full(3, -1)
     assert machine.linear_ways is not None
     places[0], counts, (shown, apart), bending = 0, np.zeros(len(moves), dtype=np.intp), masks, features(machine)
     if moves.tcp[0]:
         counts, bending = _looks(course, shown, _led_bends(course)), np.full_like(bending, np.inf)
-    plain_kernels.at_ends(
+    kernels.at_ends(
         (moves.start, moves.end),
         (text.start[0], text.end, course.first),
         (course.real.end, course.before),

@@ -179,14 +179,14 @@ class Search:
 
     def _down_compiled(self, points: Array, expected: Array) -> Nearest:
         """As `_down`."""
-        from ncfix.compensate import nearest_kernels
+        from ncfix.compensate import kernels
 
-        n, path = len(expected), (getattr(self.curve, name) for name in nearest_kernels.Path._fields)
+        n, path = len(expected), (getattr(self.curve, name) for name in kernels.CurveColumns._fields)
         found = Nearest(np.empty(n, dtype=np.intp), np.empty(n), np.empty(n))
-        nearest_kernels.down(
+        kernels.down(
             points,
             expected,
-            nearest_kernels.Path(*path),
+            kernels.CurveColumns(*path),
             (self.near, CLOSE),
             (STEPS, HOPS),
             (found.piece, found.share, found.gap),

@@ -106,7 +106,7 @@ def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
 
         nodes, motions = np.zeros(len(grid.fraction), dtype=bool), np.zeros(len(grid.counts))
         follow = np.ascontiguousarray(grid.follow)
-        kernels.fewest(grid.counts, grid.fraction, grid.command, follow, tolerance, nodes, motions)
+        kernels.fewest(grid.counts, grid.fraction, grid.command, follow, (tolerance, STRETCH), nodes, motions)
         return nodes, motions
     stretches, at, stop = _stretches(grid.counts)
     ends = np.zeros(int(grid.counts.sum()), dtype=bool)
