@@ -20,19 +20,21 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cache, lru_cache
+from importlib import import_module
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import pluggy
 
-from ncfix import hookspecs
 from ncfix.diagnostics import Message, NcfixError, PluginError
-from ncfix.hookspecs import GROUP
 
 if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint
 
 
+hookspecs = import_module("ncfix.hookspecs")
+"""The contract speaks of things of all floors, so it stands above them, and the ground takes it by its name."""
+GROUP: str = hookspecs.GROUP
 HOOKS = tuple(sorted(name for name in vars(hookspecs) if name.startswith("register_")))
 
 KINDS = tuple(hook.removeprefix("register_") for hook in HOOKS)

@@ -198,7 +198,7 @@ def test_every_hook_has_a_broken_plugin() -> None:
 
 def met(case: Case, tmp_path: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     """What the verb says that meets the plugin, installed beside the built-in ones."""
-    from ncfix.machine.piecewise import kinds
+    from ncfix.machine.effects import kinds
 
     for module in ("third_party_broken",):
         monkeypatch.delitem(sys.modules, module, raising=False)

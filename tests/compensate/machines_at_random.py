@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ncfix.machine import Axis, Effect, Machine, Tool
-from ncfix.machine.basis import Backlash, Constant, Fourier, Periodic, Polynomial
-from ncfix.machine.piecewise import Spline, Step, Table
+from ncfix.machine.basis import Backlash, ConstantBasis, Fourier, Periodic, Polynomial
+from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 
 TOPOLOGIES = {
     "table-table": "w C B F X Y Z S t",
@@ -63,7 +63,7 @@ def random_machine(
         if backlash:
             size = backlash * (1e-6 if axis.rotary else 1e-3)
             effects.append(Effect(f"E{axis.name}{axis.name}", (size,), Backlash()))
-    effects += [Effect("EX0S", (0.02,)), Effect("EA0S", (1e-4,)), Effect("EZS", (-0.01,), Constant())]
+    effects += [Effect("EX0S", (0.02,)), Effect("EA0S", (1e-4,)), Effect("EZS", (-0.01,), ConstantBasis())]
     return machine.replace(effects=tuple(effects))
 
 
@@ -90,9 +90,9 @@ def _motion(rng: np.random.Generator, axis: Axis, component: str, size: float, b
         places = np.linspace(low, high, 12)
         values = rng.uniform(-size, size, 12)
         values[-1] = values[0]
-        return Effect(name, tuple(values.tolist()), Table(tuple(places.tolist())))
+        return Effect(name, tuple(values.tolist()), PiecewiseLinear(tuple(places.tolist())))
     if basis == "step":
-        return Effect(name, tuple(rng.uniform(-size, size, 3).tolist()), Step((low / 3, high / 3)))
+        return Effect(name, tuple(rng.uniform(-size, size, 3).tolist()), PiecewiseConstant((low / 3, high / 3)))
     return Effect(name, (size,))
 
 

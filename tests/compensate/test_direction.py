@@ -10,7 +10,7 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import carried, matters, signs
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash
-from ncfix.machine.piecewise import Step
+from ncfix.machine.piecewise import PiecewiseConstant
 
 
 def with_play(topology: str) -> Machine:
@@ -21,8 +21,8 @@ def test_only_errors_that_depend_on_it_make_it_matter() -> None:
     machine = perfect(TOPOLOGIES["three-axis"])
     assert not matters(machine)
     assert not matters(machine.replace(effects=(Effect("EXX", (0.0,), Backlash()),)))
-    assert not matters(machine.replace(effects=(Effect("EXX", (0.0, 0.1), Step((5.0,))),)))
-    assert matters(machine.replace(effects=(Effect("EXX", (0.0, 0.1), Step((5.0,), "positive")),)))
+    assert not matters(machine.replace(effects=(Effect("EXX", (0.0, 0.1), PiecewiseConstant((5.0,))),)))
+    assert matters(machine.replace(effects=(Effect("EXX", (0.0, 0.1), PiecewiseConstant((5.0,), "positive")),)))
     assert matters(with_play(TOPOLOGIES["three-axis"]))
 
 

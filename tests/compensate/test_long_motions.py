@@ -17,13 +17,15 @@ from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Moves
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Polynomial
-from ncfix.machine.piecewise import Table
+from ncfix.machine.piecewise import PiecewiseLinear
 
 TOLERANCE = 1e-3
 TURN = 2 * np.pi
 SCALED = perfect("w F X Y Z t").replace(effects=(Effect("EXX", (0.05,), Polynomial((3,)), 0.0, 250.0),))
 """X is too long, and ever more so: no circle stays one."""
-KINKED = perfect("w C F X Y Z t").replace(effects=(Effect("EXC", (0.0, 0.02, 0.0), Table((-180.0, 0.0, 180.0))),))
+KINKED = perfect("w C F X Y Z t").replace(
+    effects=(Effect("EXC", (0.0, 0.02, 0.0), PiecewiseLinear((-180.0, 0.0, 180.0))),)
+)
 
 
 def planned(machine: Machine, moves: Moves, arc_pieces: bool = True) -> Plan:

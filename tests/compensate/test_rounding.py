@@ -13,7 +13,7 @@ from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Effect, Machine, load
-from ncfix.machine.basis import Constant, Polynomial
+from ncfix.machine.basis import ConstantBasis, Polynomial
 from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, tools={1: Tool(80.0, 3.0)})
@@ -67,7 +67,7 @@ def test_a_straight_line_over_a_constant_or_linear_error_stays_one_block(name: s
     rng, effects = np.random.default_rng(7), []
     for axis in "XYZ":
         for component in "XYZ":
-            basis = Constant() if name == "constant" else Polynomial((1,))
+            basis = ConstantBasis() if name == "constant" else Polynomial((1,))
             effects.append(Effect(f"E{component}{axis}", (float(rng.uniform(-0.05, 0.05)),), basis, 0.0, 250.0))
     machine = with_steps(perfect(TOPOLOGIES["three-axis"]).replace(effects=tuple(effects)), 0.001)
     points = rng.uniform(-200, 200, (40, 3))

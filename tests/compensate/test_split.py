@@ -14,7 +14,7 @@ from ncfix.compensate.plan.splitting import Grid, fewest
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash, Polynomial
-from ncfix.machine.piecewise import Table
+from ncfix.machine.piecewise import PiecewiseLinear
 
 TOLERANCE = 1e-3
 USED = 0.98 * TOLERANCE
@@ -44,7 +44,7 @@ def test_a_parabola_takes_as_many_pieces_as_it_must(size: float) -> None:
 
 
 def test_a_kink_takes_one_more_piece_at_the_kink() -> None:
-    machine = x_axis(Effect("EXX", (0.0, 0.05, 0.0), Table((-250.0, 37.0, 250.0))))
+    machine = x_axis(Effect("EXX", (0.0, 0.05, 0.0), PiecewiseLinear((-250.0, 37.0, 250.0))))
     moves = motions(machine, (-250, 0, 0), [(-250, 0, 0), (250, 0, 0)])
     pieces = plan(machine, moves, get_strategy("position"), TOLERANCE).pieces
     last = pieces.fraction[pieces.move == 1]

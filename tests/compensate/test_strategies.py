@@ -14,7 +14,7 @@ from ncfix.compensate.plan.strategies import RotaryThenLinear, Strategy, get_str
 from ncfix.control.moves import Kind
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine, State
-from ncfix.machine.piecewise import Step
+from ncfix.machine.piecewise import PiecewiseConstant
 
 POSES = 1000
 NANOMETRE = 1e-6
@@ -119,7 +119,7 @@ def test_a_point_at_the_edge_of_a_jump_is_reached_from_below() -> None:
 
 def jumping() -> Machine:
     """A machine whose error of X jumps from 0 to 10 um at 100 mm."""
-    return perfect("w F X Y Z t").replace(effects=(Effect("EXX", (0.0, 0.01), Step((100.0,))),))
+    return perfect("w F X Y Z t").replace(effects=(Effect("EXX", (0.0, 0.01), PiecewiseConstant((100.0,))),))
 
 
 @pytest.mark.parametrize("strategy", strategies().values(), ids=list(strategies()))

@@ -21,7 +21,7 @@ from ncfix.diagnose.catalogue import Candidate, catalogue
 from ncfix.diagnose.groups import Gathered, gather
 from ncfix.diagnose.view import View, view
 from ncfix.machine import Effect, Machine
-from ncfix.machine.basis import Constant
+from ncfix.machine.basis import ConstantBasis
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.synthetic import Faults, simulate
@@ -38,7 +38,8 @@ PAUSES_S = (50.0, 150.0)
 THERMAL = ("heat", "spindle")
 """Families of what warms."""
 STILL: dict[str, Any] = {
-    "basis": Constant(), "coefficients": (0.0,), "input": None, "time_constant_s": None, "center": 0.0, "scale": 1.0,
+    "basis": ConstantBasis(), "coefficients": (0.0,), "input": None, "time_constant_s": None,
+    "center": 0.0, "scale": 1.0,
 }  # fmt: skip
 """An effect without what drives it."""
 FOREIGN = ("field", "drag", "slips", "walk", "triple", "history")

@@ -13,7 +13,7 @@ from machine import chains
 from ncfix import fast
 from ncfix.machine import Effect, Machine, State, load, loads
 from ncfix.machine.basis import Periodic, Polynomial
-from ncfix.machine.piecewise import Spline, Table
+from ncfix.machine.piecewise import PiecewiseLinear, Spline
 
 SHIPPED = ("angle_head", "dmu50", "three_axis", "wCAYFXZSt", "wCBXFZYSt")
 TABLE_TABLE = "w C B F X Y Z S t"
@@ -54,7 +54,7 @@ def thinned(machine: Machine, first: int) -> Machine:
 def with_curves(machine: Machine) -> Machine:
     """With effects that their bases work out themselves: of a rotary axis, of a linear one, and of two signals."""
     rotary = next(axis.name for axis in machine.axes if axis.rotary)
-    table = Table((-90.0, -10.0, 30.0, 90.0))
+    table = PiecewiseLinear((-90.0, -10.0, 30.0, 90.0))
     spline = Spline((-300.0, -300.0, -300.0, -300.0, 0.0, 300.0, 300.0, 300.0, 300.0))
     effects = (
         Effect(f"EX{rotary}", (0.0, 0.01, -0.01, 0.02), table),

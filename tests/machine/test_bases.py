@@ -6,23 +6,24 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from ncfix.machine.basis import Backlash, Basis, Constant, Fourier, Periodic, Polynomial
-from ncfix.machine.piecewise import Spline, Step, Table, Truncated, kinds
+from ncfix.machine.basis import Backlash, Basis, ConstantBasis, Fourier, Periodic, Polynomial
+from ncfix.machine.effects import kinds
+from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline, Truncated
 
 KNOTS = (0.0, 0.0, 0.0, 0.0, 20.0, 50.0, 60.0, 60.0, 60.0, 60.0)
 EXAMPLES = [
-    Constant(),
+    ConstantBasis(),
     Polynomial((0, 1, 4)),
     Polynomial((3, 1)),
     Backlash(),
     Backlash((0, 1, 2)),
     Fourier((1, 3)),
     Periodic((1, 2, 5), 17.0),
-    Table((0.0, 10.0, 15.0, 60.0)),
+    PiecewiseLinear((0.0, 10.0, 15.0, 60.0)),
     Spline(KNOTS, 3),
     Spline((0.0, 0.0, 10.0, 60.0, 60.0), 1),
-    Step((10.0, 30.0)),
-    Step((10.0, 30.0), "positive"),
+    PiecewiseConstant((10.0, 30.0)),
+    PiecewiseConstant((10.0, 30.0), "positive"),
     Truncated((10.0, 20.0, 45.0)),
     Truncated((10.0, 30.5), 3, (2,), (0.0, 60.0)),
 ]
@@ -85,7 +86,7 @@ def test_backlash_is_half_the_play_on_either_side() -> None:
 
 
 def test_tables_are_straight_between_and_held_outside() -> None:
-    table = Table((0.0, 10.0, 30.0))
+    table = PiecewiseLinear((0.0, 10.0, 30.0))
     values = np.array([1.0, 3.0, -1.0])
     places = np.array([-5.0, 0.0, 2.5, 10.0, 20.0, 30.0, 99.0])
     np.testing.assert_allclose(table.design(places) @ values, np.interp(places, table.positions, values))
@@ -106,14 +107,14 @@ def test_cubic_splines_are_smooth_and_linear_ones_have_kinks() -> None:
 
 
 def test_steps_have_the_upper_value_where_they_jump() -> None:
-    step = Step((10.0, 30.0))
+    step = PiecewiseConstant((10.0, 30.0))
     values = np.array([1.0, 2.0, 3.0])
     np.testing.assert_allclose(step.design(np.array([9.0, 10.0, 29.0, 30.0])) @ values, [1, 2, 2, 3])
 
 
 def test_a_step_for_one_direction_is_half_there_when_the_direction_is_unknown() -> None:
     for way, sign in (("positive", 1), ("negative", -1)):
-        step = Step((10.0,), way)
+        step = PiecewiseConstant((10.0,), way)
         assert step.needs_direction
         assert [float(step.design(20.0, sign * d)[1]) for d in (1, 0, -1)] == [1.0, 0.5, 0.0]
 
@@ -121,15 +122,15 @@ def test_a_step_for_one_direction_is_half_there_when_the_direction_is_unknown() 
 @pytest.mark.parametrize(
     ("basis", "feature"),
     [
-        (Constant(), np.inf),
+        (ConstantBasis(), np.inf),
         (Polynomial((0,)), np.inf),
         (Polynomial((1, 5)), 400 / 20),
         (Fourier((1, 3)), 15.0),
         (Periodic((2,), 8.0), 0.5),
-        (Table((0.0, 10.0, 15.0)), 5.0),
+        (PiecewiseLinear((0.0, 10.0, 15.0)), 5.0),
         (Spline(KNOTS, 3), 10.0),
-        (Step((10.0,)), np.inf),
-        (Step((10.0, 13.0)), 3.0),
+        (PiecewiseConstant((10.0,)), np.inf),
+        (PiecewiseConstant((10.0, 13.0)), 3.0),
     ],
 )
 def test_feature_lengths(basis: Basis, feature: float) -> None:
@@ -144,13 +145,13 @@ def test_feature_lengths(basis: Basis, feature: float) -> None:
         (Polynomial((1, 1)), "degree", "twice"),
         (Fourier((0,)), "order", "0 is below 1"),
         (Periodic((1,), 0.0), "period", "not a positive length"),
-        (Table((1.0,)), "positions", "at least two"),
-        (Table((1.0, 3.0, 3.0)), "positions", "3 is followed by 3"),
+        (PiecewiseLinear((1.0,)), "positions", "at least two"),
+        (PiecewiseLinear((1.0, 3.0, 3.0)), "positions", "3 is followed by 3"),
         (Spline((0.0, 1.0), 0), "degree", "degree 1 or more"),
         (Spline((0.0, 1.0), 3), "knots", "needs at least 8 knots"),
         (Spline((0.0, 0.0, 2.0, 1.0, 3.0, 3.0), 1), "knots", "2 is followed by 1"),
         (Spline((0.0, 1.0, 1.0, 2.0), 1), "knots", "leave no range"),
-        (Step((1.0,), "up"), "direction", "'up' is none of both, positive, negative"),
+        (PiecewiseConstant((1.0,), "up"), "direction", "'up' is none of both, positive, negative"),
     ],
 )
 def test_what_cannot_be_is_complained_of(basis: Basis, key: str, part: str) -> None:

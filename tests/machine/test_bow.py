@@ -9,11 +9,11 @@ import pytest
 
 from machine import chains
 from ncfix.machine import Axis, Effect, Machine, State, Tool, load
-from ncfix.machine.basis import Backlash, Basis, Constant, Fourier, Periodic, Polynomial
-from ncfix.machine.piecewise import Spline, Step, Table, Truncated
+from ncfix.machine.basis import Backlash, Basis, ConstantBasis, Fourier, Periodic, Polynomial
+from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline, Truncated
 
 BASES: tuple[tuple[Basis, int], ...] = (
-    (Constant(), 1),
+    (ConstantBasis(), 1),
     (Polynomial((0, 1, 2, 3)), 4),
     (Polynomial((5,)), 1),
     (Fourier((1, 3)), 4),
@@ -55,8 +55,8 @@ def test_bounds_of_a_basis(basis: Basis, size: int) -> None:
 
 
 def test_bounds_with_kinks_and_directions() -> None:
-    assert Table((0.0, 1.0, 3.0)).bounds((0.0, -2.0, 1.0), -5, 5) == (2.0, 2.0, 0.0)
-    assert Step((0.0,)).bounds((1.0, -3.0), -5, 5) == (3.0, 0.0, 0.0)
+    assert PiecewiseLinear((0.0, 1.0, 3.0)).bounds((0.0, -2.0, 1.0), -5, 5) == (2.0, 2.0, 0.0)
+    assert PiecewiseConstant((0.0,)).bounds((1.0, -3.0), -5, 5) == (3.0, 0.0, 0.0)
     assert Backlash((0,)).bounds((0.01,), -np.inf, np.inf) == (0.01, 0.0, 0.0)
     assert Polynomial((1,)).bounds((1.0,), -np.inf, 0.0) is None
     assert Truncated((0.0,)).bounds((1.0, 1.0, 1.0), -1, 1) is None

@@ -12,7 +12,7 @@ import pytest
 
 from ncfix.machine import Effect, State, dumps, load, loads
 from ncfix.machine.axes import squareness_meaning
-from ncfix.machine.piecewise import kinds
+from ncfix.machine.effects import kinds
 
 MACHINES = ("dmu50", "three_axis", "wCAYFXZSt", "wCBXFZYSt")
 

@@ -13,7 +13,7 @@ from machine import chains
 from machine.files import GOOD, changed
 from ncfix.machine import Axis, Effect, Machine, Tool, dumps, loads
 from ncfix.machine.basis import Backlash, Fourier, Periodic, Polynomial
-from ncfix.machine.piecewise import Spline, Step, Table
+from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 
 
 def test_what_a_file_means() -> None:
@@ -89,7 +89,7 @@ def test_every_basis_and_option_comes_back() -> None:
         Effect(
             "EYX",
             (0.1, 0.2, 0.3),
-            Table((0.0, 1 / 3, 500.0)),
+            PiecewiseLinear((0.0, 1 / 3, 500.0)),
             center=1.0,
             times="Z",
             times_center=-5.0,
@@ -98,7 +98,7 @@ def test_every_basis_and_option_comes_back() -> None:
         Effect("EZX", (0.0, 1.0, 2.0, 3.0, 4.0), Spline(knots, 3)),
         Effect("EAX", (1e-5, 2e-5), Periodic((1,), 10.0)),
         Effect("ECC", (1e-5, 2e-5), Fourier((3,))),
-        Effect("EBX", (1e-5, 2e-5, 3e-5), Step((5.0, 6.0), "negative")),
+        Effect("EBX", (1e-5, 2e-5, 3e-5), PiecewiseConstant((5.0, 6.0), "negative")),
         Effect("EX0C", (0.01,), carried=True, reference=(1.0, 2.0, 1 / 3)),
         Effect("EY0C", (0.01,), Polynomial((1,)), input="temp_table", time_constant_s=0.1),
         Effect("EZX", (0.5,), input="X"),

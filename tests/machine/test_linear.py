@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from machine import chains
 from ncfix.machine import Effect, Machine, State, se3
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
-from ncfix.machine.piecewise import Table
+from ncfix.machine.piecewise import PiecewiseLinear
 
 seeds = st.integers(0, 10**6)
 
@@ -106,7 +106,7 @@ def test_the_design_matrix_of_effects_that_the_machine_does_not_have_yet() -> No
         Effect("EAC", (0.0,) * 4, Fourier((1, 2))),
         Effect("EZS", (0.0,), Polynomial((1,)), input="temp_spindle", scale=10.0),
         Effect("EAZ", (0.0,), Polynomial((1,)), times="Y"),
-        Effect("EZY", (0.0,) * 3, Table((-300.0, 0.0, 300.0))),
+        Effect("EZY", (0.0,) * 3, PiecewiseLinear((-300.0, 0.0, 300.0))),
     )
     design = machine.design(q, state, wanted)
     assert design.shape == (2, 3, 6, 2 + 4 + 1 + 1 + 3)

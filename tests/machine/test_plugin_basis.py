@@ -11,7 +11,7 @@ import pytest
 from ncfix.diagnostics import ConfigError
 from ncfix.machine import dumps, loads
 from ncfix.machine.basis import Array, Basis, key
-from ncfix.machine.piecewise import kinds
+from ncfix.machine.effects import kinds
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ def test_without_the_plugin_the_message_lists_what_there_is() -> None:
 
 
 def test_bases_come_through_the_plugin_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ncfix.machine.piecewise.registry", lambda kind, builtin: {**builtin, kind: Decay})
+    monkeypatch.setattr("ncfix.machine.effects.registry", lambda kind, builtin: {**builtin, kind: Decay})
     kinds.cache_clear()
     try:
         assert kinds()["bases"] is Decay

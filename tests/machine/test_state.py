@@ -12,7 +12,7 @@ from machine import chains
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Axis, Effect, Machine, State
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
-from ncfix.machine.piecewise import Step, Table
+from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear
 from ncfix.machine.state import lagged
 
 MACHINE = chains.four_kinds()["w C B F X Y Z t"]
@@ -48,16 +48,16 @@ def test_end_values_are_held_outside_the_range_of_the_axis_and_of_the_effect() -
 def test_an_endless_axis_comes_round_again() -> None:
     places = at(C=np.array([-350.0, 10.0, 370.0, 3610.0]))
     for effect in (
-        Effect("EZC", (0.0, 1.0, 0.0), Table((0.0, 90.0, 360.0))),
+        Effect("EZC", (0.0, 1.0, 0.0), PiecewiseLinear((0.0, 90.0, 360.0))),
         Effect("EZC", (0.1, 0.2), Fourier((3,))),
         Effect("EZC", (1.0,), Polynomial((2,)), range=(0.0, 360.0)),
-        Effect("EZC", (0.0, 1.0), Step((5.0,)), range=(0.0, 360.0)),
+        Effect("EZC", (0.0, 1.0), PiecewiseConstant((5.0,)), range=(0.0, 360.0)),
     ):
         np.testing.assert_allclose(value(effect, places), value(effect, at(C=10.0)), rtol=1e-12)
 
 
 def test_an_endless_axis_s_table_need_not_start_at_zero_nor_close() -> None:
-    table = Effect("EZC", (1.0, 2.0), Table((-90.0, 180.0)))
+    table = Effect("EZC", (1.0, 2.0), PiecewiseLinear((-90.0, 180.0)))
     np.testing.assert_allclose(
         value(table, at(C=np.array([-90.0, 180.0, 200.0, 269.0, 270.0]))), [1, 2, 2, 2, 1], atol=1e-9
     )
@@ -164,8 +164,8 @@ def test_a_lag_in_a_machine_sees_all_poses_at_once() -> None:
 def test_feature_lengths_are_the_smallest_of_each_axis() -> None:
     effects = (
         Effect("EXX", (1.0,), Polynomial((3,)), scale=100.0),
-        Effect("EYX", (1.0, 0.0), Table((0.0, 20.0))),
-        Effect("EZX", (0.0, 0.0), Table((0.0, 1.0))),
+        Effect("EYX", (1.0, 0.0), PiecewiseLinear((0.0, 20.0))),
+        Effect("EZX", (0.0, 0.0), PiecewiseLinear((0.0, 1.0))),
         Effect("EAY", (1.0,), Polynomial((1,)), times="Z"),
         Effect("EZB", (1.0, 0.0), Fourier((3,))),
         Effect("EZS", (1.0,), Polynomial((5,)), input="temp_spindle"),
@@ -182,10 +182,10 @@ def test_an_endless_axis_has_a_turn_as_its_range() -> None:
 
 def test_breakpoints_are_in_internal_units_and_sorted() -> None:
     effects = (
-        Effect("EXX", (1.0, 2.0, 3.0), Table((0.0, 20.0, 30.0)), center=5.0, scale=2.0),
-        Effect("EYX", (1.0, 2.0), Step((-7.0,))),
+        Effect("EXX", (1.0, 2.0, 3.0), PiecewiseLinear((0.0, 20.0, 30.0)), center=5.0, scale=2.0),
+        Effect("EYX", (1.0, 2.0), PiecewiseConstant((-7.0,))),
         Effect("EZX", (1.0,), Polynomial((1,)), range=(-100.0, 300.0)),
-        Effect("EZB", (1.0, 2.0), Table((0.0, 90.0))),
+        Effect("EZB", (1.0, 2.0), PiecewiseLinear((0.0, 90.0))),
     )
     machine = MACHINE.replace(effects=effects)
     np.testing.assert_allclose(machine.breakpoints("X"), [-100, -7, 5, 45, 65])

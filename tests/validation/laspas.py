@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ncfix.machine import Axis, Effect, Machine, State, Tool
-from ncfix.machine.piecewise import Table
+from ncfix.machine.piecewise import PiecewiseLinear
 
 PLACES = {"X": np.arange(-800.0, -49.0, 50), "Y": np.arange(-400.0, -24.0, 25), "Z": np.arange(-300.0, -24.0, 25)}
 # um, mrad: Tables 4 to 6
@@ -42,7 +42,7 @@ def drawn(seed: int, y_to_z: float) -> Machine:
     for name, size in RANGES.items():
         places = PLACES[name[2]]
         curve = _curve(random, len(places), name[1] == name[2]) * size * 1e-3
-        table = Table(tuple(places.tolist()))
+        table = PiecewiseLinear(tuple(places.tolist()))
         effects.append(Effect(name, tuple(curve.tolist()), table, reference=MEASURED_AT[name[2]]))
     return HOME.replace(effects=tuple(effects))
 

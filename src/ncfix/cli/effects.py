@@ -127,7 +127,7 @@ def _row(
 def _bases() -> list[Row]:
     from dataclasses import fields
 
-    from ncfix.machine.piecewise import kinds
+    from ncfix.machine.effects import kinds
 
     return [
         {"name": name, "title": basis.title, "keys": ", ".join(field.name for field in fields(basis))}  # type: ignore[arg-type]

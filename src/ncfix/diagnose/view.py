@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ncfix.diagnose.catalogue.candidate import Reach
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import SPINDLE, Axis
-from ncfix.machine.basis import Constant, Polynomial
+from ncfix.machine.basis import ConstantBasis, Polynomial
 from ncfix.measure.calibrate import Problem
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.selection import Selection
@@ -229,7 +229,7 @@ def is_free(effect: Effect) -> bool:
     """Whether an effect is a constant of the set-up and the day: where an axis lies, or a gain."""
     if effect.input is not None or effect.times is not None:
         return False
-    if isinstance(effect.basis, Constant):
+    if isinstance(effect.basis, ConstantBasis):
         return True
     return type(effect.basis) is Polynomial and max(effect.basis.degree) <= 1
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ncfix.machine import se3
-from ncfix.machine.basis import Basis, Constant
+from ncfix.machine.basis import Basis, ConstantBasis
 from ncfix.machine.se3 import Array
 
 Vector = tuple[float, float, float]
@@ -200,7 +200,7 @@ class Effect:
 
     name: str
     coefficients: tuple[float, ...]
-    basis: Basis = Constant()  # noqa: RUF009
+    basis: Basis = ConstantBasis()  # noqa: RUF009
     center: float = 0.0
     scale: float = 1.0
     covariance: Matrix | None = None

@@ -123,7 +123,7 @@ def check_shapes(basis: Basis) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Constant(Basis):
+class ConstantBasis(Basis):
     """One number, whatever the signal."""
 
     name: ClassVar[str] = "constant"
@@ -313,4 +313,4 @@ def _waves(u: Array, order: tuple[int, ...], period: float) -> Array:
     return waves
 
 
-SMOOTH: tuple[type[Basis], ...] = (Constant, Polynomial, Fourier, Periodic, Backlash)
+SMOOTH: tuple[type[Basis], ...] = (ConstantBasis, Polynomial, Fourier, Periodic, Backlash)

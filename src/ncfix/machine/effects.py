@@ -1,4 +1,4 @@
-"""Effects for people: physical ones by name, how large an effect is over the travel, its curve, its units.
+"""Effects for people: physical ones and bases by name, how large an effect is over the travel, its curve, its units.
 
 `spindle-growth`, `backlash-X`, ... stand for one or more components with the basis and the input that the physics asks
 for, zero until they are estimated. `calibrate --effects` and the selection of effects take these names beside those of
@@ -10,16 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import nan
 from typing import Protocol
 
 import numpy as np
 
 from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title
-from ncfix.machine.basis import Backlash, Periodic, Polynomial
+from ncfix.machine.basis import SMOOTH, Backlash, Basis, Periodic, Polynomial
 from ncfix.machine.error_model import signals_of
 from ncfix.machine.linear import dependence_of
 from ncfix.machine.machine import Machine
+from ncfix.machine.piecewise import PIECEWISE
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State, flatten
 from ncfix.plugins import called, handed, registry
@@ -70,6 +72,12 @@ def library(machine: Machine) -> dict[str, PhysicalEffect]:
     found += [each for pair in _carried(machine) for each in _dead_weight(*pair)]
     found += _of_spindle(machine)
     return {each.name: each for each in (*found, *_of_plugins(machine, {each.name for each in found}))}
+
+
+@lru_cache(maxsize=1)
+def kinds() -> dict[str, type[Basis]]:
+    """Every basis by its name: the built-in ones and those of plugins."""
+    return registry("bases", {basis.name: basis for basis in (*SMOOTH, *PIECEWISE)})
 
 
 def _of_plugins(machine: Machine, taken: set[str]) -> Iterator[PhysicalEffect]:

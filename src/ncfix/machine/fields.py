@@ -1,6 +1,6 @@
 """Reading a tree of plain values with all its faults: each wrong key is noted and the reading goes on.
 
-A `Section` is one table. Its readers return the value, or None if it is missing or wrong (then there is a message).
+A `TomlTable` is one table. Its readers return the value, or None if it is missing or wrong (then there is a message).
 `close` notes the keys that nobody asked for.
 """
 
@@ -40,7 +40,7 @@ class Report:
 
 
 @dataclass(slots=True)
-class Section:
+class TomlTable:
     """One table of the file, at `path`."""
 
     values: Mapping[str, Any]
@@ -133,7 +133,7 @@ class Section:
         good = [self._finite(key, item, wanted) for row in value for item in row]
         return tuple(tuple(float(item) for item in row) for row in value) if all(good) else None
 
-    def table(self, key: str, required: bool = False) -> Section | None:
+    def table(self, key: str, required: bool = False) -> TomlTable | None:
         """A table in this one."""
         value = self.get(key, required)
         if value is None:
@@ -141,9 +141,9 @@ class Section:
         if not isinstance(value, dict):
             self._wrong(key, f"a table [{dotted((*self.path, key))}]", value)
             return None
-        return Section(value, (*self.path, key), self.report)
+        return TomlTable(value, (*self.path, key), self.report)
 
-    def tables(self, key: str) -> Iterator[Section]:
+    def tables(self, key: str) -> Iterator[TomlTable]:
         """The tables of an array [[key]]."""
         value = self.get(key)
         if value is None:
@@ -152,7 +152,7 @@ class Section:
             self._wrong(key, f"tables [[{dotted((*self.path, key))}]]", value)
             return
         for index, item in enumerate(value):
-            yield Section(item, (*self.path, key, index), self.report)
+            yield TomlTable(item, (*self.path, key, index), self.report)
 
     def close(self) -> None:
         """Note the keys that nobody asked for."""

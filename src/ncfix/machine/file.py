@@ -38,10 +38,9 @@ from ncfix.machine.axes import (
     parse_topology,
 )
 from ncfix.machine.basis import Basis, check_shapes
-from ncfix.machine.effects import PhysicalEffect, at_the_ends, library
-from ncfix.machine.fields import Report, Section, did_you_mean
+from ncfix.machine.effects import PhysicalEffect, at_the_ends, kinds, library
+from ncfix.machine.fields import Report, TomlTable, did_you_mean
 from ncfix.machine.machine import DEFAULT_CORRECTION, DEFAULT_INCREMENT, Machine
-from ncfix.machine.piecewise import kinds
 from ncfix.plugins import working
 from ncfix.toml_text import decoded, key_lines, parsed
 
@@ -74,14 +73,14 @@ def loads(source: str | bytes, path: str = "<machine>") -> Machine:
     if "topology" not in values and SETUP & values.keys():
         raise ConfigError.of("NCF303", "this is a setup file, not a machine file", Place(path), "--setup is for setups")
     report = Report(path, text, key_lines(text), top=set(TOP))
-    machine = _machine(Section(values, (), report))
+    machine = _machine(TomlTable(values, (), report))
     if machine is None or report.messages:
         order = sorted(report.messages, key=lambda message: message.place.line if message.place else 0)
         raise ConfigError.collected(order)
     return machine
 
 
-def _machine(root: Section) -> Machine | None:
+def _machine(root: TomlTable) -> Machine | None:
     _schema(root)
     name = root.text("name") or Path(root.report.path).stem
     order = _topology(root)
@@ -127,7 +126,7 @@ def _physical(order: Topology | None, axes: dict[str, Axis], tool: Tool) -> Call
     return found
 
 
-def _schema(root: Section) -> None:
+def _schema(root: TomlTable) -> None:
     version = root.integer("ncfix")
     if version is not None and version != SCHEMA:
         root.note(
@@ -135,7 +134,7 @@ def _schema(root: Section) -> None:
         )
 
 
-def _topology(root: Section) -> Topology | None:
+def _topology(root: TomlTable) -> Topology | None:
     text = root.text("topology", required=True)
     if text is None:
         return None
@@ -145,7 +144,7 @@ def _topology(root: Section) -> Topology | None:
     return order
 
 
-def _axes(root: Section, order: Topology | None) -> dict[str, Axis]:
+def _axes(root: TomlTable, order: Topology | None) -> dict[str, Axis]:
     """The axes by letter; those that the topology and the tables do not both name are noted."""
     tables = root.table("axis", required=True)
     if tables is None:
@@ -160,7 +159,7 @@ def _axes(root: Section, order: Topology | None) -> dict[str, Axis]:
     return axes
 
 
-def _same_axes(root: Section, tables: Section, order: Topology) -> None:
+def _same_axes(root: TomlTable, tables: TomlTable, order: Topology) -> None:
     for letter in order.axes:
         if letter not in tables.values:
             root.note("NCF307", "topology", f"axis {letter} has no table [axis.{letter}]")
@@ -170,7 +169,7 @@ def _same_axes(root: Section, tables: Section, order: Topology) -> None:
             tables.note("NCF307", letter, f"axis {letter} is not in the topology {str(order)!r}", hint)
 
 
-def _axis(section: Section, letter: str, workpiece_side: bool) -> Axis:
+def _axis(section: TomlTable, letter: str, workpiece_side: bool) -> Axis:
     rotary = _rotary(section)
     direction = _unit(section, required=True, default=(1.0, 0.0, 0.0))
     point = _vector(section, "point", ORIGIN)
@@ -182,7 +181,7 @@ def _axis(section: Section, letter: str, workpiece_side: bool) -> Axis:
     return Axis(letter, rotary, workpiece_side, direction, point, limits, triad, moving, pitch)
 
 
-def _rotary(section: Section) -> bool:
+def _rotary(section: TomlTable) -> bool:
     kind = section.text("type", required=True)
     if kind not in (None, "linear", "rotary"):
         section.note(
@@ -191,14 +190,14 @@ def _rotary(section: Section) -> bool:
     return kind == "rotary"
 
 
-def _moving(section: Section) -> bool:
+def _moving(section: TomlTable) -> bool:
     frame = section.text("error_frame")
     if frame not in (None, "fixed", "moving"):
         section.note("NCF304", "error_frame", f"{frame!r} is neither fixed nor moving", "fixed is the default")
     return frame == "moving"
 
 
-def _range(section: Section, rotary: bool) -> tuple[float, float]:
+def _range(section: TomlTable, rotary: bool) -> tuple[float, float]:
     limits = section.numbers("range", count=2)
     if limits is None:
         return -np.inf, np.inf
@@ -208,7 +207,7 @@ def _range(section: Section, rotary: bool) -> tuple[float, float]:
     return (low * DEGREE, high * DEGREE) if rotary else (low, high)
 
 
-def _tool(root: Section) -> Tool:
+def _tool(root: TomlTable) -> Tool:
     section = root.table("tool")
     if section is None:
         return Tool()
@@ -217,12 +216,12 @@ def _tool(root: Section) -> Tool:
     return tool
 
 
-def _vector(section: Section, key: str, default: Vector) -> Vector:
+def _vector(section: TomlTable, key: str, default: Vector) -> Vector:
     values = section.numbers(key, count=3)
     return default if values is None else (values[0], values[1], values[2])
 
 
-def _unit(section: Section, required: bool, default: Vector) -> Vector:
+def _unit(section: TomlTable, required: bool, default: Vector) -> Vector:
     """The key `direction`, made a unit vector."""
     values = section.numbers("direction", required, count=3)
     if values is None:
@@ -235,7 +234,7 @@ def _unit(section: Section, required: bool, default: Vector) -> Vector:
     return x, y, z
 
 
-def _triad(section: Section) -> Triad:
+def _triad(section: TomlTable) -> Triad:
     rows = section.rows("error_axes", (3, 3))
     if rows is None:
         return BASE_AXES
@@ -251,14 +250,14 @@ def _triad(section: Section) -> Triad:
     return x, y, z
 
 
-def _positive(section: Section, key: str) -> float | None:
+def _positive(section: TomlTable, key: str) -> float | None:
     value = section.number(key)
     if value is not None and value <= 0:
         section.note("NCF305", key, f"{value:g} is not positive")
     return value
 
 
-def _pair(root: Section, key: str, default: tuple[float, float]) -> tuple[float, float]:
+def _pair(root: TomlTable, key: str, default: tuple[float, float]) -> tuple[float, float]:
     """A table { linear, rotary } in mm and degree."""
     section = root.table(key)
     if section is None:
@@ -274,7 +273,7 @@ SMALLEST_SCALE = 1e-9
 
 
 def read_effects(
-    section: Section,
+    section: TomlTable,
     letters: tuple[str, ...],
     axes: Mapping[str, Axis],
     physical: Callable[[], Mapping[str, PhysicalEffect]],
@@ -293,7 +292,7 @@ def read_effects(
     return () if found is None else (found,)
 
 
-def read_effect(section: Section, letters: tuple[str, ...], axes: Mapping[str, Axis]) -> Effect | None:
+def read_effect(section: TomlTable, letters: tuple[str, ...], axes: Mapping[str, Axis]) -> Effect | None:
     """The effect, or None if something is wrong with it (then it is noted)."""
     before = len(section.report.messages)
     name = _name(section, letters)
@@ -313,7 +312,7 @@ def read_effect(section: Section, letters: tuple[str, ...], axes: Mapping[str, A
     return Effect(name, coefficients, basis, **options)
 
 
-def _name(section: Section, letters: tuple[str, ...]) -> str | None:
+def _name(section: TomlTable, letters: tuple[str, ...]) -> str | None:
     name = section.text("name", required=True)
     if name is None:
         return None
@@ -331,7 +330,7 @@ def _name(section: Section, letters: tuple[str, ...]) -> str | None:
     return None
 
 
-def _kind(section: Section) -> type[Basis] | None:
+def _kind(section: TomlTable) -> type[Basis] | None:
     name = section.text("basis") if section.has("basis") else "constant"
     if name is None:
         return None
@@ -342,7 +341,7 @@ def _kind(section: Section) -> type[Basis] | None:
     return kind
 
 
-def _basis(section: Section, kind: type[Basis]) -> Basis | None:
+def _basis(section: TomlTable, kind: type[Basis]) -> Basis | None:
     """The basis with its parameters, which are keys of the effect."""
     parameters = {each.name: _parameter(section, each) for each in fields(kind)}  # type: ignore[arg-type]
     if any(value is None for value in parameters.values()):
@@ -357,7 +356,7 @@ def _basis(section: Section, kind: type[Basis]) -> Basis | None:
     return None if faults else basis
 
 
-def _parameter(section: Section, parameter: Field[Any]) -> Any:
+def _parameter(section: TomlTable, parameter: Field[Any]) -> Any:
     """The value of a basis parameter; its default if it is not there; None if it is wrong."""
     if not section.has(parameter.name) and not parameter.metadata["required"]:
         return parameter.default
@@ -371,13 +370,13 @@ def _parameter(section: Section, parameter: Field[Any]) -> Any:
     return readers[parameter.metadata["kind"]](parameter.name, required=True)
 
 
-def _count(section: Section, basis: Basis, coefficients: tuple[float, ...]) -> None:
+def _count(section: TomlTable, basis: Basis, coefficients: tuple[float, ...]) -> None:
     if len(coefficients) != basis.size:
         text = f"{len(coefficients)} coefficients, the basis {basis.name} has {basis.size}"
         section.note("NCF311", "coefficients", text, f"one each for {', '.join(basis.labels[:12])}")
 
 
-def _options(section: Section, letters: tuple[str, ...], size: int) -> dict[str, Any]:
+def _options(section: TomlTable, letters: tuple[str, ...], size: int) -> dict[str, Any]:
     reference = section.numbers("reference", count=3)
     options = {
         "covariance": _covariance(section, size),
@@ -395,7 +394,7 @@ def _options(section: Section, letters: tuple[str, ...], size: int) -> dict[str,
     return {key: value for key, value in options.items() if value is not None}
 
 
-def _effect_range(section: Section) -> tuple[float, float] | None:
+def _effect_range(section: TomlTable) -> tuple[float, float] | None:
     limits = section.numbers("range", count=2)
     if limits is None:
         return None
@@ -405,7 +404,7 @@ def _effect_range(section: Section) -> tuple[float, float] | None:
     return low, high
 
 
-def _signal(section: Section, key: str, letters: tuple[str, ...]) -> str | None:
+def _signal(section: TomlTable, key: str, letters: tuple[str, ...]) -> str | None:
     name = section.text(key)
     if name is None or name in letters or INPUT.fullmatch(name):
         return name
@@ -414,14 +413,14 @@ def _signal(section: Section, key: str, letters: tuple[str, ...]) -> str | None:
     return None
 
 
-def _scale(section: Section, key: str) -> float | None:
+def _scale(section: TomlTable, key: str) -> float | None:
     value = section.number(key)
     if value is not None and abs(value) < SMALLEST_SCALE:
         section.note("NCF305", key, "the scale cannot be zero" if value == 0 else f"{value:g} is no scale")
     return value
 
 
-def _covariance(section: Section, size: int) -> Matrix | None:
+def _covariance(section: TomlTable, size: int) -> Matrix | None:
     if not size:
         section.get("covariance")
         return None
@@ -437,7 +436,7 @@ def _covariance(section: Section, size: int) -> Matrix | None:
     return rows
 
 
-def _fits(section: Section, effect: Effect, axes: Mapping[str, Axis]) -> None:
+def _fits(section: TomlTable, effect: Effect, axes: Mapping[str, Axis]) -> None:
     """Note what this basis and these options cannot do for this component."""
     name, basis, source = effect.name, effect.basis, effect.input
     own = None if effect.location or effect.joint == SPINDLE else effect.joint
@@ -454,11 +453,11 @@ def _fits(section: Section, effect: Effect, axes: Mapping[str, Axis]) -> None:
         _misfit(section, "time_constant_s", "a lag acts on an `input`, and there is none")
 
 
-def _misfit(section: Section, key: str, text: str, hint: str = "") -> None:
+def _misfit(section: TomlTable, key: str, text: str, hint: str = "") -> None:
     section.note("NCF315", key if key in section.values else "name", text, hint)
 
 
-def read_named(section: Section, named: PhysicalEffect) -> tuple[Effect, ...]:
+def read_named(section: TomlTable, named: PhysicalEffect) -> tuple[Effect, ...]:
     """The effects that it is made of; nothing if something is wrong (then it is noted)."""
     section.text("name")
     before = len(section.report.messages)
@@ -483,7 +482,7 @@ def read_named(section: Section, named: PhysicalEffect) -> tuple[Effect, ...]:
     return tuple(found)
 
 
-def _check_lag(section: Section, named: PhysicalEffect, constant: float) -> None:
+def _check_lag(section: TomlTable, named: PhysicalEffect, constant: float) -> None:
     lagging = {effect.time_constant_s for effect in named.effects}
     if lagging == {None}:
         section.note("NCF315", "time_constant_s", f"{named.name} follows nothing after a time")

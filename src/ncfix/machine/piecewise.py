@@ -1,4 +1,4 @@
-"""Bases that are given piece by piece: table, spline, step, truncated powers; and all bases by name.
+"""Bases that are given piece by piece: table, spline, step, truncated powers.
 
 Outside the first and last place of a table, spline or step the end values hold.
 """
@@ -9,15 +9,13 @@ Outside the first and last place of a table, spline or step the end values hold.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.machine.basis import SMOOTH, Basis, distinct, key, powers
+from ncfix.machine.basis import Basis, distinct, key, powers
 from ncfix.machine.se3 import Array
-from ncfix.plugins import registry
 
 
 def splines(knots: Array, degree: int, coefficients: Array, u: Array) -> Array:
@@ -53,7 +51,7 @@ BOTH, POSITIVE, NEGATIVE = "both", "positive", "negative"
 
 
 @dataclass(frozen=True, slots=True)
-class Table(Basis):
+class PiecewiseLinear(Basis):
     """Values at given positions, straight lines between them: what a control's own table holds."""
 
     positions: tuple[float, ...] = key("numbers", "where the values stand, ascending")
@@ -169,7 +167,7 @@ class Spline(Basis):
 
 
 @dataclass(frozen=True, slots=True)
-class Step(Basis):
+class PiecewiseConstant(Basis):
     """One value below the first position, one between each pair, one above the last."""
 
     positions: tuple[float, ...] = key("numbers", "where the value jumps, ascending; it has the upper value there")
@@ -333,8 +331,4 @@ def _column(values: Array, u: Array) -> Array:
     return np.asarray(values, dtype=np.float64).reshape(-1, *np.ones(np.ndim(u), dtype=int))
 
 
-@lru_cache(maxsize=1)
-def kinds() -> dict[str, type[Basis]]:
-    """Every basis by its name: the built-in ones and those of plugins."""
-    builtin: tuple[type[Basis], ...] = (*SMOOTH, Table, Spline, Step, Truncated)
-    return registry("bases", {basis.name: basis for basis in builtin})
+PIECEWISE: tuple[type[Basis], ...] = (PiecewiseLinear, Spline, PiecewiseConstant, Truncated)

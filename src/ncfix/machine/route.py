@@ -18,16 +18,16 @@ import numpy as np
 from ncfix import fast
 from ncfix.machine import se3, steps
 from ncfix.machine.axes import Axis, Tool, Vector
-from ncfix.machine.basis import Constant, Fourier, Polynomial
+from ncfix.machine.basis import ConstantBasis, Fourier, Polynomial
 from ncfix.machine.chain import JointModel, SmallMotion, columns, lies_on_axis, turn
 from ncfix.machine.error_model import EffectGroup, ErrorModel, Slot
 from ncfix.machine.loops import Columns, Packed, packed, room
-from ncfix.machine.piecewise import Spline, Step, Table
+from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
 from ncfix.machine.steps import BACK, FORTH, GIVEN, PARTS, POWERS, SHIFT, TURN, WAVES, Functions, Number, Steps
 
-SUMS = (Table, Spline, Step)
+SUMS = (PiecewiseLinear, Spline, PiecewiseConstant)
 """Bases that add up their functions themselves, each sum on its own."""
 ANY = (1.0, -np.inf, np.inf, 0.0, 1.0)
 """A signal that is the position as it is."""
@@ -97,7 +97,7 @@ def terms_of(
         if not gains.any():
             continue
         signal, basis = group.signal, group.basis
-        if isinstance(basis, Constant):
+        if isinstance(basis, ConstantBasis):
             parts.append(_Part(POWERS, 0, ANY, (0,), gains))
         elif signal is not None and isinstance(basis, Polynomial) and _is_power(group, signal):
             numbers = signal.unit, signal.low, signal.high, signal.center, signal.scale

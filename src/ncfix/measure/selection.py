@@ -15,7 +15,7 @@ import numpy as np
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import COMPONENTS, NAME, SPINDLE, Axis
-from ncfix.machine.basis import Basis, Constant, Fourier, Polynomial
+from ncfix.machine.basis import Basis, ConstantBasis, Fourier, Polynomial
 from ncfix.machine.effects import library
 from ncfix.machine.fields import did_you_mean
 from ncfix.machine.piecewise import Truncated
@@ -68,7 +68,7 @@ def labels_of(effect: Effect, among: Sequence[Effect]) -> list[str]:
         own = [other for other in same if other.basis.name == effect.basis.name]
         head += f" {effect.basis.name}" + (f" {own.index(effect) + 1}" if len(own) > 1 else "")
         head += f" of {effect.input}" if effect.input else ""
-    if isinstance(effect.basis, Constant):
+    if isinstance(effect.basis, ConstantBasis):
         return [head]
     return [f"{head} {label}" for label in effect.basis.labels]
 

@@ -21,7 +21,7 @@ from ncfix.diagnose.catalogue.weight import by_foundation
 from ncfix.machine import Axis, Effect
 from ncfix.machine.axes import SPINDLE
 from ncfix.machine.basis import Polynomial
-from ncfix.machine.piecewise import Step
+from ncfix.machine.piecewise import PiecewiseConstant
 from ncfix.measure.measurement import Array
 
 LAGS = (None, 600.0, 1800.0, 5400.0)
@@ -224,7 +224,7 @@ def _slip(reach: Reach) -> Iterator[Candidate]:
     held = by_foundation(reach)
     moments = first + (last - first) * (np.arange(SLIPS) + 1) / (SLIPS + 1)
     effects = [
-        Effect(f"E{letter}0{held.name}", (), Step(positions=(float(t),)), input="time_s", carried=True)
+        Effect(f"E{letter}0{held.name}", (), PiecewiseConstant(positions=(float(t),)), input="time_s", carried=True)
         for t in moments
         for letter in LETTERS
     ]

@@ -17,7 +17,7 @@ import sympy as sp
 
 from ncfix.diagnostics import ConfigError, NcfixError, Place
 from ncfix.inputs import MOST_SAID, taken
-from ncfix.machine.fields import Report, Section, did_you_mean
+from ncfix.machine.fields import Report, TomlTable, did_you_mean
 from ncfix.machine.symbolic.chain import UNITS, Chain, Expr, Rotation, Size, Step, Translation, Variable, Vector
 from ncfix.toml_text import decoded, key_lines, parsed
 
@@ -50,13 +50,13 @@ def loads_chain(text: str, path: str = "<chain>") -> Chain:
     """The chain that a text describes; raises as `load_chain`."""
     values = parsed(text, path, "NCF301")
     report = Report(path, text, key_lines(text))
-    chain = _chain(Section(values, (), report))
+    chain = _chain(TomlTable(values, (), report))
     if report.messages:
         raise ConfigError.collected(report.messages)
     return chain
 
 
-def _chain(root: Section) -> Chain:
+def _chain(root: TomlTable) -> Chain:
     version = root.integer("ncfix-chain", required=True)
     if version not in (None, SCHEMA):
         root.note("NCF317", "ncfix-chain", f"schema version {version}, this ncfix reads {SCHEMA}")
@@ -72,14 +72,14 @@ def _chain(root: Section) -> Chain:
     return Chain(name, variables, tuple(steps), axis)
 
 
-def _tool_axis(root: Section) -> Vector:
+def _tool_axis(root: TomlTable) -> Vector:
     x, y, z = (sp.Rational(str(part)) for part in root.numbers("tool_axis", count=3) or (0, 0, 1))
     if abs(x * x + y * y + z * z - 1) > UNIT_TO:
         root.note("NCF313", "tool_axis", "is not a unit vector")
     return x, y, z
 
 
-def _texts(root: Section, key: str, required: bool = False) -> list[str]:
+def _texts(root: TomlTable, key: str, required: bool = False) -> list[str]:
     values = root.get(key, required)
     if values is None:
         return []
@@ -89,13 +89,13 @@ def _texts(root: Section, key: str, required: bool = False) -> list[str]:
     return values
 
 
-def _variables(root: Section) -> tuple[Variable, ...]:
+def _variables(root: TomlTable) -> tuple[Variable, ...]:
     tables = root.table("variable", required=True)
     found = [_variable(tables, name) for name in tables.values] if tables else []
     return tuple(variable for variable in found if variable)
 
 
-def _variable(tables: Section, name: str) -> Variable | None:
+def _variable(tables: TomlTable, name: str) -> Variable | None:
     section = tables.table(name)
     if section is None:
         return None
@@ -117,7 +117,7 @@ def _variable(tables: Section, name: str) -> Variable | None:
         return None
 
 
-def _step(root: Section, index: int, text: str, formulas: _Formulas, senses: Mapping[str, int]) -> Step | None:
+def _step(root: TomlTable, index: int, text: str, formulas: _Formulas, senses: Mapping[str, int]) -> Step | None:
     try:
         return formulas.step(text, senses)
     except _FormulaError as error:
@@ -125,7 +125,7 @@ def _step(root: Section, index: int, text: str, formulas: _Formulas, senses: Map
         return None
 
 
-def _check_steps(root: Section, variables: tuple[Variable, ...], steps: list[Step]) -> None:
+def _check_steps(root: TomlTable, variables: tuple[Variable, ...], steps: list[Step]) -> None:
     smalls = [variable.symbol for variable in variables if variable.small]
     zero = dict.fromkeys(smalls, sp.Integer(0))
     for step in steps:
