@@ -2,20 +2,27 @@
 
 The interpolation (A-79351E, trilinear in the control's current position), the size (25 x 25 x 25) and the record of
 the FOCAS library are public; the control's own text file is not: one is written only if a template is given, and its
-name says that it is assumed. What would double the error if guessed wrongly must be said: `--set sign=...`.
+name says that it is assumed. What would double the error if guessed wrongly must be said: `--set sign=...`. The grid is
+filled exactly, by least squares or in the middle of what all angles ask for, in whole numbers, play apart.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from ncfix.diagnostics import Message
+import numpy as np
+
+from ncfix.diagnostics import Message, RefusedError
+from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import (
     Assumption,
     Control,
     Files,
+    Least,
     Option,
     Properties,
     Request,
@@ -23,28 +30,53 @@ from ncfix.tables.control import (
     Written,
     one_of,
     whole,
+    wrong_setting,
 )
-from ncfix.tables.table_files import Remarks
-from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
-from ncfix_fanuc.filling import AXES, FITS, SAID, TEMPLATE, GridFilling
-from ncfix_fanuc.placing import OPTIONS as PLACES
-from ncfix_fanuc.placing import STEP as PLACING
-from ncfix_fanuc.placing import assumption
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.lower_bounds import least_of_even_nodes, least_of_functions
+from ncfix.tables.table_files import Remarks, check_all, messages_of
+from ncfix.tables.volume import AIM, Mesh, Volume, search
+from ncfix_fanuc.parameters import (
+    BACKLASH_ASSUMPTION,
+    BACKLASH_OPTIONS,
+    BACKLASH_STEP,
+    LINEAR,
+    PLACING_OPTIONS,
+    PLACING_STEP,
+    UNITS,
+    BacklashAmounts,
+    Placing,
+    anchors,
+    placing_assumption,
+    read_backlash,
+    sense_of,
+    sign_option,
+)
 from ncfix_fanuc.records import (
+    MOST_GRID_MAGNIFICATION,
     MOST_NUMBER,
-    NAME,
     SIDE,
-    TABLE,
-    TEXT,
+    VOLUME_CSV,
+    VOLUME_JSON,
+    VOLUME_TEXT,
+    PointNumbering,
     Volc,
+    check_template,
     csv_text,
     json_text,
     read_volc,
     template_text,
 )
-from ncfix_fanuc.units import UNITS, sign_option
 
-ORDER = SettingForm("XYZ, ZYX, ...: each axis once", lambda text: sorted(text) == list(AXES))
+ORDER_FORM = SettingForm("XYZ, ZYX, ...: each axis once", lambda text: sorted(text) == list(LINEAR))
+TEMPLATE = "N{no}A1P{dx}A2P{dy}A3P{dz};"
+FITS = {"auto": (False, True), "nodes": (False,), "area": (True,)}
+ROTARY_NOTES = {
+    "zero": "The grid is that of rotary axes at zero; at other angles more is left (rotary=middle shares it out).",
+    "middle": "The grid lies in the middle of what all angles of the rotary axes ask for, and is exact at none.",
+}
+LEVEL = 0.1
+"""Of the target: where less changes towards an end of the travel, the edge of the grid may hold."""
 
 
 class Fanuc(Control):
@@ -101,14 +133,14 @@ class Fanuc(Control):
             "no text file is written",
             "Punch the grid that is in the control and compare the form; --set template=... follows it.",
         ),
-        ASSUMPTION,
-        assumption("FANUC-7"),
+        BACKLASH_ASSUMPTION,
+        placing_assumption("FANUC-7"),
     )
     options: ClassVar[Mapping[str, Option]] = {
         "sign": sign_option("FANUC-1"),
         "detection_unit_um": UNITS["detection_unit_um"],
         "largest": Option("127", "largest value of a point", whole(1, MOST_NUMBER)),
-        "order": Option("XYZ", "the axes from the one whose number runs fastest", ORDER),
+        "order": Option("XYZ", "the axes from the one whose number runs fastest", ORDER_FORM),
         "first_number": Option("1", "number of the first point", whole(0, MOST_NUMBER)),
         "template": Option("", f"a line of the text file, ASSUMED, e.g. {TEMPLATE}"),
         "fit": Option(
@@ -119,17 +151,17 @@ class Fanuc(Control):
         "rotary": Option(
             "zero",
             "zero: exact with the rotary axes at zero; middle: between what all their angles ask for",
-            one_of(*SAID),
+            one_of(*ROTARY_NOTES),
         ),
-        **PLACES,
-        **OPTIONS,
+        **PLACING_OPTIONS,
+        **BACKLASH_OPTIONS,
     }
     steps = (
         "Settle the assumptions below on the machine, sign first.",
-        PLACING,
+        PLACING_STEP,
         "Set the magnification as volume.json has it.",
         "Write the records of volume.json with cnc_wrvolc, or type in volume.csv.",
-        STEP,
+        BACKLASH_STEP,
         "Switch power off and on, home all axes.",
         "Read cnc_rdvolccomp at one pose and compare it with volume.csv.",
         "Measure one line again: the error must have become smaller, not twice as large.",
@@ -143,29 +175,163 @@ class Fanuc(Control):
         """`volume.json` with the FOCAS records, the same as `volume.csv`, as text if asked for, and the play."""
         made = GridFilling.of(request, self.settings(request.settings))
         volc, mesh = made.volc()
-        files = {NAME: json_text(volc), TABLE: csv_text(volc), **made.backlash.files()}
+        files = {VOLUME_JSON: json_text(volc), VOLUME_CSV: csv_text(volc), **made.backlash.files()}
         if volc.style.template:
-            files[TEXT] = template_text(volc)
+            files[VOLUME_TEXT] = template_text(volc)
         return Written(files, tuple(made.notes(volc, mesh)), made.least())
 
     def read(self, files: Files) -> Compensation:
         """As the control would interpolate them. Raises `ConfigError` NCF491."""
         volc, backlash, remarks = _read(files)
-        for each in remarks:
-            each.check()
+        check_all(remarks)
         assert volc is not None
         return Compensation((Term((volc.grid(),)), *backlash.tables(volc.unit).terms))
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """Records that do not fit, values beyond the range, and a CSV that says something else."""
-        return tuple(message for remarks in _read(files)[2] for message in remarks.messages)
+        return messages_of(_read(files)[2])
 
     def knows(self, name: str, content: bytes) -> bool:
         """Records of the grid as ncfix writes them."""
-        return name.lower() in (NAME, TABLE) or (content.lstrip()[:1] == b"{" and b'"start_no"' in content)
+        return name.lower() in (VOLUME_JSON, VOLUME_CSV) or (content.lstrip()[:1] == b"{" and b'"start_no"' in content)
 
 
-def _read(files: Files) -> tuple[Volc | None, Backlash, list[Remarks]]:
+def _read(files: Files) -> tuple[Volc | None, BacklashAmounts, list[Remarks]]:
     volc, remarks = read_volc(files)
     backlash, more = read_backlash(files, volc.style.home_minus if volc else "")
     return volc, backlash, [remarks, *more]
+
+
+@dataclass(frozen=True, slots=True)
+class GridFilling:
+    """What a grid is made of.
+
+    sign  "correction" or "error"
+    unit  detection unit, mm
+    reference  machine coordinates of the reference position, mm
+    """
+
+    request: Request
+    sign: str
+    unit: float
+    style: PointNumbering
+    backlash: BacklashAmounts
+    fit: str
+    rotary: str
+    reference: tuple[float, ...]
+
+    @classmethod
+    def of(cls, request: Request, settings: Mapping[str, str]) -> GridFilling:
+        """From the settings; raises `UsageError` NCF485 and `RefusedError` NCF484."""
+        if not set(LINEAR) <= set(request.machine.axis_names):
+            text = f"the grid is over X, Y and Z; the machine has {' '.join(request.machine.axis_names)}"
+            raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
+        sign = settings["sign"]
+        unit = float(settings["detection_unit_um"]) / 1000
+        fit, rotary = settings["fit"], settings["rotary"]
+        style, reference = _style(settings), anchors(request, settings, LINEAR)
+        return cls(request, sign, unit, style, BacklashAmounts.of(request, settings, unit), fit, rotary, reference)
+
+    def volc(self) -> tuple[Volc, Mesh]:
+        """The grid in whole numbers, and what it misses."""
+        mesh = self._searched()
+        order = [mesh.grid.outputs.index(axis) for axis in LINEAR]
+        values = mesh.grid.values[..., order]
+        magnification = _magnification(values, self.style.largest * self.unit)
+        if magnification > MOST_GRID_MAGNIFICATION:
+            text = f"a value of {float(np.abs(values).max()):.3f} mm needs a magnification of {magnification}"
+            hint = f"the control takes {MOST_GRID_MAGNIFICATION}; a larger detection unit, or is the error in mm?"
+            raise RefusedError.of("NCF484", text, hint=hint)
+        whole = np.rint(sense_of(self.sign) * values / (magnification * self.unit)).astype(np.int64)
+        placing = Placing.of(self.reference, mesh.grid.nodes)
+        step = tuple(round(float(line[1] - line[0]), 6) for line in mesh.grid.nodes)
+        return Volc(self.sign, placing.first(step), step, self.unit, magnification, whole, self.style, placing), mesh
+
+    def _searched(self) -> Mesh:
+        """Exact at its points if that will do, or fitted to what is around them, with points only where it bends."""
+        first, *more = FITS[self.fit]
+        found = [self._mesh(first, False)]
+        if not found[0].reached:
+            found.append(self._mesh(more[0] if more else first, True))
+        return found[-1] if found[-1].reached else min(found, key=lambda mesh: mesh.left)
+
+    def _mesh(self, area: bool, trimmed: bool) -> Mesh:
+        volume = self._volume(area)
+        for index in range(len(LINEAR)) if trimmed else ():
+            volume = volume.trimmed(index, LEVEL * self.request.target)
+        return search(volume, AIM * self.request.target, [SIDE] * 3, SIDE**3)
+
+    def _volume(self, area: bool = False) -> Volume:
+        request = self.request
+        of = Volume.over_all if self.rotary == "middle" else Volume.of
+        volume = of(request.machine, LINEAR, request.space, request.tool_length, area)
+        shift = self.backlash.shift(self.unit)[[LINEAR.index(axis) for axis in volume.outputs]]
+        exact = volume.exact
+        rounded = self._rounded
+        return replace(volume, exact=lambda places: exact(places) + shift, written=rounded, anchors=self.reference)
+
+    def _rounded(self, grid: Grid) -> Grid:
+        """What whole numbers make of it."""
+        quantum = _magnification(grid.values, self.style.largest * self.unit) * self.unit
+        return replace(grid, values=np.rint(grid.values / quantum) * quantum)
+
+    def least(self) -> Least:
+        """What no grid over X, Y and Z could do better."""
+        request, play = self.request, any(self.backlash.amounts)
+        return least_of_functions(request.machine, request.space, request.tool_length, LINEAR, play)
+
+    def _even(self, mesh: Mesh) -> Iterator[str]:
+        """Of a target that is not reached, why, if it is for want of points."""
+        covered = np.array([[line[0], line[-1]] for line in mesh.grid.nodes])
+        for index, count in enumerate(mesh.grid.counts):
+            if count == SIDE:
+                yield least_of_even_nodes(replace(self._volume(), covered=covered), index, SIDE).sentence
+
+    def notes(self, volc: Volc, mesh: Mesh) -> Iterator[str]:
+        """What was made, and what is left."""
+        request, style = self.request, self.style
+        counts = " x ".join(map(str, mesh.grid.counts))
+        missed = f"it misses {1e3 * mesh.left:.2f} um at most, rounding included"
+        yield f"Grid {counts}: {mesh.grid.points} points; {missed}."
+        if volc.placing is not None:
+            yield from volc.placing.notes(LINEAR, mesh.grid.counts, volc.step, "mm")
+        rounding = volc.magnification * self.unit / 2
+        yield f"Magnification {volc.magnification}: a value is rounded by up to {1e3 * rounding:.2f} um."
+        if rounding > request.target:
+            cure = f"values have {style.largest} steps only" if volc.magnification > 1 else "a smaller unit would help"
+            yield f"The rounding is larger than the target: {cure}."
+        if mesh.left > request.target:
+            yield f"The target of {1e3 * request.target:g} um is not reached with {SIDE} points an axis."
+            yield from self._even(mesh)
+        yield from self._outside(mesh)
+        yield from self.backlash.notes(self.unit)
+        done = self.backlash.tables(self.unit)
+        yield from reversal_note(request.machine, request.space, request.tool_length, done)
+        if request.machine.rotary.any():
+            yield ROTARY_NOTES[self.rotary]
+        if style.template:
+            yield f"{VOLUME_TEXT} is a guess at the control's own file (FANUC-5): compare it with a punched one first."
+
+    def _outside(self, mesh: Mesh) -> Iterator[str]:
+        for axis, line in zip(mesh.grid.inputs, mesh.grid.nodes, strict=True):
+            low, high = self.request.space[self.request.machine.axis_names.index(axis)].tolist()
+            if line[0] > low + 1e-6 or line[-1] < high - 1e-6:
+                yield (
+                    f"The grid goes from {axis}{line[0]:g} to {axis}{line[-1]:g} only, since little changes beyond: "
+                    "there the control must hold the value of the edge (FANUC-4)."
+                )
+
+
+def _magnification(values: Array, largest: float) -> int:
+    return max(1, math.ceil(float(np.abs(values).max()) / largest - 1e-9))
+
+
+def _style(settings: Mapping[str, str]) -> PointNumbering:
+    first, largest = int(settings["first_number"]), int(settings["largest"])
+    template = settings["template"]
+    try:
+        if template:
+            check_template(template)
+    except (ValueError, KeyError, IndexError) as error:
+        raise wrong_setting(settings, "template", f"like {TEMPLATE}; {error}") from error
+    return PointNumbering(first, settings["order"], largest, template, "".join(sorted(settings["home_minus"].upper())))

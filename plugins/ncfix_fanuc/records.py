@@ -1,11 +1,15 @@
-"""The grid as records of the FOCAS library (`ODBVOLC` of fwlib32.h: 72 numbers, 24 points of three axes) and as CSV."""
+"""Grids as records of the FOCAS library (fwlib32.h), in JSON: whole numbers, and what the parameters must be.
+
+`Volc`, of `ODBVOLC`: 72 numbers, 24 points of three axes; the same as CSV, and as a text file by a template. `Lattice`,
+of `IODBROTVOLC`: three lengths and three angles at every point.
+"""
 
 from __future__ import annotations
 
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from string import Formatter
 from typing import Any
@@ -13,28 +17,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.diagnostics import RefusedError
 from ncfix.tables.control import Files
-from ncfix.tables.grid import Grid
-from ncfix.tables.table_files import Remarks
+from ncfix.tables.grid import Array, Grid, full_grid
+from ncfix.tables.table_files import DEGREE, Remarks, unit_of
 from ncfix_fanuc import json_values
 from ncfix_fanuc.json_values import SMALLEST
-from ncfix_fanuc.placing import Placing, placed
-from ncfix_fanuc.units import SIGNS
+from ncfix_fanuc.parameters import LINEAR, SIGNS, Placing, placed, sense_of
 
-POINTS = 24
+RECORD_POINTS = 24
 """Of one record."""
 SIDE = 25
 """Along an axis."""
-MOST_MAGNIFICATION = 100
+MOST_GRID_MAGNIFICATION = 100
 MOST_NUMBER = 99_999_999
-FIELDS = ("no", "dx", "dy", "dz", "x", "y", "z")
-FORM = re.compile(r"[+0 -]?\d{0,2}(?:\.\d)?[dfg]?")
+TEMPLATE_FIELDS = ("no", "dx", "dy", "dz", "x", "y", "z")
+NUMBER_FORM = re.compile(r"[+0 -]?\d{0,2}(?:\.\d)?[dfg]?")
 """How a number of a template may be written."""
-NAME, TABLE, TEXT = "volume.json", "volume.csv", "volume-ASSUMED.txt"
+VOLUME_JSON, VOLUME_CSV, VOLUME_TEXT = "volume.json", "volume.csv", "volume-ASSUMED.txt"
+MOST_LATTICE_MAGNIFICATION = 10_000
+MOST_ROTARY = 400
+LARGEST_VALUE = 127
+ANGLES = ("A", "B", "C")
 
 
 @dataclass(frozen=True, slots=True)
-class Style:
+class PointNumbering:
     """What no public text says of the numbering and the text file.
 
     first     number of the first point
@@ -70,7 +78,7 @@ class Volc:
     unit: float
     magnification: int
     values: NDArray[np.int64]
-    style: Style = Style()
+    style: PointNumbering = PointNumbering()
     placing: Placing | None = None
 
     @property
@@ -86,20 +94,27 @@ class Volc:
     @property
     def places(self) -> NDArray[np.float64]:
         """The positions of the points by number, (n, 3) mm."""
-        lines = [
-            low + step * np.arange(n) for low, step, n in zip(self.low, self.step, self.values.shape, strict=False)
-        ]
-        grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
-        return grid.transpose(*self.axes, 3).reshape(-1, 3)
+        points = full_grid(_nodes(self.low, self.step, self.values.shape)).reshape(self.values.shape)
+        return points.transpose(*self.axes, 3).reshape(-1, 3)
 
     def grid(self) -> Grid:
         """As corrections."""
-        nodes = tuple(
-            low + step * np.arange(count)
-            for low, step, count in zip(self.low, self.step, self.values.shape[:3], strict=True)
-        )
-        factor = self.unit * self.magnification * (1 if self.sign == "correction" else -1)
-        return Grid(("X", "Y", "Z"), nodes, ("X", "Y", "Z"), self.values.astype(np.float64) * factor)
+        factor = self.unit * self.magnification * sense_of(self.sign)
+        nodes = _nodes(self.low, self.step, self.values.shape)
+        return Grid(LINEAR, nodes, LINEAR, self.values.astype(np.float64) * factor)
+
+
+def _nodes(low: Sequence[float], step: Sequence[float], counts: Sequence[int]) -> tuple[Array, ...]:
+    """Evenly spaced positions along each axis."""
+    numbers = (np.arange(count, dtype=np.float64) for count in counts)
+    return tuple(first + each * line for first, each, line in zip(low, step, numbers, strict=False))
+
+
+def _json(head: Mapping[str, Any], records: Iterable[str]) -> bytes:
+    """An object with a line for each entry and each record."""
+    lines = "".join(f' "{key}": {json.dumps(value)},\n' for key, value in head.items())
+    body = ",\n".join(f"  {record}" for record in records)
+    return f'{{\n{lines} "records": [\n{body}\n ]\n}}\n'.encode()
 
 
 def json_text(volc: Volc) -> bytes:
@@ -118,29 +133,21 @@ def json_text(volc: Volc) -> bytes:
         "template": volc.style.template,
         "home_minus": volc.style.home_minus,
     }
-    lines = [f' "{key}": {json.dumps(value)},\n' for key, value in head.items()]
-    records = ",\n".join(f"  {json.dumps(record)}" for record in _records(volc.rows, volc.style.first))
-    return f'{{\n{"".join(lines)} "records": [\n{records}\n ]\n}}\n'.encode()
+    rows, first = volc.rows, volc.style.first
+    records = []
+    for start in range(0, len(rows), RECORD_POINTS):
+        part = rows[start : start + RECORD_POINTS]
+        ends = {"start_no": start + first, "start_ax": 1, "end_no": start + first + len(part) - 1, "end_ax": 3}
+        records.append(json.dumps({**ends, "num": part.size, "type": 0, "data": part.reshape(-1).tolist()}))
+    return _json(head, records)
 
 
 def _placing(volc: Volc) -> dict[str, Any]:
     """How the parameters put the grid, and the number of the point at the reference position among all."""
     if volc.placing is None:
         return {}
-    fastest = volc.axes[::-1]
-    return {
-        **volc.placing.entries("mm"),
-        "reference_number": volc.placing.number(volc.values.shape[:3], fastest, volc.style.first),
-    }
-
-
-def _records(rows: NDArray[np.int64], first: int) -> list[dict[str, Any]]:
-    found = []
-    for start in range(0, len(rows), POINTS):
-        part = rows[start : start + POINTS]
-        ends = {"start_no": start + first, "start_ax": 1, "end_no": start + first + len(part) - 1, "end_ax": 3}
-        found.append({**ends, "num": part.size, "type": 0, "data": part.reshape(-1).tolist()})
-    return found
+    number = volc.placing.number(volc.values.shape[:3], volc.axes[::-1], volc.style.first)
+    return {**volc.placing.entries("mm"), "reference_number": number}
 
 
 def csv_text(volc: Volc) -> bytes:
@@ -166,16 +173,16 @@ def _numbered(volc: Volc) -> Iterator[tuple[int, tuple[list[float], list[int]]]]
 
 def read_volc(files: Files) -> tuple[Volc | None, Remarks]:
     """The grid of the records, with remarks on them and on whether the CSV says the same."""
-    remarks = Remarks.of(NAME, files.get(NAME, b""))
+    remarks = Remarks.of(VOLUME_JSON, files.get(VOLUME_JSON, b""))
     try:
-        volc = _volc(json.loads(files.get(NAME, b"")), remarks)
+        volc = _volc(json.loads(files.get(VOLUME_JSON, b"")), remarks)
     except (ValueError, KeyError, RecursionError) as error:
         remarks.refuse(0, f"is not what ncfix writes: {type(error).__name__}: {error}")
         return None, remarks
-    if volc is not None and files.get(TABLE) != csv_text(volc):
-        remarks.refuse(0, f"{TABLE} is missing or does not say the same")
-    if volc is not None and files.get(TEXT) != (template_text(volc) if volc.style.template else None):
-        remarks.refuse(0, f"{TEXT} is missing, or there without a template, or does not say the same")
+    if volc is not None and files.get(VOLUME_CSV) != csv_text(volc):
+        remarks.refuse(0, f"{VOLUME_CSV} is missing or does not say the same")
+    if volc is not None and files.get(VOLUME_TEXT) != (template_text(volc) if volc.style.template else None):
+        remarks.refuse(0, f"{VOLUME_TEXT} is missing, or there without a template, or does not say the same")
     return volc, remarks
 
 
@@ -186,8 +193,7 @@ def _volc(found: Any, remarks: Remarks) -> Volc | None:
     rows: list[int] = []
     for record in records:
         rows += _data(record, len(rows) // 3 + style.first, remarks)
-    if found["sign"] not in SIGNS:
-        remarks.refuse(0, f"the sign is {found['sign']!r}", "correction or error")
+    _check_sign(found, remarks)
     if len(counts) != 3 or not all(2 <= count <= SIDE for count in counts):
         remarks.refuse(0, f"counts {counts}: 2 to {SIDE} points along each of three axes")
     elif len(rows) != 3 * math.prod(counts):
@@ -197,7 +203,7 @@ def _volc(found: Any, remarks: Remarks) -> Volc | None:
     step = json_values.reals(found, "interval_mm", 3, SMALLEST)
     low, placing = placed(found, "mm", step, counts, remarks)
     unit = json_values.real(found, "detection_unit_um", 1e-6, 10) / 1000
-    magnification = json_values.whole(found, "magnification", 1, MOST_MAGNIFICATION)
+    magnification = json_values.whole(found, "magnification", 1, MOST_GRID_MAGNIFICATION)
     if remarks.wrong:
         return None
     slowest = ["XYZ".index(axis) for axis in reversed(style.order)]
@@ -211,27 +217,36 @@ def _volc(found: Any, remarks: Remarks) -> Volc | None:
     return volc
 
 
-def _style(record: Mapping[str, Any], remarks: Remarks) -> Style:
+def _style(record: Mapping[str, Any], remarks: Remarks) -> PointNumbering:
     first, largest = (
         json_values.whole(record, key, low, MOST_NUMBER) for key, low in (("first_number", 0), ("largest", 1))
     )
     order, template = json_values.text(record, "order"), json_values.text(record, "template")
     home_minus = json_values.text({"home_minus": "", **record}, "home_minus")
-    if sorted(order) != ["X", "Y", "Z"]:
+    if sorted(order) != [*LINEAR]:
         remarks.refuse(0, f"the order of the axes is {order!r}", "XYZ, ZYX, ...")
-    if not set(home_minus) <= set("XYZ"):
-        remarks.refuse(0, f"home_minus is {home_minus!r}", "axes of X, Y and Z")
+    _check_home(home_minus, remarks)
     if template:
         check_template(template)
-    return Style(first, order, largest, template, home_minus)
+    return PointNumbering(first, order, largest, template, home_minus)
+
+
+def _check_sign(record: Mapping[str, Any], remarks: Remarks) -> None:
+    if record["sign"] not in SIGNS:
+        remarks.refuse(0, f"the sign is {record['sign']!r}", "correction or error")
+
+
+def _check_home(home_minus: str, remarks: Remarks) -> None:
+    if not set(home_minus) <= set(LINEAR):
+        remarks.refuse(0, f"home_minus is {home_minus!r}", "axes of X, Y and Z")
 
 
 def check_template(template: str) -> None:
     """Raise ValueError for a line that cannot be filled in, or says too little."""
     names = [(name, form) for _, name, form, _ in Formatter().parse(template) if name is not None]
     for name, form in names:
-        if name not in FIELDS or not FORM.fullmatch(form or ""):
-            raise ValueError(f"{{{name}}} with {form!r} is not known: {', '.join(FIELDS)}")
+        if name not in TEMPLATE_FIELDS or not NUMBER_FORM.fullmatch(form or ""):
+            raise ValueError(f"{{{name}}} with {form!r} is not known: {', '.join(TEMPLATE_FIELDS)}")
     if not {"dx", "dy", "dz"} <= {name for name, _ in names}:
         raise ValueError("it needs {dx}, {dy} and {dz}")
     template.format(no=1, dx=1, dy=1, dz=1, x=0.0, y=0.0, z=0.0)
@@ -240,8 +255,193 @@ def check_template(template: str) -> None:
 def _data(record: Mapping[str, Any], first: int, remarks: Remarks) -> list[int]:
     data = json_values.wholes(record, "data")
     size = len(data)
-    if record["start_no"] != first or record["num"] != size or size > 3 * POINTS:
+    if record["start_no"] != first or record["num"] != size or size > 3 * RECORD_POINTS:
         remarks.refuse(0, f"the record of point {record['start_no']} has {size} values and says {record['num']}")
     if record["end_no"] != first + size // 3 - 1:
         remarks.refuse(0, f"the record of point {record['start_no']} ends at {record['end_no']}")
     return data
+
+
+@dataclass(frozen=True, slots=True)
+class WholeNumberScale:
+    """What whole numbers stand for.
+
+    sign            "correction" or "error"
+    units           detection units, mm and rad
+    magnifications  of lengths and of angles
+    """
+
+    sign: str
+    units: tuple[float, float]
+    magnifications: tuple[int, int]
+
+    @property
+    def factors(self) -> tuple[float, float]:
+        """Correction in mm and in rad of a value of 1."""
+        sense = float(sense_of(self.sign))
+        length, angle = (sense * unit * many for unit, many in zip(self.units, self.magnifications, strict=True))
+        return length, angle
+
+    @property
+    def rounding(self) -> tuple[float, float]:
+        """The most that a length and an angle are off by, mm and rad."""
+        length, angle = (abs(factor) / 2 for factor in self.factors)
+        return length, angle
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Records over some axes.
+
+    inputs   the axes, that whose number runs fastest first
+    low      first position of each, mm or degree
+    step     interval
+    lin      (*counts, 3) lengths along X, Y and Z
+    rot      (*counts, 3) angles about X, Y and Z
+    centre   mm: where angles turn about, if they turn a table
+    home_minus  the linear axes whose reference position return goes towards minus
+    placing  how the parameters of the control put it; None in files that do not say it
+    """
+
+    inputs: tuple[str, ...]
+    low: tuple[float, ...]
+    step: tuple[float, ...]
+    scale: WholeNumberScale
+    lin: NDArray[np.int64]
+    rot: NDArray[np.int64]
+    centre: tuple[float, ...] = ()
+    home_minus: str = ""
+    placing: Placing | None = None
+
+    @classmethod
+    def of(
+        cls,
+        grids: tuple[Grid, Grid],
+        sign: str,
+        units: tuple[float, float],
+        reference: Sequence[float],
+        centre: Array | None = None,
+    ) -> Lattice:
+        """Corrections in whole numbers, with the smallest magnifications that hold them.
+
+        reference: where a node of each axis lies, mm or degree.
+        """
+        factors, whole = [], []
+        for grid, unit in zip(grids, units, strict=True):
+            factors.append(max(1, math.ceil(float(np.abs(grid.values).max()) / (LARGEST_VALUE * unit) - 1e-9)))
+            if factors[-1] > MOST_LATTICE_MAGNIFICATION:
+                text = f"a value needs a magnification of {factors[-1]}, and {MOST_LATTICE_MAGNIFICATION} is the most"
+                raise RefusedError.of("NCF484", text, hint="a larger detection unit, or is the error in mm and rad?")
+            whole.append(np.rint(sense_of(sign) * grid.values / (factors[-1] * unit)).astype(np.int64))
+        inputs = grids[0].inputs
+        lines = [line / unit_of(name) for name, line in zip(inputs, grids[0].nodes, strict=True)]
+        placing = Placing.of(reference, lines)
+        step = tuple(round(float(line[-1] - line[0]) / (len(line) - 1), 6) for line in lines)
+        scale = WholeNumberScale(sign, units, (factors[0], factors[1]))
+        middle = () if centre is None else tuple(centre.tolist())
+        return cls(inputs, placing.first(step), step, scale, whole[0], whole[1], middle, placing=placing)
+
+    def grids(self) -> tuple[Grid, Grid]:
+        """Lengths and angles as corrections, mm and rad."""
+        lines = _nodes(self.low, self.step, self.lin.shape)
+        nodes = tuple(line * unit_of(name) for name, line in zip(self.inputs, lines, strict=True))
+        length, angle = self.scale.factors
+        lin, rot = (np.asarray(part, dtype=np.float64) for part in (self.lin, self.rot))
+        return Grid(self.inputs, nodes, LINEAR, lin * length), Grid(self.inputs, nodes, ANGLES, rot * angle)
+
+    def _placing(self) -> dict[str, Any]:
+        """How the parameters put it, and which record is that of the reference position."""
+        if self.placing is None:
+            return {}
+        counts = self.lin.shape[:-1]
+        number = self.placing.number(counts, range(len(counts)))
+        return {**self.placing.entries("mm" if self.inputs == LINEAR else "deg"), "reference_number": number}
+
+    def text(self) -> bytes:
+        """JSON: what the parameters must be, and a record for each point."""
+        linear = self.inputs == LINEAR
+        head = {
+            "sign": self.scale.sign,
+            **({} if linear else {"axes": self.inputs}),
+            "first_mm" if linear else "first_deg": self.low,
+            "interval_mm" if linear else "interval_deg": self.step,
+            "counts": self.lin.shape[:-1],
+            **self._placing(),
+            "detection_unit_um": round(self.scale.units[0] * 1000, 6),
+            "detection_unit_deg": round(self.scale.units[1] / DEGREE, 9),
+            "magnification": self.scale.magnifications[0],
+            "angle_magnification": self.scale.magnifications[1],
+            **({"home_minus": self.home_minus} if linear else {"centre_mm": self.centre}),
+        }
+        order = [*reversed(range(len(self.inputs))), len(self.inputs)]
+        rows = zip(*(part.transpose(order).reshape(-1, 3).tolist() for part in (self.lin, self.rot)), strict=True)
+        return _json(head, (f'{{"no": {n}, "lin": {lin}, "rot": {rot}}}' for n, (lin, rot) in enumerate(rows, 1)))
+
+
+def read_lattice(name: str, content: bytes, linear: bool) -> tuple[Lattice | None, Remarks]:
+    """A file of records with remarks on it; no lattice if it cannot be used."""
+    remarks = Remarks.of(name, content)
+    try:
+        return _checked(json.loads(content), remarks, linear), remarks
+    except (ValueError, KeyError, RecursionError) as error:
+        remarks.refuse(0, f"is not what ncfix writes: {type(error).__name__}: {error}")
+    return None, remarks
+
+
+def _checked(value: Any, remarks: Remarks, linear: bool) -> Lattice | None:
+    records = json_values.records(value)
+    counts, inputs = tuple(json_values.wholes(value, "counts")), _inputs(value, remarks, linear)
+    words = ("three", SIDE) if linear else ("one or two", MOST_ROTARY)
+    _check_sign(value, remarks)
+    if len(counts) != len(inputs) or not all(2 <= count <= words[1] for count in counts):
+        remarks.refuse(0, f"counts {counts}: 2 to {words[1]} points along each of {words[0]} axes")
+    rows = {key: [json_values.wholes(record, key) for record in records] for key in ("lin", "rot")}
+    _check_records(records, rows, counts, remarks)
+    if remarks.wrong:
+        return None
+    order = [*reversed(range(len(counts))), len(counts)]
+    lin, rot = (np.array(rows[key], dtype=np.int64).reshape(*counts[::-1], 3).transpose(order) for key in rows)
+    end = "mm" if inputs == LINEAR else "deg"
+    step = json_values.reals(value, f"interval_{end}", len(inputs), SMALLEST)
+    low, placing = placed(value, end, step, counts, remarks)
+    if remarks.wrong:
+        return None
+    centre: tuple[float, ...] = ()
+    home_minus = ""
+    if linear:
+        home_minus = json_values.text({"home_minus": "", **value}, "home_minus")
+        _check_home(home_minus, remarks)
+    else:
+        centre = json_values.reals(value, "centre_mm", 3)
+    return Lattice(inputs, low, step, _scale(value), lin, rot, centre, home_minus, placing)
+
+
+def _inputs(record: Mapping[str, Any], remarks: Remarks, linear: bool) -> tuple[str, ...]:
+    if linear:
+        return LINEAR
+    axes = record["axes"]
+    if not isinstance(axes, list) or len(axes) not in (1, 2) or any(axis not in ANGLES for axis in axes):
+        remarks.refuse(0, f"the axes are {axes}", "one or two of A, B and C")
+        return ()
+    return tuple(axes)
+
+
+def _scale(record: Mapping[str, Any]) -> WholeNumberScale:
+    length, angle = (json_values.real(record, key, 1e-6, 10) for key in ("detection_unit_um", "detection_unit_deg"))
+    keys = ("magnification", "angle_magnification")
+    lengths, angles = (json_values.whole(record, key, 1, MOST_LATTICE_MAGNIFICATION) for key in keys)
+    return WholeNumberScale(record["sign"], (length / 1000, angle * DEGREE), (lengths, angles))
+
+
+def _check_records(
+    records: Sequence[Mapping[str, Any]], rows: Mapping[str, list[list[int]]], counts: Sequence[int], remarks: Remarks
+) -> None:
+    if [record["no"] for record in records] != list(range(1, len(records) + 1)):
+        remarks.refuse(0, "the records are not numbered 1, 2, 3, ...")
+    if len(records) != math.prod(counts):
+        remarks.refuse(0, f"{len(records)} records, {math.prod(counts)} expected of {counts}")
+    values = [row for part in rows.values() for row in part]
+    if any(len(row) != 3 for row in values):
+        remarks.refuse(0, "a record without three lengths and three angles")
+    if any(abs(value) > LARGEST_VALUE for row in values for value in row):
+        remarks.refuse(0, f"a value beyond -{LARGEST_VALUE} to {LARGEST_VALUE}")

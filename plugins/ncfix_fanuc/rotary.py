@@ -5,34 +5,55 @@ for true, as in US patent 7969111, where lattice vectors of six components that 
 rotary axes are added up and move the linear axes: a lattice over X, Y and Z, whose lengths are what is added with a
 tool of no length and whose angles turn the tool about the gauge line, so that it holds for tools of any length; and a
 second lattice over the rotary axes of a table, whose angles turn the workpiece about the table's centre.
+
+The first lattice holds the corrections with rotary axes at rest, the second what a table adds at other angles: its
+error at some angle shifts and turns the workpiece. What the linear axes have to follow is that shift, and the turn
+times the distance from where it is said to be about: six numbers for all positions of X, Y and Z.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
-from ncfix.machine import Machine
+from ncfix.machine import Machine, State
 from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import NOTHING, Compensation, Tables
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
-from ncfix.tables.correction import corners, residual
+from ncfix.tables.correction import corners, exact_correction, linear_axes, residual
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.table_files import DEGREE, Remarks, in_order
-from ncfix.tables.volume import Mesh
-from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
-from ncfix_fanuc.placing import OPTIONS as PLACES
-from ncfix_fanuc.placing import STEP as PLACING
-from ncfix_fanuc.placing import assumption
-from ncfix_fanuc.rotary_fill import PART, LatticeFilling, table_axes
-from ncfix_fanuc.rotary_records import LARGEST, LINEAR, MOST_ROTARY, SIDE, Lattice, read_lattice
-from ncfix_fanuc.units import UNITS, sign_option, units_of
+from ncfix.tables.table_files import DEGREE, Remarks, check_all, in_order, messages_of
+from ncfix.tables.volume import AIM, Mesh, Volume, inputs_that_matter, search
+from ncfix_fanuc.control import LEVEL
+from ncfix_fanuc.parameters import (
+    BACKLASH_ASSUMPTION,
+    BACKLASH_OPTIONS,
+    BACKLASH_STEP,
+    LINEAR,
+    PLACING_OPTIONS,
+    PLACING_STEP,
+    UNITS,
+    BacklashAmounts,
+    anchors,
+    placing_assumption,
+    read_backlash,
+    sign_option,
+    units_of,
+)
+from ncfix_fanuc.records import ANGLES, LARGEST_VALUE, MOST_ROTARY, SIDE, Lattice, read_lattice
 
-NAME, SECOND = "rotary.json", "rotary-axes.json"
+LATTICE_FILE, TABLE_LATTICE_FILE = "rotary.json", "rotary-axes.json"
+LENGTH = 100.0
+"""mm: the tool with which angles are worked out."""
+PART = 0.6
+"""Share of the target for either lattice, if there are two."""
+TRIES = ((False, False), (True, True))
+"""How a lattice is filled, until it will do: fitted to what is around points, with points only where it bends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +145,8 @@ class FanucRotary(Control):
         ),
         Assumption(
             "FROT-3",
-            f"Points are numbered from 1, X fastest; values are whole numbers from -{LARGEST} to {LARGEST}.",
+            f"Points are numbered from 1, X fastest; values are whole numbers from "
+            f"-{LARGEST_VALUE} to {LARGEST_VALUE}.",
             "none public",
             "so",
             "Write one point and read it back.",
@@ -139,8 +161,8 @@ class FanucRotary(Control):
             "it is written; --set rotary=no leaves it out",
             "Load lin = [100, 0, 0] at one angle only, and see whether X moves there.",
         ),
-        ASSUMPTION,
-        assumption("FROT-5"),
+        BACKLASH_ASSUMPTION,
+        placing_assumption("FROT-5"),
     )
     options: ClassVar[Mapping[str, Option]] = {
         "sign": sign_option("FROT-1"),
@@ -148,8 +170,8 @@ class FanucRotary(Control):
         "rotary": Option(
             "yes", "yes: a second lattice, over the rotary axes of a table (FROT-4); no: none", one_of("yes", "no")
         ),
-        **PLACES,
-        **OPTIONS,
+        **PLACING_OPTIONS,
+        **BACKLASH_OPTIONS,
         "rotary_points": Option(
             "72",
             "most points along a rotary axis; how many the control takes is not public",
@@ -158,9 +180,9 @@ class FanucRotary(Control):
     }
     steps = (
         "Settle FROT-1 to FROT-5 on the machine.",
-        PLACING,
+        PLACING_STEP,
         "Set the magnifications as rotary.json, and rotary-axes.json if it is there, have them.",
-        STEP,
+        BACKLASH_STEP,
         "Write the records with cnc_wrrotvolc, switch power off and on, home all axes.",
         "Measure one line with a short and with a long tool: both errors must have become smaller.",
     )
@@ -181,13 +203,13 @@ class FanucRotary(Control):
             raise RefusedError.of("NCF484", "the tool of this machine is not along Z", hint="use the control fanuc")
         units = units_of(settings)
         most = int(settings["rotary_points"])
-        backlash = Backlash.of(request, settings, units[0])
+        backlash = BacklashAmounts.of(request, settings, units[0])
         filling = LatticeFilling(request, sign, units, backlash, settings)
         two = rotary == "yes" and bool(table_axes(request))
         lattices = [filling.linear(PART if two else 1.0)]
         if two and (second := filling.rotary(PART, most)):
             lattices.append(second)
-        names = (NAME, SECOND)[: len(lattices)]
+        names = (LATTICE_FILE, TABLE_LATTICE_FILE)[: len(lattices)]
         files = {name: lattice.text() for name, (lattice, _) in zip(names, lattices, strict=True)}
         files |= backlash.files()
         return Written(files, tuple(_notes(request, lattices, backlash.tables(units[0]), backlash.notes(units[0]))))
@@ -195,8 +217,7 @@ class FanucRotary(Control):
     def read(self, files: Files) -> Turning:
         """As the control is taken to add them. Raises `ConfigError` NCF491."""
         lattices, backlash, remarks = _read(files)
-        for each in remarks:
-            each.check()
+        check_all(remarks)
         first, *more = lattices
         play = backlash.tables(first.scale.units[0])
         if not more:
@@ -205,7 +226,7 @@ class FanucRotary(Control):
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """Records that do not fit, and values beyond the range."""
-        return tuple(message for remarks in _read(files)[2] for message in remarks.messages)
+        return messages_of(_read(files)[2])
 
     def reached(self, machine: Machine, tables: Tables) -> str:
         """Without a lattice over rotary axes, nothing that they do is in it."""
@@ -217,14 +238,14 @@ class FanucRotary(Control):
         return content.lstrip()[:1] == b"{" and b'"lin"' in content
 
 
-def _read(files: Files) -> tuple[list[Lattice], Backlash, list[Remarks]]:
+def _read(files: Files) -> tuple[list[Lattice], BacklashAmounts, list[Remarks]]:
     """The lattices of a folder that can be used, play, and remarks on every file."""
-    found = [read_lattice(NAME, files.get(NAME, b""), linear=True)]
-    if SECOND in files:
-        found.append(read_lattice(SECOND, files[SECOND], linear=False))
+    found = [read_lattice(LATTICE_FILE, files.get(LATTICE_FILE, b""), linear=True)]
+    if TABLE_LATTICE_FILE in files:
+        found.append(read_lattice(TABLE_LATTICE_FILE, files[TABLE_LATTICE_FILE], linear=False))
     lattices = [lattice for lattice, _ in found if lattice is not None]
     if len({lattice.scale.sign for lattice in lattices}) > 1:
-        found[1][1].refuse(0, f"the sign is another one than that of {NAME}")
+        found[1][1].refuse(0, f"the sign is another one than that of {LATTICE_FILE}")
     backlash, more = read_backlash(files, lattices[0].home_minus if lattices else "")
     return lattices, backlash, [*(remarks for _, remarks in found), *more]
 
@@ -271,3 +292,138 @@ def _notes(
         yield "The lattice is that of rotary axes at zero; at other angles more is left."
     yield from said
     yield from reversal_note(request.machine, request.space, request.tool_length, play)
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeFilling:
+    """How lattices are filled, under these settings."""
+
+    request: Request
+    sign: str
+    units: tuple[float, float]
+    backlash: BacklashAmounts
+    settings: Mapping[str, str]
+
+    @property
+    def machine(self) -> Machine:
+        """The machine."""
+        return self.request.machine
+
+    def linear(self, share: float) -> tuple[Lattice, Mesh]:
+        """The lattice over X, Y and Z: exact at its points if that will do, or fitted to what is around them."""
+        target = share * AIM * self.request.target
+        found: list[tuple[Lattice, Mesh]] = []
+        for area, trimmed in TRIES:
+            volume = self._volume(self.request.tool_length, area)
+            for index in range(len(LINEAR)) if trimmed else ():
+                volume = volume.trimmed(index, LEVEL * self.request.target)
+            volume.written = partial(self._as_written, area=area, covered=volume.covered)
+            mesh = search(volume, target, [SIDE] * 3, SIDE**3)
+            found.append((self._lattice(mesh.grid.counts, area, volume.covered), mesh))
+            if mesh.reached:
+                break
+        return min(found, key=lambda each: each[1].left)
+
+    def _volume(self, length: float, area: bool) -> Volume:
+        volume = Volume.of(self.machine, LINEAR, self.request.space, length, area)
+        shift = self.backlash.shift(self.units[0])[[LINEAR.index(axis) for axis in volume.outputs]]
+        exact = volume.exact
+        return replace(volume, exact=lambda places: exact(places) + shift, anchors=self._anchors(LINEAR))
+
+    def _anchors(self, inputs: Sequence[str]) -> tuple[float, ...]:
+        return anchors(self.request, self.settings, inputs)
+
+    def _lattice(self, counts: Sequence[int], area: bool, covered: Array) -> Lattice:
+        """Tools of two lengths tell lengths from angles."""
+        volumes = (replace(self._volume(length, area), covered=covered) for length in (0.0, LENGTH))
+        bare, long = (volume.grid(counts) for volume in volumes)
+        order = [bare.outputs.index(axis) for axis in LINEAR]
+        lever = (long.values - bare.values)[..., order] / LENGTH
+        angles = np.stack([lever[..., 1], -lever[..., 0], np.zeros(lever.shape[:-1])], axis=-1)
+        lengths = replace(bare, outputs=LINEAR, values=bare.values[..., order])
+        grids = lengths, replace(bare, outputs=ANGLES, values=angles)
+        found = Lattice.of(grids, self.sign, self.units, self._anchors(LINEAR))
+        return replace(found, home_minus=self.backlash.home_minus)
+
+    def _as_written(self, grid: Grid, area: bool, covered: Array) -> Grid:
+        """What whole numbers make of the grid with that many points."""
+        lengths, angles = self._lattice(grid.counts, area, covered).grids()
+        total = lengths.values + np.cross(angles.values, (0.0, 0.0, -self.request.tool_length))
+        return replace(grid, values=total[..., [LINEAR.index(axis) for axis in grid.outputs]])
+
+    def rotary(self, share: float, most: int) -> tuple[Lattice, Mesh] | None:
+        """The lattice over the rotary axes, if the machine has tables that turn and their angles matter."""
+        inputs = table_axes(self.request)
+        if not inputs:
+            return None
+        table = TurningTable.of(self.request, inputs)
+        reach = np.linalg.norm(table.levers, axis=1).max()
+        space = self.request.space[list(table.columns)]
+        units = tuple(self.machine.axes[column].unit for column in table.columns)
+        names = (*LINEAR, *ANGLES)
+        volume = Volume(inputs, space, units, names, lambda places: table.six(places) * ([1.0] * 3 + [reach] * 3))
+        volume.anchors = self._anchors(inputs)
+        mesh = search(volume, share * AIM * self.request.target, [most] * len(inputs), most ** len(inputs))
+        lengths, angles = mesh.grid.values[..., :3], mesh.grid.values[..., 3:] / reach
+        grids = (
+            replace(mesh.grid, outputs=LINEAR, values=lengths),
+            replace(mesh.grid, outputs=ANGLES, values=angles),
+        )
+        return Lattice.of(grids, self.sign, self.units, volume.anchors, table.centre), mesh
+
+
+def table_axes(request: Request) -> tuple[str, ...]:
+    """The rotary axes that matter, if all of them turn the workpiece; else none."""
+    machine = request.machine
+    found = [name for name in inputs_that_matter(machine, request.space, request.tool_length) if name not in LINEAR]
+    on_table = machine.topology.upper().split("F")[0]
+    return tuple(sorted(found)) if found and all(name in on_table for name in found) else ()
+
+
+@dataclass(frozen=True, slots=True)
+class TurningTable:
+    """What the rotary axes of a table add to the correction.
+
+    columns  of the rotary axes
+    centre   where angles turn about: a point of the table's outer axis, as X, Y and Z of the tip, mm
+    places   positions of all axes at which it is looked at, the rotary ones at rest, (m, n_axes)
+    levers   from the centre to the tip there, (m, 3) mm
+    """
+
+    machine: Machine
+    columns: tuple[int, ...]
+    state: State
+    centre: Array
+    places: Array
+    levers: Array
+
+    @classmethod
+    def of(cls, request: Request, inputs: Sequence[str]) -> TurningTable:
+        """Looked at in the corners of the space of X, Y and Z, and in its middle."""
+        machine, space = request.machine, request.space
+        columns = tuple(machine.axis_names.index(name) for name in inputs)
+        outer = max(columns)
+        centre = np.asarray(machine.axes[outer].point) - np.asarray(machine.tool.point)
+        linear = [machine.axis_names.index(name) for name in LINEAR]
+        points = np.concatenate([corners(space[linear]), space[linear].mean(axis=1)[None]])
+        places = np.tile(np.clip(np.zeros(len(space)), space[:, 0], space[:, 1]), (len(points), 1))
+        places[:, linear] = points
+        levers = points - [0.0, 0.0, request.tool_length] - centre
+        return cls(machine, columns, State(request.tool_length), np.round(centre, 4), places, levers)
+
+    def six(self, positions: Array) -> Array:
+        """Three lengths and three angles at positions of the rotary axes (n, n_rotary), (n, 6) mm and rad."""
+        q = np.repeat(self.places[None], len(positions), axis=0)
+        q[:, :, list(self.columns)] = positions[:, None]
+        added = self._correction(q.reshape(-1, q.shape[-1])).reshape(len(positions), -1)
+        added = added - self._correction(self.places).reshape(-1)
+        turning = np.stack([np.cross(axis, self.levers) for axis in np.eye(3)], axis=-1)
+        shifting = np.broadcast_to(np.eye(3), turning.shape)
+        design = np.concatenate([shifting, turning], axis=-1).reshape(-1, 6)
+        found: Array = np.linalg.lstsq(design, added.T, rcond=None)[0].T
+        return found
+
+    def _correction(self, q: Array) -> Array:
+        linear = [self.machine.axis_names.index(name) for name in LINEAR]
+        assert sorted(linear) == linear_axes(self.machine)
+        return exact_correction(self.machine, q, self.state)[:, linear]

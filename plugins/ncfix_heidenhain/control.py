@@ -18,9 +18,8 @@ from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_sums
-from ncfix.tables.table_files import DEGREE, ORDER, Remarks, in_order, unit_of
-from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
-from ncfix_heidenhain.com import Com, nck_text, old_text, read_com
+from ncfix.tables.table_files import DEGREE, ORDER, Remarks, check_all, in_order, messages_of, unit_of
+from ncfix_heidenhain.table_files import CONFIG, ComTable, cma_text, nck_text, old_text, read_cma, read_com
 
 MOST = 256
 """Entries of a file of the older controls; of the newer ones no number is public."""
@@ -135,13 +134,12 @@ class Heidenhain(Control):
     def read(self, files: Files) -> Compensation:
         """As the control would take them. Raises `ConfigError` NCF491."""
         terms, remarks = self._read(files)
-        for each in remarks:
-            each.check()
+        check_all(remarks)
         return Compensation(tuple(terms))
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What the control would misread, and what is rarely meant."""
-        return tuple(message for each in self._read(files)[1] for message in each.messages)
+        return messages_of(self._read(files)[1])
 
     def knows(self, name: str, content: bytes) -> bool:
         """A `.COM` or a `.CMA`, by the name in its first line."""
@@ -154,7 +152,7 @@ class Heidenhain(Control):
             return self.lint(files)
         remarks = [read_cma(files)[2]] if configs else []
         remarks += [read_com(name, content)[1] for name, content in sorted(files.items()) if name not in configs]
-        return tuple(message for each in remarks for message in each.messages)
+        return messages_of(remarks)
 
     def _read(self, files: Files) -> tuple[list[Term], list[Remarks]]:
         axes, tables, config = read_cma(files)
@@ -183,7 +181,7 @@ def _check_entered(files: Files, tables: Mapping[str, str], config: Remarks) -> 
             config.doubt(0, f"{name} is not entered in the active line: the control does not use it")
 
 
-def _terms(axis: str, com: Com, axes: tuple[str, ...], sense: float, remarks: Remarks) -> Iterator[Term]:
+def _terms(axis: str, com: ComTable, axes: tuple[str, ...], sense: float, remarks: Remarks) -> Iterator[Term]:
     nodes = com.nodes * unit_of(axis)
     for name, values in com.columns.items():
         output = _letter(name, axes, remarks)
@@ -226,7 +224,7 @@ def _rounded(line: AxisTables) -> AxisTables:
     return AxisTables(line.input, line.nodes, tuple(line.outputs[i] for i in kept), values[:, kept], reverse)
 
 
-def _as_file(line: AxisTables, sense: float, numbered: tuple[str, ...] | None, both: bool) -> Com:
+def _as_file(line: AxisTables, sense: float, numbered: tuple[str, ...] | None, both: bool) -> ComTable:
     columns = {
         (str(numbered.index(name) + 1) if numbered else name): sense * line.values[:, i] / unit_of(name)
         for i, name in sorted(enumerate(line.outputs), key=lambda pair: ORDER.index(pair[1]))
@@ -235,10 +233,10 @@ def _as_file(line: AxisTables, sense: float, numbered: tuple[str, ...] | None, b
     own: Array = sense * line.reverse / unit
     if numbered and not both:
         own = columns[str(numbered.index(line.input) + 1)]
-    return Com(line.nodes / unit, columns, own if both or numbered else None)
+    return ComTable(line.nodes / unit, columns, own if both or numbered else None)
 
 
-def _check_size(com: Com, name: str) -> None:
+def _check_size(com: ComTable, name: str) -> None:
     largest = max(float(np.abs(values).max()) for values in com.columns.values())
     if largest > LARGEST:
         text = f"{name} would have to hold {largest:.3f}, and its columns end at {LARGEST}"

@@ -14,12 +14,20 @@ from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import Compensation, Tables, Term
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.table_files import DEGREE, Remarks, in_order, unit_of
-from ncfix_heidenhain.chain import LETTERS, Kinematics, Row, kinematics_text, over_limits, read_rows
-from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
-from ncfix_heidenhain.com import LARGE, Com, old_text, read_com
+from ncfix.tables.table_files import DEGREE, Remarks, check_all, in_order, messages_of, unit_of
+from ncfix_heidenhain.chain import (
+    LETTERS,
+    AxisErrors,
+    ChainRow,
+    ErrorChain,
+    axis_errors,
+    chain_rows,
+    kinematics_text,
+    over_limits,
+    read_rows,
+)
 from ncfix_heidenhain.control import MOST, SIGNS, sign_of
-from ncfix_heidenhain.described import Component, component, rows
+from ncfix_heidenhain.table_files import CONFIG, LARGE, ComTable, cma_text, old_text, read_cma, read_com
 
 TABLE = "kinematics.tab"
 UNITS = "units.txt"
@@ -115,9 +123,9 @@ class KinematicsComp(Control):
         machine, axes = request.machine, _axes(request.machine)
         most = int(settings["points"])
         play = settings["backlash"] == "on"
-        found = [component(machine, request.space, i, most, request.target, play) for i in range(len(axes))]
+        found = [axis_errors(machine, request.space, i, most, request.target, play) for i in range(len(axes))]
         components = [each for each, _ in found]
-        chain = rows(machine, components, angle, sense)
+        chain = chain_rows(machine, components, angle, sense)
         for text in over_limits(chain):
             raise RefusedError.of("NCF484", f"the kinematics table would have {text}", hint="ncfix fix has no limit")
         files, tables = {TABLE: kinematics_text(chain)}, {}
@@ -136,16 +144,15 @@ class KinematicsComp(Control):
         left = reversal_note(machine, request.space, request.tool_length, done)
         return Written(files, (*notes, *left))
 
-    def read(self, files: Files) -> Kinematics:
+    def read(self, files: Files) -> ErrorChain:
         """As the control would follow the chain. Raises `ConfigError` NCF491."""
         kinematics, remarks = self._read(files)
-        for each in remarks:
-            each.check()
+        check_all(remarks)
         return kinematics
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What the control would misread, and what is rarely meant."""
-        return tuple(message for each in self._read(files)[1] for message in each.messages)
+        return messages_of(self._read(files)[1])
 
     def reached(self, machine: Machine, tables: Tables) -> str:
         """Without a rotary axis in the chain there is nothing of theirs in it."""
@@ -162,9 +169,9 @@ class KinematicsComp(Control):
         remarks = [Remarks.of(name, content) for name, content in sorted(files.items())]
         for each in remarks:
             read_rows(each, files[each.path])
-        return tuple(message for each in remarks for message in each.messages)
+        return messages_of(remarks)
 
-    def _read(self, files: Files) -> tuple[Kinematics, list[Remarks]]:
+    def _read(self, files: Files) -> tuple[ErrorChain, list[Remarks]]:
         axes, tables, config = read_cma(files)
         table = Remarks.of(TABLE, files.get(TABLE, b""))
         chain = read_rows(table, files.get(TABLE, b""))
@@ -180,7 +187,7 @@ class KinematicsComp(Control):
                 components |= grids
                 own += terms
         _check_names(chain, components, table)
-        return Kinematics(chain, sense, angle, components, tuple(own)), remarks
+        return ErrorChain(chain, sense, angle, components, tuple(own)), remarks
 
 
 def _axes(machine: Machine) -> tuple[str, ...]:
@@ -191,7 +198,7 @@ def _axes(machine: Machine) -> tuple[str, ...]:
     return found
 
 
-def _com(errors: Component, axes: tuple[str, ...], sense: float, angle: float) -> Com:
+def _com(errors: AxisErrors, axes: tuple[str, ...], sense: float, angle: float) -> ComTable:
     """The table of an axis: C1 to C6 where there is anything in them, and the own angle of a rotary axis."""
     columns, back = {}, None
     if max(np.abs(errors.own).max(), np.abs(errors.back).max()) > 1e-9:
@@ -200,11 +207,11 @@ def _com(errors: Component, axes: tuple[str, ...], sense: float, angle: float) -
     for index in range(6):
         if errors.used(index):
             columns[f"C{index + 1}"] = sense * errors.values[:, index] / (angle if index >= 3 else 1.0)
-    return Com(errors.nodes / unit_of(errors.axis), columns, back)
+    return ComTable(errors.nodes / unit_of(errors.axis), columns, back)
 
 
 def _grids(
-    axis: str, com: Com, axes: tuple[str, ...], sense: float, remarks: Remarks
+    axis: str, com: ComTable, axes: tuple[str, ...], sense: float, remarks: Remarks
 ) -> tuple[dict[tuple[str, str], Grid], list[Term]]:
     """The columns C1 to C6 of an axis as they stand in the file, and the table of the axis over itself."""
     components: dict[tuple[str, str], Grid] = {}
@@ -220,7 +227,7 @@ def _grids(
     return components, own
 
 
-def _own(axis: str, nodes: Array, values: Array, com: Com, factor: float) -> tuple[Term, ...]:
+def _own(axis: str, nodes: Array, values: Array, com: ComTable, factor: float) -> tuple[Term, ...]:
     """The table of an axis over itself: BACKLASH in its place while it travels towards minus."""
     ahead = Grid((axis,), (nodes,), (axis,), values[:, None])
     if com.backlash is None or np.array_equal(values, factor * com.backlash):
@@ -229,7 +236,7 @@ def _own(axis: str, nodes: Array, values: Array, com: Com, factor: float) -> tup
     return (Term((ahead,), (axis, 1)), Term((back,), (axis, -1)))
 
 
-def _check_names(chain: tuple[Row, ...], components: Mapping[tuple[str, str], Grid], remarks: Remarks) -> None:
+def _check_names(chain: tuple[ChainRow, ...], components: Mapping[tuple[str, str], Grid], remarks: Remarks) -> None:
     named = [error for error in (row.error for row in chain) if isinstance(error, tuple)]
     for error in named:
         if error not in components:
@@ -247,7 +254,7 @@ def _read_units(files: Files, remarks: Remarks) -> tuple[float, float]:
     return 1.0 if words[0] == "error" else -1.0, ANGLES[words[1]]
 
 
-def _notes(components: list[Component], depends: list[bool], most: int) -> list[str]:
+def _notes(components: list[AxisErrors], depends: list[bool], most: int) -> list[str]:
     notes = ["The direction of the tool is corrected only as far as rotary axes can turn themselves right."]
     notes.append("units.txt is for ncfix emulate only; the control does not read it.")
     some = [each.axis for each, flag in zip(components, depends, strict=True) if flag]

@@ -31,11 +31,23 @@ from ncfix.tables.control import (
 )
 from ncfix.tables.grid import Grid
 from ncfix.tables.grid_sums import faces, searched
-from ncfix.tables.table_files import Remarks, in_order
+from ncfix.tables.table_files import Remarks, check_all, in_order, messages_of
 from ncfix.tables.volume import AIM, Volume, inputs_that_matter, search
-from ncfix_isg.configuration import LETTERS, config_text, is_list, read_configuration
-from ncfix_isg.csv_file import grid_text, is_grid, parameters, read_grids
-from ncfix_isg.leadscrew import MARK, MOST, NAME, list_text, read_leadscrews
+from ncfix_isg.volcomp_files import (
+    LETTERS,
+    MOST_SCREW_POINTS,
+    SCREW_FILE,
+    SCREW_MARK,
+    config_text,
+    grid_text,
+    is_grid,
+    is_list,
+    list_text,
+    parameters,
+    read_configuration,
+    read_grids,
+    read_leadscrews,
+)
 
 TABLE = "volcomp{}.csv"
 CONFIG = "volcomp.lis"
@@ -162,7 +174,7 @@ class Isg(Control):
         inputs = tuple(sorted(inputs, key=LETTERS.index))
         volume = Volume.of(request.machine, inputs, request.space, request.tool_length, settings["fit"] == "area")
         volume.uneven = settings["steps"] == "uneven"
-        made = _made(volume, AIM * request.target, most, settings["grids"])
+        made = _grid_set(volume, AIM * request.target, most, settings["grids"])
         names = [TABLE.format(number) for number in range(len(made.grids))]
         negate = "".join(sorted(settings["negate"].upper()))
         files = {CONFIG: config_text(numbers, settings["folder"], names, filter_steps, negate)}
@@ -170,24 +182,23 @@ class Isg(Control):
             files[name] = grid_text(_times(grid, dict.fromkeys(negate, -1.0)), owners)
         play = _play(request, settings)
         for each in play:
-            files[NAME.format(each.axis)] = list_text(each, numbers[each.axis])
+            files[SCREW_FILE.format(each.axis)] = list_text(each, numbers[each.axis])
         return Written(files, tuple(_notes(made, request, play)))
 
     def read(self, files: Files) -> Compensation:
         """As the control would take them. Raises `ConfigError` NCF491."""
         compensation, remarks = self._read(files)
-        for each in remarks:
-            each.check()
+        check_all(remarks)
         return compensation
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What the control would report, and what is rarely meant."""
         _, remarks = self._read(files)
-        return tuple(message for each in remarks for message in each.messages)
+        return messages_of(remarks)
 
     def knows(self, name: str, content: bytes) -> bool:
         """A list of VOLCOMP or of a leadscrew, or a table whose head names positions, then errors."""
-        return MARK in content or is_list(content) or is_grid(content)
+        return SCREW_MARK in content or is_list(content) or is_grid(content)
 
     def look(self, files: Files) -> tuple[Message, ...]:
         """The same; grids and lists of axes by themselves if no list of VOLCOMP names them."""
@@ -195,7 +206,7 @@ class Isg(Control):
             return self.lint(files)
         grids = sorted(name for name, content in files.items() if is_grid(content))
         remarks = [*read_grids(grids, LETTERS, files)[1], *read_leadscrews(files, None)[1]]
-        return tuple(message for each in remarks for message in each.messages)
+        return messages_of(remarks)
 
     def _read(self, files: Files) -> tuple[Compensation, list[Remarks]]:
         listed, config = read_configuration(files)
@@ -206,7 +217,7 @@ class Isg(Control):
 
 
 @dataclass(frozen=True, slots=True)
-class _Made:
+class GridSet:
     """Grids, with the axis whose error the parameters of each are called, and what they miss together, mm."""
 
     grids: tuple[Grid, ...]
@@ -214,16 +225,16 @@ class _Made:
     left: float
 
 
-def _made(volume: Volume, target: float, most: int, how: str) -> _Made:
+def _grid_set(volume: Volume, target: float, most: int, how: str) -> GridSet:
     """One grid, or several whose sum is the correction."""
     found = None
     if how == "sum" or (how == "auto" and len(volume.inputs) > ONE):
         found = faces(volume, [volume.inputs.index(axis) for axis in LINEAR], target)
     if found is None:
         mesh = search(volume, target, [most] * len(volume.inputs), most)
-        return _Made((mesh.grid,), ("",), mesh.left)
+        return GridSet((mesh.grid,), ("",), mesh.left)
     made = searched(volume, found, target, most)
-    return _Made(made.grids, tuple(volume.inputs[face.owner] for face in made.faces), made.left)
+    return GridSet(made.grids, tuple(volume.inputs[face.owner] for face in made.faces), made.left)
 
 
 def _times(grid: Grid, factors: Mapping[str, float]) -> Grid:
@@ -250,10 +261,10 @@ def _numbers(request: Request, given: str) -> dict[str, int]:
 def _play(request: Request, settings: Mapping[str, str]) -> tuple[Reversal, ...]:
     if settings["play"] == "no":
         return ()
-    return reversals(request.machine, request.space, request.tool_length, request.target, MOST)
+    return reversals(request.machine, request.space, request.tool_length, request.target, MOST_SCREW_POINTS)
 
 
-def _notes(made: _Made, request: Request, play: tuple[Reversal, ...]) -> Iterator[str]:
+def _notes(made: GridSet, request: Request, play: tuple[Reversal, ...]) -> Iterator[str]:
     for grid, owner in zip(made.grids, made.owners, strict=True):
         counts = " x ".join(f"{name} {count}" for name, count in zip(grid.inputs, grid.counts, strict=True))
         yield f"Grid {counts}: {grid.points} nodes for {', '.join(parameters(grid, owner))}."
@@ -261,7 +272,8 @@ def _notes(made: _Made, request: Request, play: tuple[Reversal, ...]) -> Iterato
     if made.left > request.target:
         yield f"The target of {1e3 * request.target:g} um is not reached with these nodes: --set points=N allows more."
     for each in play:
-        yield f"Play of {each.axis}, {1e3 * each.whole:+.2f} um from minus to plus, is in {NAME.format(each.axis)}."
+        name = SCREW_FILE.format(each.axis)
+        yield f"Play of {each.axis}, {1e3 * each.whole:+.2f} um from minus to plus, is in {name}."
     done = Compensation(tuple(term for each in play for term in each.terms()))
     yield from reversal_note(request.machine, request.space, request.tool_length, done)
     yield "The orientation of the tool is not corrected."

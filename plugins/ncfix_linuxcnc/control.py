@@ -7,12 +7,17 @@ points and held beyond them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.diagnostics import Message
 from ncfix.tables.axis_tables import positioning
-from ncfix.tables.compensation import Compensation
+from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import (
     Assumption,
     Control,
@@ -25,9 +30,227 @@ from ncfix.tables.control import (
     whole,
     wrong_setting,
 )
+from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_own_axis
-from ncfix.tables.table_files import DEGREE, in_order, unit_of
-from ncfix_linuxcnc.comp_file import MOST, Joint, comp_text, ini_text, is_ini, is_table, look_at, read_joints
+from ncfix.tables.table_files import ALONE, DEGREE, ORDER, TURNING, Remarks, check_all, in_order, messages_of, unit_of
+
+MOST = 256
+"""EMCMOT_COMP_SIZE of LinuxCNC."""
+LONGEST = 255
+"""Characters of a line that its reader takes."""
+STEEP = 0.01
+"""Change of a correction per length from which it looks like a slip: real screws stay below a thousandth."""
+LARGE = 1.0
+"""mm, degree: no machine is that wrong."""
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+GAP = r"(?:\s+|(?=[-+]))"
+"""What sscanf takes between two numbers."""
+TRIPLE = re.compile(rf"\s*({NUMBER}){GAP}({NUMBER}){GAP}({NUMBER})(.*)")
+SECTION = re.compile(r"\s*\[(\w+)\]\s*")
+ENTRY = re.compile(r"\s*(\w+)\s*=\s*(.*?)\s*")
+UNITS = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
+LOADS = re.compile(rb"(?im)^[ \t]*COMP_FILE[ \t]*=")
+Entries = dict[str, tuple[int, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class JointTable:
+    """One table: corrections (added) over the position of a joint, in mm or degree, (n,) each."""
+
+    number: int
+    axis: str
+    nodes: Array
+    forward: Array
+    reverse: Array
+
+    @property
+    def file(self) -> str:
+        """The name of its file."""
+        return f"joint_{self.number}_{self.axis}.comp"
+
+    def terms(self) -> Iterator[Term]:
+        """The two columns as tables, mm or rad."""
+        unit = unit_of(self.axis)
+        for way, values in ((1, self.forward), (-1, self.reverse)):
+            grid = Grid((self.axis,), (self.nodes * unit,), (self.axis,), (values * unit)[:, None])
+            yield Term((grid,), (self.axis, way))
+
+
+def comp_text(joint: JointTable, kind: int) -> bytes:
+    """A `.comp` file: nominal, forward, reverse. No comments: LinuxCNC stops reading where a line has another form."""
+    columns = [joint.nodes, joint.forward, joint.reverse]
+    if kind == 0:
+        columns = [joint.nodes, joint.nodes - joint.forward, joint.nodes - joint.reverse]
+    rows = zip(*(np.round(column, 6) + 0.0 for column in columns), strict=True)
+    return "".join(f"{a:.6f} {b:.6f} {c:.6f}\n" for a, b, c in rows).encode()
+
+
+def ini_text(joints: list[JointTable], letters: str, kind: int) -> bytes:
+    """The lines of the ini file that load the files."""
+    head = ["[TRAJ]", f"COORDINATES = {' '.join(letters)}", "LINEAR_UNITS = mm", "ANGULAR_UNITS = degree"]
+    parts = [
+        ["", f"[JOINT_{joint.number}]", f"COMP_FILE = {joint.file}", f"COMP_FILE_TYPE = {kind}"] for joint in joints
+    ]
+    return "".join(f"{line}\n" for line in [*head, *(line for part in parts for line in part)]).encode()
+
+
+def read_joints(files: Files) -> tuple[list[JointTable], list[Remarks]]:
+    """The tables that an ini file among these loads, with remarks on every file."""
+    inis = [name for name in files if name.lower().endswith(".ini")]
+    path = inis[0] if len(inis) == 1 else "comp.ini"
+    ini = Remarks.of(path, files[path] if len(inis) == 1 else b"", "#")
+    if len(inis) != 1:
+        ini.refuse(0, f"{len(inis)} ini files instead of one")
+        return [], [ini]
+    sections = _sections(ini)
+    line, coordinates = sections.get("TRAJ", {}).get("COORDINATES", (0, ""))
+    letters = "".join(coordinates.split()).upper()
+    if not set(letters) <= set(ORDER):
+        ini.refuse(line, f"COORDINATES = {coordinates}", f"letters of {ORDER}")
+    scale = _scale(sections, ini)
+    remarks, joints = [ini], []
+    for name, entries in sections.items():
+        if name.startswith("JOINT_") and "COMP_FILE" in entries:
+            found = _joint(name, entries, letters, scale, files, ini, remarks)
+            joints += [found] if found else []
+    return joints, remarks
+
+
+def is_ini(content: bytes) -> bool:
+    """Whether a file is an ini file that loads tables."""
+    return LOADS.search(content) is not None
+
+
+def is_table(content: bytes) -> bool:
+    """Whether a file begins as a table does: three numbers, and nothing else, in its first line."""
+    first = content.decode("latin-1").lstrip().split("\n", 1)[0].strip()
+    match = TRIPLE.fullmatch(first)
+    return match is not None and not match[4].strip()
+
+
+def look_at(files: Files) -> list[Remarks]:
+    """Remarks on an ini file with its tables, and on tables that it does not load: of the type with less to say."""
+    inis = {name: content for name, content in files.items() if is_ini(content)}
+    found = [remarks for name in inis for remarks in read_joints({**_others(files, inis), name: inis[name]})[1]]
+    loaded = {remarks.path for remarks in found}
+    for name in _others(files, inis).keys() - loaded:
+        kinds = []
+        for measured in (False, True):
+            kinds.append(Remarks.of(name, files[name]))
+            _table(kinds[-1], 0, "X", measured, 1.0)
+        found.append(min(kinds, key=lambda remarks: (len(remarks.wrong), len(remarks.doubtful))))
+    return sorted(found, key=lambda remarks: remarks.path)
+
+
+def _others(files: Files, inis: Files) -> dict[str, bytes]:
+    return {name: content for name, content in files.items() if name not in inis}
+
+
+def _sections(ini: Remarks) -> dict[str, Entries]:
+    found: dict[str, Entries] = {}
+    entries: Entries = found.setdefault("", {})
+    for number, row in enumerate(ini.rows, 1):
+        if section := SECTION.fullmatch(row):
+            entries = found.setdefault(section[1].upper(), {})
+        elif entry := ENTRY.fullmatch(row):
+            entries[entry[1].upper()] = (number, entry[2])
+        elif row.strip() and not row.lstrip().startswith(("#", ";")):
+            ini.refuse(number, "neither a section, nor NAME = VALUE, nor a comment")
+    return found
+
+
+def _scale(sections: dict[str, Entries], ini: Remarks) -> float:
+    line, unit = sections.get("TRAJ", {}).get("LINEAR_UNITS", (0, ""))
+    if unit.lower() not in UNITS:
+        ini.refuse(line, f"LINEAR_UNITS = {unit or 'nothing'}", "mm or inch, under [TRAJ]")
+    return UNITS.get(unit.lower(), 1.0)
+
+
+def _joint(
+    section: str, entries: Entries, letters: str, scale: float, files: Files, ini: Remarks, remarks: list[Remarks]
+) -> JointTable | None:
+    line, name = entries["COMP_FILE"]
+    number = section.removeprefix("JOINT_")
+    if not number.isdecimal() or int(number[:4]) >= len(letters):
+        ini.refuse(line, f"[{section}] is no axis of COORDINATES = {letters or 'nothing'}")
+        return None
+    kind_line, kind = entries.get("COMP_FILE_TYPE", (line, "0"))
+    if "COMP_FILE_TYPE" not in entries:
+        ini.doubt(line, f"[{section}] has no COMP_FILE_TYPE: LinuxCNC takes 0, actual positions")
+    if kind not in ("0", "1"):
+        ini.refuse(kind_line, f"COMP_FILE_TYPE = {kind or 'nothing'}", "1: corrections, 0: actual positions")
+    if "BACKLASH" in entries:
+        ini.doubt(entries["BACKLASH"][0], "BACKLASH is ignored where there is a COMP_FILE", "take the line out")
+    if name not in files:
+        ini.refuse(line, f"the file {name} is missing")
+        return None
+    found = Remarks.of(name, files[name])
+    remarks.append(found)
+    if ALONE.search(files[name].decode("latin-1")):
+        found.refuse(0, "a line ends in CR alone: LinuxCNC takes what follows for the same line", "LF or CR LF")
+    axis = letters[int(number)]
+    return _table(found, int(number), axis, kind == "0", 1.0 if axis in TURNING else scale)
+
+
+def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: float) -> JointTable | None:
+    rows = np.array(list(_triples(remarks)), dtype=np.float64).reshape(-1, 3)
+    if len(rows) > MOST:
+        remarks.refuse(MOST + 1, f"{len(rows)} points, and LinuxCNC holds {MOST}")
+    if len(rows) < 2:
+        remarks.refuse(0, f"{len(rows)} points")
+        return None
+    steps = np.diff(rows[:, 0])
+    for row in np.flatnonzero(steps <= 0):
+        remarks.refuse(int(row) + 2, "the nominal positions must ascend")
+    if (steps <= 0).any():
+        return None
+    nodes, trims = rows[:, 0], rows[:, :1] - rows[:, 1:] if measured else rows[:, 1:]
+    if not _too_large(remarks, trims * scale, measured, "degree" if axis in TURNING else "mm"):
+        _look_for_jumps(remarks, steps, trims)
+    stored: NDArray[np.float64] = trims.astype(np.float32).astype(np.float64) * scale
+    return JointTable(number, axis, nodes * scale, stored[:, 0], stored[:, 1])
+
+
+def _too_large(remarks: Remarks, trims: Array, measured: bool, unit: str) -> bool:
+    """Whether the first correction that no machine needs is refused: most likely the file is of the other type."""
+    rows = np.flatnonzero(np.abs(trims).max(axis=1) > LARGE)
+    if rows.size:
+        size = trims[rows[0]][np.abs(trims[rows[0]]).argmax()]
+        other = "1, corrections" if measured else "0, actual positions"
+        text = f"a correction of {size:g} {unit}, which no machine needs: LinuxCNC would move there"
+        remarks.refuse(int(rows[0]) + 1, text, f"is it a file of COMP_FILE_TYPE {other}?")
+    return bool(rows.size)
+
+
+def _triples(remarks: Remarks) -> Iterator[tuple[float, float, float]]:
+    """The points up to the first line that LinuxCNC's reader stops at."""
+    for number, row in enumerate(remarks.rows, 1):
+        match = TRIPLE.fullmatch(row)
+        if match is None and not any(each.strip() for each in remarks.rows[number - 1 :]):
+            return
+        if match is None:
+            what = "a blank line" if not row.strip() else "a decimal comma" if "," in row else "not three numbers"
+            remarks.refuse(number, f"{what}: LinuxCNC stops reading here", "three numbers on every line, no comments")
+            return
+        if len(row) > LONGEST:
+            remarks.refuse(number, f"longer than {LONGEST} characters")
+        if match[4].startswith(","):
+            remarks.refuse(number, "a decimal comma: LinuxCNC takes what is before it for the whole number")
+        elif match[4].strip():
+            remarks.doubt(number, "more than three numbers: the rest is ignored")
+        place, there, back = float(match[1]), float(match[2]), float(match[3])
+        if not np.isfinite([place, there, back]).all():
+            remarks.refuse(number, "a number beyond all bounds")
+            return
+        yield place, there, back
+
+
+def _look_for_jumps(remarks: Remarks, steps: Array, trims: Array) -> None:
+    """Name the points where the correction rises and falls again, or jumps, faster than a screw can err."""
+    slopes = np.abs(np.diff(trims, axis=0)).max(axis=1) / steps
+    for row in np.flatnonzero(slopes > STEEP):
+        text = f"the correction changes by {slopes[row]:.3g} per unit of length from the line before"
+        remarks.doubt(int(row) + 2, text, "a slip of the digits?")
 
 
 class LinuxCnc(Control):
@@ -96,14 +319,13 @@ class LinuxCnc(Control):
     def read(self, files: Files) -> Compensation:
         """As LinuxCNC loads them. Raises `ConfigError` NCF491."""
         joints, remarks = read_joints(files)
-        for each in remarks:
-            each.check()
+        check_all(remarks)
         return Compensation(tuple(term for joint in joints for term in joint.terms()))
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What would stop LinuxCNC's reader early, and what is rarely meant."""
         _, remarks = read_joints(files)
-        return tuple(message for each in remarks for message in each.messages)
+        return messages_of(remarks)
 
     def knows(self, name: str, content: bytes) -> bool:
         """An ini file that names tables, or a table: numbers by threes in the first line that has anything."""
@@ -111,10 +333,10 @@ class LinuxCnc(Control):
 
     def look(self, files: Files) -> tuple[Message, ...]:
         """The same, and of tables that no ini file loads what is wrong in them under either type."""
-        return tuple(message for each in look_at(files) for message in each.messages)
+        return messages_of(look_at(files))
 
 
-def _joints(tables: Compensation, letters: str) -> list[Joint]:
+def _joints(tables: Compensation, letters: str) -> list[JointTable]:
     found = []
     for term in tables.terms[::2]:
         (axis,) = term.outputs
@@ -122,7 +344,7 @@ def _joints(tables: Compensation, letters: str) -> list[Joint]:
         unit = unit_of(axis)
         nodes = pair[0].nodes[0] / unit
         forward, reverse = (grid.values[:, 0] / unit for grid in pair)
-        found.append(Joint(letters.index(axis), axis, nodes, forward, reverse))
+        found.append(JointTable(letters.index(axis), axis, nodes, forward, reverse))
     return sorted(found, key=lambda joint: joint.number)
 
 

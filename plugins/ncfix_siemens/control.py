@@ -22,14 +22,19 @@ from ncfix.tables.correction import orientation_error, random_poses
 from ncfix.tables.grid import Array
 from ncfix.tables.scheme import Scheme, SchemeTask, automatic
 from ncfix.tables.scheme_fixed import fixed
-from ncfix_siemens.cec import cec_text
-from ncfix_siemens.combine import Reading, tables_of
-from ncfix_siemens.eec import eec_text
-from ncfix_siemens.facts import ASSUMPTIONS, OFF, PROPERTIES, STEPS
-from ncfix_siemens.options import OPTIONS, Settings, checked
-from ncfix_siemens.probe import probe_files
-from ncfix_siemens.reading import as_corrections, read_folder, reading_of
-from ncfix_siemens.table import Table
+from ncfix.tables.table_files import check_all, messages_of
+from ncfix_siemens.products import TableReading, as_corrections, read_folder, reading_of, tables_of
+from ncfix_siemens.settings import (
+    ASSUMPTIONS,
+    OPTIONS,
+    PROPERTIES,
+    STEPS,
+    SWITCH_OFF,
+    Settings,
+    checked_settings,
+    probe_files,
+)
+from ncfix_siemens.tables import CecTable, cec_text, eec_text
 
 CEC = "NC_CEC.INI"
 TABLES = re.compile(rb"(?im)^[^;\n]*\$(?:AN_CEC|AA_ENC_COMP)(?:_\w+)?[ \t]*\[")
@@ -53,7 +58,7 @@ class Siemens(Control):
     assumptions: ClassVar[tuple[Assumption, ...]] = ASSUMPTIONS
     options: ClassVar[Mapping[str, Option]] = OPTIONS
     steps: ClassVar[tuple[str, ...]] = STEPS
-    switch_off = OFF
+    switch_off = SWITCH_OFF
 
     def _missing(self, given: Mapping[str, str]) -> Iterator[Message]:
         """Whoever has not settled the sign has not settled the products either: both are asked for at once."""
@@ -68,19 +73,19 @@ class Siemens(Control):
 
     def write(self, request: Request) -> Written:
         """`NC_CEC.INI`, and an EEC file for each axis if `positioning=eec`."""
-        settings = checked(self.settings(request.settings), request.machine)
+        settings = checked_settings(self.settings(request.settings), request.machine)
         scheme = _scheme(request, settings)
         own = [term for term in scheme.tables.terms if settings.eec and _own(term)]
         others = [term for term in scheme.tables.terms if not (settings.eec and _own(term))]
         if any(len(term.factors) > 1 for term in others) and not settings.terms:
             raise UsageError((self._wanting("for these tables, since some are multiplied"),))
-        reading = Reading(settings.axes, 1 if settings.sign == "correction" else -1, settings.terms)
+        reading = TableReading(settings.axes, 1 if settings.sign == "correction" else -1, settings.terms)
         cec = tables_of(others, reading)
         if len(cec) > settings.limits.tables:
             text = f"{len(cec)} tables are needed, and {settings.model} has {settings.limits.tables}"
             hint = "--set tables=N if yours has more; product_terms=only needs least"
             raise RefusedError.of("NCF484", text, hint=hint)
-        eec = [replace(table, index=0) for table in tables_of(own, Reading(settings.axes, -1, ""))]
+        eec = [replace(table, index=0) for table in tables_of(own, TableReading(settings.axes, -1, ""))]
         files = {f"{table.output}_EEC.INI": eec_text(table, _heads(settings)) for table in eec}
         if cec or not eec:
             files[CEC] = cec_text(cec, _heads(settings), _titles(cec, settings), settings.style)
@@ -88,7 +93,7 @@ class Siemens(Control):
 
     def probe(self, request: Request) -> Written:
         """Two small files that settle `value_sign` and `product_terms`, and what to do with them."""
-        settings = checked(request.settings, request.machine)
+        settings = checked_settings(request.settings, request.machine)
         ranges = {
             axis.name: (low / axis.unit, high / axis.unit)
             for axis, (low, high) in zip(request.machine.axes, request.space.tolist(), strict=True)
@@ -99,8 +104,7 @@ class Siemens(Control):
         """As the control would run them. Raises `ConfigError` NCF491."""
         folder = read_folder(files)
         reading, unsaid = reading_of(folder)
-        for each in (*folder.remarks, unsaid):
-            each.check()
+        check_all([*folder.remarks, unsaid])
         assert reading is not None
         return as_corrections(folder, reading)
 
@@ -108,7 +112,7 @@ class Siemens(Control):
         """What the control would stumble over, ignore or take otherwise than it looks, and what is rarely meant."""
         folder = read_folder(files)
         _, unsaid = reading_of(folder)
-        return tuple(message for each in (*folder.remarks, unsaid) for message in each.messages)
+        return messages_of([*folder.remarks, unsaid])
 
     def knows(self, name: str, content: bytes) -> bool:
         """Assignments to values of tables."""
@@ -117,7 +121,7 @@ class Siemens(Control):
     def look(self, files: Files) -> tuple[Message, ...]:
         """The same, but for sign, products and letters of axes, which only comments of ncfix say."""
         folder = read_folder(files)
-        return self.lint(files) if folder.said else tuple(each for one in folder.remarks for each in one.messages)
+        return self.lint(files) if folder.said else messages_of(folder.remarks)
 
 
 def _scheme(request: Request, settings: Settings) -> Scheme:
@@ -160,7 +164,7 @@ def _heads(settings: Settings) -> list[str]:
     return [f"ncfix: {' '.join(said)}", "assumptions SIEMENS-1 to SIEMENS-7: see hand-over.md"]
 
 
-def _titles(tables: Sequence[Table], settings: Settings) -> dict[int, str]:
+def _titles(tables: Sequence[CecTable], settings: Settings) -> dict[int, str]:
     """A comment for each table; numbers are those that MULT_BY_TABLE takes."""
     letters = {axis: letter for letter, axis in settings.axes.items()}
     pointed = {table.multiply for table in tables}
@@ -177,7 +181,7 @@ def _titles(tables: Sequence[Table], settings: Settings) -> dict[int, str]:
     return found
 
 
-def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[Table]) -> Iterator[str]:
+def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[CecTable]) -> Iterator[str]:
     products = sum(bool(table.multiply) for table in cec)
     yield f"Scheme {settings.scheme}: {len(cec)} tables of {settings.limits.tables}, {products} of them multiplied."
     if scheme.rest > request.target / 10:

@@ -10,7 +10,7 @@ import pytest
 
 from ncfix.diagnostics import ExitCode
 from ncfix.tables.control import get_control
-from ncfix_siemens.probe import PRODUCT, SHEET, SIGN
+from ncfix_siemens.settings import PROBE_SHEET, PRODUCT_PROBE, SIGN_PROBE
 
 SAID = ("--set", "value_sign=error", "--set", "product_terms=only")
 
@@ -47,13 +47,16 @@ def test_the_wrong_sign_would_double_the_error(shop: Any, ncfix: Any) -> None:
 def test_the_probe_needs_no_settings_and_says_what_to_do(shop: Any, ncfix: Any) -> None:
     folder: Path = shop.folder / "probe"
     result = ncfix("export", "siemens", "-m", shop.machine, "-o", folder, "--probe")
-    assert (result.code, result.out.decode().split()) == (ExitCode.DONE, sorted([PRODUCT, SIGN, SHEET]))
-    assert sorted(path.name for path in folder.iterdir()) == sorted([PRODUCT, SIGN, SHEET])
-    sheet = (folder / SHEET).read_text()
+    assert (result.code, result.out.decode().split()) == (
+        ExitCode.DONE,
+        sorted([PRODUCT_PROBE, SIGN_PROBE, PROBE_SHEET]),
+    )
+    assert sorted(path.name for path in folder.iterdir()) == sorted([PRODUCT_PROBE, SIGN_PROBE, PROBE_SHEET])
+    sheet = (folder / PROBE_SHEET).read_text()
     for part in ("value_sign=error", "value_sign=correction", "product_terms=only", "0.32 mm", "AX1", "MD32710"):
         assert part in sheet
     control = get_control("siemens")
-    for name in (SIGN, PRODUCT):
+    for name in (SIGN_PROBE, PRODUCT_PROBE):
         remarks = control.lint({name: (folder / name).read_bytes()})
         assert all("no file says" in message.text for message in remarks)  # which is what the probe is for
 
@@ -62,8 +65,8 @@ def test_the_probe_as_json_with_other_axes(shop: Any, ncfix: Any) -> None:
     folder: Path = shop.folder / "probe"
     axes = "axes=X:X1,Y:Y1,Z:Z1"
     found = ncfix("export", "siemens", "-m", shop.machine, "-o", folder, "--probe", "--set", axes, "--json").json()
-    assert found["files"] == sorted([PRODUCT, SIGN, SHEET])
-    assert b"$AN_CEC_OUTPUT_AXIS[0]=(X1)" in (folder / SIGN).read_bytes()
+    assert found["files"] == sorted([PRODUCT_PROBE, SIGN_PROBE, PROBE_SHEET])
+    assert b"$AN_CEC_OUTPUT_AXIS[0]=(X1)" in (folder / SIGN_PROBE).read_bytes()
 
 
 def test_other_controls_have_nothing_to_probe(shop: Any, ncfix: Any) -> None:

@@ -18,8 +18,9 @@ from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
 from ncfix.tables.table_files import Remarks
 from ncfix.testing import AXES, check_control, single_error
-from ncfix_fanuc.increments import diffused
-from ncfix_fanuc.pitch_text import Pitch, Record, pitch_text, read_increments, read_records
+from ncfix_fanuc.parameters import PunchedParameter, read_records
+from ncfix_fanuc.pitch import diffused
+from ncfix_fanuc.pitch_files import Pitch, pitch_text, read_increments
 
 CONTROL = get_control("fanuc-pitch")
 SETTINGS = CONTROL.settings({"sign": "correction"})
@@ -109,7 +110,7 @@ def test_the_sample_is_read_and_its_numbers_written_again(shared: Callable[[str]
     assert pitch_text(Pitch("X", first, increments, 33, 1, 1.0)) == content
 
 
-def punched(record: Record) -> str:
+def punched(record: PunchedParameter) -> str:
     """A record as the control writes it."""
     words = "".join(f"{record.kind}{index if record.kind else ''}P{value}" for index, value in record.values)
     return f"N{record.number:05d}{words};"

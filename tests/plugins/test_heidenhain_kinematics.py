@@ -16,8 +16,8 @@ from ncfix.tables.correction import random_poses, ranges_of
 from ncfix.tables.export import Exported, export
 from ncfix.tables.table_files import Remarks
 from ncfix.testing import check_control, single_error
-from ncfix_heidenhain.chain import Row, kinematics_text, over_limits, read_rows
-from ncfix_heidenhain.table_text import read_table
+from ncfix_heidenhain.chain import ChainRow, kinematics_text, over_limits, read_rows
+from ncfix_heidenhain.table_files import read_table
 
 CONTROL = get_control("heidenhain-kinematics")
 SETTINGS = CONTROL.settings({"sign": "error", "angle_unit": "deg"})
@@ -128,16 +128,16 @@ def test_the_sample_is_read_and_written_again_identically(shared: Callable[[str]
     assert table is not None
     assert table.text() == content
     assert rows == (
-        Row("Trans", "X", 0.016),
-        Row("MachAxis", "B"),
-        Row("Trans", "A", 0.0, 0.0015),
-        Row("MachBase"),
-        Row("Trans", "Y", None, ("A", "C2")),
+        ChainRow("Trans", "X", 0.016),
+        ChainRow("MachAxis", "B"),
+        ChainRow("Trans", "A", 0.0, 0.0015),
+        ChainRow("MachBase"),
+        ChainRow("Trans", "Y", None, ("A", "C2")),
     )
 
 
 def test_a_table_beyond_the_limits_of_the_control_is_told() -> None:
-    axis, trans = Row("MachAxis", "X"), Row("Trans", "Y", 1.0, 0.1)
+    axis, trans = ChainRow("MachAxis", "X"), ChainRow("Trans", "Y", 1.0, 0.1)
     assert not list(over_limits([axis, *[trans] * 49]))
     assert "51 rows" in next(over_limits([axis, *[trans] * 50]))
     assert any("COMPTAB" in text for text in over_limits([axis, *[trans] * 100]))
@@ -179,7 +179,7 @@ def test_broken_files(case: str) -> None:
 
 
 def test_too_many_rows_are_refused() -> None:
-    rows = [*[Row("Trans", "X", 1.0)] * 51, Row("MachBase")]
+    rows = [*[ChainRow("Trans", "X", 1.0)] * 51, ChainRow("MachBase")]
     remarks = Remarks.of("kinematics.tab", kinematics_text(rows))
     read_rows(remarks, kinematics_text(rows))
     assert any("51 rows" in message.text for message in remarks.messages)

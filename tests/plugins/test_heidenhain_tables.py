@@ -17,8 +17,7 @@ from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
 from ncfix.tables.table_files import Remarks
 from ncfix.testing import check_control, single_error
-from ncfix_heidenhain.com import read_com
-from ncfix_heidenhain.table_text import read_table
+from ncfix_heidenhain.table_files import read_com, read_table
 
 CONTROL = get_control("heidenhain")
 CMA = (

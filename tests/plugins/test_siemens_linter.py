@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from ncfix.diagnostics import ConfigError
 from ncfix.tables.table_files import Remarks
-from ncfix_siemens.eec import read_eec
-from ncfix_siemens.syntax import parsed, written
+from ncfix_siemens.assignments import parsed, written
+from ncfix_siemens.tables import read_eec
 from tables.siemens_files import CONTROL, EEC, GOOD, HEAD, ONE, PAIR, at
 
 WRONG = {

@@ -17,11 +17,10 @@ from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import Exported, export
 from ncfix.tables.table_files import Remarks
 from ncfix.testing import check_control, single_error
-from ncfix_siemens.cec import Style, cec_text, read_cec
-from ncfix_siemens.combine import TERMS, Reading, compensation
-from ncfix_siemens.probe import READINGS
-from ncfix_siemens.syntax import Assignment, assignments, parsed, written
-from ncfix_siemens.table import Table
+from ncfix_siemens.assignments import ArrayAssignment, assignments, parsed, written
+from ncfix_siemens.products import TableReading, compensation
+from ncfix_siemens.settings import PROBE_READINGS, TERMS
+from ncfix_siemens.tables import CecStyle, CecTable, cec_text, read_cec
 from tables.siemens_files import CONTROL, EEC, GOOD, PAIR, at
 
 MACHINES = Path(__file__).resolve().parents[2] / "examples" / "machines"
@@ -51,9 +50,9 @@ def test_golden_bytes_of_a_table_that_is_added() -> None:
 
 
 def test_golden_bytes_of_a_pair() -> None:
-    base = Table(0, "AX1", "AX2", -10.0, 20.0, np.array([-0.5, 0.5]), direction=-1, multiply=2)
-    multiplier = Table(1, "AX4", "AX2", 0.0, 120.0, np.array([0.0, 0.8660254, -0.8660254, 0.0]), modulo=True)
-    style = Style(brackets=False, metric=True, path="/_N_CUS_DIR")
+    base = CecTable(0, "AX1", "AX2", -10.0, 20.0, np.array([-0.5, 0.5]), direction=-1, multiply=2)
+    multiplier = CecTable(1, "AX4", "AX2", 0.0, 120.0, np.array([0.0, 0.8660254, -0.8660254, 0.0]), modulo=True)
+    style = CecStyle(brackets=False, metric=True, path="/_N_CUS_DIR")
     assert cec_text([base, multiplier], ["made by hand"], {1: "sine"}, style) == (
         b"%_N_NC_CEC_INI\n;$PATH=/_N_CUS_DIR\nMETRIC\nCHANDATA(1)\n; made by hand\n"
         b"$AN_CEC[0,0]=-0.5\n$AN_CEC[0,1]=0.5\n$AN_CEC_INPUT_AXIS[0]=AX1\n$AN_CEC_OUTPUT_AXIS[0]=AX2\n"
@@ -224,7 +223,7 @@ def test_samples_are_read_and_written_again_identically(shared: Callable[[str], 
     assert written(lines) == text
     remarks = Remarks("sample")
     found = list(assignments(lines, remarks))
-    assert len(found) == text.count("]=") == sum(isinstance(line, Assignment) for line in lines)
+    assert len(found) == text.count("]=") == sum(isinstance(line, ArrayAssignment) for line in lines)
     assert not remarks.messages
 
 
@@ -248,9 +247,9 @@ def test_the_probe_of_products_reads_as_its_comment_says(shared: Callable[[str],
     remarks = Remarks("")
     tables = read_cec(parsed(text), remarks)
     assert not remarks.messages
-    reading = Reading({"X": "AX1", "Z": "AX3"}, 1, terms)
+    reading = TableReading({"X": "AX1", "Z": "AX3"}, 1, terms)
     found = compensation(tables, reading).at(("X", "Z"), np.array([[-50.0, -20.0]]))
-    assert found[0].tolist() == pytest.approx([READINGS[terms], 0.0])
+    assert found[0].tolist() == pytest.approx([PROBE_READINGS[terms], 0.0])
 
 
 # -- settings ----------------------------------------------------------------------------------------------------------

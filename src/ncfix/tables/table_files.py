@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -83,6 +84,17 @@ class Remarks:
         return Place(self.path, line, 0, self.rows[line - 1] if 0 < line <= len(self.rows) else "")
 
 
+def check_all(remarks: Iterable[Remarks]) -> None:
+    """Raise `ConfigError` for the first file in which anything is wrong."""
+    for each in remarks:
+        each.check()
+
+
+def messages_of(remarks: Iterable[Remarks]) -> tuple[Message, ...]:
+    """All of several files."""
+    return tuple(message for each in remarks for message in each.messages)
+
+
 def _rows(text: str) -> list[str]:
     """The lines, whether they end in LF, CR LF or CR."""
     rows = re.split("\r\n|\n|\r", text)
@@ -94,9 +106,9 @@ def unit_of(letter: str) -> float:
     return DEGREE if letter in TURNING else 1.0
 
 
-def in_order(machine: Machine, known: str = ORDER) -> tuple[str, ...]:
+def in_order(machine: Machine, known: Sequence[str] = ORDER) -> tuple[str, ...]:
     """The axes of a machine as its control counts them; raises `RefusedError` NCF484 for one that it cannot have."""
-    odd = [axis.name for axis in machine.axes if axis.name not in known or (axis.name in TURNING) != axis.rotary]
+    odd = [axis.name for axis in machine.axes if axis.name not in {*known} or (axis.name in TURNING) != axis.rotary]
     if odd:
         lengths = " ".join(letter for letter in known if letter not in TURNING)
         text = f"axes {' '.join(odd)}: linear axes are {lengths} here, rotary axes {' '.join(TURNING)}"

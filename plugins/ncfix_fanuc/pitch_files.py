@@ -1,8 +1,13 @@
-"""Stored pitch errors as the control sums them up, read back from their files, with remarks on what does not fit."""
+"""Stored pitch errors as files: written, and read back as the control sums them up, with remarks on what does not fit.
+
+Increments are in the form of the sample of B-63980EN, p. 100: `no,value`; parameters 3620 to 3625 belong to them.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +16,84 @@ from ncfix.tables.compensation import Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import TURNING, Remarks, as_number, unit_of
-from ncfix_fanuc.pitch_text import NUMBERS, Pitch, read_increments, read_records
-from ncfix_fanuc.units import SIGNS, sense_of
+from ncfix_fanuc.parameters import SIGNS, read_records, sense_of
 
+LARGEST_INCREMENT = 7
+MOST_POINTS = 128
+"""Points of an axis."""
+NUMBERS = {"reference": 3620, "low": 3621, "high": 3622, "magnification": 3623, "interval": 3624, "turn": 3625}
+HEAD = "no,value"
+POINT = re.compile(r"\s*(\d{1,6})\s*[,;\s]\s*([-+]?\d{1,6})\s*")
 PARAMETERS, SETTINGS = "parameters.txt", "settings.txt"
-MOST_MAGNIFICATION = 100
+MOST_PITCH_MAGNIFICATION = 100
 FAR = 1e6
 """mm or degree: no interval is that long."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pitch:
+    """The increments of one axis.
+
+    axis           its letter
+    first          number of the first point
+    increments     (n,) times magnification times detection unit: what is added on the way from the point before; of a
+                   turn the first is the last one again
+    reference      number of the point at machine zero
+    magnification  factor
+    interval       mm or degree
+    turn           travel of a turn, degree; 0 for an axis that does not turn round
+    """
+
+    axis: str
+    first: int
+    increments: NDArray[np.int64]
+    reference: int
+    magnification: int
+    interval: float
+    turn: float = 0.0
+
+    @property
+    def last(self) -> int:
+        """The number of the last point."""
+        return self.first + len(self.increments) - 1
+
+
+def pitch_text(pitch: Pitch) -> bytes:
+    """The increments."""
+    note = f"# No.{pitch.first}..{pitch.last}, incremental values (-7..+7), x magnification, detection units"
+    rows = [f"{number},{value}" for number, value in enumerate(pitch.increments.tolist(), pitch.first)]
+    return "".join(f"{row}\n" for row in [note, HEAD, *rows]).encode()
+
+
+def is_increments(content: bytes) -> bool:
+    """Whether a file holds increments by point number."""
+    rows = (row.split("#", 1)[0].replace(" ", "").lower() for row in content.decode("latin-1").splitlines())
+    return next((row for row in rows if row.strip()), "") == HEAD
+
+
+def read_increments(remarks: Remarks) -> tuple[int, NDArray[np.int64]]:
+    """The number of the first point, and the increments."""
+    rows = [(line, row) for line, row in enumerate(remarks.rows, 1) if row.split("#", 1)[0].strip()]
+    if not rows or rows[0][1].replace(" ", "").lower() != HEAD:
+        remarks.refuse(rows[0][0] if rows else 0, f"should begin with {HEAD}")
+        return 0, np.zeros(0, dtype=np.int64)
+    found: list[tuple[int, int]] = []
+    for line, row in rows[1:]:
+        match = POINT.fullmatch(row.split("#", 1)[0])
+        if match is None:
+            remarks.refuse(line, "not a point number, a comma and a whole number")
+            continue
+        number, value = int(match[1]), int(match[2])
+        if found and number != found[-1][0] + 1:
+            remarks.refuse(line, f"point {number} after point {found[-1][0]}")
+        if abs(value) > LARGEST_INCREMENT:
+            text = f"{value} is beyond -{LARGEST_INCREMENT} to {LARGEST_INCREMENT}"
+            remarks.refuse(line, text, "a larger magnification")
+        found.append((number, value))
+    if len(found) < 2 or len(found) > MOST_POINTS:
+        remarks.refuse(0, f"{len(found)} points; 2 to {MOST_POINTS} are possible")
+    first = found[0][0] if found else 0
+    return first, np.array([value for _, value in found], dtype=np.int64)
 
 
 def read_pitches(files: Files) -> tuple[tuple[Term, ...], list[Remarks]]:
@@ -83,8 +159,8 @@ def _check(remarks: Remarks, parameters: Mapping[str, float], first: int, last: 
         remarks.refuse(0, "an interval of zero")
     elif not 0 < parameters["interval"] <= FAR:
         remarks.refuse(0, f"an interval of {parameters['interval']:g}")
-    if parameters["magnification"] not in range(MOST_MAGNIFICATION + 1):
-        remarks.refuse(0, f"a magnification of {parameters['magnification']:g}", f"0 to {MOST_MAGNIFICATION}")
+    if parameters["magnification"] not in range(MOST_PITCH_MAGNIFICATION + 1):
+        remarks.refuse(0, f"a magnification of {parameters['magnification']:g}", f"0 to {MOST_PITCH_MAGNIFICATION}")
     if parameters["reference"] not in range(100_000):
         remarks.refuse(0, f"a reference position at point {parameters['reference']:g}")
     elif not first <= parameters["reference"] <= last:

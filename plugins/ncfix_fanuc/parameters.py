@@ -1,0 +1,341 @@
+"""What the parameters of Fanuc controls say, for all of their compensations: signs and units, places of grids, play.
+
+Parameters are punched as by Series 15i and later (B-63330EN): records `N03620A1P33A2P...;` between two lines with `%`.
+
+Where the control puts a grid: its parameters say how many points there are along each axis, how far apart they are,
+and which of them lies at the reference position. So there must be a point there, and its number goes with the files.
+
+Play is backlash compensation, parameter 1851: what is added to an axis whenever it turns round. The parameter manuals
+(B-63090EN, B-64120EN and later) say it: detection units, -9999 to 9999; moved against the direction of its reference
+position return, an axis is moved by the amount as well, in the direction of that motion. Moved in the direction of the
+return it is not, so that the mean of both ways is off by half of the amount, which goes into the grid.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ncfix.diagnostics import UsageError
+from ncfix.tables.axis_tables import reversals
+from ncfix.tables.compensation import Compensation, Term
+from ncfix.tables.control import Assumption, Files, Option, Request, SettingForm, number, one_of
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.table_files import DEGREE, Remarks
+from ncfix_fanuc import json_values
+
+SIGNS = ("correction", "error")
+SIGNED = "correction: values are added to the command; error: they are taken off it"
+UNITS: Mapping[str, Option] = {
+    "detection_unit_um": Option("0.1", "detection unit of linear axes, um", number(1e-3, 10)),
+    "detection_unit_deg": Option("0.0001", "detection unit of rotary axes and of angles, degree", number(1e-6, 10)),
+}
+RECORD = re.compile(r"N(\d{1,6})(?:Q\d)?((?:[ASL]\d{1,3}[PM][-+]?\d{1,12}\.?\d*)+);?")
+PLAIN = re.compile(r"N(\d{1,6})(?:Q\d)?P([-+]?\d{1,12}\.?\d*);?")
+ENTRY = re.compile(r"([ASL])(\d+)[PM]([-+]?\d+\.?\d*)")
+PLACE = re.compile(r"([XYZABC])=?([+-]?(?:\d+\.?\d*|\.\d+))")
+REFERENCE, POINTS, FIRST = "reference", "reference_points", "first"
+CLOSE = 1e-6
+"""mm or degree: positions nearer to each other are one."""
+PLACING_STEP = (
+    "For each axis set the number of points, the interval, and the number of the point at the reference position as "
+    "the remarks below list them: the control puts the grid by these, not by the positions in the files."
+)
+BACKLASH_FILE = "backlash.txt"
+BACKLASH_PARAMETER = 1851
+LARGEST_BACKLASH = 9999
+LINEAR = ("X", "Y", "Z")
+BACKLASH_ASSUMPTION = Assumption(
+    "FANUC-6",
+    "X, Y and Z are the axes 1, 2 and 3 of the parameters, they home towards plus unless --set home_minus says "
+    "otherwise, and backlash compensation acts besides the grid.",
+    "parameter manuals: 1851 in detection units, first added when the axis moves against its reference position "
+    "return; of the grid they say nothing",
+    "so; --set play=no writes no backlash",
+    "Parameter 1006#5 (ZMI) is the direction of the return. Turn an axis round under a dial gauge with 1851 at zero, "
+    "and as written: the play must have gone, not doubled.",
+)
+HOMING = SettingForm(
+    "axes of X, Y and Z, like XY",
+    lambda text: set(text.upper()) <= set(LINEAR) and len(set(text.upper())) == len(text),
+)
+BACKLASH_OPTIONS: Mapping[str, Option] = {
+    "play": Option(
+        "yes", "yes: play goes into the backlash compensation of the axes; no: it is left", one_of("yes", "no")
+    ),
+    "home_minus": Option("", "axes of X, Y and Z whose reference position return goes towards minus, e.g. XY", HOMING),
+}
+BACKLASH_STEP = (
+    "Is there a backlash.txt? Add its amounts to what parameter 1851 holds (the machine was measured with that); set "
+    "nothing else for the same play, such as bidirectional pitch error compensation (3605#0)."
+)
+
+
+def sign_option(settled: str) -> Option:
+    """The option `sign`, with the assumption that it is about."""
+    return Option(None, SIGNED, one_of(*SIGNS), settled)
+
+
+def sense_of(sign: str) -> int:
+    """1 if values are added, -1 if they are taken off."""
+    return 1 if sign == SIGNS[0] else -1
+
+
+def units_of(settings: Mapping[str, str]) -> tuple[float, float]:
+    """Detection units, mm and rad."""
+    length, angle = (float(settings[key]) for key in UNITS)
+    return length / 1000, angle * DEGREE
+
+
+def is_records(content: bytes) -> bool:
+    """Whether a file is of records between two lines with %, as parameters are punched."""
+    rows = [row.strip() for row in content.decode("latin-1").split("\n") if row.strip()]
+    return len(rows) > 1 and rows[0] == "%" and bool(RECORD.fullmatch(rows[1]) or PLAIN.fullmatch(rows[1]))
+
+
+def parameter_text(values: Mapping[int, Sequence[float]]) -> bytes:
+    """Records of axis parameters: number -> one value for each axis in turn."""
+    rows = [
+        f"N{number:05d}{''.join(f'A{n}P{_short(value)}' for n, value in enumerate(row, 1))};"
+        for number, row in sorted(values.items())
+    ]
+    return "".join(f"{row}\n" for row in ["%", *rows, "%"]).encode()
+
+
+def _short(value: float) -> str:
+    return f"{value:.0f}" if value == round(value) else f"{value:.4f}"
+
+
+@dataclass(frozen=True, slots=True)
+class PunchedParameter:
+    """A parameter as punched: kind "A" for axes, "S" spindles, "L" paths, "" for a plain one; values by their index."""
+
+    number: int
+    kind: str
+    values: tuple[tuple[int, str], ...]
+
+
+def read_records(remarks: Remarks) -> tuple[PunchedParameter, ...]:
+    """The records of a punched parameter file."""
+    rows = [(line, "".join(row.split()).upper()) for line, row in enumerate(remarks.rows, 1) if row.strip()]
+    if len(rows) < 2 or rows[0][1] != "%" or rows[-1][1] != "%":
+        remarks.refuse(0, "should begin and end with a line %")
+    found = []
+    for line, row in rows:
+        if row == "%":
+            continue
+        plain, several = PLAIN.fullmatch(row), RECORD.fullmatch(row)
+        if plain:
+            found.append(PunchedParameter(int(plain[1]), "", ((0, plain[2]),)))
+        elif several:
+            entries = ENTRY.findall(several[2])
+            if len({kind for kind, _, _ in entries}) > 1:
+                remarks.refuse(line, "axes, spindles or paths, not several kinds in one record")
+            found.append(
+                PunchedParameter(int(several[1]), entries[0][0], tuple((int(n), value) for _, n, value in entries))
+            )
+        else:
+            remarks.refuse(line, "is no record N..P.. or N..A1P..A2P..")
+    return tuple(found)
+
+
+def _entries(text: str) -> list[tuple[str, float]] | None:
+    """Letters and positions; None for text that says anything else, or something twice."""
+    found = [PLACE.fullmatch(part) for part in re.split(r"[ ,]+", text.strip().upper()) if part]
+    pairs = [(match[1], float(match[2])) for match in found if match is not None]
+    return pairs if len(pairs) == len(found) == len({letter for letter, _ in pairs}) else None
+
+
+REFERENCE_FORM = SettingForm("axes with their positions, like X0,Y0,Z-10.5", lambda text: _entries(text) is not None)
+
+
+def placing_assumption(name: str) -> Assumption:
+    """What is taken for true of the place of a grid, under this id."""
+    return Assumption(
+        name,
+        "Points are an interval apart, numbered from 1 towards plus along each axis, and a parameter for each axis "
+        "says which of them lies at its reference position: machine zero, unless --set reference says otherwise.",
+        "the parameters of stored pitch error compensation (3620 to 3624) place their points so; of the grid no public "
+        "text says more than that it has points, intervals and vertices",
+        "machine zero is the reference position of every axis",
+        "Parameter 1240 is the machine coordinate of the reference position. With the grid on, stand at the reference "
+        "position of all axes: cnc_rdvolccomp must show the value of the point whose number the files give for it; "
+        "then move one axis by its interval towards plus: the value of the next point must show.",
+    )
+
+
+PLACING_OPTIONS: Mapping[str, Option] = {
+    REFERENCE: Option(
+        "",
+        "machine coordinates of the reference position, e.g. X0,Y0,Z-10; of axes that are not named it is machine zero",
+        REFERENCE_FORM,
+    )
+}
+
+
+def anchors(request: Request, settings: Mapping[str, str], inputs: Sequence[str]) -> tuple[float, ...]:
+    """The reference position along each axis of a grid, mm or degree.
+
+    Raises `UsageError` NCF485 where it is not in the range of the grid, or said of an axis that the machine lacks.
+    """
+    machine = request.machine
+    given = dict(_entries(settings[REFERENCE]) or ())
+    strange = sorted(set(given) - set(machine.axis_names))
+    if strange:
+        text = f"{REFERENCE} names {', '.join(strange)}, and the machine has {' '.join(machine.axis_names)}"
+        raise UsageError.of("NCF485", text, hint=REFERENCE_FORM.hint)
+    for name in inputs:
+        index = machine.axis_names.index(name)
+        low, high = (float(value) / machine.axes[index].unit for value in request.space[index])
+        place = given.get(name, 0.0)
+        if not low - CLOSE <= place <= high + CLOSE:
+            what = "" if name in given else ", which is taken to be machine zero,"
+            text = f"the reference position of {name}, {place:g}{what} is not between {low:g} and {high:g}"
+            text += ": the control puts the grid by the point that lies there"
+            hint = (
+                f"--set {REFERENCE}={name}POSITION, where {name} stands after its reference position return (machine "
+            )
+            hint += "coordinates); or a range in the machine file, or --range, that takes it in"
+            raise UsageError.of("NCF485", text, hint=hint)
+    return tuple(given.get(name, 0.0) for name in inputs)
+
+
+@dataclass(frozen=True, slots=True)
+class Placing:
+    """A grid as the control's parameters put it, each along its axes.
+
+    reference  machine coordinates of the reference position, mm or degree
+    points     number of the point that lies there, from 1
+    """
+
+    reference: tuple[float, ...]
+    points: tuple[int, ...]
+
+    @classmethod
+    def of(cls, reference: Sequence[float], lines: Sequence[Any]) -> Placing:
+        """From the positions of the nodes along each axis, mm or degree, of which one is at the reference position."""
+        numbers = [int(np.argmin(np.abs(np.asarray(line) - at))) for line, at in zip(lines, reference, strict=True)]
+        off = [abs(line[number] - at) for line, number, at in zip(lines, numbers, reference, strict=True)]
+        assert max(off) < CLOSE, f"no node at the reference position {reference}: {off}"
+        return cls(tuple(float(at) for at in reference), tuple(number + 1 for number in numbers))
+
+    def first(self, step: Sequence[float]) -> tuple[float, ...]:
+        """Where the first points lie."""
+        return tuple(
+            round(at - (number - 1) * each, 6)
+            for at, number, each in zip(self.reference, self.points, step, strict=True)
+        )
+
+    def entries(self, unit: str) -> dict[str, Any]:
+        """As they stand in a file; unit: mm or deg."""
+        return {f"{REFERENCE}_{unit}": self.reference, POINTS: self.points}
+
+    def number(self, counts: Sequence[int], fastest: Sequence[int], first: int = 1) -> int:
+        """The number that the point at the reference position has among all; fastest: the axes, fastest first."""
+        strides = {axis: math.prod(counts[each] for each in fastest[:place]) for place, axis in enumerate(fastest)}
+        return first + sum((self.points[axis] - 1) * stride for axis, stride in strides.items())
+
+    def notes(self, inputs: Sequence[str], counts: Sequence[int], step: Sequence[float], unit: str) -> Iterator[str]:
+        """What the parameters of each axis must be, in words."""
+        rows = zip(inputs, counts, step, self.reference, self.points, self.first(step), strict=True)
+        for name, count, each, at, point, first in rows:
+            place = f"the reference position {name}{at:g} is point {point} (so the first is at {name}{first:g})"
+            yield f"{name}: {count} points, interval {each:g} {unit}, {place}."
+
+
+def placed(
+    record: Mapping[str, Any], unit: str, step: Sequence[float], counts: Sequence[int], remarks: Remarks
+) -> tuple[tuple[float, ...], Placing | None]:
+    """Where the first points of a grid lie by its parameters, and these; None in old files, which say that alone."""
+    said = json_values.reals(record, f"{FIRST}_{unit}", len(step))
+    if POINTS not in record:
+        text = f"does not say which point lies at the reference position: the control cannot put the grid ({POINTS})"
+        remarks.doubt(0, text, "export again")
+        return said, None
+    numbers = json_values.wholes(record, POINTS)
+    reference = json_values.reals(record, f"{REFERENCE}_{unit}", len(step))
+    if len(numbers) != len(step) or any(not 1 <= number <= most for number, most in zip(numbers, counts, strict=False)):
+        remarks.refuse(0, f"{POINTS} {numbers}: a point of each axis, of {list(counts)}")
+        return said, None
+    placing = Placing(reference, tuple(numbers))
+    first = placing.first(step)
+    if any(abs(one - other) > CLOSE for one, other in zip(first, said, strict=True)):
+        text = f"by {REFERENCE}_{unit}, {POINTS} and the intervals the grid begins at {list(first)}"
+        remarks.refuse(0, f"{text}, and {FIRST}_{unit} says {list(said)}", "the control goes by the former")
+    return first, placing
+
+
+@dataclass(frozen=True, slots=True)
+class BacklashAmounts:
+    """Amounts of X, Y and Z in detection units, and the axes that go home towards minus."""
+
+    amounts: tuple[int, ...] = (0, 0, 0)
+    home_minus: str = ""
+
+    @classmethod
+    def of(cls, request: Request, settings: Mapping[str, str], unit: float) -> BacklashAmounts:
+        """The play of a machine, as it is written; unit: detection unit, mm."""
+        home = "".join(sorted(settings["home_minus"].upper()))
+        if settings["play"] == "no":
+            return cls(home_minus=home)
+        found = {
+            each.axis: round(each.whole / unit)
+            for each in reversals(request.machine, request.space, request.tool_length, request.target, 2)
+        }
+        return cls(
+            tuple(int(np.clip(found.get(axis, 0), -LARGEST_BACKLASH, LARGEST_BACKLASH)) for axis in LINEAR), home
+        )
+
+    def files(self) -> dict[str, bytes]:
+        """The parameter as it is punched; no file if there is no play."""
+        return (
+            {BACKLASH_FILE: parameter_text({BACKLASH_PARAMETER: [float(each) for each in self.amounts]})}
+            if any(self.amounts)
+            else {}
+        )
+
+    def shift(self, unit: float) -> Array:
+        """What grids must hold besides the mean of both ways, X, Y and Z, mm."""
+        signs = [-1.0 if axis in self.home_minus else 1.0 for axis in LINEAR]
+        found: Array = np.array(self.amounts) * signs * unit / 2
+        return found
+
+    def tables(self, unit: float) -> Compensation:
+        """What the control does: the amount, in the direction of motion, against that of the return."""
+        terms = []
+        for axis, amount in zip(LINEAR, self.amounts, strict=True):
+            way = 1 if axis in self.home_minus else -1
+            if amount:
+                grid = Grid((axis,), (np.zeros(1),), (axis,), np.array([[way * amount * unit]]))
+                terms.append(Term((grid,), (axis, way)))
+        return Compensation(tuple(terms))
+
+    def notes(self, unit: float) -> Iterator[str]:
+        """What was written, in words."""
+        for axis, amount in zip(LINEAR, self.amounts, strict=True):
+            if amount:
+                yield f"Play of {axis}, {1e3 * amount * unit:+.2f} um, is in {BACKLASH_FILE}: {amount} detection units."
+
+
+def read_backlash(files: Files, home_minus: str) -> tuple[BacklashAmounts, list[Remarks]]:
+    """The amounts of the file, if there is one, with remarks on it."""
+    if BACKLASH_FILE not in files:
+        return BacklashAmounts(home_minus=home_minus), []
+    remarks = Remarks.of(BACKLASH_FILE, files[BACKLASH_FILE])
+    amounts = dict.fromkeys(range(1, len(LINEAR) + 1), 0)
+    for record in read_records(remarks):
+        if record.number != BACKLASH_PARAMETER or record.kind != "A":
+            remarks.refuse(0, f"parameter {record.number} is not for here", f"N0{BACKLASH_PARAMETER}A1P..A2P..A3P..;")
+            continue
+        for axis, value in record.values:
+            if axis not in amounts or float(value) != round(float(value)) or abs(float(value)) > LARGEST_BACKLASH:
+                hint = f"whole numbers from -{LARGEST_BACKLASH} to {LARGEST_BACKLASH}, axes 1 to 3"
+                remarks.refuse(0, f"{value} for axis {axis}", hint)
+            else:
+                amounts[axis] = round(float(value))
+    return BacklashAmounts(tuple(amounts.values()), home_minus), [remarks]

@@ -1,0 +1,311 @@
+"""Heidenhain's free tables, and the axis compensation tables that are such: `.COM` and `.CMA`.
+
+A free table has a BEGIN line, a line of column names, rows in fixed columns, and [END]. A column begins where its name
+begins and ends where the next one does; that is all there is to it. What is read can be written again to the byte.
+
+`.COM` files hold values over the positions of one axis, a column for every axis that they move. Two forms: that of the
+NCK controls (TNC 640, 620, 320, MANUALplus), with the position in a column of its own, and that of the iTNC 530, with
+datum and distance in the BEGIN line and columns named by axis numbers, `1=F()`. `config.cma` says which `.COM` file an
+axis looks up, a column for every axis, the active line marked with `*`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.tables.control import Files
+from ncfix.tables.grid import Array
+from ncfix.tables.table_files import ORDER, Remarks, as_number
+
+END = "[END]"
+NAME = re.compile(r"\S+")
+ACTIVE = "ACTIVE"
+CONFIG = "config.cma"
+BACKLASH = "BACKLASH"
+POSITION = "AXISPOS"
+NCK_BEGIN = re.compile(r"(\S+) (MM|INCH)\s*")
+OLD_BEGIN = re.compile(r"(\S+)\s+DATUM:([-+]?\d+\.?\d*)\s+DISTANCE:([-+]?\d+\.?\d*)\s*")
+FUNCTION = re.compile(r"(\d+)=F\(\)")
+COMPONENT = re.compile(r"C[1-6]")
+LARGE = 1.0
+"""mm or degree: no machine is that wrong; most likely the unit is."""
+STEEP = 1 / 64
+"""Change of a value per distance that the older controls allow."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableColumn:
+    """A column: its name, and its width in characters."""
+
+    name: str
+    width: int
+
+
+@dataclass(frozen=True, slots=True)
+class TextTable:
+    """A table as text.
+
+    begin    the words of the BEGIN line after BEGIN, blanks included; "" where there is no such line
+    columns  in their order
+    rows     a cell for each column
+    lines    the line that each row is on
+    ended    whether it ends with [END]
+    padded   whether blanks fill the last column
+    eol      between lines
+    """
+
+    begin: str
+    columns: tuple[TableColumn, ...]
+    rows: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...] = ()
+    ended: bool = True
+    padded: bool = True
+    eol: str = "\n"
+
+    def text(self) -> bytes:
+        """The file."""
+        return "".join(f"{line}{self.eol}" for line in self._lines()).encode("ascii")
+
+    def cells(self, name: str) -> list[str]:
+        """One column, "" where it is missing."""
+        names = [column.name for column in self.columns]
+        return [row[names.index(name)] if name in names else "" for row in self.rows]
+
+    def _lines(self) -> Iterator[str]:
+        if self.begin:
+            yield f"BEGIN {self.begin}"
+        yield self._row([column.name for column in self.columns])
+        for row in self.rows:
+            yield self._row(row)
+        if self.ended:
+            yield END
+
+    def _row(self, cells: Sequence[str]) -> str:
+        line = "".join(f"{cell:<{column.width}}" for cell, column in zip(cells, self.columns, strict=True))
+        return line if self.padded else line.rstrip()
+
+
+def read_table(remarks: Remarks, content: bytes) -> TextTable | None:
+    """The table in a file; None, with a remark, where there is none."""
+    lines = [line for line in enumerate(remarks.rows, 1) if line[1].strip()]
+    if not lines:
+        remarks.refuse(0, "is empty")
+        return None
+    begin = lines.pop(0)[1][len("BEGIN ") :] if lines[0][1].upper().startswith("BEGIN ") else ""
+    ended = bool(lines) and lines[-1][1].strip().upper() == END
+    body = lines[: len(lines) - ended]
+    if not body or not body[0][1].startswith("NR"):
+        remarks.refuse(body[0][0] if body else 0, "no line of column names, which begins with NR")
+        return None
+    head = body.pop(0)[1]
+    columns = _columns(head)
+    _look_for_tabs(remarks)
+    rows = tuple(_cells(remarks, cell_number, line, columns) for cell_number, line in body)
+    eol = "\r\n" if b"\r\n" in content else "\n"
+    return TextTable(begin, columns, rows, tuple(n for n, _ in body), ended, head.endswith(" "), eol)
+
+
+def _columns(head: str) -> tuple[TableColumn, ...]:
+    found = list(NAME.finditer(head))
+    ends = [*(match.start() for match in found[1:]), len(head)]
+    return tuple(TableColumn(match[0], end - match.start()) for match, end in zip(found, ends, strict=True))
+
+
+def _cells(remarks: Remarks, cell_number: int, line: str, columns: Sequence[TableColumn]) -> tuple[str, ...]:
+    cells, start = [], 0
+    for index, column in enumerate(columns):
+        stop = start + column.width if index + 1 < len(columns) else len(line)
+        cell = line[start:stop]
+        if index + 1 < len(columns) and len(cell) == column.width and not cell.endswith(" ") and cell.strip():
+            remarks.refuse(cell_number, f"what stands under {column.name} runs into the next column")
+        if cell.startswith(" ") and cell.strip():
+            remarks.doubt(cell_number, f"what stands under {column.name} does not begin where the column does")
+        cells.append(cell.strip())
+        start = stop
+    if len(cells[-1].split()) > 1:
+        remarks.refuse(cell_number, "more cells than there are columns")
+    return tuple(cells)
+
+
+def _look_for_tabs(remarks: Remarks) -> None:
+    for cell_number, row in enumerate(remarks.rows, 1):
+        if "\t" in row:
+            remarks.refuse(cell_number, "a tab: columns are counted in characters")
+            return
+
+
+def cell_number(remarks: Remarks, line: int, cell: str, name: str) -> float:
+    """A number in a cell; a remark and nan where it is none."""
+    found = as_number(cell)
+    if found is not None:
+        return found
+    what = "a decimal comma" if "," in cell else f"{cell!r} is no number" if cell else "nothing"
+    remarks.refuse(line, f"{what} under {name}")
+    return float("nan")
+
+
+def cma_text(axes: Sequence[str], tables: Mapping[str, str]) -> bytes:
+    """One line, active: the file of every axis that has one."""
+    width = max(13, *(len(name) + 2 for name in tables.values())) if tables else 13
+    columns = (TableColumn("NR", 5), TableColumn(ACTIVE, 7), *(TableColumn(axis, width) for axis in axes))
+    row = ("0", "*", *(tables.get(axis, "") for axis in axes))
+    return TextTable(f"{CONFIG} MM", columns, (row,)).text()
+
+
+def read_cma(files: Files) -> tuple[tuple[str, ...], dict[str, str], Remarks]:
+    """All axes in their order, and the file of each in the active line; with remarks."""
+    names = [name for name in files if name.lower().endswith(".cma")]
+    if len(names) != 1:
+        remarks = Remarks.of(CONFIG, b"")
+        remarks.refuse(0, f"{len(names)} .cma files instead of one")
+        return (), {}, remarks
+    remarks = Remarks.of(names[0], files[names[0]])
+    table = read_table(remarks, files[names[0]])
+    if table is None:
+        return (), {}, remarks
+    axes = _cma_axes(table, remarks)
+    return axes, _active_files(table, axes, files, remarks), remarks
+
+
+def _cma_axes(table: TextTable, remarks: Remarks) -> tuple[str, ...]:
+    """The axes that have a column, each of which should be there once."""
+    axes = tuple(column.name for column in table.columns if column.name not in ("NR", ACTIVE))
+    for axis in axes:
+        if len(axis) != 1 or axis not in ORDER or axes.count(axis) > 1:
+            remarks.refuse(0, f"the column {axis} is no axis, or is there twice")
+    return axes
+
+
+def _active_files(table: TextTable, axes: Sequence[str], files: Files, remarks: Remarks) -> dict[str, str]:
+    """Axis -> its file, of those that the active line names and that are there."""
+    marked = [row for row, cell in enumerate(table.cells(ACTIVE)) if cell == "*"]
+    if len(marked) != 1:
+        remarks.refuse(0, f"{len(marked)} lines are marked with *", "exactly one line is active")
+        return {}
+    row = marked[0]
+    named = {axis: name for axis in axes if (name := table.cells(axis)[row])}
+    for axis, name in named.items():
+        if name not in files:
+            remarks.refuse(table.lines[row], f"the file {name} of axis {axis} is missing")
+    return {axis: name for axis, name in named.items() if name in files}
+
+
+@dataclass(frozen=True, slots=True)
+class ComTable:
+    """A table as it is in the file, mm and degree.
+
+    nodes     positions of the axis, (n,)
+    columns   letter of an axis, number of an axis, or C1 to C6 -> values, (n,)
+    backlash  of the axis itself in negative travel, (n,); None where there is no such column
+    """
+
+    nodes: Array
+    columns: Mapping[str, Array]
+    backlash: Array | None = None
+
+
+def nck_text(name: str, com: ComTable, decimals: int) -> bytes:
+    """The form of the NCK controls."""
+    heads = [POSITION, *([BACKLASH] if com.backlash is not None else []), *com.columns]
+    values = [com.nodes, *([com.backlash] if com.backlash is not None else []), *com.columns.values()]
+    return _com_text(f"{name} MM", [(head, 14) for head in heads], values, decimals, True)
+
+
+def old_text(name: str, com: ComTable, decimals: int) -> bytes:
+    """The form of the iTNC 530; the nodes must be evenly spaced."""
+    backlash = np.zeros_like(com.nodes) if com.backlash is None else com.backlash
+    step = (com.nodes[-1] - com.nodes[0]) / (len(com.nodes) - 1)
+    begin = f"{name}  DATUM:{com.nodes[0]:+.4f} DISTANCE:{step:+.4f}"
+    heads = [(head if COMPONENT.fullmatch(head) else f"{head}=F()", 14) for head in com.columns]
+    return _com_text(begin, [(BACKLASH, 14), *heads], [backlash, *com.columns.values()], decimals, False)
+
+
+def _com_text(
+    begin: str, heads: Sequence[tuple[str, int]], values: Sequence[Array], decimals: int, ended: bool
+) -> bytes:
+    columns = (TableColumn("NR", 5), *(TableColumn(*head) for head in heads))
+    table = np.stack([np.round(column, decimals) + 0.0 for column in values], axis=1)
+    rows = tuple((str(n), *(f"{value:+.{decimals}f}" for value in row)) for n, row in enumerate(table.tolist()))
+    return TextTable(begin, columns, rows, ended=ended).text()
+
+
+def read_com(path: str, content: bytes) -> tuple[ComTable | None, Remarks]:
+    """A table of either form, with remarks."""
+    remarks = Remarks.of(path, content)
+    table = read_table(remarks, content)
+    if table is None:
+        return None, remarks
+    names = [column.name for column in table.columns]
+    _check_numbers(remarks, table)
+    nodes = _positions(remarks, table, path)
+    held = [name for name in names if name not in ("NR", POSITION, BACKLASH)]
+    for name in held:
+        if not (FUNCTION.fullmatch(name) or COMPONENT.fullmatch(name) or (len(name) == 1 and name in "XYZABCUVW")):
+            remarks.refuse(0, f"the column {name} is no axis", "letters of axes, 1=F(), or C1 to C6")
+        if names.count(name) > 1:
+            remarks.refuse(0, f"the column {name} is there twice")
+    if not held:
+        remarks.refuse(0, "no column of values")
+    columns = {_short(name): _com_values(remarks, table, name) for name in held}
+    backlash = _com_values(remarks, table, BACKLASH) if BACKLASH in names else None
+    if remarks.wrong:
+        return None, remarks
+    _look(remarks, table, nodes, columns)
+    return ComTable(nodes, columns, backlash), remarks
+
+
+def _short(name: str) -> str:
+    match = FUNCTION.fullmatch(name)
+    return match[1] if match else name
+
+
+def _check_numbers(remarks: Remarks, table: TextTable) -> None:
+    for expected, (line, cell) in enumerate(zip(table.lines, table.cells("NR"), strict=True)):
+        if cell != str(expected):
+            remarks.refuse(line, f"row {cell or 'without a number'} where {expected} should be")
+            return
+
+
+def _positions(remarks: Remarks, table: TextTable, path: str) -> Array:
+    if len(table.rows) < 2:
+        remarks.refuse(0, f"{len(table.rows)} points")
+    if POSITION in [column.name for column in table.columns]:
+        match = NCK_BEGIN.fullmatch(table.begin)
+        if match and match[2] != "MM":
+            remarks.refuse(1, f"the unit is {match[2]}", "ncfix reads MM")
+        if not table.ended:
+            remarks.refuse(len(remarks.rows), "[END] is missing: the file may have been cut short")
+        nodes = _com_values(remarks, table, POSITION)
+    else:
+        match = OLD_BEGIN.fullmatch(table.begin)
+        step = float(match[3]) if match else 0.0
+        nodes = (float(match[2]) if match else 0.0) + step * np.arange(len(table.rows), dtype=np.float64)
+        if match and step <= 0:
+            remarks.refuse(1, f"DISTANCE:{match[3]}", "a distance above zero")
+    if not match:
+        remarks.refuse(1, "BEGIN should be followed by NAME MM, or NAME DATUM:... DISTANCE:...")
+    elif match[1].upper() != path.upper():
+        remarks.doubt(1, f"says that it is {match[1]}")
+    for row in np.flatnonzero(np.diff(nodes) <= 0):
+        remarks.refuse(table.lines[row + 1], "the positions must ascend")
+    return nodes
+
+
+def _com_values(remarks: Remarks, table: TextTable, name: str) -> Array:
+    cells = zip(table.lines, table.cells(name), strict=True)
+    return np.array([cell_number(remarks, line, cell, name) for line, cell in cells], dtype=np.float64)
+
+
+def _look(remarks: Remarks, table: TextTable, nodes: Array, columns: Mapping[str, Array]) -> None:
+    """Values that are too large, and those that change faster than any axis errs."""
+    for name, values in columns.items():
+        for row in np.flatnonzero(np.abs(values) > LARGE)[:1]:
+            remarks.refuse(table.lines[row], f"{values[row]:g} under {name}, which no machine needs", "mm, not um")
+        slopes = np.abs(np.diff(values)) / np.diff(nodes)
+        for row in np.flatnonzero(slopes > STEEP)[:1]:
+            text = f"{name} changes by {slopes[row]:.3g} per unit from the row before; older controls allow {STEEP:.3g}"
+            remarks.doubt(table.lines[row + 1], text, "a slip of the digits?")

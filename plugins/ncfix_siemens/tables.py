@@ -1,0 +1,263 @@
+"""One compensation table of the control, and the files of them, with remarks on what is wrong in these.
+
+CEC, `%_N_NC_CEC_INI`: any axis over any axis. EEC (LEC), `%_N_AX1_EEC_INI`: an encoder over its own axis; its values
+are errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.table_files import Remarks
+from ncfix_siemens.assignments import ArrayAssignment, Assigned, FileRow, assignments
+
+DIGITS = 7
+"""Decimals of values: 0.1 nm, so that factors of products keep theirs."""
+PLACES = 4
+"""Decimals of positions."""
+BOTH = 0
+CEC_FIELDS = ("INPUT_AXIS", "OUTPUT_AXIS", "STEP", "MIN", "MAX", "DIRECTION", "MULT_BY_TABLE", "IS_MODULO")
+NEEDED = CEC_FIELDS[:5]
+LINKS = ("INPUT_NCU", "OUTPUT_NCU")
+CEC_VALUE = "AN_CEC"
+STEEP = 0.01
+"""mm per mm: no machine errs that fast."""
+CLEARLY = 1.001
+"""How much larger than the largest positive value the largest negative one must be to be remarked on."""
+BOTH_WAYS = 0
+FLIPPED = "ncfix writes it positive; a sign that is turned in both factors of a pair turns nothing"
+LARGE = 1.0
+"""mm or degree: no machine is that wrong; most likely the unit is."""
+EEC_FIELDS = ("STEP", "MIN", "MAX", "IS_MODULO")
+EEC_VALUE = "AA_ENC_COMP"
+
+
+@dataclass(frozen=True, slots=True)
+class CecTable:
+    """Values at evenly spaced positions of an axis.
+
+    index      of the table (CEC), or of the encoder (EEC)
+    input      machine axis that is looked up, e.g. AX1
+    output     machine axis that is corrected
+    low, step  first position and distance, mm or degree
+    values     (k + 1,) mm or degree; those of a multiplier are plain numbers
+    direction  0: always; 1, -1: only while the input axis moves that way
+    multiply   number (index + 1) of the table that it is multiplied by; 0: none
+    modulo     the values repeat
+    """
+
+    index: int
+    input: str
+    output: str
+    low: float
+    step: float
+    values: Array
+    direction: int = BOTH
+    multiply: int = 0
+    modulo: bool = False
+
+    @property
+    def high(self) -> float:
+        """The last position."""
+        return round(self.low + self.step * (len(self.values) - 1), PLACES)
+
+    @property
+    def positions(self) -> Array:
+        """All positions, (k + 1,)."""
+        found: Array = self.low + self.step * np.arange(len(self.values), dtype=np.float64)
+        return found
+
+    def grid(self, input_name: str, output_name: str, factor: float, input_unit: float) -> Grid:
+        """The table with its values times a factor, over positions in mm or rad."""
+        nodes: Array = self.positions * input_unit
+        values: Array = (self.values * factor)[:, None]
+        return Grid((input_name,), (nodes,), (output_name,), values, (self.modulo,))
+
+
+def number(value: float, digits: int = DIGITS) -> str:
+    """As short as it can be with these decimals, and always with a decimal point."""
+    text = f"{round(value, digits) + 0.0:.{digits}f}".rstrip("0")
+    return f"{text}0" if text.endswith(".") else text
+
+
+@dataclass(frozen=True, slots=True)
+class CecStyle:
+    """What is left open: axis names in brackets, a METRIC line, a path line."""
+
+    brackets: bool = True
+    metric: bool = False
+    path: str = ""
+
+
+def cec_text(tables: Iterable[CecTable], heads: Iterable[str], titles: Mapping[int, str], style: CecStyle) -> bytes:
+    """The file; `heads` are comments for its top, `titles` one for each table."""
+    lines = ["%_N_NC_CEC_INI"]
+    lines += [f";$PATH={style.path}"] if style.path else []
+    lines += ["METRIC"] if style.metric else []
+    lines += ["CHANDATA(1)", *(f"; {head}" for head in heads)]
+    for table in tables:
+        lines += [f"; {titles[table.index]}"] if table.index in titles else []
+        lines += _assigned(table, style)
+    return "".join(f"{line}\n" for line in [*lines, "M17"]).encode()
+
+
+def _assigned(table: CecTable, style: CecStyle) -> Iterator[str]:
+    for place, value in enumerate(table.values.tolist()):
+        yield f"$AN_CEC[{table.index},{place}]={number(value)}"
+    names = (f"({name})" if style.brackets else name for name in (table.input, table.output))
+    sizes = (number(value, PLACES) for value in (table.step, table.low, table.high))
+    whole = (str(value) for value in (table.direction, table.multiply, int(table.modulo)))
+    for field, value in zip(CEC_FIELDS, (*names, *sizes, *whole), strict=True):
+        yield f"$AN_CEC_{field}[{table.index}]={value}"
+
+
+def read_cec(lines: Iterable[FileRow], remarks: Remarks) -> list[CecTable]:
+    """The tables of a file, by index, with remarks; a table that is not complete is left out."""
+    found: dict[int, Assigned] = {}
+    for each in assignments(lines, remarks):
+        _sort_cec(each, found, remarks)
+    tables = [_cec_table(index, found[index], remarks) for index in sorted(found)]
+    good = [table for table in tables if table is not None]
+    _look_at_products(good, found, remarks)
+    return good
+
+
+def _sort_cec(assignment: ArrayAssignment, tables: dict[int, Assigned], remarks: Remarks) -> None:
+    name = assignment.name.upper()
+    field = name.removeprefix(f"{CEC_VALUE}_")
+    if field in LINKS:
+        remarks.doubt(assignment.line, f"${assignment.name}: axes of other control units are not followed")
+        return
+    wanted = 2 if name == CEC_VALUE else 1
+    if name != CEC_VALUE and field not in CEC_FIELDS:
+        remarks.refuse(assignment.line, f"${assignment.name} is not a variable of these tables")
+        return
+    if len(assignment.indices) != wanted or not all(index.strip().isdecimal() for index in assignment.indices):
+        remarks.refuse(
+            assignment.line, f"${assignment.name} takes {wanted} whole number{'s' * (wanted > 1)} in its brackets"
+        )
+        return
+    index, *number = (int(text) for text in assignment.indices)
+    place, names = f"$AN_CEC[{index},{{}}]", f"$AN_CEC_{{}}[{index}]"
+    table = tables.setdefault(index, Assigned(f"table {index + 1}", place, names, remarks))
+    if number:
+        table.put_value(number[0], assignment)
+    else:
+        table.put_field(field, assignment)
+
+
+def _cec_table(index: int, table: Assigned, remarks: Remarks) -> CecTable | None:
+    before = len(remarks.wrong)
+    if table.lacks(NEEDED):
+        return None
+    source, output = (_axis(table.fields[field], remarks) for field in NEEDED[:2])
+    direction = table.choice("DIRECTION", (0, 1, -1))
+    multiply = table.choice("MULT_BY_TABLE")
+    modulo = bool(table.choice("IS_MODULO", (0, 1)))
+    values = table.curve(modulo)
+    if values is None or len(remarks.wrong) > before:
+        return None
+    low, step = table.number("MIN"), table.number("STEP")
+    return CecTable(index, source, output, low, step, values, direction, multiply, modulo)
+
+
+def _axis(assignment: ArrayAssignment, remarks: Remarks) -> str:
+    name = assignment.value.strip().removeprefix("(").removesuffix(")").strip()
+    if not name.replace("_", "").isalnum():
+        remarks.refuse(assignment.line, f"{assignment.value!r} is not the name of an axis")
+    return name.upper()
+
+
+def _look_at_products(tables: Iterable[CecTable], found: Mapping[int, Assigned], remarks: Remarks) -> None:
+    by_number = {table.index + 1: table for table in tables}
+    pointed = {table.multiply for table in by_number.values() if table.multiply}
+    for own, table in by_number.items():
+        if table.multiply:
+            line = found[table.index].fields["MULT_BY_TABLE"].line
+            _look_at_pair(table, by_number.get(table.multiply), line, remarks)
+        if not (table.multiply or own in pointed):
+            _look_at_sizes(table, found[table.index], remarks)
+
+
+def _look_at_pair(table: CecTable, other: CecTable | None, line: int, remarks: Remarks) -> None:
+    if other is None:
+        text = f"table {table.index + 1} is multiplied by table {table.multiply}, which is not there"
+        remarks.refuse(line, text, "the number of a table is its index + 1")
+        return
+    if other.output != table.output:
+        text = f"table {table.index + 1} is for {table.output}, the table that it is multiplied by for {other.output}"
+        remarks.refuse(line, text, "both factors have the same output axis")
+    if other.direction != BOTH_WAYS:
+        remarks.refuse(line, f"table {table.multiply} multiplies others and acts one way only: what then is not public")
+    if other.multiply:
+        remarks.doubt(line, f"table {table.multiply} is itself multiplied by another: what then is not public")
+    if other is not table and -other.values.min() > CLEARLY * other.values.max():
+        remarks.doubt(line, f"the largest value of the multiplier, table {table.multiply}, is negative", FLIPPED)
+
+
+def _look_at_sizes(table: CecTable, found: Assigned, remarks: Remarks) -> None:
+    """A value that no machine needs, or a jump from one to the next; of tables that are added."""
+    largest = int(np.argmax(np.abs(table.values)))
+    if abs(table.values[largest]) > LARGE:
+        text = f"a value of {table.values[largest]:g}, which no machine needs"
+        remarks.doubt(found.values[largest].line, text, "values are in mm and degree, not um")
+    slopes = np.abs(np.diff(table.values)) / table.step
+    place = int(np.argmax(slopes))
+    if slopes[place] > STEEP:
+        text = f"the value changes by {slopes[place]:.3g} per unit of length from the one before"
+        remarks.doubt(found.values[place + 1].line, text, "a slip of the digits?")
+
+
+def eec_text(table: CecTable, heads: Iterable[str]) -> bytes:
+    """The file of one encoder."""
+    axis, encoder = table.output, table.index
+    lines = [f"%_N_{axis}_EEC_INI", "CHANDATA(1)", *(f"; {head}" for head in heads)]
+    lines += [f"$AA_ENC_COMP[{encoder},{n},{axis}]={number(value)}" for n, value in enumerate(table.values.tolist())]
+    sizes = [number(value, PLACES) for value in (table.step, table.low, table.high)]
+    for field, value in zip(EEC_FIELDS, (*sizes, str(int(table.modulo))), strict=True):
+        lines.append(f"$AA_ENC_COMP_{field}[{encoder},{axis}]={value}")
+    return "".join(f"{line}\n" for line in [*lines, "M17"]).encode()
+
+
+def read_eec(lines: Iterable[FileRow], remarks: Remarks) -> list[CecTable]:
+    """The tables of a file, with remarks; one that is not complete is left out."""
+    found: dict[tuple[int, str], Assigned] = {}
+    for each in assignments(lines, remarks):
+        _sort_eec(each, found, remarks)
+    tables = [_eec_table(*key, found[key], remarks) for key in sorted(found)]
+    return [table for table in tables if table is not None]
+
+
+def _sort_eec(assignment: ArrayAssignment, tables: dict[tuple[int, str], Assigned], remarks: Remarks) -> None:
+    name = assignment.name.upper()
+    field = name.removeprefix(f"{EEC_VALUE}_")
+    wanted = 3 if name == EEC_VALUE else 2
+    if name != EEC_VALUE and field not in EEC_FIELDS:
+        remarks.refuse(assignment.line, f"${assignment.name} is not a variable of these tables")
+        return
+    if len(assignment.indices) != wanted or not all(index.strip().isdecimal() for index in assignment.indices[:-1]):
+        inside = "encoder, number and axis" if wanted == 3 else "encoder and axis"
+        remarks.refuse(assignment.line, f"${assignment.name} takes {inside} in its brackets")
+        return
+    encoder, axis = int(assignment.indices[0]), assignment.indices[-1].strip().upper()
+    place, names = f"$AA_ENC_COMP[{encoder},{{}},{axis}]", f"$AA_ENC_COMP_{{}}[{encoder},{axis}]"
+    table = tables.setdefault((encoder, axis), Assigned(axis, place, names, remarks))
+    if wanted == 3:
+        table.put_value(int(assignment.indices[1]), assignment)
+    else:
+        table.put_field(field, assignment)
+
+
+def _eec_table(encoder: int, axis: str, table: Assigned, remarks: Remarks) -> CecTable | None:
+    before = len(remarks.wrong)
+    if table.lacks(EEC_FIELDS[:3]):
+        return None
+    modulo = bool(table.choice("IS_MODULO", (0, 1)))
+    values = table.curve(modulo)
+    if values is None or len(remarks.wrong) > before:
+        return None
+    return CecTable(encoder, axis, axis, table.number("MIN"), table.number("STEP"), values, modulo=modulo)
