@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from ncfix.control.flow import ENDLESS as CODE
+from ncfix.control.flow import MOST, NEVER_ENDS, WAITS, Recurrence
 from ncfix.control.moves import Moves, Rule
-from ncfix.control.recurrence import ENDLESS as CODE
-from ncfix.control.recurrence import MOST, NEVER_ENDS, WAITS, Recurrence
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError

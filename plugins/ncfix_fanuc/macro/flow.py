@@ -1,86 +1,155 @@
-"""Where a program of Macro B goes on: GOTO, IF, WHILE, and the calls M98, G65 and G66.
+"""Where a program of Macro B goes on: GOTO, IF, WHILE, and the calls M98, G65 and G66, as operations.
 
-Source: Fanuc 30i operator's manual, "Custom macro", "Branch and repetition", "Macro call"; "Subprogram".
+Source: Fanuc 30i operator's manual, "Custom macro", "Branch and repetition", "Macro call", "Argument specification";
+"Subprogram".
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from bisect import bisect_right
+from collections.abc import Callable, Iterable
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.control.faults import Fault
+from ncfix.control.flow import NO_SUBPROGRAM, Call, Flow, Jump, Let, OpenCall, Operation, Return
 from ncfix.control.parts import NotInPartsError
+from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
+from ncfix.text.tree import Flow as FlowItem
 from ncfix_fanuc.macro import builder
 from ncfix_fanuc.macro.arithmetic import number
-from ncfix_fanuc.macro.outline import Outline
 from ncfix_iso.rs274.control import Control
-from ncfix_iso.rs274.flow import NO_SUBPROGRAM, TOO_DEEP
 from ncfix_iso.rs274.parameters import Store
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit, has_words
 
-MAX_CALLS = 15
-"""Calls that may be nested: ten of subprograms, five of macros."""
-
 BAD_JUMP = "NCF242"
 
+ONCE = dict(
+    zip(
+        "ABCIJKDEFHMQRSTUVWXYZ",
+        (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26),
+        strict=True,
+    )
+)
+"""Argument specification I: one variable for each address."""
 
-@dataclass(slots=True)
-class Call:
-    """A call that has not returned.
+SETS = 10
+"""Argument specification II: I J K may stand so many times."""
 
-    label       program that was called
-    unit, block where to go on after it
-    entry       the text and block where it begins
-    remaining   how many more times it is to run
-    arguments   local variables of a macro; None for a subprogram, which shares its caller's
+LENGTHS = frozenset("ABCIJKQRUVWXYZ")
+"""Arguments whose numbers count least increments of their address when they have no decimal point."""
+
+
+def local_variables(arguments: Iterable[tuple[str, float, bool]]) -> Store:
+    """The local variables that arguments (address, value, known only at run time) set, in the order written."""
+    store = Store()
+    count, last = 1, 0
+    for address, value, runtime in arguments:
+        if address not in ONCE:
+            raise Fault("NCF221", f"{address} cannot be an argument of a macro")
+        number = ONCE[address]
+        if address in "IJK":
+            position = "IJK".index(address) + 1
+            count += position <= last
+            last = position
+            number = 3 * count + position
+            if count > SETS:
+                raise Fault("NCF221", f"I, J and K may stand {SETS} times in a macro call")
+        store.assign(number, value, runtime)
+    return store
+
+
+def named_programs(unit: RS274Unit) -> dict[int, str]:
+    """The blocks that begin a program with a name: `<NAME>` stands alone there."""
+    program = unit.program
+    heads = {shape: span for shape, t in enumerate(program.templates) if (span := head_of(t)) is not None}
+    named = (block for block, shape in enumerate(unit.template) if shape in heads) if heads else ()
+    return {block: program.slice(block, heads[unit.template[block]]).strip("<> \t") for block in named}
+
+
+def head_of(template: Template) -> Span | None:
+    """Where the name stands that begins a program, if the block is nothing else."""
+    items = [item for item in template.items if not isinstance(item, Comment)]
+    alone = len(items) == 1 and isinstance(items[0], Opaque) and items[0].kind == "text word"
+    return items[0].span if alone else None
+
+
+class Outline:
+    """What control statements of one text refer to.
+
+    programs  number (or name) of each program -> the block of its O-word
+    starts    the blocks of O-words, ascending
+    partner   block of a DO -> that of its END, and the other way round
     """
 
-    label: str
-    unit: RS274Unit
-    block: int
-    entry: tuple[RS274Unit, int]
-    remaining: int
-    arguments: Store | None
+    def __init__(self, unit: RS274Unit) -> None:
+        self.unit = unit
+        self.programs: dict[str, int] = {}
+        self.starts: list[int] = []
+        self.partner: dict[int, int] = {}
+        open_loops: list[tuple[str, int]] = []
+        names = named_programs(unit)
+        for block in sorted({*unit.flows, *names}):
+            flow = next((item for item in unit.program.items_of(block) if isinstance(item, FlowItem)), None)
+            if block in names or flow is None or flow.keyword == "program":
+                self.programs.setdefault(names[block] if block in names or flow is None else str(flow.label), block)
+                self.starts.append(block)
+                open_loops = []
+            elif flow.keyword in ("do", "end"):
+                self._note_loop(flow, block, open_loops)
+
+    def _note_loop(self, flow: FlowItem, block: int, open_loops: list[tuple[str, int]]) -> None:
+        """Note the DO or END of a loop; `open_loops` are those begun so far in this program."""
+        label = str(flow.label)
+        if isinstance(flow.label, Literal):
+            label = f"{self.unit.program.values_of(block)[flow.label.slot]:g}"
+        if flow.keyword == "do":
+            open_loops.append((label, block))
+            return
+        at = next((i for i in range(len(open_loops) - 1, -1, -1) if open_loops[i][0] == label), -1)
+        if at >= 0:
+            self.partner[block], self.partner[open_loops[at][1]] = open_loops[at][1], block
+            del open_loops[at:]
+
+    @cached_property
+    def numbers(self) -> NDArray[np.float64]:
+        """(n,) the N word of each block, NaN without."""
+        return self.unit.program.column("N")
+
+    def numbered(self, target: int, block: int) -> int:
+        """The block with that N word in the program that `block` stands in: the next one, else the first."""
+        at = bisect_right(self.starts, block)
+        first = self.starts[at - 1] if at else 0
+        stop = self.starts[at] if at < len(self.starts) else self.unit.stop
+        found = first + np.flatnonzero(self.numbers[first:stop] == target)
+        if not len(found):
+            raise Fault(BAD_JUMP, f"there is no block N{target} in this program")
+        later = found[found > block]
+        return int(later[0] if len(later) else found[0])
 
 
-class MacroFlow:
-    """Where execution stands, and where statements take it.
+class MacroFlow(Flow[RS274Unit]):
+    """Where execution stands.
 
-    unit, block  what is executed next
-    passed       the condition of the last IF .. THEN held
-    skipping     always None: nothing is looked for line by line here
+    find         gives the text of a file by the number or name of its program
     in_parts     only a part of the text is known; `heads`: numbers and names of the program itself
     looked       a subprogram has been looked for
     """
 
-    skipping: str | None = None
+    most_calls = 15
+    too_deep = f"calls are nested more than {most_calls} deep at O{{}}"
+    """Ten of subprograms, five of macros."""
 
     def __init__(
         self, control: Control, main: RS274Unit, find: Callable[[str], RS274Unit | None], *, in_parts: bool = False
     ) -> None:
+        super().__init__(main, control.budget)
+        self.control, self.main, self.find = control, main, find
         self.in_parts, self.looked = in_parts, False
         self.heads: frozenset[str] = frozenset()
-        self.control = control
-        self.main = main
-        self.find = find
-        self.unit = main
-        self.block = 0
-        self.calls: list[Call] = []
-        self.passed = False
         self.outlines: dict[int, Outline] = {}
-        self.handlers: dict[str, Callable[[FlowLine], None]] = {
-            "program": self.program,
-            "goto": self.jump,
-            "if goto": self.branch,
-            "if then": self.condition,
-            "do": self.loop,
-            "end": self.loop_end,
-        }
-
-    @property
-    def outline(self) -> Outline:
-        """The outline of the text that is executed."""
-        return self.outline_of(self.unit)
 
     def outline_of(self, unit: RS274Unit) -> Outline:
         """The outline of a text."""
@@ -97,105 +166,90 @@ class MacroFlow:
             raise NotInPartsError("the text holds several programs")
         self.heads |= outline.programs.keys()
 
-    # -- what the interpreter asks ------------------------------------------------------------------------------------
-
-    def arrive(self) -> bool:
-        """See `Interpreter`."""
-        return self.block < self.unit.stop
-
-    def follow(self, flow: FlowLine) -> None:
-        """Do what a statement says; `block` is already that of the next line."""
-        self.handlers[flow.keyword](flow)
-
     def unfinished(self) -> Fault | None:
-        """What is wrong if the text ends here."""
-        return self.missing_end() if self.calls else None
-
-    def missing_end(self) -> Fault:
-        """The fault of a subprogram without M99."""
-        return Fault(BAD_JUMP, f"the program O{self.calls[-1].label} ends without M99")
+        """What is wrong if the text ends here: a subprogram without M99."""
+        return Fault(BAD_JUMP, f"the program O{self.calls[-1].name} ends without M99") if self.calls else None
 
     # -- statements ---------------------------------------------------------------------------------------------------
 
-    def program(self, flow: FlowLine) -> None:
-        """An O-word: the head of the program that runs, or that of the next one."""
-        here = self.block - 1
-        if self.calls:
-            raise self.missing_end()
-        if here != self.outline.starts[0]:
-            self.block = self.unit.stop
+    def lowered(self, line: FlowLine, unit: RS274Unit, block: int) -> tuple[Operation, ...]:
+        """What a statement comes down to."""
+        outline = self.outline_of(unit)
+        partner = outline.partner.get(block, -1)
+        match line.keyword:
+            case "program" if outline.starts and block != outline.starts[0]:
+                return Let(self.check_returned), Jump(unit.stop)
+            case "program":
+                return (Let(self.check_returned),)
+            case "goto":
+                return (Jump(lambda: self.target(line)),)
+            case "if goto":
+                return (Jump(lambda: self.target(line), lambda: self.holds(line)),)
+            case "if then":
+                return (Jump(block + 1, lambda: not self.holds(line)),)
+            case "do" if partner < 0:
+                return (Let(lambda: self.stop(f"DO{line.label} has no END{line.label}")),)
+            case "do":
+                return (Jump(partner + 1, lambda: not self.holds(line)),) if line.arguments else ()
+            case "end" if partner < 0:
+                return (Let(lambda: self.stop("this END has no DO before it")),)
+            case "end":
+                return (Jump(partner),)
+        raise AssertionError("there are no other statements")
 
-    def jump(self, flow: FlowLine) -> None:
-        """GOTO n."""
-        label = flow.label
-        self.go_to(int(label) if isinstance(label, str) else round(number(self.control.deciding(label))))
+    def stop(self, text: str) -> None:
+        """The control stops."""
+        raise Fault(BAD_JUMP, text)
 
-    def go_to(self, target: int) -> None:
-        """Go on at block N of this program."""
+    def check_returned(self) -> None:
+        """An O-word is the head of the program that runs, or that of the next one, but none of one that is called."""
+        fault = self.unfinished()
+        if fault is not None:
+            raise fault
+
+    def holds(self, line: FlowLine) -> bool:
+        """Whether a condition is met."""
+        return self.control.deciding(line.arguments[0]) != 0.0
+
+    def target(self, line: FlowLine) -> int:
+        """The block to which GOTO leads."""
+        label = line.label
+        return self.numbered(int(label) if isinstance(label, str) else round(number(self.control.deciding(label))))
+
+    def numbered(self, target: int) -> int:
+        """Block N of this program."""
         if target < 1:
             raise Fault(BAD_JUMP, f"there is no block N{target}")
-        found = self.outline.numbered(target, self.block - 1)
-        if found is None:
-            raise Fault(BAD_JUMP, f"there is no block N{target} in this program")
-        self.block = found
-
-    def branch(self, flow: FlowLine) -> None:
-        """IF [..] GOTO n."""
-        if self.control.deciding(flow.arguments[0]) != 0.0:
-            self.jump(flow)
-
-    def condition(self, flow: FlowLine) -> None:
-        """IF [..] THEN: whether the rest of the block is done."""
-        self.passed = self.control.deciding(flow.arguments[0]) != 0.0
-
-    def loop(self, flow: FlowLine) -> None:
-        """WHILE [..] DO m, and DO m, which never ends by itself."""
-        end = self.outline.partner.get(self.block - 1)
-        if end is None:
-            raise Fault(BAD_JUMP, f"DO{flow.label} has no END{flow.label}")
-        if flow.arguments and self.control.deciding(flow.arguments[0]) == 0.0:
-            self.block = end + 1
-
-    def loop_end(self, flow: FlowLine) -> None:
-        """END m: back to its DO."""
-        begin = self.outline.partner.get(self.block - 1)
-        if begin is None:
-            raise Fault(BAD_JUMP, "this END has no DO before it")
-        self.block = begin
+        return self.outline_of(self.unit).numbered(target, self.block - 1)
 
     # -- calls --------------------------------------------------------------------------------------------------------
 
-    def call_by_code(self, label: str, times: int) -> None:
-        """M98: the subprogram shares the local variables of its caller."""
-        self.begin(label, times, None)
-
     def begin(self, label: str, times: int, arguments: Store | None) -> None:
-        """Enter a program: in this text, or in a file of its own."""
+        """Enter a program, in this text or in a file of its own: a macro with arguments, or a subprogram."""
+        self.follow((Call(lambda: self.called(label, times, arguments)),))
+
+    def called(self, label: str, times: int, arguments: Store | None) -> OpenCall[RS274Unit] | None:
+        """The call of a program; None where it is not executed, or is one of the builder's that is not at hand."""
         if times < 1:
-            return
-        if len(self.calls) >= MAX_CALLS:
-            raise Fault(TOO_DEEP, f"calls are nested more than {MAX_CALLS} deep at O{label}")
+            return None
+        self.check_depth(label)
         try:
             entry = self.entry(label)
         except Fault as fault:
             if fault.code != NO_SUBPROGRAM or not builder.is_builders(label):
                 raise
             builder.ran(self.control, label)
-            return
-        self.enter(Call(label, self.unit, self.block, entry, times - 1, arguments))
+            return None
+        self.budget.foresee(times - 1)
+        if arguments is None:
+            return OpenCall(label, entry, times - 1)
+        scopes = self.control.parameters.scopes
+        scopes.append(arguments.copy())
 
-    def enter(self, call: Call) -> None:
-        """Go to where a call leads."""
-        self.control.budget.foresee(call.remaining)
-        self.calls.append(call)
-        self.start(call)
+        def again() -> None:
+            scopes[-1] = arguments.copy()
 
-    def start(self, call: Call) -> None:
-        """Begin a call, for the first time or again."""
-        if call.arguments is not None:
-            fresh = Store(dict(call.arguments.values), set(call.arguments.runtime))
-            self.control.parameters.scopes.append(fresh)
-        self.unit, self.block = call.entry
+        return OpenCall(label, entry, times - 1, again=again, leave=scopes.pop)
 
     def entry(self, label: str) -> tuple[RS274Unit, int]:
         """The text and block at which a program begins, after its O-word."""
@@ -218,28 +272,21 @@ class MacroFlow:
         first = outline.starts[0] if outline.starts else -1
         return file, outline.programs.get(label, first) + 1
 
-    def under_way(self) -> tuple[object, ...]:
-        """The calls that have not returned, and how often each is still to be made."""
-        return tuple((id(call.unit), call.block, call.remaining) for call in self.calls)
-
     def enter_local(self, target: int, times: int) -> None:
         """M97 of Haas: a subprogram that begins at a block N of this program."""
-        found = self.outline.numbered(target, self.block - 1)
-        if found is None:
-            raise Fault(BAD_JUMP, f"there is no block N{target} in this program")
+        found = self.outline_of(self.unit).numbered(target, self.block - 1)
         if times > 0:
-            self.enter(Call(f"N{target}", self.unit, self.block, (self.unit, found), times - 1, None))
+            self.budget.foresee(times - 1)
+            self.enter(OpenCall(f"N{target}", (self.unit, found), times - 1))
 
-    def finish(self, target: int | None = None) -> None:
-        """M99: return, to a block N if one is named, or run again if the call asked for several times."""
-        call = self.calls[-1]
-        if call.arguments is not None:
-            self.control.parameters.scopes.pop()
-        if call.remaining and target is None:
-            call.remaining -= 1
-            self.start(call)
+    def come_back(self, target: int | None) -> None:
+        """M99: return, to a block N if one is named, or run again if the call asked for several times.
+
+        In the main program it goes to that block, or to the start, where ncfix takes it as the end.
+        """
+        if target is None:
+            self.follow((Return(),))
             return
-        self.calls.pop()
-        self.unit, self.block = call.unit, call.block
-        if target is not None:
-            self.go_to(target)
+        if self.calls:
+            self.finish(again=False)
+        self.jump(self.numbered(target))

@@ -15,10 +15,9 @@ from ncfix.text.language import Run
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import dynamic, polar, scaling, system, vectors
 from ncfix_fanuc.macro.arithmetic import variable_number
-from ncfix_fanuc.macro.calls import LENGTHS, local_variables
 from ncfix_fanuc.macro.control import MacroControl
 from ncfix_fanuc.macro.corners import CORNER
-from ncfix_fanuc.macro.flow import BAD_JUMP, MacroFlow
+from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
 from ncfix_fanuc.macro.lengths import LENGTH_IN_STEPS, lone_number
 from ncfix_fanuc.macro.points import G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.rules import MACRO
@@ -28,7 +27,7 @@ from ncfix_iso.rs274.control import Block
 from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, RS274Interpreter
 from ncfix_iso.rs274.order import MACHINE
 from ncfix_iso.rs274.parameters import Store
-from ncfix_iso.rs274.plans import Codes, Plan, RS274Unit, plan_of
+from ncfix_iso.rs274.plans import Codes, Plan, plan_of
 
 G20, G21, G90, G91 = 200, 210, 900, 910
 G65, G66_1, G67 = 650, 661, 670
@@ -116,15 +115,11 @@ class MacroInterpreter(RS274Interpreter):
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
-    def execute(self, plan: Plan, unit: RS274Unit, block: int) -> bool:
-        """Execute a block; True if the program ends there."""
-        self.flow.passed = False
-        ended = super().execute(plan, unit, block)
-        if plan.flow is None or self.flow.block != block + 1:
-            return ended
-        if plan.flow.keyword == "if then" and self.flow.passed:
-            return self.execute_words(plan, block)
-        return ended
+    def beside_statement(self, plan: Plan, index: int) -> bool:
+        """Execute the words that stand beside a statement: behind THEN, or the number of a program."""
+        if plan.flow is not None and plan.flow.keyword == "if then":
+            return self.execute_words(plan, index)
+        return super().beside_statement(plan, index)
 
     def execute_words(self, plan: Plan, index: int) -> bool:
         """Execute a block of words and assignments."""
@@ -291,13 +286,8 @@ class MacroInterpreter(RS274Interpreter):
     def returned(self, block: Block) -> bool:
         """M99: back to the caller; in the main program, to block P or to the start, where ncfix takes it as the end."""
         target = whole(block.get("P"), "P of M99") if "P" in block.values else None
-        if self.flow.calls:
-            self.flow.finish(target)
-            return False
-        if target is None:
-            return True
-        self.flow.go_to(target)
-        return False
+        self.flow.come_back(target)
+        return self.flow.ended
 
     def subprogram(self, block: Block) -> None:
         """M98 Pn Ln Qn; the repeats may stand before four digits of the number, Q is the block to begin at."""
@@ -313,7 +303,7 @@ class MacroInterpreter(RS274Interpreter):
         if "Q" in block.values:
             if times != 1:
                 raise Fault(BAD_JUMP, "where a repeated call begins that names a block (Q of M98) is not certain")
-            self.flow.go_to(whole(block.values["Q"], "Q of M98"))
+            self.flow.jump(self.flow.numbered(whole(block.values["Q"], "Q of M98")))
 
     def is_there(self, label: str) -> bool:
         """Whether there is a program of that number."""

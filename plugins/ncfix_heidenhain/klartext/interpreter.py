@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import Protocol
 
 from ncfix.control.coordinates import INDEX
 from ncfix.control.faults import Fault
+from ncfix.control.flow import Return
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.places import mask_of
@@ -20,7 +22,7 @@ from ncfix_heidenhain.klartext import cycles, lines, tilting, trans_cycles
 from ncfix_heidenhain.klartext.calculate import Evaluate
 from ncfix_heidenhain.klartext.codes import after_motion, before_motion
 from ncfix_heidenhain.klartext.control import Control
-from ncfix_heidenhain.klartext.flow import FlowControl
+from ncfix_heidenhain.klartext.flow import PROGRAM, KlartextFlow
 from ncfix_heidenhain.klartext.lane import run_lane
 from ncfix_heidenhain.klartext.layout import CORNERS
 from ncfix_heidenhain.klartext.paths import PATHS, astray
@@ -54,7 +56,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     """Follows one program."""
 
     control: Control
-    flow: FlowControl
+    flow: KlartextFlow
     recorder: Recorder | None
 
     def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
@@ -66,7 +68,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             self.main = KlartextUnit(program, self.axes)
         except Fault as fault:
             raise SourceError.of(fault.code, fault.text, control.locate(), fault.hint) from None
-        self.flow = FlowControl(self.main, self.find, control.scope.parameters, control.budget, self.main.begin)
+        self.flow = KlartextFlow(control, self.main, self.find)
         control.locate = self.place
         control.unit = self.main.mm
         control.recompose()
@@ -119,7 +121,10 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         if plan.statement is not None:
             return self.state(plan, flow)
         if plan.flow is not None:
-            self.branch(plan, flow)
+            operations = unit.operations.get(block)
+            if operations is None:
+                operations = unit.operations[block] = flow.operations(plan, partial(self.holds, plan))
+            flow.follow(operations)
             return False
         self.assign(plan)
         words = self.evaluated(plan.words)
@@ -136,7 +141,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             return self.motion(plan, words, flow)
         return False
 
-    def state(self, plan: Plan, flow: FlowControl) -> bool:
+    def state(self, plan: Plan, flow: KlartextFlow) -> bool:
         """A statement that is not taken apart."""
         assert plan.statement is not None
         kind, span = plan.statement
@@ -146,23 +151,10 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         if kind == UNREAD:
             unread_line(self.control, flow.unit.program.text_of(flow.block - 1))
         elif kind == "program":
-            return text.upper().startswith("END") and flow.end_of_program()
+            flow.follow((Return(kind=PROGRAM),) if text.upper().startswith("END") else ())
         else:
             statement(self.control, flow, text)
-        return False
-
-    def branch(self, plan: Plan, flow: FlowControl) -> None:
-        """A label, a call or a condition."""
-        assert plan.flow is not None
-        label = str(plan.flow.label)
-        match plan.flow.keyword:
-            case "label" if label == "0":
-                flow.end_of_subprogram()
-            case "call":
-                times = plan.flow.arguments
-                flow.call(label, int(times[0].value) if times else None)  # type: ignore[union-attr]
-            case "if" if self.holds(plan):
-                flow.jump(label)
+        return flow.ended
 
     def holds(self, plan: Plan) -> bool:
         """Whether a condition is met; raises `Fault` if that is known only at run time."""
@@ -197,7 +189,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         number, at_runtime = self.control.scope.value_of(plan.tool)
         return self.control.scope.parameters.lacking if at_runtime else number
 
-    def names(self, plan: Plan, flow: FlowControl) -> str:
+    def names(self, plan: Plan, flow: KlartextFlow) -> str:
         """The words of a cycle definition that have no value."""
         program, block = flow.unit.program, flow.block - 1
         items = program.items_of(block)
@@ -213,7 +205,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
-    def motion(self, plan: Plan, words: Words, flow: FlowControl) -> bool:
+    def motion(self, plan: Plan, words: Words, flow: KlartextFlow) -> bool:
         """A block of path words and M codes; True if it ends the program."""
         control = self.control
         codes = frozenset(code for code, _ in plan.codes)
@@ -252,7 +244,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         if "fauto" in plan.flags:
             modal.feed = self.control.auto_feed
 
-    def corner_ahead(self, flow: FlowControl) -> bool:
+    def corner_ahead(self, flow: KlartextFlow) -> bool:
         """Whether the next block makes a corner of the end of this one."""
         following = flow.unit.next_plan(flow.block)
         return following is not None and following.name in CORNERS

@@ -1,7 +1,8 @@
 """O-words: subprograms, branches and loops, and M98 and M99, followed as LinuxCNC's interpreter does.
 
 The interpreter reads on from line to line. A branch not taken, a loop left, a subprogram being defined or looked for
-make it skip: it passes over all lines but o-words with the label that it waits for.
+make it skip: it passes over all lines but o-words with the label that it waits for. Labels are known once they have
+been met, and may be computed: so what an o-word comes down to is found out when it is executed.
 Source: LinuxCNC documentation, "O codes"; what it leaves open was tried out on `rs274`.
 """
 
@@ -9,48 +10,51 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 
 from ncfix.control.faults import Fault
+from ncfix.control.flow import NO_LABEL, NO_SUBPROGRAM, Call, Flow, Jump, Let, OpenCall, Operation
 from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.control import Control
 from ncfix_iso.rs274.expressions import Evaluate
-from ncfix_iso.rs274.labels import BAD_FLOW, Label, Labels, oword
 from ncfix_iso.rs274.parameters import Store
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit
 from ncfix_iso.rs274.settings import restore
 
-MAX_CALLS = 10
-"""How deep subprograms may be nested, the main program included (LinuxCNC)."""
+BAD_FLOW = NO_LABEL
+MAX_CALLS = 9
+"""How deep subprograms may be nested (LinuxCNC: 10, with the main program)."""
 
-NO_SUBPROGRAM = "NCF231"
-TOO_DEEP = "NCF232"
 GLOBAL = frozenset({"sub", "endsub", "call", "return", "program"})
 ENDS_OF_LOOPS = {"endwhile": "while", "endrepeat": "repeat"}
+BY_CODE = "M98"
+"""The kind of calls that share #1 to #30 with the caller."""
 
 
 @dataclass(slots=True)
-class Call:
-    """A subprogram call that has not returned.
+class Label:
+    """Where an o-word was first met, as what, and how many times a `repeat` is still to run."""
 
-    label       of the subprogram
-    unit, block where to go on after it
-    by_code     it was called with M98: #1 to #30 are shared with the caller
-    saved       the caller's #1 to #30 otherwise
-    remaining   how many more times M98 calls it
-    """
-
-    label: str
     unit: RS274Unit
     block: int
-    by_code: bool = False
-    saved: list[tuple[float, bool]] = field(default_factory=list)
-    remaining: int = 0
+    keyword: str
+    repeats: int = -1
 
 
-class FlowControl:
-    """Where execution stands, and where o-words take it: a `Course`.
+def oword(name: str) -> str:
+    """A label as it is written, without the subprogram that it stands in: `o100`, `o<name>`."""
+    label = name.rpartition("#")[2]
+    return f"o{label}" if label.isdigit() else f"o<{label}>"
 
+
+class OWords(Flow[RS274Unit]):
+    """Where execution stands, and where o-words take it.
+
+    name             the full name of the label of the o-word that is executed
+    labels           all that have been met, by their full names
+    skipping         the label that execution waits for; None while it does not skip
+    skipping_from    where that began
     skipping_to_sub  what is waited for is the begin of a subprogram that has been called
     defining         the subprogram that is being defined and passed over; None outside of one
     executed_if      a branch of the `if` that was met last has been executed
@@ -58,17 +62,19 @@ class FlowControl:
     continuing       the same of a `continue`
     """
 
+    most_calls = MAX_CALLS
+    too_deep = f"subprograms are nested more than {MAX_CALLS} deep at {{}}"
+
     def __init__(self, control: Control, main: RS274Unit, find: Callable[[str], RS274Unit | None]) -> None:
+        super().__init__(main, control.budget)
         self.control = control
         self.find = find
-        self.unit = main
-        self.block = 0
-        self.calls: list[Call] = []
+        self.name = ""
+        self.labels: dict[str, Label] = {}
         self.skipping: str | None = None
         self.skipping_to_sub = False
         self.skipping_from: tuple[RS274Unit, int] = (main, 0)
         self.defining: str | None = None
-        self.labels = Labels()
         self.executed_if = False
         self.breaking = False
         self.continuing = False
@@ -98,7 +104,7 @@ class FlowControl:
         label = flow.label if isinstance(flow.label, str) else self.computed_label(flow.label)
         if flow.keyword in GLOBAL:
             return label
-        scope = self.calls[-1].label if self.calls else self.defining or ""
+        scope = self.calls[-1].name if self.calls else self.defining or ""
         return f"{scope}#{label}"
 
     def computed_label(self, label: Evaluate) -> str:
@@ -112,7 +118,18 @@ class FlowControl:
 
     def enter_label(self, flow: FlowLine, name: str) -> Label:
         """Note where a label stands; raises `Fault` if it stands elsewhere too."""
-        return self.labels.enter(name, flow.keyword, self.unit, self.block - 1)
+        known = self.labels.setdefault(name, Label(self.unit, self.block - 1, flow.keyword))
+        if known.block != self.block - 1 or known.unit is not self.unit:
+            line = known.unit.program.line(known.block)
+            raise Fault(BAD_FLOW, f"the label {oword(name)} is used already, in line {line}")
+        return known
+
+    def known(self, name: str, keyword: str, *openings: str) -> Label:
+        """The label that a line with this keyword belongs to; raises `Fault` if it was not met as one of `openings`."""
+        known = self.labels.get(name)
+        if known is None or known.keyword not in openings:
+            raise Fault(BAD_FLOW, f"{oword(name)} {keyword} has no {' or '.join(openings)} before it")
+        return known
 
     def skip_to(self, name: str) -> None:
         """Pass over what follows, up to o-words with this label."""
@@ -126,7 +143,7 @@ class FlowControl:
     # -- the walk -----------------------------------------------------------------------------------------------------
 
     def arrive(self) -> bool:
-        """See `Interpreter`; while skipping: go to the next o-word of this text."""
+        """See `Flow`; while skipping: go to the next o-word of this text."""
         if self.skipping is not None:
             at = bisect_left(self.unit.flows, self.block)
             if at == len(self.unit.flows):
@@ -136,21 +153,26 @@ class FlowControl:
             self.block = self.unit.flows[at]
         return self.block < self.unit.stop
 
-    def follow(self, flow: FlowLine) -> None:
-        """Do what an o-word says; `block` is already that of the next line."""
-        name = self.name_of(flow)
-        keyword = flow.keyword
+    def lowered(self, line: FlowLine, unit: RS274Unit, block: int) -> tuple[Operation, ...]:
+        """What an o-word comes down to: it is passed over, or does what it says; then execution may skip."""
+        handler = self.handlers[line.keyword]
+        return (
+            Jump(None, partial(self.passes_over, line)),
+            Let(lambda: handler(line, self.name)),
+            Jump(None, lambda: self.skipping is not None),
+        )
+
+    def passes_over(self, flow: FlowLine) -> bool:
+        """Whether an o-word does nothing, while something else is waited for or a subprogram defined."""
+        name, keyword = self.name_of(flow), flow.keyword
+        self.name = name
         if keyword in ("sub", "program") and self.defining is not None:
             raise Fault(BAD_FLOW, f"{oword(name)} {keyword} stands inside the subprogram {oword(self.defining)}")
-        if self.skipping is not None and self.skipping != name:
-            return
+        if self.skipping is not None and (self.skipping != name or keyword == "call"):
+            return True
         if self.skipping_to_sub and keyword not in ("sub", "program"):
-            return
-        if self.defining is not None and keyword not in ("endsub", "return"):
-            return
-        if keyword == "call" and self.skipping is not None:
-            return
-        self.handlers[keyword](flow, name)
+            return True
+        return self.defining is not None and keyword not in ("endsub", "return")
 
     def unfinished(self) -> Fault | None:
         """What is wrong if the text ends here."""
@@ -158,7 +180,7 @@ class FlowControl:
             return self.missing_end()
         if self.calls:
             return Fault(
-                BAD_FLOW, f"the file ends inside the subprogram {oword(self.calls[-1].label)}", "endsub is missing"
+                BAD_FLOW, f"the file ends inside the subprogram {oword(self.calls[-1].name)}", "endsub is missing"
             )
         return None
 
@@ -175,7 +197,7 @@ class FlowControl:
 
     def subprogram(self, flow: FlowLine, name: str) -> None:
         """`sub`, or a bare program number: it begins here, or is only defined here."""
-        by_code = bool(self.calls) and self.calls[-1].by_code
+        by_code = bool(self.calls) and self.calls[-1].kind == BY_CODE
         if self.calls and self.skipping is not None and by_code != (flow.keyword == "program"):
             raise Fault(
                 BAD_FLOW,
@@ -194,33 +216,40 @@ class FlowControl:
         parameters = self.control.parameters
         arguments = [self.control.value_of(argument) for argument in flow.arguments]
         saved = parameters.locals()
-        self.begin(Call(name, self.unit, self.block, saved=saved))
+        self.begin(name, 0, "", lambda: parameters.set_locals(saved))
         parameters.set_locals(arguments)
 
     def call_by_code(self, label: str, times: int) -> None:
         """M98 P.. L..: the subprogram shares #1 to #30 with its caller."""
-        self.control.budget.foresee(times)
+        self.budget.foresee(times)
         if times > 0:
-            self.begin(Call(label, self.unit, self.block, by_code=True, remaining=times - 1))
+            self.begin(label, times - 1, BY_CODE, lambda: None)
 
-    def begin(self, call: Call) -> None:
+    def begin(self, label: str, left: int, kind: str, restored: Callable[[], None]) -> None:
         """Enter a subprogram: known already, in a file of its own, or further down."""
-        if len(self.calls) + 1 >= MAX_CALLS:
-            raise Fault(TOO_DEEP, f"subprograms are nested more than {MAX_CALLS - 1} deep at {oword(call.label)}")
-        self.calls.append(call)
-        self.control.parameters.scopes.append(Store())
-        self.control.saved.append(None)
-        known = self.labels.find(call.label)
-        if known is not None:
-            self.go_to(known)
-            return
-        self.skip_to(call.label)
-        self.skipping_to_sub = True
-        file = self.find(call.label)
-        if file is not None:
-            self.unit, self.block = file, 0
-        elif not self.control.rules.strict:
-            self.block = 0
+        self.check_depth(oword(label))
+        control, known = self.control, self.labels.get(label)
+
+        def leave() -> None:
+            control.parameters.scopes.pop()
+            saved = control.saved.pop()
+            restored()
+            if saved is not None and saved.at_return:
+                restore(control, saved.modal)
+
+        def again() -> None:
+            call.entry = self.labels[label].unit, self.labels[label].block
+
+        file = None if known else self.find(label)
+        begin = self.block if control.rules.strict else 0
+        entry = (known.unit, known.block) if known else (file, 0) if file else (self.unit, begin)
+        call = OpenCall(label, entry, left, kind, again, leave)
+        control.parameters.scopes.append(Store())
+        control.saved.append(None)
+        if known is None:
+            self.skip_to(label)
+            self.skipping_to_sub = True
+        self.follow((Call(lambda: call),))
 
     def leave(self, flow: FlowLine, name: str) -> None:
         """`endsub` and `return`."""
@@ -230,37 +259,20 @@ class FlowControl:
             if flow.keyword == "endsub":
                 self.defining = self.skipping = None
             return
-        if self.calls[-1].by_code:
-            raise Fault(BAD_FLOW, f"{oword(self.calls[-1].label)} was called with M98 and has to end with M99")
-        parameters = self.control.parameters
+        if self.calls[-1].kind == BY_CODE:
+            raise Fault(BAD_FLOW, f"{oword(self.calls[-1].name)} was called with M98 and has to end with M99")
         value = self.argument(flow) if flow.arguments else 0.0
-        parameters.returned = (value, bool(flow.arguments))
+        self.control.parameters.returned = (value, bool(flow.arguments))
         self.finish()
 
-    def finish(self) -> None:
-        """Return from a subprogram, or run it again if M98 asked for it several times."""
-        call = self.calls[-1]
+    def finish(self, kind: str = "", *, again: bool = True) -> None:
+        """See `Flow`."""
         self.skipping = None
-        if call.remaining:
-            call.remaining -= 1
-            self.go_to(self.labels.entries[call.label])
-            return
-        self.calls.pop()
-        self.control.parameters.scopes.pop()
-        saved = self.control.saved.pop()
-        if not call.by_code:
-            self.control.parameters.set_locals(call.saved)
-        self.unit, self.block = call.unit, call.block
-        if saved is not None and saved.at_return:
-            restore(self.control, saved.modal)
+        super().finish(kind, again=again)
 
     def go_to(self, label: Label) -> None:
         """Go on at a label."""
         self.unit, self.block = label.unit, label.block
-
-    def under_way(self) -> tuple[object, ...]:
-        """The calls that have not returned, and how often each is still to be made."""
-        return tuple((id(call.unit), call.block, call.remaining) for call in self.calls)
 
     # -- branches -----------------------------------------------------------------------------------------------------
 
@@ -274,7 +286,7 @@ class FlowControl:
 
     def otherwise_if(self, flow: FlowLine, name: str) -> None:
         """`elseif [..]`."""
-        self.labels.known(name, flow.keyword, "if")
+        self.known(name, flow.keyword, "if")
         if self.executed_if:
             self.skip_to(name)
         elif self.argument(flow) != 0.0:
@@ -283,7 +295,7 @@ class FlowControl:
 
     def otherwise(self, flow: FlowLine, name: str) -> None:
         """`else`."""
-        self.labels.known(name, flow.keyword, "if")
+        self.known(name, flow.keyword, "if")
         if self.executed_if:
             self.skip_to(name)
         elif self.skipping is not None:
@@ -292,7 +304,7 @@ class FlowControl:
 
     def end_branch(self, flow: FlowLine, name: str) -> None:
         """`endif`."""
-        self.labels.known(name, flow.keyword, "if")
+        self.known(name, flow.keyword, "if")
         self.skipping = None
         self.executed_if = True
 
@@ -301,11 +313,11 @@ class FlowControl:
     def do(self, flow: FlowLine, name: str) -> None:
         """`do`: a loop whose condition stands at its end."""
         self.skipping = None
-        self.labels.entries.setdefault(name, Label(self.unit, self.block - 1, flow.keyword))
+        self.labels.setdefault(name, Label(self.unit, self.block - 1, flow.keyword))
 
     def loop(self, flow: FlowLine, name: str) -> None:
         """`while [..]`: the begin of a loop, or the end of a `do`."""
-        known = self.labels.find(name)
+        known = self.labels.get(name)
         self.skipping = None
         value = self.argument(flow)
         if known is not None and known.keyword == "do":
@@ -332,20 +344,20 @@ class FlowControl:
 
     def break_loop(self, flow: FlowLine, name: str) -> None:
         """`break`."""
-        self.labels.known(name, flow.keyword, "while", "do")
+        self.known(name, flow.keyword, "while", "do")
         self.skip_to(name)
         self.breaking = True
 
     def continue_loop(self, flow: FlowLine, name: str) -> None:
         """`continue`."""
-        self.labels.known(name, flow.keyword, "while", "do")
+        self.known(name, flow.keyword, "while", "do")
         if self.skipping is None:
             self.skip_to(name)
             self.continuing = True
 
     def end_loop(self, flow: FlowLine, name: str) -> None:
         """`endwhile`, `endrepeat`."""
-        label = self.labels.known(name, flow.keyword, ENDS_OF_LOOPS[flow.keyword])
+        label = self.known(name, flow.keyword, ENDS_OF_LOOPS[flow.keyword])
         if self.skipping is None or self.continuing:
             self.continuing = False
             self.skipping = None

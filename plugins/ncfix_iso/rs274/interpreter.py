@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS, N_LETTERS
 from ncfix.control.faults import Fault
+from ncfix.control.flow import NEVER_ENDS, WAITS, Flow
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.control.places import mask_of
-from ncfix.control.recurrence import NEVER_ENDS, WAITS
 from ncfix.text.language import Run
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
 from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.choice import motion_of
 from ncfix_iso.rs274.control import RUNTIME_BRANCH, Block, Control
-from ncfix_iso.rs274.course import Course
-from ncfix_iso.rs274.flow import FlowControl
+from ncfix_iso.rs274.flow import OWords
 from ncfix_iso.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix_iso.rs274.order import MACHINE, MOTIONS
 from ncfix_iso.rs274.plans import POLAR, Codes, Plan, RS274Unit, grouped_codes, has_words
@@ -54,13 +53,13 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         super().__init__(control, program, run, in_parts=in_parts)
         self.axes = mask_of(control.machine)
         self.main = RS274Unit(program, control.rules, self.axes)
-        self.flow: Course = self.prepared()
+        self.flow = self.prepared()
         systems.load_setup(control)
 
-    def prepared(self) -> Course:
+    def prepared(self) -> Flow[RS274Unit]:
         """Give the control its own parameters; where execution begins."""
         control = self.control
-        flow = FlowControl(control, self.main, self.find)
+        flow = OWords(control, self.main, self.find)
         control.parameters.persistent = lambda number: systems.before_persistent(control, number)
         predefined.install(control, flow)
         return flow
@@ -112,14 +111,15 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             self.span = plan.flow.span
             if self.recorder and not self.flow.calls:
                 self.recorder.head(unit, block, plan.flow.keyword)
-            self.flow.follow(plan.flow)
-            return self.beside_number(plan, block)
+            operations = unit.operations.get(block)
+            if operations is None:
+                operations = unit.operations[block] = self.flow.lowered(plan.flow, unit, block)
+            return self.flow.follow(operations) and self.beside_statement(plan, block)
         return self.execute_words(plan, block)
 
-    def beside_number(self, plan: Plan, index: int) -> bool:
-        """Execute the words that stand beside the number of a program, if it begins there (not in LinuxCNC)."""
-        flow, line = self.flow, plan.flow
-        begins = flow.skipping is None and flow.block == index + 1 and line is not None and line.keyword == "program"
+    def beside_statement(self, plan: Plan, index: int) -> bool:
+        """Execute the words that stand beside the number of a program that begins there (not in LinuxCNC)."""
+        begins = plan.flow is not None and plan.flow.keyword == "program"
         if self.control.rules.strict or not begins or not has_words(plan):
             return False
         written, self.recorder = self.recorder, None  # the line has been written as it stands
@@ -272,7 +272,5 @@ class RS274Interpreter(Interpreter[RS274Unit]):
                 times, number = divmod(number, LAST_PROGRAM + 1)
             self.flow.call_by_code(str(number), times)
         if codes.call == RETURN:
-            if not self.flow.calls:
-                return True
             self.flow.finish()
-        return False
+        return bool(self.flow.ended)

@@ -11,7 +11,7 @@ from functools import partial
 
 from ncfix.control.coordinates import LETTERS
 from ncfix_iso.rs274.control import Control
-from ncfix_iso.rs274.flow import FlowControl
+from ncfix_iso.rs274.flow import OWords
 
 VERSION = 2.9
 """The version of LinuxCNC that programs find: that of the interpreter which is followed."""
@@ -19,7 +19,7 @@ VERSION = 2.9
 Getter = Callable[[], float]
 
 
-def install(control: Control, flow: FlowControl) -> None:
+def install(control: Control, flow: OWords) -> None:
     """Give a control its own parameters."""
     control.parameters.live = numbered(control)
     control.parameters.predefined = positions(control) | modes(control) | machine(control) | program(control, flow)
@@ -113,7 +113,7 @@ def machine(control: Control) -> dict[str, Getter]:
     return getters
 
 
-def program(control: Control, flow: FlowControl) -> dict[str, Getter]:
+def program(control: Control, flow: OWords) -> dict[str, Getter]:
     """Where in the program execution stands, and what the last subprogram returned."""
     return {
         "_line": lambda: float(flow.unit.program.line(flow.block - 1)),

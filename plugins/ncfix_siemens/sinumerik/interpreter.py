@@ -10,6 +10,7 @@ from operator import or_
 import numpy as np
 
 from ncfix.control.flatten import RUNTIME, FlatLine
+from ncfix.control.flow import Call
 from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Moves
 from ncfix.control.parts import NotInPartsError
@@ -17,10 +18,9 @@ from ncfix.control.places import mask_of
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
 from ncfix.text.tree import Program
-from ncfix_siemens.sinumerik.bypass import bypassed
 from ncfix_siemens.sinumerik.calling import call_word, ran_elsewhere
-from ncfix_siemens.sinumerik.course import AtRuntimeError, Course
 from ncfix_siemens.sinumerik.destination import Words
+from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.heading import note_stretch
 from ncfix_siemens.sinumerik.increments import stand
 from ncfix_siemens.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
@@ -29,8 +29,8 @@ from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, Plan, is_
 from ncfix_siemens.sinumerik.poles import all_or_none
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn, act, finish_block, say
-from ncfix_siemens.sinumerik.sweep import DECIDED_AT_RUNTIME, demoted, sweep
 from ncfix_siemens.sinumerik.synchronous import is_harmless
+from ncfix_siemens.sinumerik.undecided import DECIDED_AT_RUNTIME, bypassed, demoted, sweep
 from ncfix_siemens.sinumerik.unit import HEAD, PROCEDURE, SinumerikUnit, units_of
 from ncfix_siemens.sinumerik.unroll import Recorder
 from ncfix_siemens.sinumerik.vectors import run_vectors
@@ -63,7 +63,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
     """
 
     control: Sinumerik
-    flow: Course
+    flow: SinumerikFlow
     recorder: Recorder | None
 
     def __init__(self, control: Sinumerik, program: Program, run: Run, *, in_parts: bool = False) -> None:
@@ -73,7 +73,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             raise NotInPartsError("the text holds several programs")
         self.main = units[0]
         self.files |= {unit.name: unit for unit in units[1:] if unit.name}
-        self.flow = Course(control, self.main, self.main.begin)
+        self.flow = SinumerikFlow(control, self.main)
         self.again: int | None = None
         self.at_once = not changes_tools(self.main.all_plans(), program.source)
         self.called = False
@@ -207,38 +207,32 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         finish_block(control, turn)
         if turn.elsewhere:
             ran_elsewhere(control, turn.elsewhere, changes_tool=control.tools.selected != 0)
-        return self.go_on(plan, turn)
+        return self.go_on(plan, turn, unit, block)
 
-    def go_on(self, plan: Plan, turn: Turn) -> bool:
+    def go_on(self, plan: Plan, turn: Turn, unit: SinumerikUnit, block: int) -> bool:
         """Where the block leads: into a subprogram, to the end, by a jump, or on. True if the program ends."""
-        flow = self.flow
-        if turn.subprogram is not None:
-            flow.call(turn.subprogram, turn.arguments, turn.written, turn.times)
+        flow, called = self.flow, turn.subprogram
+        if called is not None:
+            flow.follow((Call(lambda: flow.called(called, turn.arguments, turn.written, turn.times)),))
             return False
-        branchings = [step for step in plan.steps if isinstance(step, Branching)]
-        for step in branchings:
+        steps = [step for step in plan.steps if isinstance(step, Branching)]
+        if steps:
+            if block not in unit.operations:
+                unit.operations[block] = [flow.lowered(step, steps, block) for step in steps]
+            flow.times = None if turn.words.runtime("P") else round(turn.words.get("P", 1.0))
+        for step, lowered in zip(steps, unit.operations[block] if steps else (), strict=True):
             self.span = step.span
-            if step.keyword in ("repeat", "repeatb") and step.label:
-                if turn.words.runtime("P"):
-                    raise AtRuntimeError
-                flow.repeat(step, round(turn.words.get("P", 1.0)))
-            else:
-                self.follow(step, plan)
-            if step.keyword in ("if", "case"):
+            try:
+                goes_on = flow.follow(lowered)
+            except AtRuntimeError:
+                if self.recorder is not None or not bypassed(self.control, flow, step, steps):
+                    raise
+                goes_on = False
+            if not goes_on or step.keyword in ("if", "case"):
                 break
         if turn.ends or not PROGRAM_ENDS.isdisjoint(turn.m):
-            if not flow.calls:
-                return True
             flow.finish()
-        return False
-
-    def follow(self, step: Branching, plan: Plan) -> None:
-        """Do what a control structure says; raises `AtRuntimeError` where only the control knows, and it matters."""
-        try:
-            self.flow.follow(step, plan.steps)
-        except AtRuntimeError:
-            if self.recorder is not None or not bypassed(self.control, self.flow, step, plan.steps):
-                raise
+        return flow.ended
 
     def opaque(self, plan: Plan, text: str) -> None:
         """Text that is no motion, or that nobody understands."""

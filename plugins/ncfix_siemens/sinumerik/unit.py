@@ -132,6 +132,12 @@ class SinumerikUnit(TextUnit[Plan]):
             raise Fault(BROKEN, f"{OPENING.get(keyword, 'ENDIF').upper()} of this {keyword.upper()} is missing")
         return self.ends[block]
 
+    def begin_of(self, block: int, keyword: str) -> int:
+        """Where the structure begins that ends in a block; raises `Fault` if it does not."""
+        if block not in self.begins:
+            raise Fault(BROKEN, f"{keyword.upper()} without a {CLOSING[keyword].upper()} before it")
+        return self.begins[block]
+
     def find(self, label: str, block: int, keyword: str) -> int | None:
         """The block that a jump leads to; None if there is none in the direction that it looks."""
         places = self.labelled(label)

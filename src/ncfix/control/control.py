@@ -10,12 +10,12 @@ from functools import cached_property
 from ncfix.control import contour, tcp
 from ncfix.control.builder import Builder, Style
 from ncfix.control.coordinates import LETTERS, Vector
+from ncfix.control.flow import Budget
 from ncfix.control.motion import AT_START, Motion, Unknown, blanked, first_reason, leaves_unknown
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.passing import Pass, Passing, may_pass
 from ncfix.control.places import mask_of
 from ncfix.control.pointing import Pointing
-from ncfix.control.recurrence import Budget
 from ncfix.control.standing import Standing
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect

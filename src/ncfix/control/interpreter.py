@@ -8,16 +8,16 @@ executed, programs that go round for ever, where in the program a fault is, and 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from ncfix.control.arc_lane import turned
 from ncfix.control.control import Control
 from ncfix.control.faults import Fault
+from ncfix.control.flow import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.control.lane import run_lane
-from ncfix.control.recurrence import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.control.unit import TextUnit
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
@@ -27,26 +27,6 @@ from ncfix.text.tree import Program, Span
 NO_END = "NCF234"
 
 U = TypeVar("U", bound=TextUnit[Any])
-
-
-class Flow(Protocol[U]):
-    """Where execution stands, and where control structures and calls take it.
-
-    unit, block  what is executed next
-    """
-
-    unit: U
-    block: int
-
-    @property
-    def calls(self) -> Sequence[object]:
-        """Calls that have not returned."""
-
-    def arrive(self) -> bool:
-        """Settle what is executed next; whether the text has such a block."""
-
-    def under_way(self) -> tuple[object, ...]:
-        """The calls that have not returned, and how often each is still to be made."""
 
 
 class Interpreter(ABC, Generic[U]):

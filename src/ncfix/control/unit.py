@@ -24,6 +24,7 @@ class TextUnit(ABC, Generic[P]):
     external  the file that it comes from; empty for what stands in the main program's own text
     plans     by shape, made when first asked for; units of one program share them
     template  index of each block's shape; `first`: where its numbers begin among `numbers`
+    operations  what the control structures of blocks come down to, see `flow`; made when a block is first executed
     ahead     what the fast lane has seen of the blocks to come
     """
 
@@ -47,6 +48,7 @@ class TextUnit(ABC, Generic[P]):
         self.template: Sequence[int] = view(program.template)
         self.first: Sequence[int] = view(program.first_number)
         self.numbers: Sequence[float] = view(program.numbers)
+        self.operations: dict[int, Any] = {}
         self.ahead = Ahead()
         self._lanes: Any = None
         self._stops: NDArray[np.int64] | None = None

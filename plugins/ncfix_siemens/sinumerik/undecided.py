@@ -1,34 +1,39 @@
-"""What follows a branch that is decided at run time: every motion there may come from anywhere, and is refused.
+"""Branches that are decided at run time: those that need not be followed, and what is refused behind all others.
 
-Blocks further up that a jump or loop may lead back to are refused too, though they have been followed once.
+Where a branch holds nothing but assignments and messages the axes stand where they stood, whichever way the control
+goes; what it may assign is not known after it. Behind any other branch every motion may come from anywhere, and is
+refused; blocks further up that a jump or loop may lead back to are refused too, though they have been followed once.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.passing import Pass, Passing
-from ncfix_siemens.sinumerik.course import Course
 from ncfix_siemens.sinumerik.destination import End, Leg, Words
+from ncfix_siemens.sinumerik.flow import SinumerikFlow
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
-from ncfix_siemens.sinumerik.plans import Branching, Plan
+from ncfix_siemens.sinumerik.lettings import BY_THEMSELVES
+from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, Plan
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
+from ncfix_siemens.sinumerik.vocabulary import HARMLESS, OF_THE_CONTROL, PROBING, UNSEEN
 
 DECIDED_AT_RUNTIME = "which blocks are executed here is decided at run time"
 NO_MOTIONS = frozenset({40, 740, 750, 250, 260, 1100, 1110, 1120})
 MACHINE = frozenset({530, 1530})
 
 
-def sweep(course: Course) -> int | None:
+def sweep(flow: SinumerikFlow) -> int | None:
     """Refuse the motions of all that is left; the first block that may be executed again, None for none."""
-    control = course.control
+    control = flow.control
     control.refusal = control.refusal or DECIDED_AT_RUNTIME
     control.lose_all(DECIDED_AT_RUNTIME)
-    places = [(call.unit, call.block) for call in course.calls] + [(course.unit, course.block - 1)]
+    places = [call.back for call in flow.calls] + [(flow.unit, flow.block - 1)]
     again = [found for unit, block in places if not unit.external if (found := earliest(unit, block)) is not None]
     for unit, block in reversed(places):
         for each in range(block, unit.stop):
@@ -82,3 +87,57 @@ def demoted(moves: Moves, first: int | None) -> Moves:
     reason = np.where(rows, reasons.index(DECIDED_AT_RUNTIME), moves.reason).astype(np.int16)
     rule = np.where(rows, Rule.REFUSE, moves.rule).astype(np.int8)
     return replace(moves, rule=rule, reason=reason, reasons=reasons)
+
+
+LOUD_M = frozenset({20, 60, 170, 300})
+"""M codes, in tenths, that end programs or change tools."""
+
+QUIET_WORDS = frozenset("SH")
+INNER = frozenset({"if", "else", "endif"})
+
+
+def bypassed(control: Sinumerik, flow: SinumerikFlow, step: Branching, steps: Iterable[Branching]) -> bool:
+    """Go past a branch that nobody can decide, if nothing in it matters; `flow.block` is that of the next line."""
+    if step.keyword != "if":
+        return False
+    here, unit = flow.block - 1, flow.unit
+    jump = next((each for each in steps if each.keyword.startswith("goto")), None)
+    end = unit.find(jump.label, here, jump.keyword) if jump is not None and jump.label else unit.ends.get(here)
+    if end is None or end <= here or not all(is_quiet(unit.plan(block)) for block in range(here + 1, end)):
+        return False
+    if unbalanced(unit, here, end, alone=jump is None):
+        return False
+    for block in range(here + 1, end):
+        for each in unit.plan(block).steps:
+            if isinstance(each, Letting):
+                control.variables.forget(each.name)
+    flow.block = end if jump is not None else end + 1
+    return True
+
+
+def is_quiet(plan: Plan) -> bool:
+    """Whether a block moves nothing, changes no coordinates, and leads nowhere else."""
+    if plan.opaque or plan.g or not LOUD_M.isdisjoint(plan.m):
+        return False
+    if any(setting.address not in QUIET_WORDS for setting in plan.settings):
+        return False
+    return all(is_quiet_step(step) for step in plan.steps)
+
+
+def is_quiet_step(step: object) -> bool:
+    """Whether an assignment, a name or a control structure does no more than that."""
+    match step:
+        case Letting(name):
+            quiet = not name.startswith("$") and not OF_THE_CONTROL.match(name)
+            return quiet and name not in BY_THEMSELVES | UNSEEN.keys() | PROBING
+        case Calling(name):
+            return name in HARMLESS
+        case Branching(keyword):
+            return keyword in INNER or keyword == "label"
+    return False
+
+
+def unbalanced(unit: SinumerikUnit, begin: int, end: int, *, alone: bool) -> bool:
+    """Whether a structure that begins between two blocks ends elsewhere."""
+    inner = range(begin + (0 if alone else 1), end)
+    return any(each in inner and not begin <= last <= end for each, last in unit.ends.items())

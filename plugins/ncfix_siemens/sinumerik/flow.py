@@ -1,0 +1,236 @@
+"""Where control structures, jumps, repetitions and calls of SINUMERIK lead, as operations."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from ncfix.control.faults import Fault
+from ncfix.control.flow import NO_LABEL, Flow, Jump, Let, OpenCall, Operation, Repeat
+from ncfix.text.tree import Expression, NamedParameter, Parameter
+from ncfix_siemens.sinumerik.plans import Branching, Letting
+from ncfix_siemens.sinumerik.state import Sinumerik
+from ncfix_siemens.sinumerik.unit import SinumerikUnit
+from ncfix_siemens.sinumerik.values import Evaluate, Key, Value, compiled, number
+from ncfix_siemens.sinumerik.variables import Local
+
+
+class AtRuntimeError(Exception):
+    """What is executed next is decided at run time."""
+
+
+def decided(value: Value) -> float:
+    """A number that decides where to go on; raises `AtRuntimeError` where only the control knows it."""
+    found = number(value)
+    if found is None:
+        raise AtRuntimeError
+    return found
+
+
+class SinumerikFlow(Flow[SinumerikUnit]):
+    """Where execution stands, and what takes it elsewhere.
+
+    times  how often the block that is executed says (P); None where only the control knows
+    """
+
+    most_calls = 16
+    too_deep = f"subprograms are nested more than {most_calls} deep"
+
+    def __init__(self, control: Sinumerik, main: SinumerikUnit) -> None:
+        super().__init__(main, control.budget)
+        self.control = control
+        self.times: int | None = 1
+
+    # -- control structures -------------------------------------------------------------------------------------------
+
+    def lowered(self, step: Branching, steps: Sequence[Branching], here: int) -> tuple[Operation, ...]:
+        """What a control structure or jump of block `here` comes down to; `steps`: all of the block."""
+        unit, keyword = self.unit, step.keyword
+        jump = next((each for each in steps if each.keyword.startswith("goto")), None)
+        if keyword.startswith("goto"):
+            return (self._goto(step, here),)
+        if keyword == "if" and jump is not None:
+            return (self._goto(jump, here, lambda: self.holds(step)),)
+        if keyword == "case":
+            value = step.values[0]
+            choices = [each for each in steps if each.keyword.startswith(("of ", "default "))]
+            chosen = (self._goto(each, here, partial(self._is_chosen, value, each)) for each in choices)
+            return Let(lambda: decided(value(self.control))), *chosen
+        if keyword in ("repeat", "repeatb") and step.label:
+            return (self._section(step, here),)
+
+        def past() -> int:
+            return unit.others.get(here, unit.end_of(here, keyword)) + 1
+
+        match keyword:
+            case "if" | "while":
+                return (Jump(past, lambda: not self._goes_in(step, here)),)
+            case "for":
+                return (
+                    Let(lambda: self._assign(step, step.values[1](self.control), 0.0)),
+                    Jump(past, lambda: not self._goes_in(step, here)),
+                )
+            case "repeat":
+                return (Let(lambda: unit.end_of(here, keyword)),)
+            case "else":
+                return (Jump(past),)
+            case "endwhile" | "endloop":
+                return (Jump(lambda: unit.begin_of(here, keyword)),)
+            case "until":
+                return (Jump(lambda: unit.begin_of(here, keyword) + 1, lambda: self._goes_on(step, here)),)
+            case "endfor":
+                return (Jump(lambda: unit.begin_of(here, keyword) + 1, lambda: self._next(here)),)
+        return ()
+
+    def holds(self, step: Branching) -> bool:
+        """Whether a condition holds."""
+        return decided(step.values[0](self.control)) != 0.0
+
+    def _goes_in(self, step: Branching, here: int) -> bool:
+        """Whether what is in a structure is executed; FOR: as long as its variable is not past the last value."""
+        if step.keyword == "for":
+            value, last = step.values[0](self.control), step.values[2](self.control)
+            self.unit.end_of(here, "for")
+            return decided(value) <= decided(last)
+        if step.keyword == "while":
+            self.unit.end_of(here, "while")
+        holds = self.holds(step)
+        self.unit.end_of(here, step.keyword)
+        return holds
+
+    def _goes_on(self, step: Branching, here: int) -> bool:
+        """UNTIL: whether the loop goes on."""
+        self.unit.begin_of(here, step.keyword)
+        return not self.holds(step)
+
+    def _next(self, here: int) -> bool:
+        """ENDFOR: one more; whether the loop goes on."""
+        begin = self.unit.begin_of(here, "endfor")
+        self.control.first = self.unit.first[begin]
+        loop = next(each for each in self.unit.branchings(begin) if each.keyword == "for")
+        self._assign(loop, loop.values[0](self.control), 1.0)
+        return self._goes_in(loop, begin)
+
+    def _assign(self, loop: Branching, value: Value, step: float) -> None:
+        """Give the variable of FOR a value, and a step more."""
+        key = self.key_of(loop.written[0])
+        if key is None:
+            raise AtRuntimeError
+        self.control.variables.assign(key, decided(value) + step)
+
+    def _is_chosen(self, value: Evaluate, choice: Branching) -> bool:
+        if choice.keyword.startswith("default "):
+            return True
+        return decided(choice.values[0](self.control)) == number(value(self.control))
+
+    def _goto(self, step: Branching, here: int, when: Callable[[], bool] | None = None) -> Jump:
+        """`GOTOF label` and its like."""
+        unit, keyword = self.unit, step.keyword.rpartition(" ")[2]
+
+        def target() -> int | None:
+            if not step.label:
+                raise AtRuntimeError
+            found = unit.find(step.label, here, keyword)
+            if found is None and keyword != "gotoc":
+                where = {"gotof": " further down", "gotob": " further up"}.get(keyword, "")
+                raise Fault(NO_LABEL, f"there is no label {step.label}{where}")
+            return found
+
+        return Jump(unit.begin, when) if keyword == "gotos" else Jump(target, when, out=True)
+
+    def _section(self, step: Branching, here: int) -> Repeat:
+        """`REPEAT label`, `REPEAT first last`, `REPEATB label`."""
+        unit = self.unit
+
+        def start() -> int:
+            return place(step.label)
+
+        def place(label: str) -> int:
+            found = unit.find(label, here, "goto")
+            if found is None:
+                raise Fault(NO_LABEL, f"there is no label {label}")
+            return found
+
+        def stop() -> int:
+            if step.keyword == "repeatb":
+                return start() + 1
+            if step.values:
+                return place(str(step.values[0](self.control))) + 1
+            begin = start()
+            return next((block for block in unit.labelled("ENDLABEL") if block > begin), here)
+
+        def times() -> int:
+            if self.times is None:
+                raise AtRuntimeError
+            return self.times
+
+        return Repeat(start, times, stop)
+
+    # -- variables ----------------------------------------------------------------------------------------------------
+
+    def let(self, step: Letting) -> None:
+        """Give a variable its value."""
+        variables = self.control.variables
+        if step.value is None:
+            index: tuple[Value, ...] = tuple(part(self.control) for part in step.index)
+            values = [part(self.control) for part in step.listed]
+            variables.fill(step.name, index, values, repeated=step.repeated)
+            return
+        value = step.value(self.control)
+        if not step.index:
+            variables.assign(step.name, value)
+            return
+        places = tuple(number(part(self.control)) for part in step.index)
+        if any(place is None for place in places):
+            variables.forget(step.name)
+            return
+        variables.assign((step.name, tuple(place for place in places if place is not None)), value)
+
+    def key_of(self, expression: Expression | None) -> Key | None:
+        """The variable that an expression names, if it names one."""
+        match expression:
+            case NamedParameter(name):
+                return name
+            case Parameter(index):
+                place = number(compiled(index)(self.control))
+                return None if place is None else ("r", (place,))
+        return None
+
+    # -- calls --------------------------------------------------------------------------------------------------------
+
+    def called(
+        self, unit: SinumerikUnit, arguments: Sequence[Evaluate], written: Sequence[Expression | None], times: int
+    ) -> OpenCall[SinumerikUnit] | None:
+        """The call of a subprogram; None where it is not executed."""
+        self.check_depth(unit.name)
+        if times < 1:
+            return None
+        self.budget.foresee(times)
+        control = self.control
+        values: list[Value] = [argument(control) for argument in arguments]
+        local = Local()
+        results: dict[str, Key] = {}
+        for place, parameter in enumerate(unit.parameters):
+            given = place < len(values) and written[place] is not None
+            local.kinds[parameter.name] = parameter.kind
+            local.values[parameter.name] = values[place] if given else None if parameter.kind == "axis" else 0.0
+            key = self.key_of(written[place]) if given else None
+            if parameter.by_reference and key is not None:
+                results[parameter.name] = key
+        kept = (copy.copy(control.modal), copy.copy(control.modes), copy.copy(control.frames)) if unit.saves else None
+
+        def leave() -> None:
+            control.variables.scopes.pop()
+            for name, theirs in results.items():
+                control.variables.assign(theirs, local.values.get(name))
+            if kept is not None:
+                control.restore(*kept)
+
+        control.variables.scopes.append(local)
+        return OpenCall(unit.name, (unit, unit.begin), times - 1, leave=leave)
+
+    def finish(self, kind: str = "", *, again: bool = True) -> None:
+        """See `Flow`; a subprogram that is gone through counts as a block."""
+        self.budget.spend(1 if self.calls else 0)
+        super().finish(kind, again=again)
