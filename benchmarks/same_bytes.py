@@ -27,8 +27,8 @@ import programs
 
 from ncfix import fast
 from ncfix.cli import console
-from ncfix.cli.job import Job
-from ncfix.cli.targets import Target
+from ncfix.cli.batch import FixJob
+from ncfix.cli.targets import OutputTarget
 from ncfix.compensate.options import FixOptions
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
@@ -156,9 +156,9 @@ def corrected(case: Case, way: Way, folder: Path) -> Found:
     output = folder / "out"
     output.unlink(missing_ok=True)
     options = FixOptions(tolerance_um=5.0, allow_refused=True, force=True)
-    job = Job(case.machine, case.setup, case.dialect, options)
+    job = FixJob(case.machine, case.setup, case.dialect, options)
     with console.keeping() as said:
-        outcome = job.outcome(Target(str(case.program), str(output), force=True), way.jobs)
+        outcome = job.outcome(OutputTarget(str(case.program), str(output), force=True), way.jobs)
     text = output.read_bytes() if output.exists() else b""
     words = [line for line in said if "->" not in line and not line.startswith("  tip error")]
     return Found(text, (str(int(outcome.code)), *words))

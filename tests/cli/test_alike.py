@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ncfix.cli.alike import gathered, named
-from ncfix.cli.console import MOST, keeping, tell_some
+from ncfix.cli.console import MOST, keeping, lines_named, said_once, tell_some
 from ncfix.diagnostics import Message, Place
 
 
@@ -12,13 +11,13 @@ def said(*lines: int, text: str = "why", path: str = "p.nc") -> list[Message]:
 
 
 def test_one_text_is_said_once_where_it_first_stands() -> None:
-    (only,) = gathered(said(8, 11, 12, 13, 19))
+    (only,) = said_once(said(8, 11, 12, 13, 19))
     assert only.text == "why (5 times, lines 8, 11 to 13, 19)"
     assert only.place == Place("p.nc", 8)
 
 
 def test_other_texts_and_other_programs_stay_apart_and_in_order() -> None:
-    found = gathered(
+    found = said_once(
         [*said(3), *said(4, text="other"), *said(5, path="q.nc"), Message("NCF409", "x"), Message("NCF409", "x")]
     )
     assert [message.text for message in found] == ["why", "other", "why", "x", "x"]
@@ -26,7 +25,7 @@ def test_other_texts_and_other_programs_stay_apart_and_in_order() -> None:
 
 def test_texts_that_differ_in_how_much_are_said_once_where_it_is_most() -> None:
     sizes = {3: "9.5", 4: "10.25", 5: "1.2e+03", 6: "0.5"}
-    (only,) = gathered(
+    (only,) = said_once(
         [
             message
             for line, size in sizes.items()
@@ -45,14 +44,14 @@ def test_other_axes_rates_and_several_figures_stay_apart() -> None:
         "1 mm at the start and 3 mm",
     ]
     texts += ["9 mm/min", "8 mm/min", "'1.2.3 mm' is no number", "'1.2.4 mm' is no number"]
-    found = gathered([message for line, text in enumerate(texts, start=1) for message in said(line, text=text)])
+    found = said_once([message for line, text in enumerate(texts, start=1) for message in said(line, text=text)])
     assert [message.text for message in found] == texts
 
 
 def test_many_stretches_are_only_bounded() -> None:
-    assert named([2, 4]) == "lines 2, 4"
-    assert named([7]) == "line 7"
-    assert named(range(2, 40, 2)) == "between lines 2 and 38"
+    assert lines_named([2, 4]) == "lines 2, 4"
+    assert lines_named([7]) == "line 7"
+    assert lines_named(range(2, 40, 2)) == "between lines 2 and 38"
 
 
 def test_of_many_that_say_something_else_the_first_are_said_and_the_rest_is_counted() -> None:

@@ -16,9 +16,9 @@ from typing import IO, Any
 import pytest
 
 from ncfix import inputs
-from ncfix.cli.faults import owned
+from ncfix.cli.console import owned
 from ncfix.cli.main import run
-from ncfix.cli.parts import Source
+from ncfix.cli.streams import Source
 from ncfix.diagnostics import ExitCode, SourceError
 
 VERBS = {

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ncfix.cli.explain import all_codes
+from ncfix.cli.listings import all_codes
 from ncfix.diagnostics import ExitCode
 
 

@@ -10,7 +10,7 @@ from unittest import mock
 
 import pytest
 
-from ncfix.cli.options import Beside
+from ncfix.cli.options import SubprogramFiles
 from ncfix.diagnostics import ExitCode
 
 NEITHER_OFFSET_NOR_START = b"G21 G90 G94 G54\nG1 X10 F100\nM2\n"
@@ -263,7 +263,7 @@ def test_a_name_that_two_files_have_in_other_cases_is_no_subprogram(shop: Any, n
 def test_a_folder_is_listed_once_for_all_the_subprograms_that_it_lacks(tmp_path: Path) -> None:
     """A builder's cycle may be called thousands of times, and the folder may have thousands of files."""
     (tmp_path / "Bore.NC").write_bytes(b"M17")
-    find = Beside((str(tmp_path),))
+    find = SubprogramFiles((str(tmp_path),))
     with mock.patch("os.listdir", side_effect=os.listdir) as listed:
         assert [find(f"L{number}") for number in range(9)] == [None] * 9
         assert find("BORE") == b"M17"

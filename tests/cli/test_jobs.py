@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from ncfix.cli import processes
+from ncfix.cli import fix
 from ncfix.cli.batch import Batch
-from ncfix.cli.processes import AUTO, ON_ONE, PAYS_BYTES, PAYS_PROGRAMS, settled
-from ncfix.cli.targets import STREAM, Target
+from ncfix.cli.fix import AUTO, ON_ONE, PAYS_BYTES, PAYS_PROGRAMS, processes_for
+from ncfix.cli.targets import STREAM, OutputTarget
 from ncfix.diagnostics import ExitCode
 
 PROCESSORS = 12
@@ -19,16 +19,16 @@ PROCESSORS = 12
 @pytest.fixture(autouse=True)
 def computer(monkeypatch: pytest.MonkeyPatch) -> None:
     """One with a dozen processors."""
-    monkeypatch.setattr(processes, "processors", lambda: PROCESSORS)
+    monkeypatch.setattr(fix, "processors", lambda: PROCESSORS)
 
 
-def programs(folder: Path, count: int, size: int) -> list[Target]:
+def programs(folder: Path, count: int, size: int) -> list[OutputTarget]:
     """Programs of so many bytes, which take no room."""
     paths = [folder / f"{number}.nc" for number in range(count)]
     for path in paths:
         with path.open("wb") as file:
             file.truncate(size)
-    return [Target(str(path), f"{path}.out") for path in paths]
+    return [OutputTarget(str(path), f"{path}.out") for path in paths]
 
 
 @pytest.mark.parametrize(
@@ -45,16 +45,16 @@ def programs(folder: Path, count: int, size: int) -> list[Target]:
     ],
 )
 def test_as_many_as_pay(count: int, size: int, expected: int, tmp_path: Path) -> None:
-    assert settled(AUTO, programs(tmp_path, count, size)) == expected
+    assert processes_for(AUTO, programs(tmp_path, count, size)) == expected
 
 
 def test_what_is_asked_for_is_taken(tmp_path: Path) -> None:
-    assert settled(3, programs(tmp_path, 1, 10)) == 3
+    assert processes_for(3, programs(tmp_path, 1, 10)) == 3
 
 
 @pytest.mark.parametrize("source", [STREAM, "/no/such/program.nc"])
 def test_what_cannot_be_measured_gets_one(source: str) -> None:
-    assert settled(AUTO, [Target(source, "out.nc")]) == 1
+    assert processes_for(AUTO, [OutputTarget(source, "out.nc")]) == 1
 
 
 @pytest.mark.parametrize("word", ["0", "-1", "many", "1.5"])
@@ -73,7 +73,7 @@ def test_without_jobs_a_long_program_is_shared_out(ncfix: Any, shop: Any, monkey
         return run(batch, jobs, make)
 
     monkeypatch.setattr(Batch, "run", noted)
-    monkeypatch.setattr(processes, "PAYS_BYTES", shop.program.stat().st_size // 5)
+    monkeypatch.setattr(fix, "PAYS_BYTES", shop.program.stat().st_size // 5)
     call = ("fix", shop.program, "-m", shop.machine, "-o", "-", "--assume-zero")
     outputs = {ncfix(*call, *chosen).out for chosen in ([], ["--jobs", "auto"], ["-j", "1"])}
     assert asked == [5, 5, 1]

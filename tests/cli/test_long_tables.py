@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
+from ncfix.cli.programs import Motions
 from ncfix.cli.simulate import Errors
-from ncfix.cli.trace import Motions
 from ncfix.diagnostics import ExitCode
 
 PARTS = (1000, 10_000)

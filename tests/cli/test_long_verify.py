@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ncfix.cli.comparing import Pair
+from ncfix.cli.verify import ProgramPair
 from ncfix.diagnostics import ExitCode
 
 GIVEN = ("--offset", "G54=0,0,0,0,0", "--tool", "0=0", "--dialect", "linuxcnc")
@@ -60,11 +60,11 @@ def corrected(root: Path, ncfix: Any, tmp_path: Path) -> list[str]:
 @pytest.fixture
 def only_in_parts(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Nothing may be compared as a whole."""
-    monkeypatch.setattr(Pair, "_as_wholes", never)
+    monkeypatch.setattr(ProgramPair, "_as_wholes", never)
     return monkeypatch
 
 
-def never(pair: Pair) -> None:
+def never(pair: ProgramPair) -> None:
     raise AssertionError("compared as a whole")
 
 
@@ -127,7 +127,7 @@ def test_play_is_taken_up_in_any_parts(root: Path, ncfix: Any, monkeypatch: pyte
     assert wholes[0]["within"]
     assert not wholes[1]["within"]
     monkeypatch.setenv("NCFIX_NO_FAST", "1")
-    monkeypatch.setattr(Pair, "_as_wholes", never)
+    monkeypatch.setattr(ProgramPair, "_as_wholes", never)
     for part in (1000, 2500):
         monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
         for each, whole in zip((fixed, original), wholes, strict=True):
@@ -147,7 +147,7 @@ def test_play_that_is_half_taken_up_is_so_in_any_parts(
     original.write_text("\n".join(["G21 G90 G94 G17 F900", "G0 X20 Y5 Z5", *text, "M2", ""]))
     given = ("-m", root / "examples/machines/wCBXFZYSt.toml", "--assume-zero", "--dialect", "linuxcnc", "--json")
     whole = ncfix("verify", original, original, *given).json()
-    monkeypatch.setattr(Pair, "_as_wholes", never)
+    monkeypatch.setattr(ProgramPair, "_as_wholes", never)
     monkeypatch.setenv("NCFIX_NO_FAST", "1")
     monkeypatch.setenv("NCFIX_PART_BYTES", "1000")
     found = ncfix("verify", original, original, *given).json()

@@ -71,18 +71,18 @@ def test_wrong_use_is_said_in_json_too(ncfix: Ncfix) -> None:
 
 
 def test_a_fault_ends_one_program_and_not_the_others(shop: Shop, ncfix: Ncfix, monkeypatch: pytest.MonkeyPatch) -> None:
-    from ncfix.cli import job
+    from ncfix.cli import batch
 
     other = shop.folder / "other.ngc"
     other.write_bytes(shop.program.read_bytes())
-    whole = job.Job._whole
+    whole = batch.Job._whole
 
-    def broken(self: job.Job, source: job.Source, *rest: object) -> object:
+    def broken(self: batch.Job, source: batch.Source, *rest: object) -> object:
         if source.path.endswith("part.ngc"):
             raise KeyError("nobody foresaw this")
         return whole(self, source, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(job.Job, "_whole", broken)
+    monkeypatch.setattr(batch.Job, "_whole", broken)
     arguments = ("fix", shop.program, other, "-m", shop.machine, "-o", shop.folder / "out", "--assume-zero", "--json")
     result = ncfix(*arguments)
     assert result.code == 5

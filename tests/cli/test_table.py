@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ncfix.cli.table import DIGITS, ROWS, Columns, Words, as_csv, as_json
+from ncfix.cli.columns import DIGITS, ROWS, Columns, WordColumn, as_csv, as_json
 
 COUNT = ROWS + 7
 
@@ -38,7 +38,11 @@ def said(value: float) -> str:
 def columns() -> Columns:
     rng = np.random.default_rng(7)
     names = ["", "plain", "with, comma", 'a "word"', "two\nlines", "Maß"]
-    return {"line": rng.integers(0, 10**10, COUNT), "word": Words(names, rng.integers(0, 6, COUNT)), **numbers(rng)}
+    return {
+        "line": rng.integers(0, 10**10, COUNT),
+        "word": WordColumn(names, rng.integers(0, 6, COUNT)),
+        **numbers(rng),
+    }
 
 
 def test_cells_are_what_python_writes(columns: Columns) -> None:
@@ -46,7 +50,7 @@ def test_cells_are_what_python_writes(columns: Columns) -> None:
     assert found[0] == list(columns)
     for name, cells in zip(found[0], zip(*found[1:], strict=True), strict=True):
         column = columns[name]
-        if isinstance(column, Words):
+        if isinstance(column, WordColumn):
             assert list(cells) == [column.names[each] for each in column.which]
         elif column.dtype.kind == "i":
             assert list(cells) == list(map(str, column.tolist()))
@@ -57,7 +61,7 @@ def test_cells_are_what_python_writes(columns: Columns) -> None:
 def test_the_object_is_what_json_writes(columns: Columns) -> None:
     cells = []
     for column in columns.values():
-        if isinstance(column, Words):
+        if isinstance(column, WordColumn):
             cells.append([column.names[each] for each in column.which])
         else:
             values = column.tolist()
@@ -72,7 +76,7 @@ def test_the_object_is_what_json_writes(columns: Columns) -> None:
 def test_tables_one_after_the_other_are_one(columns: Columns, form: object) -> None:
     def some(part: slice) -> Columns:
         return {
-            name: Words(each.names, each.which[part]) if isinstance(each, Words) else each[part]
+            name: WordColumn(each.names, each.which[part]) if isinstance(each, WordColumn) else each[part]
             for name, each in columns.items()
         }
 

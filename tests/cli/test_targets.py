@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.cli.targets import Outputs, Target, targets
+from ncfix.cli.targets import Outputs, OutputTarget, targets
 from ncfix.diagnostics import UsageError
 
 
@@ -116,7 +116,7 @@ def test_nothing_is_made_while_targets_are_looked_for(parts: Path) -> None:
 
 
 def test_a_target_writes_where_it_says(parts: Path) -> None:
-    Target("c.ngc", "out/c.ngc").write(b"new")
+    OutputTarget("c.ngc", "out/c.ngc").write(b"new")
     assert Path("out/c.ngc").read_bytes() == b"new"
-    Target("c.ngc", "c.ngc", in_place=True).write(b"new")
+    OutputTarget("c.ngc", "c.ngc", in_place=True).write(b"new")
     assert (Path("c.ngc").read_bytes(), Path("c.ngc.orig").read_bytes()) == (b"new", b"c.ngc")

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ncfix.cli.parts import Outlet
+from ncfix.cli.streams import Outlet
 from ncfix.compensate.crew import Ground
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions

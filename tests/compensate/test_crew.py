@@ -17,9 +17,9 @@ import pytest
 from compensate.streaming import run
 from compensate.test_stream import OPTIONS, SETUP, program, streamed
 from ncfix.cli import console
-from ncfix.cli.job import Job
-from ncfix.cli.parts import Outlet, Source
-from ncfix.cli.targets import Target
+from ncfix.cli.batch import FixJob
+from ncfix.cli.streams import Outlet, Source
+from ncfix.cli.targets import OutputTarget
 from ncfix.compensate import crew, fix
 from ncfix.compensate.corrector import Corrector, Done
 from ncfix.compensate.post import GoneError, Post, lines_between
@@ -153,8 +153,8 @@ def test_what_is_said_of_it(machine: Machine, tmp_path: Path, monkeypatch: pytes
     source, output = tmp_path / "p.ngc", tmp_path / "out.ngc"
     source.write_bytes(program(5, 400, 0.0))
     with console.keeping() as said:
-        outcome = Job(machine, Setup(assume_zero=True), "linuxcnc", OPTIONS).outcome(
-            Target(str(source), str(output)), 2
+        outcome = FixJob(machine, Setup(assume_zero=True), "linuxcnc", OPTIONS).outcome(
+            OutputTarget(str(source), str(output)), 2
         )
     assert outcome.code != 0
     assert "NCF017" in "".join(said)

@@ -1,4 +1,4 @@
-"""The command line: one file per verb; nothing but arguments, files, messages and exit codes.
+"""The command line, verbs by topic; nothing but arguments, files, messages and exit codes.
 
 Numeric packages are imported inside the commands, so that `--help` answers at once.
 """

@@ -2,11 +2,13 @@
 
 Whatever goes to a terminal goes through here, and nothing in it steers the terminal: names, programs and machine files
 come from anywhere. Text for people is made visible (`diagnostics.visible`) wherever it goes; data is left as it is, but
-where it goes to a terminal.
+where it goes to a terminal. Messages that say the same of several lines of a program are told as one that names them
+all. Bugs are owned up to, and never dressed as the user's mistakes.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -22,26 +24,75 @@ from typing import Any, TextIO
 
 import click
 
-from ncfix.cli.alike import gathered
-from ncfix.diagnostics import Message, Place, UsageError, visible
+from ncfix.diagnostics import FaultError, Message, NcfixError, Place, PluginError, UsageError, visible
 from ncfix.files import unwritable
+from ncfix.plugins import blamed
 
+FEW_STRETCHES = 8
+"""So many stretches of lines are named one by one."""
+FIGURE = re.compile(r"(?<![-.\w])\d+(?:\.\d+)?(?:e[-+]\d+)?(?= (?:mm|um|degrees|times)\b(?!/))")
+"""How much it is, in a message."""
 SCHEMA = 1
 """Version of the objects that `--json` prints."""
-
 CODE = re.compile(r"\bNCF\d{3}:")
 MOST = 20
 """Messages of one code that are written out."""
-
 BUSY_AFTER_S = 2.0
 """Progress is shown for what takes longer, on a terminal."""
+_kept: ContextVar[list[str] | None] = ContextVar("kept", default=None)
+DEBUG = "NCFIX_DEBUG"
+"""The environment variable that asks for tracebacks; workers inherit it."""
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""What the system says where there is no room: never a bug."""
+
+
+def said_once(messages: Iterable[Message]) -> list[Message]:
+    """Each message once, where it first stands, with the other lines of which it is said.
+
+    Of those that differ only in how much it is, the one that says the most stands for all.
+    """
+    groups: dict[tuple[str, ...], list[Message]] = {}
+    for number, message in enumerate(messages):
+        place = message.place
+        alone = "" if place is not None and place.line else str(number)
+        key = message.code, _kind(message.text), message.hint, place.path if place else "", alone
+        groups.setdefault(key, []).append(message)
+    return [_as_one(group) for group in groups.values()]
+
+
+def _as_one(group: Sequence[Message]) -> Message:
+    most = max(group, key=lambda message: _size(message.text))
+    if len(group) == 1:
+        return most
+    lines = sorted({message.place.line for message in group if message.place})
+    shown = "" if all(message.text == most.text for message in group) else "; the largest is shown"
+    return replace(most, text=f"{most.text} ({len(group)} times, {lines_named(lines)}{shown})")
+
+
+def _kind(text: str) -> str:
+    """A text without its figure; one with several figures is a kind of its own."""
+    found = FIGURE.findall(text)
+    return FIGURE.sub("", text) if len(found) == 1 else text
+
+
+def _size(text: str) -> float:
+    """The figure of a text, 0 without one."""
+    found = FIGURE.search(text)
+    return float(found[0]) if found else 0.0
+
+
+def lines_named(lines: Sequence[int]) -> str:
+    """Line numbers in words, those that follow each other as stretches: "lines 3 to 5, 9"."""
+    begins = [line for before, line in zip((None, *lines), lines, strict=False) if before is None or line > before + 1]
+    ends = [line for line, after in zip(lines, (*lines[1:], None), strict=True) if after is None or after > line + 1]
+    if len(begins) > FEW_STRETCHES:
+        return f"between lines {lines[0]} and {lines[-1]}"
+    parts = [str(a) if a == b else f"{a} to {b}" for a, b in zip(begins, ends, strict=True)]
+    return f"line{'s' if len(lines) > 1 else ''} {', '.join(parts)}"
 
 
 class ReaderGoneError(Exception):
     """Whoever read standard output has closed it."""
-
-
-_kept: ContextVar[list[str] | None] = ContextVar("kept", default=None)
 
 
 def say(text: str) -> None:
@@ -91,7 +142,7 @@ def tell_some(messages: Iterable[Message], shown: Callable[[list[Message]], Iter
     """
     seen: Counter[str] = Counter()
     first = []
-    for message in gathered(messages):
+    for message in said_once(messages):
         seen[message.code] += 1
         if seen[message.code] <= MOST:
             first.append(message)
@@ -234,3 +285,54 @@ def settle() -> None:
 def _abandon(stream: TextIO) -> None:
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def owned(error: Exception) -> NcfixError:
+    """An exception as the error that is told: a remedy where there is one, else a fault of ncfix."""
+    if isinstance(error, NcfixError):
+        if error.__cause__ is not None and isinstance(error, PluginError):
+            _trace(error.__cause__)
+        return error
+    if isinstance(error, OSError) and error.errno in FULL:
+        return unwritable(str(error.filename or "<stdout>"), error)
+    plugin = blamed(error)
+    if plugin is not None:
+        _trace(error)
+        return plugin
+    if isinstance(error, MemoryError):
+        hint = "leave out what is not needed, or do it on a computer with more memory"
+        return FaultError.of("NCF024", "there is not enough memory for this", hint=hint)
+    return fault(error)
+
+
+def _trace(error: BaseException) -> None:
+    """The traceback, if that is asked for."""
+    import traceback
+
+    if os.environ.get(DEBUG, "") not in ("", "0"):
+        say("".join(traceback.format_exception(error)))
+
+
+def fault(error: Exception) -> FaultError:
+    """Own up to a bug, with its traceback if that is asked for."""
+    import traceback
+
+    _trace(error)
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    at = f"{os.path.basename(where.filename)}:{where.lineno}"
+    text = f"this is a fault of ncfix: {type(error).__name__}: {error} ({at})"
+    return FaultError.of("NCF000", text, hint="ncfix --debug shows the traceback; please report it with the input")
+
+
+@contextmanager
+def debugging(wanted: bool) -> Iterator[None]:
+    """Tracebacks are asked for, as by the environment variable."""
+    before = os.environ.get(DEBUG)
+    if wanted:
+        os.environ[DEBUG] = "1"
+    try:
+        yield
+    finally:
+        if wanted:
+            os.environ.pop(DEBUG)
+            os.environ.update({} if before is None else {DEBUG: before})

@@ -1,23 +1,70 @@
-"""`ncfix fix`: programs in, corrected programs out."""
+"""`ncfix fix`: programs in, corrected programs out, on as many processes as `--jobs` says."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ncfix.cli import console
-from ncfix.cli.completion import PATH, OneOf
-from ncfix.cli.options import dialect_option, json_option, load_machine, machine_option, sound, tolerance_option
-from ncfix.cli.processes import Jobs, settled
+from ncfix.cli.options import (
+    PATH,
+    OneOf,
+    dialect_option,
+    json_option,
+    load_machine,
+    machine_option,
+    sound,
+    tolerance_option,
+)
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.targets import JSON, Outputs, check_streams, targets
+from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, targets
+from ncfix.host import processors
 from ncfix.plugins import registry
 
 if TYPE_CHECKING:
-    from ncfix.cli.job import Job
+    from ncfix.cli.batch import FixJob
+
+AUTO = 0
+"""`--jobs auto` as a number: as many as pay."""
+PAYS_BYTES = 8 << 20
+"""One process more pays for each so much text: starting it costs a tenth of what correcting this text takes."""
+PAYS_PROGRAMS = 8
+"""And one for each so many programs besides the first."""
+ON_ONE = 8
+"""At most so many for a single program: each of them reads all of it."""
+
+
+class Jobs(click.IntRange):
+    """A number of processes, or `auto`."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Make it the number, or AUTO."""
+        number: int = AUTO if value == "auto" else super().convert(value, param, ctx)
+        return number
+
+
+def processes_for(jobs: int, programs: Sequence[OutputTarget]) -> int:
+    """How many processes work on these programs: what was asked for, or as many as pay, at most one a processor."""
+    if jobs != AUTO:
+        return jobs
+    pay = sum(map(_size, programs)) / PAYS_BYTES + (len(programs) - 1) / PAYS_PROGRAMS
+    return max(1, min(int(pay), processors(), ON_ONE if len(programs) == 1 else len(programs)))
+
+
+def _size(target: OutputTarget) -> int:
+    """Bytes of a program; what cannot be told (a pipe, no such file) counts as none."""
+    if target.source == STREAM:
+        return 0
+    try:
+        return os.stat(target.source).st_size
+    except OSError:
+        return 0
 
 
 def _strategies() -> Iterable[str]:
@@ -112,7 +159,9 @@ def fix(
         check_streams(JSON if as_json else None, program=target)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     job = _job(machine_path, dialect, given, {**choices, "force": force})
-    outcomes = list(Batch(job, wanted, outputs.folder(programs), resume).run(settled(jobs, wanted), staff(executor)))
+    outcomes = list(
+        Batch(job, wanted, outputs.folder(programs), resume).run(processes_for(jobs, wanted), staff(executor))
+    )
     if len(outcomes) > 1:
         written = sum(outcome.entry["output"] is not None for outcome in outcomes)
         console.say(f"{len(outcomes)} programs: {written} written, {len(outcomes) - written} not")
@@ -121,11 +170,11 @@ def fix(
     return max(outcome.code for outcome in outcomes)
 
 
-def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: dict[str, Any]) -> Job:
-    from ncfix.cli.job import Job
+def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: dict[str, Any]) -> FixJob:
+    from ncfix.cli.batch import FixJob
     from ncfix.compensate.options import FixOptions
 
     if choices.pop("thesis"):
         choices["strategy"] = "thesis"
     machine = sound(load_machine(machine_path), machine_path, choices["force"])
-    return Job(machine, setup.load(), dialect, FixOptions(**choices))
+    return FixJob(machine, setup.load(), dialect, FixOptions(**choices))

@@ -1,20 +1,39 @@
-"""`ncfix machine check|show FILE`: is a machine file in order, and what does it say."""
+"""Verbs about machines: `ncfix machine check|show`, `ncfix effects`, `ncfix derive`.
+
+Is a machine file in order, and what does it say; which effects and bases it may name; the error equations of a machine,
+symbolically.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ncfix.cli import console
-from ncfix.cli.completion import PATH
-from ncfix.cli.options import json_option, load_machine
-from ncfix.cli.targets import shown
+from ncfix.cli.options import PATH, force_option, json_option, load_machine
+from ncfix.cli.targets import STREAM, Outputs, shown, targets
 from ncfix.diagnostics import ExitCode, Message, Place, visible
 from ncfix.plugins import nearest, registry
 
 if TYPE_CHECKING:
     from ncfix.machine import Axis, Effect, Machine
+    from ncfix.machine.symbolic import Derivation
+
+Row = dict[str, str]
+GENERIC = """
+ncfix = 1
+topology = "w C B F X Y Z t"
+axis.X = { type = "linear", direction = [1, 0, 0], range = [-250, 250], pitch = 10 }
+axis.Y = { type = "linear", direction = [0, 1, 0], range = [-250, 250], pitch = 10 }
+axis.Z = { type = "linear", direction = [0, 0, 1], range = [-250, 250], pitch = 10 }
+axis.B = { type = "rotary", direction = [0, -1, 0] }
+axis.C = { type = "rotary", direction = [0, 0, -1] }
+"""
+"""The machine whose effects are listed if none is given."""
+CONSTANT = ("locations", "spindle")
+"""The errors of a machine that a protocol is made for, unless it is said otherwise: those that are constants."""
 
 
 @click.group()
@@ -76,12 +95,12 @@ def show(file: str, as_json: bool) -> None:
     """
     found = load_machine(file)
     if as_json:
-        console.put_json(path=shown(file), **_as_dict(found))
+        console.put_json(path=shown(file), **_machine_as_dict(found))
     else:
         console.put("\n".join(_page(found)) + "\n")
 
 
-def _as_dict(machine: Machine) -> dict[str, Any]:
+def _machine_as_dict(machine: Machine) -> dict[str, Any]:
     return {
         "name": machine.name,
         "hash": machine.hash,
@@ -155,11 +174,11 @@ def _errors(machine: Machine) -> list[str]:
         found = [effect for effect in machine.effects if effect.joint == joint]
         if found:
             lines += ["", f"errors of {joint}" if joint != "S" else "errors of the spindle"]
-            lines += [_effect(machine, effect) for effect in found]
+            lines += [_effect_line(machine, effect) for effect in found]
     return lines
 
 
-def _effect(machine: Machine, effect: Effect) -> str:
+def _effect_line(machine: Machine, effect: Effect) -> str:
     from ncfix.machine.effects import depends_on
 
     facts = _effect_as_dict(machine, effect)
@@ -169,3 +188,194 @@ def _effect(machine: Machine, effect: Effect) -> str:
         low, high = facts["range"]
         size = f"{low:+.3g} {facts['unit']}" if low == high else f"{low:+.3g} ... {high:+.3g} {facts['unit']}"
     return f"  {effect.name:<5} {facts['title']:<44} {depends_on(effect):<28} {size}"
+
+
+@click.command()
+@click.option("-m", "--machine", "path", type=PATH, metavar="FILE", help="List the effects that this machine can have.")
+@click.option("--bases", is_flag=True, help="List the bases for `basis = ...` with their keys instead.")
+@json_option
+def effects(path: str | None, bases: bool, as_json: bool) -> None:
+    """List the error effects that a machine file may have: ISO 230-1 components, then physical effects by name.
+
+    Without a machine, those of one with X Y Z and a table with B and C.
+    """
+    rows = _basis_rows() if bases else _effect_rows(path)
+    if as_json:
+        console.put_json(**{"bases" if bases else "effects": rows})
+    elif rows:
+        console.table(tuple(rows[0]), [tuple(row.values()) for row in rows])
+
+
+def _effect_rows(path: str | None) -> list[Row]:
+    from ncfix.machine import loads
+
+    machine = load_machine(path) if path else loads(GENERIC)
+    return [*_components(machine, with_all=path is None), *_physical(machine), *_nameless(machine)]
+
+
+def _components(machine: Machine, with_all: bool) -> list[Row]:
+    from ncfix.machine.axes import (
+        SPINDLE,
+        Effect,
+        component_names,
+        component_title,
+        instruments_for,
+        large_size,
+        squareness_meaning,
+        usual_basis,
+    )
+
+    letters = "XYZABC" if with_all else "".join(machine.axis_names)
+    axes = {axis.name: axis for axis in machine.axes}
+    rows = []
+    for name in component_names(letters + SPINDLE):
+        effect = Effect(name, ())
+        seen = instruments_for(name)
+        title = component_title(name, axes.get(name[-1]))
+        unit = "rad" if effect.rotational else "mm"
+        square = squareness_meaning(name)
+        basis, much = usual_basis(name), large_size(name)
+        rows.append(_row(name, title, unit=unit, basis=basis, much=much, seen=seen, squareness=square))
+    return rows
+
+
+def _physical(machine: Machine) -> list[Row]:
+    from ncfix.machine.effects import library
+
+    rows = []
+    for named in library(machine).values():
+        parts = dict.fromkeys(f"{each.name} {each.basis.name}" for each in named.effects)
+        unit = " ".join(dict.fromkeys("rad" if each.rotational else "mm" for each in named.effects))
+        much = "" if math.isnan(named.largest) else f"{named.largest:g}"
+        seen, needs = " ".join(named.instruments), " ".join(named.needs)
+        rows.append(_row(named.name, named.title, unit=unit, basis=", ".join(parts), much=much, seen=seen, needs=needs))
+    return rows
+
+
+def _nameless(machine: Machine) -> list[Row]:
+    """Effects of plugins that this machine cannot have, or that only diagnosis knows."""
+    from ncfix.machine.effects import library
+    from ncfix.plugins import registry
+
+    there = library(machine)
+    absent = ((name, each) for name, each in registry("effects").items() if name not in there)
+    return [_row(name, getattr(each, "title", "")) for name, each in absent]
+
+
+def _row(
+    name: str,
+    title: str,
+    *,
+    unit: str = "",
+    basis: str = "",
+    much: str = "",
+    seen: str = "",
+    needs: str = "",
+    squareness: str = "",
+) -> Row:
+    """A row of the table; the order is that of its columns."""
+    return {
+        "name": name,
+        "unit": unit,
+        "title": title,
+        "basis": basis,
+        "much": much,
+        "seen by": seen,
+        "needs": needs,
+        "squareness": squareness,
+    }
+
+
+def _basis_rows() -> list[Row]:
+    from dataclasses import fields
+
+    from ncfix.machine.effects import kinds
+
+    return [
+        {"name": name, "title": basis.title, "keys": ", ".join(field.name for field in fields(basis))}  # type: ignore[arg-type]
+        for name, basis in sorted(kinds().items())
+    ]
+
+
+@click.command()
+@click.option("-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="The machine file (TOML).")
+@click.option(
+    "--chain", "chain_path", type=PATH, metavar="FILE", help="A chain file (docs/derive.md) instead of a machine."
+)
+@click.option("--order", type=click.IntRange(1, 4), default=1, show_default=True, help="Order of the errors.")
+@click.option("--effects", metavar="LIST", help="Groups motions, locations, spindle, machine; names or patterns: E?C.")
+@click.option("--letters", is_flag=True, help="Fixed angles between axes as letters instead of their values.")
+@click.option("--latex", "form", flag_value="latex", help="Print LaTeX.")
+@click.option("--python", "form", flag_value="python", help="Print a Python module of numpy functions.")
+@click.option("--protocol", "form", flag_value="protocol", help="Print what can be identified, and a protocol.")
+@click.option("--vary", metavar="LIST", default="tool_length", help="Lengths to vary as well, for --protocol.")
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Where to write instead of standard output."
+)
+@force_option
+@json_option
+def derive(
+    machine_path: str | None,
+    chain_path: str | None,
+    order: int,
+    effects: str | None,
+    letters: bool,
+    form: str | None,
+    vary: str,
+    output: str,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Derive the nominal formulas and the error formulas of a machine, simplified.
+
+    Needs the extra `symbolic`: pip install "ncfix[symbolic]".
+    """
+    if (machine_path is None) == (chain_path is None):
+        raise click.UsageError("give one of --machine and --chain")
+    if as_json and form and output == STREAM:
+        raise click.UsageError(f"--json prints the formulas in a form of its own; --{form} beside it needs -o FILE")
+    source = machine_path or chain_path or ""
+    target = targets([source], Outputs(output, force=force))[0]
+    from ncfix.machine import symbolic
+
+    include = effects.split(",") if effects else None
+    if chain_path is not None:
+        derivation = symbolic.derive(symbolic.load_chain(chain_path), order, include)
+    else:
+        include = list(CONSTANT) if include is None and form == "protocol" else include
+        with console.busy("deriving"):
+            derivation = symbolic.derive(load_machine(source), order, include, letters)
+    if not as_json or target.file:
+        with console.busy("writing the formulas"):
+            text = _formulas(derivation, form, vary.split(","))
+        target.write(text.encode())
+    if as_json:
+        console.put_json(**_derivation_as_dict(derivation))
+
+
+def _formulas(derivation: Derivation, form: str | None, vary: list[str]) -> str:
+
+    from ncfix.machine.symbolic import measuring, to_latex, to_python, to_text
+
+    if form == "protocol":
+        return measuring(derivation, vary)
+    return {"latex": to_latex, "python": to_python}.get(form or "", to_text)(derivation)
+
+
+def _derivation_as_dict(derivation: Derivation) -> dict[str, Any]:
+    from ncfix.machine.symbolic import inverse_nominal
+
+    inverse = inverse_nominal(derivation)
+    return {
+        "name": derivation.chain.name,
+        "order": derivation.order,
+        "variables": [
+            {"name": v.name, "size": v.size.value, "axis": v.axis, "value": v.value, "definition": v.definition}
+            for v in derivation.chain.variables
+        ],
+        "nominal": {name: str(formula) for name, formula in derivation.nominal.items()},
+        "inverse": {name: str(formula) for name, formula in inverse.formulas.items()},
+        "inverse_notes": inverse.notes,
+        "error": {name: str(formula) for name, formula in derivation.error.items()},
+        "without_effect": derivation.without_effect,
+    }

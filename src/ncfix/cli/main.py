@@ -15,7 +15,7 @@ import click
 
 from ncfix import __version__
 from ncfix.cli import console
-from ncfix.cli.faults import debugging, owned
+from ncfix.cli.console import debugging, owned
 from ncfix.diagnostics import ExitCode, Message, NcfixError, UsageError
 from ncfix.plugins import PluginWarning, registry
 
@@ -40,7 +40,16 @@ VERBS = {
     "explain": "Explain a message code.",
     "completion": "Print the completion script of a shell.",
 }
-"""The built-in verbs in the order of `--help`; verb `x` is the command `x` in the module `ncfix.cli.x`."""
+"""The built-in verbs in the order of `--help`."""
+
+MODULES = {
+    **dict.fromkeys(("check", "trace"), "programs"),
+    **dict.fromkeys(("plan", "calibrate", "diagnose"), "measurements"),
+    **dict.fromkeys(("export", "emulate", "lint"), "tables"),
+    **dict.fromkeys(("derive", "effects"), "machine"),
+    **dict.fromkeys(("dialects", "plugins", "explain", "completion"), "listings"),
+}
+"""In which module of `ncfix.cli` the command of a verb is, if not in one of its own name."""
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 + SIGINT."""
@@ -62,7 +71,7 @@ class Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """One verb; plugins are only loaded if it is not a built-in one."""
         if cmd_name in VERBS:
-            command: click.Command = getattr(import_module(f"ncfix.cli.{cmd_name}"), cmd_name)
+            command: click.Command = getattr(import_module(f"ncfix.cli.{MODULES.get(cmd_name, cmd_name)}"), cmd_name)
             return command
         return registry("commands").get(cmd_name)
 

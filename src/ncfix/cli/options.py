@@ -1,20 +1,21 @@
-"""Options that several verbs share, and the inputs that they name."""
+"""Options that several verbs share, the inputs that they name, and what a shell completes of their values."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ncfix import fast
 from ncfix.cli import console
-from ncfix.cli.completion import DIALECT, PATH
-from ncfix.cli.parts import part_bytes
+from ncfix.cli.streams import part_bytes
 from ncfix.cli.targets import STREAM, read, shown
 
 if TYPE_CHECKING:
@@ -24,28 +25,92 @@ if TYPE_CHECKING:
     from ncfix.text.tree import Program
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
-machine_option = click.option(
-    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", required=True, help="The machine file (TOML)."
-)
-optional_machine_option = click.option(
-    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="The machine file (TOML)."
-)
-dialect_option = click.option(
-    "--dialect", type=DIALECT, metavar="NAME", help="The control's language; found out if not given."
-)
-table_option = click.option(
-    "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Where to write the table (CSV)."
-)
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
-
 SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".mpf")
 """Under what a subprogram's file may go besides its name, beside the suffix of the program that calls it."""
-
-
 LONGEST = 5000.0
 """mm: no tool is longer."""
 FINEST_UM = 0.01
 """No control has digits for a finer tolerance, and pieces without number would be sought for it."""
+
+
+class PathName(click.ParamType):  # type: ignore[type-arg]
+    """The path of a file or folder, taken as it is written; the shell itself completes it.
+
+    kind  what the shell is asked for: file or dir
+    """
+
+    name = "path"
+
+    def __init__(self, kind: str = "file") -> None:
+        self.kind = kind
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The path."""
+        return str(value)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """What says to the shell that it is to look for files."""
+        return [CompletionItem(incomplete, type=self.kind)]
+
+
+class OneOf(click.ParamType):  # type: ignore[type-arg]
+    """A name, taken as it is written; those that there are by now are completed."""
+
+    name = "text"
+
+    def __init__(self, known: Callable[[], Iterable[str]]) -> None:
+        self.known = known
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """The names that begin so, in whatever case."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of plugins that are left out: there is no place to say so now
+            begun = incomplete.lower()
+            return [CompletionItem(name) for name in self.known() if name.lower().startswith(begun)]
+
+
+def of_kind(kind: str) -> OneOf:
+    """The name of something that plugins register: "dialects", "controls", ..."""
+
+    def known() -> Iterable[str]:
+        from ncfix.plugins import registry
+
+        return sorted(registry(kind))
+
+    return OneOf(known)
+
+
+PATH = PathName()
+
+
+FOLDER = PathName("dir")
+
+
+DIALECT = of_kind("dialects")
+
+
+CONTROL = of_kind("controls")
+
+
+machine_option = click.option(
+    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", required=True, help="The machine file (TOML)."
+)
+
+
+optional_machine_option = click.option(
+    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="The machine file (TOML)."
+)
+
+
+dialect_option = click.option(
+    "--dialect", type=DIALECT, metavar="NAME", help="The control's language; found out if not given."
+)
+
+
+table_option = click.option(
+    "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Where to write the table (CSV)."
+)
 
 
 class Positive(click.ParamType):  # type: ignore[type-arg]
@@ -80,7 +145,7 @@ class FiniteRange(click.FloatRange):
         return found
 
 
-class Length(click.ParamType):  # type: ignore[type-arg]
+class ToolLength(click.ParamType):  # type: ignore[type-arg]
     """A length in mm that a tool can have, or none at all."""
 
     name = "mm"
@@ -149,7 +214,7 @@ def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class SubprogramFiles:
     """Finds the files of subprograms in folders, the first first, by their name with or without a suffix.
 
     Where no file has the name as it is written, one is taken that has it in another case, if it is the only one.
@@ -195,4 +260,4 @@ def subprograms(setup: Setup, *paths: str) -> Callable[[str], bytes | None]:
     """Finds the files of subprograms: beside the program and the one that it was made of, and where the setup says."""
     beside = dict.fromkeys("." if path == STREAM else os.path.dirname(path) or "." for path in paths)
     suffixes = dict.fromkeys((*SUBPROGRAM_SUFFIXES, *(os.path.splitext(path)[1].lower() for path in paths)))
-    return Beside((*beside, *setup.subprograms), tuple(suffixes))
+    return SubprogramFiles((*beside, *setup.subprograms), tuple(suffixes))

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
-from ncfix.cli.completion import PATH
-from ncfix.cli.options import force_option
+from ncfix.cli.options import PATH, force_option
 from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 from ncfix.diagnostics import Place, SourceError
 

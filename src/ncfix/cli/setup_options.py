@@ -11,17 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ncfix.cli.options import PATH
+
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup
-from ncfix.cli.completion import PATH
 
 OFFSET_AXES = "XYZABCUVW"
 """The order of the numbers of a work offset."""
-
 AXIS = re.compile(r"[XYZABCUVW]")
+BOTH = "both"
+"""All positions of block delete."""
 
 
-class Assignment(click.ParamType):  # type: ignore[type-arg]
+class KeyValue(click.ParamType):  # type: ignore[type-arg]
     """`KEY=VALUE`; the value as `convert_value` makes it, which raises ValueError with what is wrong."""
 
     def __init__(self, metavar: str, convert_value: Callable[[str, str], Any], upper: bool = True) -> None:
@@ -77,7 +79,7 @@ def tool_values(name: str, text: str) -> tuple[float, ...]:
     return values
 
 
-class Position(click.ParamType):  # type: ignore[type-arg]
+class AxisValues(click.ParamType):  # type: ignore[type-arg]
     """`X=0,Z=300`: positions by axis letter."""
 
     name = "X=0,Z=300"
@@ -96,10 +98,6 @@ class Position(click.ParamType):  # type: ignore[type-arg]
             except ValueError as error:
                 self.fail(f"{value!r}: {error}; it reads like {self.name}", param, ctx)
         return found
-
-
-BOTH = "both"
-"""All positions of block delete."""
 
 
 class Switches(click.ParamType):  # type: ignore[type-arg]
@@ -125,28 +123,28 @@ OPTIONS = (
     click.option(
         "--offset",
         "offsets",
-        type=Assignment("G54=0,0,-300", offset_values),
+        type=KeyValue("G54=0,0,-300", offset_values),
         multiple=True,
         help="A work offset in the order X Y Z A B C, mm and degrees (repeatable).",
     ),
     click.option(
         "--tool",
         "tools",
-        type=Assignment("12=120.0", tool_values),
+        type=KeyValue("12=120.0", tool_values),
         multiple=True,
         help="The length of a tool, mm; and its radius, as 12=120.0,5.0 (repeatable).",
     ),
     click.option("--tool-table", "tool_table", type=PATH, metavar="FILE", help="The control's own tool table."),
     click.option(
         "--initial",
-        type=Position(),
+        type=AxisValues(),
         multiple=True,
         help="Where the axes are at the start, machine coordinates (repeatable).",
     ),
     click.option(
         "--input",
         "inputs",
-        type=Assignment("temp_spindle=24.5", lambda key, text: number(text), upper=False),
+        type=KeyValue("temp_spindle=24.5", lambda key, text: number(text), upper=False),
         multiple=True,
         metavar="temp_spindle=24.5",
         help="What the machine's errors depend on besides its axes (repeatable).",
@@ -166,7 +164,7 @@ OPTIONS = (
     ),
     click.option(
         "--probed",
-        type=Position(),
+        type=AxisValues(),
         multiple=True,
         help="Where probing ends nominally, coordinates of the program: its results count as known (repeatable).",
     ),

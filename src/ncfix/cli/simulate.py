@@ -13,16 +13,14 @@ import click
 from click.core import ParameterSource
 
 from ncfix.cli import console
-from ncfix.cli.completion import PATH
-from ncfix.cli.following import Following, figures
-from ncfix.cli.options import FiniteRange, dialect_option, force_option, json_option, load_machine, machine_option
-from ncfix.cli.parts import Keep, Source, source_of
+from ncfix.cli.following import Following, dialect_in, figures, task_of, tell_of_stamp, through
+from ncfix.cli.options import PATH, FiniteRange, dialect_option, force_option, json_option, load_machine, machine_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.targets import JSON, STREAM, Outputs, Target, check_streams, read, shown, targets
-from ncfix.cli.through import dialect_in, task_of, tell_of_stamp, through
+from ncfix.cli.streams import Keep, Source, source_of
+from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, read, shown, targets
 
 if TYPE_CHECKING:
-    from ncfix.cli.table import Columns
+    from ncfix.cli.columns import Columns
     from ncfix.compensate.figures.simulation import Along, TipError
     from ncfix.diagnostics import Message
     from ncfix.measure.synthetic import Faults
@@ -82,7 +80,7 @@ def simulate(
         _simulate_program(Following.of(machine_path, dialect, given), program, target, as_json)
 
 
-def _simulate_program(following: Following, program: str, target: Target | None, as_json: bool) -> None:
+def _simulate_program(following: Following, program: str, target: OutputTarget | None, as_json: bool) -> None:
     """Say how large the errors along a program are, and write them to a table if there is to be one."""
     with source_of(program) as source, ExitStack() as opened:
         errors = Errors(following, source, Keep(target.file, opened) if target else None)
@@ -148,7 +146,7 @@ class Errors:
     def _gone_along(
         self, errors: Iterable[TipError], keep: Callable[[Iterable[bytes]], Iterable[bytes]] | None
     ) -> tuple[Iterable[bytes], Along]:
-        from ncfix.cli.table import as_csv
+        from ncfix.cli.columns import as_csv
         from ncfix.compensate.figures.simulation import Along, TipError
 
         along = Along()

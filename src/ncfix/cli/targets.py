@@ -55,7 +55,7 @@ def shown(path: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class OutputTarget:
     """Where the output for one input goes.
 
     source    the input, as the user wrote it
@@ -127,7 +127,7 @@ class Outputs:
 
 def targets(
     given: Sequence[str], outputs: Outputs, others: Sequence[str | None] = (), folders: bool = False
-) -> list[Target]:
+) -> list[OutputTarget]:
     """Where each output goes, which is none of the programs nor of the `others` that are read.
 
     folders  a folder among the inputs stands for all programs below it
@@ -138,7 +138,7 @@ def targets(
     _check_choices(outputs, folder)
     programs = gathered(given, folder) if folders else [Gathered(path, os.path.basename(path)) for path in given]
     if outputs.in_place:
-        found = [Target(program.path, program.path, in_place=True) for program in programs]
+        found = [OutputTarget(program.path, program.path, in_place=True) for program in programs]
     else:
         found = [_target(program, outputs, folder) for program in programs]
     _check_clash(found)
@@ -151,7 +151,7 @@ def targets(
     return found
 
 
-def check_streams(printed: str | None, **outputs: Target | None) -> None:
+def check_streams(printed: str | None, **outputs: OutputTarget | None) -> None:
     """Refuse more than one thing on standard output: NCF010.
 
     printed  what goes there in any case, in words; None if nothing does
@@ -184,21 +184,21 @@ def _check_choices(outputs: Outputs, folder: str | None) -> None:
         raise UsageError.of("NCF016", "--resume goes on with a folder of outputs, and there is none", hint="-o FOLDER")
 
 
-def _target(program: Gathered, outputs: Outputs, folder: str | None) -> Target:
+def _target(program: Gathered, outputs: Outputs, folder: str | None) -> OutputTarget:
     if folder is not None:
         if program.path == STREAM:
             hint = f"-o {os.path.join(folder, 'NAME')}"
             raise UsageError.of("NCF003", "standard input has no name to be written under", Place(folder), hint)
         path = os.path.join(folder, program.name)
-        return Target(program.path, path, False, outputs.force, outputs.resume, program.name, folder)
+        return OutputTarget(program.path, path, False, outputs.force, outputs.resume, program.name, folder)
     if outputs.output is None and program.path != STREAM:
         raise UsageError.of("NCF003", "no output given", hint="-o FILE, -o DIR, -o - or --in-place")
-    return Target(program.path, outputs.output or STREAM, force=outputs.force)
+    return OutputTarget(program.path, outputs.output or STREAM, force=outputs.force)
 
 
-def _check_clash(found: Sequence[Target]) -> None:
+def _check_clash(found: Sequence[OutputTarget]) -> None:
     """Refuse outputs that are one file, here or on a computer that does not tell large letters from small ones."""
-    same: dict[object, list[Target]] = {}
+    same: dict[object, list[OutputTarget]] = {}
     for target in found:
         same.setdefault((target.in_place and _file(target.path)) or files.alike(target.path), []).append(target)
     for group in same.values():
@@ -212,7 +212,7 @@ def _check_clash(found: Sequence[Target]) -> None:
             raise UsageError.of("NCF006", text, Place(group[1].path), hint)
 
 
-def _check_in_place(target: Target) -> None:
+def _check_in_place(target: OutputTarget) -> None:
     place = Place(target.path)
     if target.path == STREAM:
         raise UsageError.of("NCF005", "standard input cannot be changed in place", hint="-o FILE")
@@ -222,7 +222,7 @@ def _check_in_place(target: Target) -> None:
         raise UsageError.of("NCF008", f"was fixed in place before: {target.backup} exists", place, hint)
 
 
-def _check_output(target: Target, inputs: Collection[tuple[int, int]]) -> None:
+def _check_output(target: OutputTarget, inputs: Collection[tuple[int, int]]) -> None:
     place = Place(target.path)
     files.check_output(target.path, target.root, target.force)
     if _file(target.path) in inputs:

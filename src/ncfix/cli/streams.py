@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING
 
 from ncfix import files, inputs
 from ncfix.cli import console
-from ncfix.cli.targets import STREAM, Target, shown, stdin
+from ncfix.cli.targets import STREAM, OutputTarget, shown, stdin
 from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def looked_bytes() -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Fixed:
+class FixedText:
     """A corrected program: what of it is not written yet, whether it differs from the original, and the report."""
 
     text: bytes | Iterable[bytes]
@@ -223,7 +223,7 @@ def _stamped(kept: Iterable[bytes], stamp: Stamp) -> Iterator[bytes]:
 
 
 @contextmanager
-def outlet_for(target: Target, sure: bool, stamped: Callable[[], bool]) -> Iterator[Outlet]:
+def outlet_for(target: OutputTarget, sure: bool, stamped: Callable[[], bool]) -> Iterator[Outlet]:
     """An outlet; `sure`: everything that the stamp says is known from the beginning."""
     with room_for(target.file) as kept:
         yield Outlet(kept, target.path == STREAM and sure, stamped)

@@ -19,10 +19,19 @@ DIGITS = 9
 """Decimals that are kept: what is below has no meaning on any machine."""
 ROWS = 1 << 13
 """Rows that are written at a time."""
+LONGEST = 24
+"""Characters of a number at most: a sign, 17 digits, a point, and an exponent of three digits with its sign."""
+CLEAR = 1e15
+"""Steps of the last decimal from which on a double has not as many digits, and the shortest text may have fewer."""
+SMALL = 100_000
+"""Steps below which a number is written with an exponent."""
+TIE = 4e-16
+"""So close to the middle between two outputs, as a share of the number of steps, a product of doubles may have been
+rounded over to the other side: twice its rounding error, and that of the constant, which is a whole number, is none."""
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
+class WordColumn:
     """A column of words: which of some names each row has, (n,)."""
 
     names: Sequence[str]
@@ -32,18 +41,18 @@ class Words:
         return len(self.which)
 
 
-def named(kinds: type[IntEnum], values: NDArray[Any]) -> Words:
+def named(kinds: type[IntEnum], values: NDArray[Any]) -> WordColumn:
     """Kinds by their names."""
     known = sorted(kinds)
-    return Words([kind.name.lower() for kind in known], np.searchsorted(known, values))
+    return WordColumn([kind.name.lower() for kind in known], np.searchsorted(known, values))
 
 
-Columns = dict[str, NDArray[Any] | Words]
+Columns = dict[str, NDArray[Any] | WordColumn]
 """Name -> values, all of one length; whole numbers from 0 on, and others, of which those not known are NaN."""
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class RowForm:
     """How the rows of a table are written.
 
     begin, between, end  what stands before the first cell of a row, between two cells, and behind the last
@@ -59,11 +68,11 @@ class Form:
 
     def rows(self, columns: Columns) -> Iterator[bytes]:
         """The rows, some at a time."""
-        whole = [self._named(each) if isinstance(each, Words) else each for each in columns.values()]
+        whole = [self._named(each) if isinstance(each, WordColumn) else each for each in columns.values()]
         for start in range(0, len(whole[0]), ROWS):
             yield self._written([column[start : start + ROWS] for column in whole])
 
-    def _named(self, words: Words) -> NDArray[Any]:
+    def _named(self, words: WordColumn) -> NDArray[Any]:
         """The cells of a column of words."""
         return np.array([self.word(name).encode() for name in words.names]).take(words.which)
 
@@ -89,17 +98,6 @@ class Form:
                 part[odd] = 0
             cells.append(texts)
         return cells
-
-
-LONGEST = 24
-"""Characters of a number at most: a sign, 17 digits, a point, and an exponent of three digits with its sign."""
-CLEAR = 1e15
-"""Steps of the last decimal from which on a double has not as many digits, and the shortest text may have fewer."""
-SMALL = 100_000
-"""Steps below which a number is written with an exponent."""
-TIE = 4e-16
-"""So close to the middle between two outputs, as a share of the number of steps, a product of doubles may have been
-rounded over to the other side: twice its rounding error, and that of the constant, which is a whole number, is none."""
 
 
 def _steps(values: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -172,8 +170,10 @@ def _shortest(value: float) -> str:
     return repr(round(value, DIGITS) + 0.0)
 
 
-CSV = Form(b"", b",", b"\n", _quoted, lambda value: "" if math.isnan(value) else _shortest(value))
-JSON = Form(
+CSV = RowForm(b"", b",", b"\n", _quoted, lambda value: "" if math.isnan(value) else _shortest(value))
+
+
+JSON = RowForm(
     b",\n  [\n   ",
     b",\n   ",
     b"\n  ]",

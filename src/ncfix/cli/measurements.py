@@ -1,0 +1,463 @@
+"""Verbs about measurements: `ncfix plan`, `ncfix calibrate`, `ncfix diagnose`.
+
+The poses that tell most about a machine's errors; the errors that measurements show; why a machine disagrees with its
+model.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ncfix.cli import console
+from ncfix.cli.options import (
+    PATH,
+    FiniteRange,
+    ToolLength,
+    force_option,
+    json_option,
+    load_machine,
+    machine_option,
+    sound,
+    table_option,
+)
+from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, each_once, read, shown, targets
+from ncfix.diagnostics import ExitCode, RefusedError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ncfix.cli.targets import OutputTarget
+    from ncfix.diagnose.diagnosis import Diagnosis
+    from ncfix.machine import Machine
+    from ncfix.measure.calibrate import Calibration
+    from ncfix.measure.candidates import Room
+    from ncfix.measure.plan import Planned
+    from ncfix.measure.prediction import Prediction
+
+LOSSES = ("auto", "none", "huber", "tukey")
+KINDS = ("tcp", "tcp6", "probe", "length")
+ROUNDING = 1e-9
+"""mm or degree: no way beyond the travel."""
+
+
+@click.command()
+@click.argument("measured", type=PATH, nargs=-1, required=True)
+@machine_option
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE", required=True, help="Where to write the calibrated machine (TOML)."
+)
+@click.option("--effects", metavar="LIST", help="Names or patterns like EC0Y,E?X; all; or a model like esmaeili-13-bc.")
+@click.option(
+    "--loss",
+    type=click.Choice(LOSSES),
+    default="auto",
+    show_default=True,
+    help="What far-off values count: auto gives gross outliers no weight and names them.",
+)
+@click.option(
+    "--prune",
+    type=FiniteRange(0.5, 1.0, min_open=True, max_open=True),
+    metavar="LEVEL",
+    help="Leave out coefficients that are not significant at this level, e.g. 0.999.",
+)
+@click.option(
+    "--knots",
+    type=click.IntRange(min=0),
+    default=0,
+    metavar="N",
+    help="New error motions of linear axes are parabolas that join at N knots, not cubics; see --prune.",
+)
+@click.option("--time-constants", is_flag=True, help="Estimate the time constants of effects that lag, too.")
+@click.option("--allow-misfit", is_flag=True, help="Write the machine even if it does not describe the measurements.")
+@force_option
+@json_option
+def calibrate(
+    measured: tuple[str, ...],
+    machine_path: str,
+    output: str,
+    effects: str | None,
+    loss: str,
+    prune: float | None,
+    knots: int,
+    time_constants: bool,
+    allow_misfit: bool,
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Estimate the errors of a machine from measurements and write the machine with them.
+
+    Without --effects those of the machine file are estimated; of a machine without effects, all that can be. Exit
+    code 4: the result does not describe the measurements, and nothing was written.
+    """
+    from ncfix.machine import dumps
+    from ncfix.machine.plausible import doubts
+    from ncfix.measure.calibrate import calibrate as calibrated
+    from ncfix.measure.misfit import refusals
+    from ncfix.measure.prediction import guesses, over_the_travels
+    from ncfix.measure.reader import reads
+
+    each_once(measured)
+    target = targets([measured[0]], Outputs(output, force=force), (machine_path, *measured[1:]))[0]
+    check_streams(JSON if as_json else None, machine=target)
+    machine = load_machine(machine_path)
+    data = [reads(read(path), machine, shown(path)) for path in measured]
+    with console.busy("calibrating"):
+        calibration = calibrated(data, machine, effects, loss, prune, knots, time_constants)
+    over = over_the_travels(calibration)
+    remarks = (*calibration.remarks, *guesses(calibration, over))
+    odd = doubts(calibration.machine, target.path)
+    refused = refusals(calibration, odd)
+    if refused and not allow_misfit:
+        console.tell(*(each for each in remarks if each not in refused))
+        raise RefusedError(refused)
+    remarks = (*remarks, *(doubt.message for doubt in odd))
+    console.tell(*remarks)
+    target.write(dumps(calibration.machine).encode())
+    if as_json:
+        said = [message.as_dict() for message in remarks]
+        console.put_json(**_as_dict(calibration, over), remarks=said, output=target.path)
+    elif output != STREAM:
+        _print(calibration, over)
+    return ExitCode.DONE
+
+
+def _as_dict(calibration: Calibration, over: Prediction) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    from ncfix.measure.residuals import residuals, rms_by_set
+
+    residual = residuals(calibration.problem, calibration.estimate)
+    tests = {"ball_bar": _ball_bars(calibration), "positioning": _positioning(calibration)}
+    sigma, covariance = calibration.sigma, calibration.covariance
+    return {
+        "parameters": [
+            {"name": label, "value": value, "sigma": deviation, "held": math.isnan(deviation)}
+            for label, value, deviation in zip(
+                calibration.labels, calibration.estimate.coefficients.tolist(), sigma.tolist(), strict=True
+            )
+        ],
+        "covariance": covariance,
+        "set_up": _set_up(calibration),
+        "chi_square": calibration.chi_square,
+        "freedom": calibration.freedom,
+        "condition": calibration.estimate.solution.condition,
+        "rms_um": {
+            "before": calibration.before_um,
+            "after": calibration.after_um,
+            "sets": rms_by_set(calibration.problem, residual),
+        },
+        "prediction": asdict(over),
+        "largest_cook": float(residual.cook.max(initial=0.0)),
+        **{name: rows for name, rows in tests.items() if rows},
+    }
+
+
+def _ball_bars(calibration: Calibration) -> list[dict[str, Any]]:
+    """What ball-bar tests say by themselves, um."""
+    from dataclasses import asdict
+
+    from ncfix.measure.ball_bar import figures
+
+    seen = (each.measurement for each in calibration.problem.observations)
+    return [asdict(each) for measurement in seen for each in figures(measurement, calibration.problem.machine)]
+
+
+def _positioning(calibration: Calibration) -> list[dict[str, Any]]:
+    """ISO 230-2 of direct readings, um and urad."""
+    from dataclasses import asdict
+
+    from ncfix.measure.positioning import figures
+
+    return [asdict(each) for seen in calibration.problem.observations for each in figures(seen.measurement)]
+
+
+def _set_up(calibration: Calibration) -> dict[str, float]:
+    labels = [label for each in calibration.problem.observations for label in each.unknowns.labels]
+    return dict(zip(labels, calibration.estimate.unknowns.tolist(), strict=False))
+
+
+def _print(calibration: Calibration, over: Prediction) -> None:
+    console.table(("coefficient", "value", "sigma", "unit"), list(_rows(calibration)))
+    for bar in _ball_bars(calibration):
+        _say_bar(bar)
+    for row in _positioning(calibration):
+        _say_positioning(row)
+    held = "; what is held counts as known" if any(map(math.isnan, calibration.sigma.tolist())) else ""
+    figures = f"{over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms"
+    console.say(f"sigma of the tip error over the travels: {figures}{held}")
+    lengths = not math.isnan(calibration.before_um)
+    rms = (
+        f"rms {calibration.before_um:.2f} um before, {calibration.after_um:.2f} um after" if lengths else "only angles"
+    )
+    console.say(f"{rms}; {_noise(calibration)}")
+
+
+def _rows(calibration: Calibration) -> Iterator[tuple[str, str, str, str]]:
+    from ncfix.machine.effects import units
+
+    machine, selection = calibration.problem.machine, calibration.problem.selection
+    said = [unit for effect in selection.estimated for unit in units(machine, effect)]
+    values, sigma = calibration.estimate.coefficients.tolist(), calibration.sigma.tolist()
+    for label, value, deviation, (factor, unit) in zip(calibration.labels, values, sigma, said, strict=True):
+        known = "held" if math.isnan(deviation) else f"{factor * deviation:.3g}"
+        if value or known != "held":
+            yield label, f"{factor * value:.4g}", known, unit
+
+
+def _noise(calibration: Calibration) -> str:
+    """How the residuals go with the noise; where nobody knows it, they are all that says how large it is."""
+    freedom = f"{calibration.freedom} degrees of freedom"
+    if calibration.problem.noise_known:
+        return f"reduced chi-square {calibration.chi_square:.3f} with {freedom}"
+    return f"noise neither given nor to be told from repeats: sigmas are those of the residuals ({freedom})"
+
+
+def _say_bar(bar: dict[str, Any]) -> None:
+    centre = ", ".join(f"{value:.1f}" for value in bar["centre"])
+    text = (
+        f"ball-bar set {bar['name']}: size {bar['size']:+.1f} um, form {bar['form']:.1f} um, centre off by {centre} um"
+    )
+    circle = bar["circle"]
+    if circle:
+        names = {"G(b)": "Gb", "H": "H", "D": "D", "Fmax": "F_max", "Fmin": "F_min"}
+        text += "; ISO 230-4: " + ", ".join(f"{name} {circle[key]:.1f}" for name, key in names.items())
+    console.say(text)
+
+
+def _say_positioning(row: dict[str, Any]) -> None:
+    unit = "urad" if row["component"][1] in "ABC" else "um"
+    known = [f"{name} {row[name]:.1f}" for name in ("A", "R", "E", "M", "B") if row[name] == row[name]]
+    console.say(f"{row['component']} set {row['name']}, ISO 230-2: {', '.join(known)} {unit}")
+
+
+@click.command()
+@machine_option
+@click.option("--kind", type=click.Choice(KINDS), default="tcp", show_default=True, help="What will be measured.")
+@click.option("-n", "--count", type=click.IntRange(min=1), default=40, show_default=True, help="How many poses.")
+@click.option("--effects", metavar="LIST", help="Effects to be determined, as for calibrate.")
+@click.option("--separate", metavar="EFFECT,EFFECT", help="Find poses that tell these effects apart.")
+@click.option("--existing", type=PATH, metavar="FILE", help="A measurement that the new poses complete.")
+@click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW,HIGH", help="Where the axis may go (repeatable).")
+@click.option("--tool-length", "lengths", multiple=True, type=ToolLength(), metavar="MM", help="A tool (repeatable).")
+@click.option(
+    "--ball",
+    "balls",
+    multiple=True,
+    metavar="NAME=X,Y,Z",
+    help="Where a ball stands, kinds probe and tcp (repeatable).",
+)
+@click.option(
+    "--reach", "reaches", multiple=True, metavar="x=LOW,HIGH", help="Where the tip may be: x, y or z (repeatable)."
+)
+@click.option(
+    "--input", "inputs", multiple=True, metavar="NAME=LOW,HIGH", help="What else can be set, e.g. load_kg (repeatable)."
+)
+@click.option("--gcode", type=PATH, metavar="FILE", help="Also write a skeleton of the program that goes to the poses.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Other candidates.")
+@table_option
+@force_option
+@json_option
+def plan(
+    machine_path: str,
+    kind: str,
+    count: int,
+    effects: str | None,
+    separate: str | None,
+    existing: str | None,
+    ranges: tuple[str, ...],
+    lengths: tuple[float, ...],
+    balls: tuple[str, ...],
+    reaches: tuple[str, ...],
+    inputs: tuple[str, ...],
+    gcode: str | None,
+    seed: int,
+    output: str,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Choose the poses to be measured, and write them as a measurement file to be filled in."""
+    from ncfix.measure.plan import plan as planned
+    from ncfix.measure.program import skeleton
+    from ncfix.measure.reader import reads
+    from ncfix.measure.writer import dumps
+
+    sources = () if existing is None else (existing,)
+    target = targets([machine_path], Outputs(output, force=force), sources)[0]
+    program = targets([machine_path], Outputs(gcode, force=force), sources)[0] if gcode else None
+    check_streams(JSON if as_json else None, program=program, poses=None if as_json else target)
+    machine = load_machine(machine_path)
+    before = reads(read(existing), machine, shown(existing)) if existing else None
+    names = [name.strip() for name in separate.split(",")] if separate else []
+    room = _room(ranges, lengths, balls, reaches, inputs, machine)
+    with console.busy("choosing poses"):
+        found = planned(machine, kind, count, room, effects, names, before, seed)
+    empty = found.plan.form.measured if kind != "probe" else ()
+    text = dumps(found.plan, empty)
+    if program:
+        program.write(skeleton(found.plan, machine).encode())
+    figures = {"worst_um": found.worst_um, "mean_um": found.mean_um, "determined": len(found.seen)}
+    listed = {"unseen": found.unseen, "open": found.open}
+    if as_json:
+        console.put_json(kind=kind, count=count, **figures, **listed, output=output)
+    if not as_json or output != STREAM:
+        target.write(text.encode())
+    _say(found, separated=bool(separate))
+
+
+def _say(planned: Planned, *, separated: bool) -> None:
+    """What the poses do not tell, and how well the tip error will be known where that was sought."""
+    if planned.unseen:
+        console.say(f"no pose of this kind tells {', '.join(planned.unseen)} from the rest")
+    if not separated:
+        console.say(
+            f"tip error known to {planned.worst_um:.2f} um at worst per um of noise, {planned.mean_um:.2f} um rms"
+        )
+    if planned.open:
+        console.say(f"nearly open is a combination of {', '.join(planned.open)}")
+        console.say(
+            "more poses may tell it, another kind of measurement or another tool; or seek fewer effects (--effects)"
+        )
+
+
+def _room(
+    ranges: tuple[str, ...],
+    lengths: tuple[float, ...],
+    balls: tuple[str, ...],
+    reaches: tuple[str, ...],
+    inputs: tuple[str, ...],
+    machine: Machine,
+) -> Room:
+    from ncfix.measure.candidates import Room
+
+    limits = _limits(ranges, "--range")
+    travels = {axis.name: tuple(limit / axis.unit for limit in axis.range) for axis in machine.axes}
+    for name, (low, high) in limits.items():
+        if name not in travels:
+            raise click.BadParameter(f"the machine has no axis {name}, only {' '.join(travels)}", param_hint="--range")
+        lowest, highest = travels[name]
+        if low < lowest - ROUNDING or high > highest + ROUNDING:
+            raise click.BadParameter(f"{name} goes from {lowest:g} to {highest:g} only", param_hint="--range")
+    reach = _limits(reaches, "--reach")
+    for name in reach:
+        if name not in ("x", "y", "z"):
+            raise click.BadParameter(f"{name} is none of x, y and z of the workpiece", param_hint="--reach")
+    places = {}
+    for text in balls:
+        name, values = _named(text, 3, "--ball")
+        places[name] = (values[0], values[1], values[2])
+    return Room(limits, lengths or (100.0,), places, reach, _limits(inputs, "--input"))
+
+
+def _limits(texts: tuple[str, ...], option: str) -> dict[str, tuple[float, float]]:
+    """NAME=LOW,HIGH or NAME=LOW:HIGH."""
+    found = {}
+    for text in texts:
+        name, (low, high) = _named(text.replace(":", ","), 2, option)
+        if low >= high:
+            raise click.BadParameter(f"{text!r} is an empty range", param_hint=option)
+        found[name] = (low, high)
+    return found
+
+
+def _named(text: str, count: int, option: str) -> tuple[str, list[float]]:
+    name, equals, rest = text.partition("=")
+    try:
+        values = [float(part) for part in rest.split(",")]
+    except ValueError:
+        values = []
+    if not equals or len(values) != count or not all(map(math.isfinite, values)):
+        raise click.BadParameter(f"{text!r} is not NAME= and {count} numbers", param_hint=option)
+    return name.strip(), values
+
+
+@click.command()
+@click.argument("measured", type=PATH, nargs=-1, required=True)
+@machine_option
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE", help="Where to write the machine with the effects added (TOML)."
+)
+@click.option("--without", multiple=True, metavar="NAME", help="An effect that is not to be considered (repeatable).")
+@click.option(
+    "--next", "next_path", type=PATH, metavar="FILE", help="Write the poses to be measured next: CSV, else a program."
+)
+@click.option("--report", type=PATH, metavar="FILE", help="Write a report with figures (HTML or Markdown).")
+@click.option("--check", is_flag=True, help="Exit code 1 if anything is missing.")
+@force_option
+@json_option
+def diagnose(
+    measured: tuple[str, ...],
+    machine_path: str,
+    output: str | None,
+    without: tuple[str, ...],
+    next_path: str | None,
+    report: str | None,
+    check: bool,
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
+    from ncfix.diagnose import result, words
+    from ncfix.diagnose.checks import remarks
+    from ncfix.diagnose.diagnosis import NOTHING
+    from ncfix.diagnose.diagnosis import diagnose as diagnosed
+    from ncfix.machine import dumps
+    from ncfix.measure.reader import reads
+    from ncfix.report.diagnosis import document
+    from ncfix.report.forms import form_of
+
+    each_once(measured)
+    inputs = (*measured, machine_path)
+    machine_target, next_target, page_target = (_target(path, force, inputs) for path in (output, next_path, report))
+    check_streams("what was found", machine=machine_target, poses=next_target, report=page_target)
+    form = form_of(report) if report is not None else None
+    machine = load_machine(machine_path)
+    data = [reads(read(path), machine, shown(path)) for path in measured]
+    for each in data:
+        console.tell_some(each.remarks)
+    with console.busy("diagnosing"):
+        diagnosis = diagnosed(data, machine, without)
+    console.tell(*remarks(diagnosis.view, diagnosis.case.unheard_of))
+    written = None
+    if machine_target is not None and diagnosis.machine is not None:
+        sound(diagnosis.machine, machine_target.path, force)
+        machine_target.write(dumps(result.with_provenance(diagnosis)).encode())
+        written = machine_target.path
+    if next_target is not None:
+        _write_next(diagnosis, next_target)
+    if page_target is not None and form is not None:
+        page_target.write(form(document(diagnosis)))
+    if as_json:
+        console.put_json(**result.as_dict(diagnosis, written))
+    else:
+        console.put(words.text(diagnosis))
+        _say_written(diagnosis, output, written)
+    return ExitCode.FINDINGS if check and diagnosis.verdict != NOTHING else ExitCode.DONE
+
+
+def _target(path: str | None, force: bool, inputs: Sequence[str]) -> OutputTarget | None:
+    """Where an output goes that was asked for; none of the inputs."""
+    return targets([STREAM], Outputs(path, force=force), inputs)[0] if path is not None else None
+
+
+def _write_next(diagnosis: Diagnosis, target: OutputTarget) -> None:
+    from ncfix.measure.program import skeleton
+    from ncfix.measure.writer import dumps
+
+    if diagnosis.proposal is None or diagnosis.proposal.plan is None:
+        console.say("no further poses are proposed")
+        return
+    plan = diagnosis.proposal.plan
+    table = target.path.endswith(".csv")
+    target.write((dumps(plan, ("dx", "dy", "dz")) if table else skeleton(plan, diagnosis.view.machine)).encode())
+
+
+def _say_written(diagnosis: Diagnosis, output: str | None, written: str | None) -> None:
+    if output and written is None:
+        wrong = "; constants that are wrong are for `ncfix calibrate`" if diagnosis.moved else ""
+        console.say(f"no machine file was written: there is nothing to add to the model{wrong}")

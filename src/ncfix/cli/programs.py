@@ -1,0 +1,209 @@
+"""Verbs that look at programs and write none: `ncfix check` what is wrong with them, `ncfix trace` their motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from ncfix.batch.gathering import gathered
+from ncfix.cli import console
+from ncfix.cli.following import Following, dialect_in, parts_of, task_of, through
+from ncfix.cli.options import PATH, dialect_option, force_option, json_option, optional_machine_option, table_option
+from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.streams import Keep, Source, source_of
+from ncfix.cli.targets import Outputs, shown, targets
+from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
+
+if TYPE_CHECKING:
+    from ncfix.cli.columns import Columns
+    from ncfix.compensate.checking import Checked
+    from ncfix.control.moves import Moves
+    from ncfix.machine import Machine
+    from ncfix.text.tree import Program
+
+
+@dataclass(frozen=True, slots=True)
+class LookedAt:
+    """What was found in a program, and the dialect in which it was read."""
+
+    dialect: str
+    checked: Checked
+
+
+def looked_at(following: Following, path: str) -> LookedAt:
+    """Look at a program."""
+    with source_of(path) as source:
+        return through([source], lambda: _in_parts(following, source), lambda: _whole(following, source))
+
+
+def _in_parts(following: Following, source: Source) -> LookedAt:
+    """While it is read; raises what that does, and `NotInPartsError`."""
+    from ncfix.compensate.survey import survey_alone, survey_on
+
+    dialect = dialect_in(following, source)
+    if following.machine is None:
+        return LookedAt(dialect.name, survey_alone(*parts_of(following, source, dialect)))
+    return LookedAt(dialect.name, survey_on(task_of(following, source, dialect), source.read))
+
+
+def _whole(following: Following, source: Source) -> LookedAt:
+    program = following.read(source.path, source.everything())
+    return LookedAt(program.dialect.name, following.checked(program, source.path))
+
+
+@click.command()
+@click.argument("programs", type=PATH, nargs=-1, required=True, metavar="PROGRAM...")
+@optional_machine_option
+@dialect_option
+@setup_options
+@json_option
+def check(
+    programs: tuple[str, ...], machine_path: str | None, dialect: str | None, given: SetupOptions, as_json: bool
+) -> int:
+    """Read each PROGRAM, of a folder all below it, and follow it as the control would. Writes nothing.
+
+    With a machine file also: does it stay within the travel, and what would its correction refuse? Exit code 1 with
+    findings.
+    """
+    following = Following.of(machine_path, dialect, given)
+    outcomes = [_outcome(following, program.path) for program in gathered(programs)]
+    if as_json:
+        console.put_json(files=[outcome.entry for outcome in outcomes])
+    return max(outcome.code for outcome in outcomes)
+
+
+@dataclass(frozen=True, slots=True)
+class CheckOutcome:
+    """What was found in one program: its exit code and its entry in the JSON object."""
+
+    code: int
+    entry: dict[str, Any]
+
+
+def _outcome(following: Following, path: str) -> CheckOutcome:
+    entry: dict[str, Any] = {"path": shown(path)}
+    try:
+        with console.busy(f"checking {shown(path)}"):
+            looked = looked_at(following, path)
+    except NcfixError as error:
+        console.tell(*error.messages)
+        return CheckOutcome(error.exit_code, {**entry, "errors": _as_dicts(error.messages)})
+    checked, dialect = looked.checked, looked.dialect
+    console.tell_some(checked.findings)
+    count = len(checked.findings)
+    said = console.counted(count, "finding") if count else "nothing found"
+    size = f"{console.counted(checked.blocks, 'block')}, {console.counted(checked.moves, 'motion')}"
+    console.say(f"{visible(shown(path))}: {size}, {dialect}: {said}")
+    entry |= {"dialect": dialect, "blocks": checked.blocks, "moves": checked.moves}
+    return CheckOutcome(
+        ExitCode.FINDINGS if count else ExitCode.DONE, {**entry, "findings": _as_dicts(checked.findings)}
+    )
+
+
+def _as_dicts(messages: tuple[Message, ...]) -> list[dict[str, object]]:
+    return [message.as_dict() for message in messages]
+
+
+@click.command()
+@click.argument("program", type=PATH)
+@optional_machine_option
+@table_option
+@force_option
+@dialect_option
+@setup_options
+@json_option
+def trace(
+    program: str,
+    machine_path: str | None,
+    output: str,
+    force: bool,
+    dialect: str | None,
+    given: SetupOptions,
+    as_json: bool,
+) -> None:
+    """Print the motions of PROGRAM as a table: where each leads, in machine axes and at the tool tip."""
+    (target,) = targets([program], Outputs(output, force=force), (machine_path, *given.files))
+    following = Following.of(machine_path, dialect, given)
+    with source_of(program) as source, ExitStack() as opened:
+        csv = None if as_json and target.file is None else Keep(target.file, opened)
+        motions = Motions(following, source, csv, Keep(None, opened) if as_json else None)
+        with console.busy(f"following {shown(program)}"):
+            table, messages = through([source], motions.in_parts, motions.whole)
+        console.tell(*messages)
+        if csv:
+            target.write(table.csv)
+        console.put_all(table.json)
+
+
+class TableTexts(NamedTuple):
+    """A table as text; empty in a form that is not asked for."""
+
+    csv: Iterable[bytes]
+    json: Iterable[bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Motions:
+    """The motions of a program, to be written as a table: `csv`, `json`, or both."""
+
+    following: Following
+    source: Source
+    csv: Keep | None
+    json: Keep | None
+
+    def written(self, tables: Iterable[Columns]) -> TableTexts:
+        """The table as text."""
+        from ncfix.cli.columns import as_csv, as_json
+
+        tables = list(tables) if self.csv and self.json else tables
+        return TableTexts(
+            self.csv(as_csv(tables)) if self.csv else (),
+            self.json(as_json(tables, path=shown(self.source.path))) if self.json else (),
+        )
+
+    def in_parts(self) -> tuple[TableTexts, Sequence[Message]]:
+        """The table and what there is to say, of a program that is read; raises what that does, `NotInPartsError`."""
+        machine = self.following.machine
+        parts, found = parts_of(self.following, self.source, dialect_in(self.following, self.source))
+        table = self.written(table_of(part.program, part.moves, machine) for part in found)
+        parts.blocks_behind()
+        return table, parts.follower.messages
+
+    def whole(self) -> tuple[TableTexts, Sequence[Message]]:
+        """The same of a program as a whole."""
+        path = self.source.path
+        program = self.following.read(path, self.source.everything())
+        found = self.following.trace(program, path)
+        return self.written([table_of(program, found.moves, self.following.machine)]), found.messages
+
+
+def table_of(program: Program, moves: Moves, machine: Machine | None) -> Columns:
+    """The motions by columns, mm and degrees; the tip only where the machine is known."""
+    from ncfix.cli.columns import WordColumn, named
+    from ncfix.control.moves import FeedMode, Kind, Rule
+
+    positions, tip = _positions(moves, machine)
+    columns: Columns = {"line": program.lines(moves.block), "kind": named(Kind, moves.kind)}
+    columns |= dict(zip(moves.axes, positions.T, strict=True))
+    columns |= {f"tip_{name}": values for name, values in zip("xyz", tip.T, strict=False)}
+    columns |= {"feed": moves.feed, "feed_mode": named(FeedMode, moves.feed_mode)}
+    return columns | {"rule": named(Rule, moves.rule), "reason": WordColumn(moves.reasons, moves.reason)}
+
+
+def _positions(moves: Moves, machine: Machine | None) -> tuple[Any, Any]:
+    """Axis positions at the ends of the motions, mm and degrees, and where the tip is in the workpiece, mm."""
+    import numpy as np
+
+    from ncfix.compensate.plan.kinematics import reached_joints
+
+    if machine is None:
+        q, tip = moves.end, np.empty((len(moves), 0))
+    else:
+        q, reached = reached_joints(machine, moves.end, moves.tcp, moves.tool_length)
+        q = np.where(reached[:, None], q, np.nan)
+        tip = machine.tip(q, moves.tool_length)
+    return np.where(moves.rotary, np.degrees(q), q), tip

@@ -1,0 +1,427 @@
+"""Verbs for compensation tables: `ncfix export` makes them, `ncfix emulate` runs them, `ncfix lint` looks for faults.
+
+A program that is run with tables active gets one figure, as does a program that is rewritten.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Container, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ncfix import files
+from ncfix.cli import console
+from ncfix.cli.following import Following, figures
+from ncfix.cli.options import (
+    CONTROL,
+    FOLDER,
+    PATH,
+    Positive,
+    ToolLength,
+    dialect_option,
+    force_option,
+    json_option,
+    machine_option,
+    sound,
+    subprograms,
+)
+from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.targets import STREAM, shown
+from ncfix.diagnostics import ConfigError, ExitCode, Message, Place, RefusedError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ncfix.compensate.fix import Fixed
+    from ncfix.compensate.following import Followed
+    from ncfix.machine import Machine
+    from ncfix.tables.compensation import Tables
+    from ncfix.tables.control import Control, Written
+    from ncfix.tables.export import Exported
+    from ncfix.tables.forms import Linted
+    from ncfix.text.tree import Program
+
+SAME = 0.5
+"""mm: tools whose lengths differ by less are the same to tables."""
+INSTEAD = "give the original program, or run this one without tables"
+MANY = 4
+"""Lengths that are listed."""
+
+
+def along(
+    following: Following,
+    control: Control,
+    tables: Tables,
+    settings: Mapping[str, str],
+    path: str,
+    tool_length: float,
+) -> dict[str, Any]:
+    """What a control with these tables leaves along a program: `{path, error_before_um, error_after_um, remarks}`.
+
+    Both are looked at where the tool cuts; rewritten programs have the figures of `fix` after, which looks at the ends
+    of rapids too. It is remarked on if the program's tools are not of the length that the tables hold for, mm.
+
+    Raises `RefusedError` for a program that would be corrected twice: NCF493 if it carries a stamp of ncfix, NCF438 if
+    its numbers show it.
+    """
+    from ncfix.compensate.figures.simulation import Along, seems_corrected, tip_errors, tip_with
+    from ncfix.compensate.plan.intent import Intent
+    from ncfix.machine import State
+
+    program, followed = _followed(following, path)
+    names, machine, moves = followed.machine.axis_names, followed.machine, followed.trace.moves
+    intent, lines = Intent(machine, moves, State()), program.lines(moves.block)
+    before = figures(Along.of(tip_errors(intent, lines)))
+    if control.rewrites:
+        after = rewritten(following, settings, path).report.as_dict()["error_after_um"] or before
+    else:
+        if seems_corrected(machine, moves):
+            text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
+            raise RefusedError.of("NCF438", text, Place(shown(path)), INSTEAD)
+        made = tip_with(lambda q, way, length: tables.for_tool(length).at(names, q, way))
+        after = figures(Along.of(tip_errors(intent, lines, made=made)))
+    fixed_length = not (control.any_tool or control.rewrites) and machine.depends_on_tool_length
+    remarks = list(_other_tools(moves.tool_length, tool_length)) if fixed_length else []
+    return {"path": shown(path), "error_before_um": before, "error_after_um": after, "remarks": remarks}
+
+
+def _other_tools(used: NDArray[np.float64], length: float) -> Iterator[str]:
+    import numpy as np
+
+    others = sorted({float(round(each, 3)) for each in used[np.isfinite(used)] if abs(each - length) > SAME})
+    if others:
+        listed = ", ".join(f"{each:g}" for each in others[:MANY]) + (" ..." if len(others) > MANY else "")
+        yield f"The tables hold for a tool of {length:g} mm; this program also runs with {listed} mm."
+
+
+def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
+    """The program as `ncfix fix` rewrites it under these settings of the control."""
+    from ncfix.compensate.fix import FixOptions, fix_program
+
+    assert following.machine is not None
+    options = FixOptions(strategy=settings["strategy"], tolerance_um=float(settings["tolerance_um"]))
+    find = subprograms(following.setup, path)
+    return fix_program(following.read(path), following.machine, following.setup, options, find)
+
+
+def rewritten_file(following: Following, settings: Mapping[str, str], path: str) -> dict[str, bytes]:
+    """Its file; raises `RefusedError` with what could not be corrected, if anything could not."""
+    fixed = rewritten(following, settings, path)
+    refused = [Message(each.code, each.reason, Place(shown(path), each.line)) for each in fixed.report.refused]
+    if refused:
+        raise RefusedError.collected(refused)
+    return {os.path.basename(path): fixed.text}
+
+
+def _followed(following: Following, path: str) -> tuple[Program, Followed]:
+    from ncfix.compensate.following import follow
+    from ncfix.text import stamp
+
+    assert following.machine is not None
+    program = following.read(path)
+    block = stamp.find(program)
+    if block is not None:
+        text = "the program has been corrected already: with tables of the same errors it would be corrected twice"
+        place = program.place(block)
+        raise RefusedError.of("NCF493", text, place, INSTEAD)
+    return program, follow(program, following.machine, following.setup, subprograms(following.setup, path))
+
+
+@click.command()
+@click.argument("control", type=CONTROL)
+@machine_option
+@click.option("-o", "--output", type=FOLDER, metavar="DIR", required=True, help="The folder for the files.")
+@click.option(
+    "--tool-length", type=ToolLength(), default=0.0, show_default=True, help="The length that the tables hold for, mm."
+)
+@click.option(
+    "--target-um",
+    type=Positive(),
+    default=1.0,
+    show_default=True,
+    help="How much correction may be lost between the points of a table.",
+)
+@click.option(
+    "--range",
+    "ranges",
+    metavar="X=LOW,HIGH",
+    multiple=True,
+    help="Cover less than the travel; mm, degree (repeatable).",
+)
+@click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="An option of the control (repeatable).")
+@click.option("--probe", is_flag=True, help="Write small files that settle on the machine what --set must say.")
+@click.option(
+    "--program", type=PATH, metavar="FILE", help="Rewrite this program (control gcode), or run it with the tables."
+)
+@force_option
+@dialect_option
+@setup_options
+@json_option
+def export(
+    control: str,
+    machine_path: str,
+    output: str,
+    tool_length: float,
+    target_um: float,
+    ranges: tuple[str, ...],
+    settings: tuple[str, ...],
+    probe: bool,
+    program: str | None,
+    force: bool,
+    dialect: str | None,
+    given: SetupOptions,
+    as_json: bool,
+) -> int:
+    """Write compensation tables for CONTROL, with a hand-over sheet and what they leave.
+
+    The figures are those of the files: they are read back and run as the control would, over 20000 random poses.
+    """
+
+    from ncfix.plugins import called
+    from ncfix.tables.control import Request, Written, get_control
+    from ncfix.tables.correction import ranges_of
+    from ncfix.tables.export import export as exported
+
+    chosen = get_control(control)
+    check_folder(output)
+    following = Following.of(machine_path, dialect, given)
+    machine = following.machine
+    assert machine is not None
+    sound(machine, machine_path, force)
+    space = ranges_of(machine, given_ranges(machine, ranges))
+    options = chosen.settings(dict(_pair(each, "--set NAME=VALUE") for each in settings), complete=not probe)
+    request = Request(machine, space, tool_length, 1e-3 * target_um, options)
+    if probe:
+        found = called("controls", chosen.name, chosen.probe, request, gives=Written)
+        write_folder(output, found, force)
+        _tell_of_probe(found, chosen.name, as_json)
+        return ExitCode.DONE
+    more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
+    with console.busy("making tables"):
+        made = exported(chosen, request)
+        if program is not None:
+            more["program"] = along(following, chosen, made.tables, options, program, tool_length)
+        if program is not None and chosen.rewrites:
+            made = replace(made, files={**made.files, **rewritten_file(following, options, program)})
+    write_folder(output, made, force)
+    console.tell_some(made.messages)
+    tell(made, as_json, control=chosen.name, reaches=made.reaches, **more)
+    return ExitCode.DONE
+
+
+def given_ranges(machine: Machine, texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+    """Axis -> range in mm or rad, from X=LOW,HIGH or X=LOW:HIGH in mm or degree; raises `UsageError` NCF483."""
+    units = {axis.name: axis.unit for axis in machine.axes}
+    found = {}
+    for text in texts:
+        name, value = _pair(text, "--range X=LOW,HIGH")
+        try:
+            low, high = (float(part) * units.get(name, 1.0) for part in value.replace(":", ",").split(","))
+        except ValueError as error:
+            hint = "--range X=LOW,HIGH, mm or degree"
+            raise UsageError.of("NCF483", f"{text!r} is not a range", hint=hint) from error
+        found[name] = (low, high)
+    return found
+
+
+def _pair(text: str, form: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise click.UsageError(f"{text!r} should be {form}")
+    return name.strip(), value.strip()
+
+
+def _tell_of_probe(written: Written, control: str, as_json: bool) -> None:
+    if as_json:
+        console.put_json(control=control, files=sorted(written.files), notes=written.notes)
+        return
+    console.put("".join(f"{name}\n" for name in sorted(written.files)))
+
+
+def check_folder(folder: str) -> None:
+    """Refuse what cannot be a folder of tables: NCF003 or NCF007."""
+    if folder in ("", STREAM):
+        raise UsageError.of("NCF003", "tables are several files, which go to a folder", hint="-o FOLDER")
+    if os.path.lexists(folder) and not os.path.isdir(folder):
+        raise UsageError.of("NCF007", "is not a folder", Place(folder), "-o FOLDER")
+
+
+def write_folder(folder: str, made: Exported | Written, force: bool) -> None:
+    """Write all files, or none if one is there already or must not be, or there is no room.
+
+    Raises `UsageError` NCF004, NCF005, NCF007, NCF023.
+    """
+    check_folder(folder)
+    paths = {os.path.join(folder, name): content for name, content in made.files.items()}
+    for path in paths:
+        files.check_output(path, folder, force)
+        if os.path.lexists(path) and not force:
+            raise files.exists_already(path)
+    fresh = [path for path in paths if not os.path.lexists(path)]
+    try:
+        for path, content in paths.items():
+            files.write_whole(path, content, force, folder)
+    except UsageError:
+        for path in fresh:
+            with suppress(OSError):
+                os.unlink(path)
+        raise
+
+
+def tell(made: Exported, as_json: bool, **more: object) -> None:
+    """Say what the tables leave."""
+    figures = made.left.figures()
+    reaches, program = more.pop("reaches"), more.get("program")
+    if as_json:
+        entries = {**more, "class": reaches, "files": sorted(made.files), "residual_um": figures}
+        warnings = [message.as_dict() for message in made.messages]
+        if made.least:
+            entries["least_um"] = {"max": 1e3 * made.least.value, "why": made.least.why}
+        console.put_json(**entries, limits=made.limits(), notes=made.notes, warnings=warnings)
+        return
+    rows = [(when, *(f"{figures[when][key]:.2f}" for key in ("max", "rms", "mean"))) for when in ("before", "after")]
+    console.table(("tip error, um", "max", "rms", "mean"), rows)
+    pose = " ".join(f"{name}{value:g}" for name, value in figures["after"]["at"].items())
+    limits = made.limits()
+    console.put(f"class {reaches}; {limits['tables']} tables, {limits['points']} points; most is left at {pose}\n")
+    if isinstance(program, dict):
+        for when in ("before", "after"):
+            console.put(f"{program['path']} {when}: {console.error_figures(program[f'error_{when}_um'])}\n")
+        for remark in program["remarks"]:
+            console.say(remark)
+        if program["error_after_um"]["rms"] > program["error_before_um"]["rms"]:
+            console.say("This program is made worse: it runs where these tables do not fit the machine.")
+    for note in made.notes:
+        console.say(note)
+
+
+@click.command()
+@click.argument("control", type=CONTROL)
+@click.argument("folder", type=FOLDER, metavar="TABLEDIR")
+@machine_option
+@click.option("--program", type=PATH, metavar="FILE", help="Also run this program with the tables active.")
+@click.option("--other-machine", is_flag=True, help="Run tables that were made for another machine or other errors.")
+@dialect_option
+@setup_options
+@json_option
+def emulate(
+    control: str,
+    folder: str,
+    machine_path: str,
+    program: str | None,
+    other_machine: bool,
+    dialect: str | None,
+    given: SetupOptions,
+    as_json: bool,
+) -> int:
+    """Say what the tables in TABLEDIR, which `ncfix export` wrote for CONTROL, leave on this machine.
+
+    Exit code 1 if there is something to remark on the files.
+    """
+
+    from ncfix.tables.control import get_control
+    from ncfix.tables.export import SIDE_FILE, read_manifest
+    from ncfix.tables.export import emulate as emulated
+
+    chosen = get_control(control)
+    following = Following.of(machine_path, dialect, given)
+    assert following.machine is not None
+    content = read_folder(folder)
+    more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
+    with console.busy("running the tables"):
+        try:
+            found = emulated(chosen, content, following.machine, folder.rstrip(os.sep), other_machine)
+        except ConfigError as error:
+            raise ConfigError.collected(_below(folder, error.messages, content)) from error
+        if program is not None:
+            made = read_manifest(content[SIDE_FILE], SIDE_FILE)
+            more["program"] = along(following, chosen, found.tables, made.settings, program, made.tool_length)
+    found = replace(found, messages=_below(folder, found.messages, content))
+    console.tell_some(found.messages)
+    tell(found, as_json, control=chosen.name, reaches=found.reaches, **more)
+    return ExitCode.FINDINGS if found.messages else ExitCode.DONE
+
+
+def _below(folder: str, messages: Iterable[Message], names: Container[str]) -> tuple[Message, ...]:
+    """The messages with the folder before the names of its files."""
+    return tuple(
+        replace(message, place=replace(message.place, path=os.path.join(folder, message.place.path)))
+        if message.place is not None and message.place.path in names
+        else message
+        for message in messages
+    )
+
+
+def read_folder(folder: str) -> dict[str, bytes]:
+    """All files of a folder; raises `SourceError` NCF002."""
+    try:
+        names = sorted(os.listdir(folder))
+    except OSError as error:
+        raise files.unreadable(folder, error) from error
+    paths = {name: os.path.join(folder, name) for name in names}
+    return {name: files.read_bytes(path) for name, path in paths.items() if os.path.isfile(path)}
+
+
+@click.command()
+@click.argument("paths", nargs=-1, required=True, metavar="FILE...")
+@click.option("--control", metavar="NAME", default="", help="Whose tables they are; else by what they hold.")
+@json_option
+def lint(paths: tuple[str, ...], control: str, as_json: bool) -> int:
+    """Say what a control would not load, or would misread, in each FILE; of a folder in all of its files.
+
+    Files of one control that lie in one folder are looked at together. Exit code 1 with findings, 3 if a file is of no
+    known form.
+    """
+    from ncfix.tables.forms import lint_files
+
+    worst, entries = int(ExitCode.DONE), []
+    for folder, content in _gathered(paths):
+        for name, looked in sorted(lint_files(content, control).items()):
+            path = os.path.join(folder, name)
+            messages = [_placed(message, folder, content) for message in looked.messages]
+            console.tell_some(messages)
+            worst = max(worst, _code(looked))
+            entries.append(_entry(path, looked, messages))
+            if not as_json:
+                said = console.counted(len(messages), "finding") if messages else "nothing found"
+                console.say(f"{shown(path)}: {looked.title or 'of no known form'}: {said}")
+    if as_json:
+        console.put_json(files=entries)
+    return worst
+
+
+def _gathered(paths: Sequence[str]) -> Iterator[tuple[str, dict[str, bytes]]]:
+    """Folder -> the files in it that are meant; raises `SourceError` NCF002."""
+    found: dict[str, dict[str, bytes]] = {}
+    for path in paths:
+        if os.path.isdir(path):
+            found.setdefault(path.rstrip(os.sep) or os.sep, {}).update(read_folder(path))
+        else:
+            folder, name = os.path.split(path)
+            found.setdefault(folder, {})[name] = files.read_bytes(path)
+    yield from ((folder, content) for folder, content in found.items() if content)
+
+
+def _placed(message: Message, folder: str, names: dict[str, bytes]) -> Message:
+    """With the folder before the name of its file."""
+    if message.place is None or message.place.path not in names:
+        return message
+    return replace(message, place=replace(message.place, path=os.path.join(folder, message.place.path)))
+
+
+def _code(looked: Linted) -> int:
+    if not looked.owner:
+        return ExitCode.UNREADABLE
+    return ExitCode.FINDINGS if looked.messages else ExitCode.DONE
+
+
+def _entry(path: str, looked: Linted, messages: Sequence[Message]) -> dict[str, Any]:
+    found = [message.as_dict() for message in messages]
+    return {"path": shown(path), "form": looked.owner or None, "title": looked.title or None, "findings": found}
