@@ -19,17 +19,17 @@ import numpy as np
 from diagnose.study import FAMILIES, Scene, drawn
 from diagnose.tables import put
 from diagnose.worlds import World
-from ncfix.diagnose import constants, gates, verdict, weighing
-from ncfix.diagnose.conclusion import concluded
-from ncfix.diagnose.diagnosis import Diagnosis, diagnose
-from ncfix.diagnose.selection import Selected, judged, select
-from ncfix.diagnose.weighing import Members, Scale
+from ncfix.diagnose import diagnosis, evidence, joint_fit
+from ncfix.diagnose.diagnosis import Diagnosis, concluded, diagnose
+from ncfix.diagnose.evidence import Comparison, Members
+from ncfix.diagnose.joint_fit import passing
+from ncfix.diagnose.selection import Selected, select, with_alternatives, with_constants, with_constants_free
 
 TRIED: tuple[tuple[str, ModuleType, tuple[float, ...]], ...] = (
-    ("UNNAMED", weighing, (0.0, 6.0)),
-    ("RATHER", gates, (0.25, 1.0)),
-    ("MUCH", verdict, (1 / 6, 2 / 3)),
-    ("EXCESS_UM", verdict, (1.0, 3.0)),
+    ("UNNAMED", evidence, (0.0, 6.0)),
+    ("RATHER", joint_fit, (0.25, 1.0)),
+    ("MUCH", diagnosis, (1 / 6, 2 / 3)),
+    ("EXCESS_UM", diagnosis, (1.0, 3.0)),
 )
 """Constant, where it is, and other values; more than the first of them changes only what is made of the evidence."""
 ASKED = ("clutter", "single", "two", "deleted", "foreign")
@@ -41,7 +41,7 @@ class Again:
 
     found: Diagnosis
     members: Members = field(init=False)
-    scale: Scale = field(init=False)
+    scale: Comparison = field(init=False)
 
     def __post_init__(self) -> None:
         """The evidence as it is weighed."""
@@ -49,14 +49,14 @@ class Again:
 
     def weigh(self) -> None:
         """Which effects are there, from the start."""
-        court = self.found.case.court
-        freed = constants.freed(court)
-        self.scale = Scale(court)
-        self.members = constants.added(self.scale, select(freed, (*freed.names, *court.rivals)))
+        evidence = self.found.case.evidence
+        freed = with_constants_free(evidence)
+        self.scale = Comparison(evidence)
+        self.members = with_constants(self.scale, select(freed, (*freed.names, *evidence.alternatives)))
 
     def concluded(self) -> Diagnosis:
         """What is said of them."""
-        selected: Selected = gates.passed(self.scale, judged(self.scale, self.members))
+        selected: Selected = passing(self.scale, with_alternatives(self.scale, self.members))
         return concluded(self.found.case, self.scale, selected)
 
 

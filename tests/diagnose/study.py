@@ -1,6 +1,6 @@
 """How often the diagnosis is right on worlds of its own: `python tests/diagnose/study.py single=20 deleted=20 ...`.
 
-`--set weighing.MISSHAPEN=0.1` tries another value of a constant, `--from 40` other worlds, `--log FILE` keeps a line
+`--set evidence.MISSHAPEN=0.1` tries another value of a constant, `--from 40` other worlds, `--log FILE` keeps a line
 of JSON for every scene, and `--read FILE` takes such scenes as done. Prints the table of docs/diagnose.md, or puts it
 there with `--table docs/diagnose.md`.
 """
@@ -20,8 +20,7 @@ from numpy.random import Generator
 
 from diagnose.tables import put
 from diagnose.worlds import FOREIGN, THERMAL, World
-from ncfix.diagnose.diagnosis import Diagnosis, diagnose
-from ncfix.diagnose.verdict import NOTHING, UNKNOWN
+from ncfix.diagnose.diagnosis import NOTHING, UNKNOWN, Diagnosis, diagnose
 from ncfix.measure.measurement import Array
 
 WORLDS = (
@@ -50,7 +49,7 @@ class Scene:
 
 
 def clean(world: World, random: Generator) -> Scene:
-    return Scene(np.zeros(len(world.view.y)))
+    return Scene(np.zeros(len(world.data.y)))
 
 
 def clutter(world: World, random: Generator) -> Scene:

@@ -7,7 +7,7 @@ import pytest
 
 from diagnose.worlds import World
 from ncfix.diagnose.diagnosis import diagnose
-from ncfix.diagnose.twins import TOLD, alike
+from ncfix.diagnose.selection import TOLD_APART, act_alike
 from ncfix.machine import Effect
 from ncfix.machine.basis import Fourier
 from ncfix.measure.measurement import Array
@@ -25,19 +25,19 @@ def world() -> World:
 
 def missed(world: World, name: str, shown: Array) -> float:
     """Share of squares of an error that the best form of a name cannot show, beside what is free."""
-    base = orthonormal(world.view.base)
+    base = orthonormal(world.data.base)
     left = without(base, shown[:, None])
-    forms = [group.columns for group in world.gathered.groups if group.owner.name == name]
+    forms = [group.columns for group in world.visible.groups if group.owner.name == name]
     rests = [without(orthonormal(without(base, form)), left) for form in forms]
     return min(float((rest**2).sum()) for rest in rests) / float((left**2).sum())
 
 
 @pytest.mark.parametrize("held", [-0.8, -0.3, 0.1, 0.55])
 def test_a_scale_may_be_held_anywhere(world: World, held: float) -> None:
-    low, high = world.view.reach.spans["X"]
+    low, high = world.data.measured.spans["X"]
     place = (low + high) / 2 + held * (high - low) / 2
-    unit = world.view.design([Effect("EXX", (0.0,), times="X", times_center=place, times_scale=100.0)])[:, 0]
-    time = world.view.column("time_s")[world.view.row]
+    unit = world.data.design([Effect("EXX", (0.0,), times="X", times_center=place, times_scale=100.0)])[:, 0]
+    time = world.data.column("time_s")[world.data.row]
     clock = 2 * (time - time.mean()) / np.ptp(time)
     assert missed(world, "thermal scale X", unit * np.sin(2.5 * clock)) < HARDLY
 
@@ -45,7 +45,7 @@ def test_a_scale_may_be_held_anywhere(world: World, held: float) -> None:
 @pytest.mark.parametrize("ratio", [0.75, 1.0, 1.3])
 def test_a_slide_tilts_by_nearly_the_slope(world: World, ratio: float) -> None:
     """A bow u^2 without its mean, and its slope 2 u times the ratio, are within one of the loadings."""
-    sag, (low, high) = world.candidate("bed sag X"), world.view.reach.spans["X"]
+    sag, (low, high) = world.candidate("bed sag X"), world.data.measured.spans["X"]
     assert [effect.name for effect in sag.effects[4:6]] == ["EZX", "EBX"]
     units = np.where([[effect.rotational] for effect in sag.effects], (high - low) / 2, 1.0)
     asked, rests = np.zeros((2, len(sag.effects), 5)), []
@@ -58,13 +58,13 @@ def test_a_slide_tilts_by_nearly_the_slope(world: World, ratio: float) -> None:
 
 
 def test_a_wobble_has_overtones(world: World) -> None:
-    columns = world.view.design([Effect("EAC", (0.0,) * 6, Fourier(order=(1, 5, 7)))])
+    columns = world.data.design([Effect("EAC", (0.0,) * 6, Fourier(order=(1, 5, 7)))])
     assert missed(world, "wobble C", columns @ np.array([1.0, 0.2, 0.1, 0.0, 0.05, 0.05])) < HARDLY
 
 
 def test_waves_of_a_worm_are_no_encoder(world: World) -> None:
     """A worm of six waves that swells along the turn, which has orders five and seven besides."""
-    columns = world.view.design([Effect("ECC", (0.0,) * 6, Fourier(order=(5, 6, 7)))])
+    columns = world.data.design([Effect("ECC", (0.0,) * 6, Fourier(order=(5, 6, 7)))])
     assert (
         missed(world, "encoder C", columns @ np.array([0.15, 0.0, 1.0, 0.0, 0.15, 0.0])) > 0.5
     )  # 8 columns, 60 poses; less than 2e-3 with orders up to 8
@@ -75,14 +75,14 @@ def test_names_are_alike_if_either_shows_what_the_other_does() -> None:
     own = random.normal(size=(60, 4))
     turned, richer = own @ random.normal(size=(4, 4)), np.concatenate([own, 3 * random.normal(size=(60, 4))], axis=1)
     shown = own @ np.ones(4)
-    assert alike(own, shown, turned)
-    assert not alike(own, shown, richer)  # which shows more than this: nine tenths of its squares
+    assert act_alike(own, shown, turned)
+    assert not act_alike(own, shown, richer)  # which shows more than this: nine tenths of its squares
     apart = turned + 0.3 * random.normal(size=turned.shape)
-    assert ((without(orthonormal(apart), shown[:, None])) ** 2).sum() > TOLD
-    assert not alike(own, shown, apart)  # the data tell them
+    assert ((without(orthonormal(apart), shown[:, None])) ** 2).sum() > TOLD_APART
+    assert not act_alike(own, shown, apart)  # the data tell them
     basis = orthonormal(own)
-    assert alike(own, shown, basis)
-    assert not alike(own, shown, basis * [1.0, 1.0, 1.0, 1e-3])  # of which the last had to be 8 mm and not 8 um
+    assert act_alike(own, shown, basis)
+    assert not act_alike(own, shown, basis * [1.0, 1.0, 1.0, 1e-3])  # of which the last had to be 8 mm and not 8 um
 
 
 def test_a_spindle_that_grows_may_be_a_frame_that_drifts_where_no_tool_turns() -> None:

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, perfect, plan
-from ncfix.diagnose import result, words
-from ncfix.diagnose.carriers import ALONG
+from ncfix.diagnose.assessment import ALONG
 from ncfix.diagnose.catalogue import catalogue, without
 from ncfix.diagnose.checks import remarks
 from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
-from ncfix.diagnose.gapmap import patterns
-from ncfix.diagnose.view import view
-from ncfix.diagnose.wandering import background
+from ncfix.diagnose.noise import estimated_background
+from ncfix.diagnose.presentation import as_dict, text, with_provenance
+from ncfix.diagnose.residual_data import residual_data
+from ncfix.diagnose.residual_patterns import patterns
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Backlash
@@ -60,7 +60,7 @@ def test_a_backlash_is_named_and_added(backlash: Diagnosis) -> None:
 
 
 def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
-    found = result.as_dict(backlash)
+    found = as_dict(backlash)
     assert {"verdict", "effects", "unknown", "gap_um", "where", "next_measurements", "machine"} <= set(found)
     assert set(found["gap_um"]) == {"before", "after", "floor", "holdout_before", "holdout_after"}
     wanted = {"name", "title", "axis", "why", "coefficients", "sigma", "p_value", "aliases"}
@@ -68,7 +68,7 @@ def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
     assert found["findable_um"]["backlash X"] <= 3.0  # 150 poses, 2 um of noise
     assert found["effects"][0]["plausible"]["is"]
     assert found["effects"][0]["targets"] == ["fix", *(f"export {name}" for name in ALONG)]
-    assert result.with_provenance(backlash).provenance["added"] == "backlash X"
+    assert with_provenance(backlash).provenance["added"] == "backlash X"
 
 
 def test_constants_that_the_data_do_not_ask_to_change_stay(known: Machine, backlash: Diagnosis) -> None:
@@ -88,8 +88,8 @@ def test_constants_that_the_data_put_elsewhere_are_said_and_changed(known: Machi
     (moved,) = found.moved
     assert moved.name.startswith("EC0Y")
     assert abs(moved.data - true) < 4 * moved.sigma
-    assert "EC0Y" in words.text(found)
-    assert result.as_dict(found)["constants"][0]["file"] == pytest.approx(true + 60e-6)
+    assert "EC0Y" in text(found)
+    assert as_dict(found)["constants"][0]["file"] == pytest.approx(true + 60e-6)
     assert found.machine is not None
     assert abs(found.machine.effects[index].coefficients[0] - true) < 20e-6
 
@@ -103,8 +103,8 @@ def test_nothing_missing_does_not_hide_constants_that_are_wrong(known: Machine) 
     )
     assert found.verdict == NOTHING
     assert found.machine is None
-    assert "but constants of the machine file are not what the data say" in words.text(found).splitlines()[0]
-    assert "ncfix calibrate" in words.text(found)
+    assert "but constants of the machine file are not what the data say" in text(found).splitlines()[0]
+    assert "ncfix calibrate" in text(found)
     assert "ncfix calibrate" in markdown.rendered(document(found)).decode()
 
 
@@ -136,16 +136,16 @@ def test_every_kind_of_measurement_can_be_diagnosed(kind: str) -> None:
     worn = known.replace(effects=(*known.effects, Effect("EXX", (0.02,), Backlash())))
     found = diagnose([simulate(plan(known, kind, 60, 1), worn, Faults(1.5), 1)], known)
     assert all("backlash X" in (each.candidate.name, *each.aliases) for each in found.findings)
-    assert result.as_dict(found)["verdict"] in markdown.rendered(document(found)).decode()
+    assert as_dict(found)["verdict"] in markdown.rendered(document(found)).decode()
 
 
 def test_the_report_and_the_text_name_it(backlash: Diagnosis) -> None:
-    assert "backlash X" in words.text(backlash)
-    page, text = (form.rendered(document(backlash)).decode() for form in (html, markdown))
+    assert "backlash X" in text(backlash)
+    page, plain_page = (form.rendered(document(backlash)).decode() for form in (html, markdown))
     assert "backlash X" in page
     assert page.count("<svg") >= 5
     assert page.count("<circle") > 100
-    assert "## backlash X" in text
+    assert "## backlash X" in plain_page
 
 
 def test_a_name_that_must_not_be_used_is_not_used(known: Machine) -> None:
@@ -153,7 +153,7 @@ def test_a_name_that_must_not_be_used_is_not_used(known: Machine) -> None:
     found = diagnose([measured(worn, 80)], known, ("backlash-x", "no such name"))
     assert all(each.candidate.name != "backlash X" for each in found.findings)
     assert found.case.unheard_of == ("no such name",)
-    assert any(message.code == "NCF657" for message in remarks(found.view, found.case.unheard_of))
+    assert any(message.code == "NCF657" for message in remarks(found.data, found.case.unheard_of))
 
 
 def test_nothing_is_named_where_nothing_is(known: Machine) -> None:
@@ -162,9 +162,9 @@ def test_nothing_is_named_where_nothing_is(known: Machine) -> None:
 
 
 def test_the_catalogue_has_fifty_names_each_once(known: Machine) -> None:
-    names = [each.name for each in catalogue(view([measured(known, 40)], known).reach)]
+    names = [each.name for each in catalogue(residual_data([measured(known, 40)], known).measured)]
     assert len(names) == len(set(names)) >= 50
-    assert without(catalogue(view([measured(known, 40)], known).reach), ["exx"])[0][0].name != "EXX"
+    assert without(catalogue(residual_data([measured(known, 40)], known).measured), ["exx"])[0][0].name != "EXX"
 
 
 def test_errors_with_the_sign_of_corrections_are_a_mistake(known: Machine) -> None:
@@ -215,22 +215,22 @@ def test_files_that_contradict_each_other_are_refused(known: Machine) -> None:
 def test_one_side_only_is_said(known: Machine) -> None:
     poses = plan(known, "tcp", 60)
     one = poses.with_columns({name: np.ones(60) for name in poses.columns if name.startswith("dir_")})
-    seen = view([simulate(one, known, Faults(NOISE_UM), 1)], known)
+    seen = residual_data([simulate(one, known, Faults(NOISE_UM), 1)], known)
     [message] = remarks(seen, ())
     assert message.code == "NCF653"
     assert "C, B, X, Z, Y came from one side only" in message.text
-    assert not any("backlash" in each.name for each in catalogue(seen.reach))
+    assert not any("backlash" in each.name for each in catalogue(seen.measured))
 
 
 def test_play_is_not_looked_for_where_a_file_does_not_say_from_where_the_axis_came(known: Machine) -> None:
     first, second = plan(known, "tcp", 60), plan(known, "tcp", 60, 1)
     silent = replace(second, columns={name: values for name, values in second.columns.items() if name != "dir_X"})
     silent = replace(silent, path="silent.csv")
-    seen = view([simulate(each, known, Faults(NOISE_UM), 1) for each in (first, silent)], known)
+    seen = residual_data([simulate(each, known, Faults(NOISE_UM), 1) for each in (first, silent)], known)
     [message] = remarks(seen, ())
     assert message.code == "NCF658"
     assert "silent.csv does not say from where X came" in message.text
-    names = {each.name for each in catalogue(seen.reach)}
+    names = {each.name for each in catalogue(seen.measured)}
     assert "backlash X" not in names
     assert "backlash Y" in names
 
@@ -249,15 +249,15 @@ def test_patterns_are_judged_by_what_the_others_leave(known: Machine) -> None:
     random = np.random.default_rng(3)
     # each pose is off by itself: 20 um, forty times the noise
     shaken = {name: plain.column(name) + 0.02 * random.normal(size=len(plain)) for name in ("dx", "dy", "dz")}
-    seen = view([plain.with_columns(shaken)], known)
+    seen = residual_data([plain.with_columns(shaken)], known)
     everything = np.zeros((len(seen.y), len(seen.y)))
-    assert patterns(background(seen, everything, seen.relative), 0.5) == []
+    assert patterns(estimated_background(seen, everything, seen.relative), 0.5) == []
 
 
 def test_a_noise_that_repeats_deny_is_said(known: Machine) -> None:
     poses = plan(known, "tcp", 40).rows(np.repeat(np.arange(40), 3))
     seen = simulate(poses, known, Faults(NOISE_UM), 5)
     honest, wrong = seen.with_header("noise_um", "2"), seen.with_header("noise_um", "0.2")
-    assert remarks(view([honest], known), ()) == []
-    (said,) = remarks(view([wrong], known), ())
+    assert remarks(residual_data([honest], known), ()) == []
+    (said,) = remarks(residual_data([wrong], known), ())
     assert (said.code, said.text[:31]) == ("NCF659", "the files state 0.2 um of noise")

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.stats import multivariate_normal
 
 from ncfix.diagnose.evidence import SIZES, log_odds
-from ncfix.diagnose.groups import fewer
-from ncfix.diagnose.holdout import cells
-from ncfix.diagnose.view import damped
+from ncfix.diagnose.forms import principal_rotation
+from ncfix.diagnose.joint_fit import pose_regions
+from ncfix.diagnose.residual_data import damped
 
 ROUNDING = 1e-9
 
@@ -28,7 +28,7 @@ def test_log_odds_are_those_of_two_normal_distributions() -> None:
 def test_fewer_columns_carry_the_same_squares() -> None:
     random = np.random.default_rng(1)
     columns = random.normal(size=(50, 2)) @ random.normal(size=(2, 7))
-    turned = fewer(columns)
+    turned = principal_rotation(columns)
     assert turned.shape[1] <= 2
     assert abs(((columns @ turned) ** 2).sum() / (columns**2).sum() - 1) < 3e-3  # groups.NEGLIGIBLE
 
@@ -41,7 +41,7 @@ def test_damped_least_squares_leave_what_cannot_be_told() -> None:
 
 def test_regions_are_equally_large_and_neighbourly() -> None:
     u = np.random.default_rng(0).uniform(-1, 1, (320, 2))
-    label = cells(u)
+    label = pose_regions(u)
     assert sorted(np.bincount(label).tolist()) == [20] * 16
     inside = np.mean([np.ptp(u[label == k], axis=0).max() for k in range(16)])
     assert inside < 0.8

@@ -7,8 +7,8 @@ import pytest
 
 from machine.chains import four_kinds
 from measure.poses import plan
-from ncfix.diagnose.fields import frames_of
-from ncfix.diagnose.view import view
+from ncfix.diagnose.forms import tip_frames
+from ncfix.diagnose.residual_data import residual_data
 from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE
 from ncfix.measure.synthetic import Faults, simulate
@@ -23,9 +23,9 @@ FRAMES = {"w Y X F Z t": 1, "w C B F X Y Z t": 2, "w X F Y Z C A t": 2, "w C F X
 def test_a_shift_of_the_whole_frame_is_among_them(name: str, count: int) -> None:
     """Whatever turns: where it is the tool, the base's axes are not those that the spindle carries."""
     known = four_kinds()[name]
-    seen = view([simulate(plan(known, "tcp", 40), known, Faults(1.0), 1)], known)
+    seen = residual_data([simulate(plan(known, "tcp", 40), known, Faults(1.0), 1)], known)
     tip = seen.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in "XYZ"]) / 1e3
-    frames = frames_of(seen, tip)
+    frames = tip_frames(seen, tip)
     held = next(axis.name for axis in known.axes if not axis.workpiece_side)
     shifted = seen.design([Effect(f"E{letter}0{held}", (0.0,), carried=True) for letter in "XYZ"]) / 1e3
     own = seen.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in "XYZ"]) / 1e3

@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from diagnose.worlds import World
-from ncfix.diagnose.addition import WIDE
-from ncfix.diagnose.background import everything_of
-from ncfix.diagnose.evidence import Court, Member
-from ncfix.diagnose.holdout import FOLDS, held_out
-from ncfix.diagnose.view import view
-from ncfix.diagnose.wandering import background
+from ncfix.diagnose.evidence import Evidence, Member
+from ncfix.diagnose.joint_fit import FOLDS, WIDE, held_out
+from ncfix.diagnose.noise import estimated_background, everything_covariance
+from ncfix.diagnose.residual_data import residual_data
 from ncfix.measure.measurement import Array
 
 ROUNDING_UM = 1e-4
@@ -19,24 +17,24 @@ ROUNDING_UM = 1e-4
 
 def test_a_fold_is_predicted_from_the_others() -> None:
     world = World.of("three_axis", 2, 40)
-    data = world.measured(np.zeros(len(world.view.y)), np.random.default_rng(0), stated=True)
-    seen = view([data], world.machine)
-    ground = background(seen, everything_of(seen, world.gathered.groups), seen.relative)
-    court = Court(ground, world.gathered.groups, len(world.gathered.groups))
-    member = Member(court.forms["EXX"][0], 6.0)
-    found = held_out(court, [member], 0.4)
-    columns = 6.0 * court.groups[member.group].columns
-    assert np.allclose(found.with_all, _plainly(court, columns, found.cell), atol=ROUNDING_UM)
+    data = world.measured(np.zeros(len(world.data.y)), np.random.default_rng(0), stated=True)
+    seen = residual_data([data], world.machine)
+    background = estimated_background(seen, everything_covariance(seen, world.visible.groups), seen.relative)
+    evidence = Evidence(background, world.visible.groups, len(world.visible.groups))
+    member = Member(evidence.forms["EXX"][0], 6.0)
+    found = held_out(evidence, [member], 0.4)
+    columns = 6.0 * evidence.groups[member.group].columns
+    assert np.allclose(found.with_all, _plainly(evidence, columns, found.cell), atol=ROUNDING_UM)
     assert np.allclose(found.without, found.less[0], atol=ROUNDING_UM)
 
 
-def _plainly(court: Court, columns: Array, cell: Array) -> Array:
+def _plainly(evidence: Evidence, columns: Array, cell: Array) -> Array:
     """Base and effect are carried over to each fold; noise and everything else is not."""
-    seen = court.background.view
+    seen = evidence.background.data
     size = np.sqrt((seen.base**2).mean(axis=0))
     base = WIDE * seen.base[:, size > 0] / size[size > 0]
     signal = base @ base.T + columns @ columns.T
-    whole = signal + np.linalg.inv(court.background.precision(0.4))
+    whole = signal + np.linalg.inv(evidence.background.precision(0.4))
     error = np.empty(len(seen.y))
     for fold in range(FOLDS):
         test = cell % FOLDS == fold

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, plan
-from ncfix.diagnose.contest import COUNT, Contest, chance, climbed, exchanged, worst
-from ncfix.diagnose.next_poses import SURE, SURELY, Proposal
-from ncfix.diagnose.offer import (
+from ncfix.diagnose.discrimination import COUNT, TOLD_APART, Discrimination, chance, climbed, exchanged, worst
+from ncfix.diagnose.next_poses import (
+    SURE,
+    SURELY,
+    Proposal,
     axes_beyond,
     marked,
     new_tools,
@@ -17,8 +19,7 @@ from ncfix.diagnose.offer import (
     stays_where_it_was,
     travels_of,
 )
-from ncfix.diagnose.rounds import TOLD
-from ncfix.diagnose.view import view
+from ncfix.diagnose.residual_data import residual_data
 from ncfix.measure.program import skeleton
 from ncfix.measure.reader import reads
 from ncfix.measure.synthetic import Faults, simulate
@@ -29,27 +30,27 @@ ROUNDING = 1e-8
 
 
 @pytest.fixture(scope="module")
-def contest() -> Contest:
+def contest() -> Discrimination:
     """An effect of which the old rows show only what the other can imitate."""
     random = np.random.default_rng(4)
     columns = random.normal(size=(OFFERED, HEIGHT, WIDTH)) * random.gamma(1.0, size=(OFFERED, 1, 1))
     signal = columns @ np.ones(WIDTH) + random.normal(size=(OFFERED, HEIGHT)) * random.gamma(0.5, size=(OFFERED, 1))
     old = random.normal(size=(200, WIDTH))
     seen = old @ np.ones(WIDTH)
-    return Contest(old.T @ old + np.eye(WIDTH), old.T @ seen, float(seen @ seen), columns, signal)
+    return Discrimination(old.T @ old + np.eye(WIDTH), old.T @ seen, float(seen @ seen), columns, signal)
 
 
-def test_one_pose_more_is_what_a_new_fit_says(contest: Contest) -> None:
+def test_one_pose_more_is_what_a_new_fit_says(contest: Discrimination) -> None:
     rows = list(range(11))
     found = contest.told_with(rows)
     assert np.allclose(found[20:30], [contest.told([*rows, k]) for k in range(20, 30)], rtol=ROUNDING)
 
 
-def test_more_poses_never_tell_less(contest: Contest) -> None:
+def test_more_poses_never_tell_less(contest: Discrimination) -> None:
     assert (contest.told_with([3, 5]) >= contest.told([3, 5]) - ROUNDING).all()
 
 
-def test_exchanged_poses_beat_a_thousand_random_dozens(contest: Contest) -> None:
+def test_exchanged_poses_beat_a_thousand_random_dozens(contest: Discrimination) -> None:
     rows = exchanged([[contest]], OFFERED)
     random = np.random.default_rng(0)
     by_chance = [contest.told(random.permutation(OFFERED)[:COUNT].tolist()) for _ in range(1000)]
@@ -58,20 +59,20 @@ def test_exchanged_poses_beat_a_thousand_random_dozens(contest: Contest) -> None
 
 
 @pytest.fixture(scope="module")
-def harder(contest: Contest) -> Contest:
+def harder(contest: Discrimination) -> Discrimination:
     """Another, of which the same dozen tells little."""
     weak = 0.05
-    return Contest(
+    return Discrimination(
         contest.matrix, weak * contest.vector, weak**2 * contest.square, contest.columns, weak * contest.signal[::-1]
     )
 
 
-def test_the_worst_rival_of_a_name_counts(contest: Contest, harder: Contest) -> None:
+def test_the_worst_rival_of_a_name_counts(contest: Discrimination, harder: Discrimination) -> None:
     one, both = climbed([[contest]], list(range(COUNT))), climbed([[contest, harder]], list(range(COUNT)))
     assert worst([[contest, harder]], both)[0] > worst([[contest, harder]], one)[0]
 
 
-def test_whichever_name_is_true(contest: Contest, harder: Contest) -> None:
+def test_whichever_name_is_true(contest: Discrimination, harder: Discrimination) -> None:
     """Poses that tell the first name from the second surely, and the second from the first hardly, leave half open."""
     rounds = [[contest], [harder]]
     one, both = climbed([[contest]], list(range(COUNT))), climbed(rounds, list(range(COUNT)))
@@ -114,7 +115,7 @@ def test_a_tool_that_was_not_used_is_marked_in_the_file() -> None:
 
 def test_the_chance_of_one_name_is_that_of_odds_that_scatter() -> None:
     random = np.random.default_rng(0)
-    for told in (TOLD, 12.0, SURELY):
+    for told in (TOLD_APART, 12.0, SURELY):
         # the log odds of two names whose predictions are told apart by t: half the difference of two sums of squares
         apart = np.sqrt(told / 36) * np.ones(36)
         noise = random.normal(size=(20_000, 36))
@@ -131,8 +132,8 @@ def test_the_tip_stays_where_it_was_whatever_the_tool() -> None:
     known = machine("wCBXFZYSt")
     short = plan(known, "tcp", 60)
     short = short.with_columns({"tool_length": np.full(60, 100.0)})
-    seen = view([simulate(short, known, Faults(1.0), 1)], known)
-    offered = poses_on_offer(seen, seen.reach.spans, (100.0, 300.0))
+    seen = residual_data([simulate(short, known, Faults(1.0), 1)], known)
+    offered = poses_on_offer(seen, seen.measured.spans, (100.0, 300.0))
     assert set(offered.column("tool_length")) == {100.0, 300.0}
     assert stays_where_it_was(seen, offered).all()
     tips = known.tip(offered.positions(known), offered.column("tool_length"))
@@ -145,9 +146,9 @@ def test_the_tip_of_a_shorter_tool_may_go_wherever_these_travels_lead() -> None:
     """Where it was, half of Z is out of its reach; no shorter tool hits what a longer one did not."""
     known = machine("wCBXFZYSt")
     long = plan(known, "tcp", 60).with_columns({"tool_length": np.full(60, 250.0)})
-    seen = view([simulate(long, known, Faults(1.0), 1)], known)
-    low, high = seen.reach.spans["Z"]
-    offered = poses_on_offer(seen, seen.reach.spans, (100.0, 250.0), roaming=True)
+    seen = residual_data([simulate(long, known, Faults(1.0), 1)], known)
+    low, high = seen.measured.spans["Z"]
+    offered = poses_on_offer(seen, seen.measured.spans, (100.0, 250.0), roaming=True)
     short = offered.column("tool_length") == 100.0
     assert np.ptp(offered.column("Z")[short]) > 0.95 * (high - low)
     assert stays_where_it_was(seen, offered.rows(np.flatnonzero(~short))).all()

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from diagnose.worlds import World
-from ncfix.diagnose.background import everything_of
-from ncfix.diagnose.groups import gather
-from ncfix.diagnose.outliers import FAILED, weighed
-from ncfix.diagnose.rivals import rivals
-from ncfix.diagnose.view import view
+from ncfix.diagnose.forms import unnamed_alternatives, visible_forms
+from ncfix.diagnose.noise import FAILED, downweighted, everything_covariance
+from ncfix.diagnose.residual_data import residual_data
 from ncfix.measure.measurement import Array
 
 POSES, SIGMA_UM = 48, 3.0
@@ -21,16 +19,16 @@ SPOILT, BY = (7, 40), 12.0
 def put_aside(name: str, sizes: float, spoilt: tuple[int, ...]) -> set[int]:
     """The rows that are put aside where an effect is so many times the noise."""
     world, random = World.of("three_axis", 1, POSES), np.random.default_rng(1)
-    shown: Array = world.effect(name, sizes * SIGMA_UM, random) + random.normal(scale=SIGMA_UM, size=len(world.view.y))
+    shown: Array = world.effect(name, sizes * SIGMA_UM, random) + random.normal(scale=SIGMA_UM, size=len(world.data.y))
     for row in spoilt:
         shown[3 * row] += BY * SIGMA_UM
     every = shown.reshape(-1, 3) / 1e3
-    seen = view(
+    seen = residual_data(
         [world.plain.with_columns({n: world.plain.columns[n] + every[:, k] for k, n in enumerate(("dx", "dy", "dz"))})],
         world.machine,
     )
-    named = gather(seen, world.candidates).groups
-    _, outlying = weighed(seen, everything_of(seen, named), (*named, *rivals(seen, named)))
+    named = visible_forms(seen, world.candidates).groups
+    _, outlying = downweighted(seen, everything_covariance(seen, named), (*named, *unnamed_alternatives(seen, named)))
     return set(np.flatnonzero(outlying).tolist())
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from diagnose.plates import PLATES, mill, plain, plate
-from ncfix.diagnose import words
 from ncfix.diagnose.diagnosis import NOTHING, UNKNOWN, diagnose
+from ncfix.diagnose.presentation import text
 
 README = {
     "D2130A1": (5.4, 4.3, 4.1),
@@ -30,7 +30,7 @@ def test_least_squares_are_those_of_the_page(name: str, shared: Callable[[str], 
 def test_nothing_is_named_on_the_plate_where_there_is_nothing(shared: Callable[[str], Path]) -> None:
     found = diagnose([plate(shared("measurements"), "D1396A1")], mill())
     assert (found.verdict, found.findings) == (NOTHING, ())
-    assert "without repeats" in words.text(found)
+    assert "without repeats" in text(found)
 
 
 @pytest.mark.parametrize("name", EXPECTED)

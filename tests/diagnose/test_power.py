@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from ncfix.diagnose.power import blind, mean_odds, said
+from ncfix.diagnose.selection import findable_in_words, mean_odds, shows_hardly_anything
 
 DRAWS = 4000
 
@@ -24,7 +24,10 @@ def test_odds_are_the_mean_of_those_of_effects_of_that_size(size: float) -> None
 
 def test_sizes_are_said_once_and_names_that_cannot_show_count() -> None:
     sizes = {"EXX": 1.5, "EYX": 1.5, "EZX": 6.0, "drift X": np.inf}
-    assert said(sizes, 5) == "what would have been found: from 1.5 um rms on 2 of 5 effects, from 6 um rms on 3"
-    assert not blind(sizes, 5)
-    assert blind(sizes, 7)
-    assert said({"EXX": np.inf}, 9) == "none of 9 effects would have been found, were it 24 um rms"
+    assert (
+        findable_in_words(sizes, 5)
+        == "what would have been found: from 1.5 um rms on 2 of 5 effects, from 6 um rms on 3"
+    )
+    assert not shows_hardly_anything(sizes, 5)
+    assert shows_hardly_anything(sizes, 7)
+    assert findable_in_words({"EXX": np.inf}, 9) == "none of 9 effects would have been found, were it 24 um rms"

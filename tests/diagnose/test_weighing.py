@@ -9,14 +9,24 @@ import pytest
 from scipy.special import logsumexp
 
 from diagnose.worlds import World
-from ncfix.diagnose.background import PRIOR, SHARES, everything_of, marginal
 from ncfix.diagnose.diagnosis import FOUND, UNKNOWN, diagnose
-from ncfix.diagnose.evidence import Court, Member
-from ncfix.diagnose.rivals import rivals
-from ncfix.diagnose.selection import judged, likeliest, select
-from ncfix.diagnose.view import view
-from ncfix.diagnose.wandering import background
-from ncfix.diagnose.weighing import FALSE_ALARM, FURTHER, SURE, UNNAMED, Scale, margin
+from ncfix.diagnose.evidence import (
+    FALSE_ALARM,
+    FURTHER,
+    PRIOR,
+    SHARES,
+    SURE,
+    UNNAMED,
+    Comparison,
+    Evidence,
+    Member,
+    entry_price,
+    marginal,
+)
+from ncfix.diagnose.forms import unnamed_alternatives
+from ncfix.diagnose.noise import estimated_background, everything_covariance
+from ncfix.diagnose.residual_data import residual_data
+from ncfix.diagnose.selection import likeliest, select, with_alternatives
 from ncfix.measure.measurement import Array
 
 DRAWS = 150
@@ -33,78 +43,78 @@ def five() -> World:
     return World.of("wCBXFZYSt", 1, 80)
 
 
-def heard(world: World, shown: Array, seed: int = 0) -> Court:
+def heard(world: World, shown: Array, seed: int = 0) -> Evidence:
     """The named groups before data with this in them."""
-    seen = view([world.measured(shown, np.random.default_rng(seed), stated=True)], world.machine)
-    ground = background(seen, everything_of(seen, world.gathered.groups), seen.relative)
-    return Court(ground, world.gathered.groups, len(world.gathered.groups))
+    seen = residual_data([world.measured(shown, np.random.default_rng(seed), stated=True)], world.machine)
+    background = estimated_background(seen, everything_covariance(seen, world.visible.groups), seen.relative)
+    return Evidence(background, world.visible.groups, len(world.visible.groups))
 
 
 @pytest.fixture(scope="module")
-def court(world: World) -> Court:
-    return heard(world, np.zeros(len(world.view.y)))
+def evidence(world: World) -> Evidence:
+    return heard(world, np.zeros(len(world.data.y)))
 
 
-def test_noise_alone_rarely_weighs_more_than_nothing(court: Court) -> None:
+def test_noise_alone_rarely_weighs_more_than_nothing(evidence: Evidence) -> None:
     """Markov: at most one of a hundred; five of 150 would have a probability of 2 % at that rate."""
     random, alarms = np.random.default_rng(1), 0
     for _ in range(DRAWS):
-        court.y, court.inner = random.normal(size=len(court.y)), {}
-        scale = Scale(court)
-        best = max(scale.weight({name: each}) for name, each in likeliest(scale, court.names, {}).items())
+        evidence.y, evidence.inner = random.normal(size=len(evidence.y)), {}
+        scale = Comparison(evidence)
+        best = max(scale.weight({name: each}) for name, each in likeliest(scale, evidence.names, {}).items())
         alarms += best > scale.weight({})
     assert alarms <= 4
     assert pytest.approx(np.exp(-SURE)) == FALSE_ALARM
 
 
-def test_the_likelihood_of_a_set_is_that_of_one_normal_distribution(court: Court) -> None:
+def test_the_likelihood_of_a_set_is_that_of_one_normal_distribution(evidence: Evidence) -> None:
     """From inner products of pairs, the same as with the covariance written out; its scale is integrated out."""
-    members = [Member(court.forms["EXX"][0], 6.0), Member(court.forms["drift Y"][0], 3.0)]
-    beside = np.random.default_rng(2).normal(size=(len(court.y), 3))
-    found, parts = court.likelihood(members, beside), []
-    known = [court.columns[:, court.part(each.group)] * each.size for each in members]
+    members = [Member(evidence.forms["EXX"][0], 6.0), Member(evidence.forms["drift Y"][0], 3.0)]
+    beside = np.random.default_rng(2).normal(size=(len(evidence.y), 3))
+    found, parts = evidence.likelihood(members, beside), []
+    known = [evidence.columns[:, evidence.part(each.group)] * each.size for each in members]
     for share, prior in zip(SHARES, PRIOR, strict=True):
-        whole = np.diag(court.background.variance(share))
+        whole = np.diag(evidence.background.variance(share))
         whole += sum((each @ each.T for each in [*known, beside]), np.zeros_like(whole))
-        squares = float(court.y @ np.linalg.solve(whole, court.y))
+        squares = float(evidence.y @ np.linalg.solve(whole, evidence.y))
         determinant = float(np.linalg.slogdet(whole)[1])
-        parts.append(marginal(squares, determinant, len(court.y), court.background.freedom) + np.log(prior))
+        parts.append(marginal(squares, determinant, len(evidence.y), evidence.background.freedom) + np.log(prior))
     assert found == pytest.approx(float(logsumexp(parts)), abs=1e-4)  # evidence.FALLEN: exp(-12) is left away
 
 
 def test_every_further_name_pays_less_than_the_first() -> None:
-    assert [margin(count) for count in range(4)] == [0.0, SURE, SURE + FURTHER, SURE + 2 * FURTHER]
+    assert [entry_price(count) for count in range(4)] == [0.0, SURE, SURE + FURTHER, SURE + 2 * FURTHER]
     assert 0 < FURTHER < SURE
 
 
-def test_a_name_pays_for_what_it_was_chosen_from(world: World, court: Court) -> None:
-    every = (*court.groups, *rivals(world.view, court.groups))
-    scale = Scale(Court(court.background, every, court.named))
-    names, shapes = len(scale.names), len(scale.court.forms["EXX"]) * 5
+def test_a_name_pays_for_what_it_was_chosen_from(world: World, evidence: Evidence) -> None:
+    every = (*evidence.groups, *unnamed_alternatives(world.data, evidence.groups))
+    scale = Comparison(Evidence(evidence.background, every, evidence.named))
+    names, shapes = len(scale.names), len(scale.evidence.forms["EXX"]) * 5
     assert scale.price("EXX") == pytest.approx(np.log(names * shapes))
-    first = scale.court.rivals[0]
+    first = scale.evidence.alternatives[0]
     assert scale.price(first) > UNNAMED
     assert scale.free == ()
 
 
-def test_members_that_are_free_are_no_names(court: Court) -> None:
-    freed = Scale(court, (Member(court.forms["EXX"][0], 300.0),))
+def test_members_that_are_free_are_no_names(evidence: Evidence) -> None:
+    freed = Comparison(evidence, (Member(evidence.forms["EXX"][0], 300.0),))
     assert "EXX" not in freed.names
     assert len(freed.all({})) == 1
 
 
 def test_an_effect_is_selected_with_its_runners_up(world: World) -> None:
-    scale = Scale(heard(world, world.effect("lateral play EZX", SIZE_UM, np.random.default_rng(3))))
-    found = judged(scale, select(scale, scale.names))
+    scale = Comparison(heard(world, world.effect("lateral play EZX", SIZE_UM, np.random.default_rng(3))))
+    found = with_alternatives(scale, select(scale, scale.names))
     assert found.named == ["lateral play EZX"]
-    assert max(found.runners["lateral play EZX"].values()) < found.odds["lateral play EZX"]
+    assert max(found.runners_up["lateral play EZX"].values()) < found.odds["lateral play EZX"]
     assert found.p_value("lateral play EZX") < 1e-6
 
 
 def test_an_error_that_a_name_holds_is_no_rival_to_it(five: World) -> None:
-    groups = five.gathered.groups
-    titles = {group.owner.title for group in rivals(five.view, groups)}
-    less = rivals(five.view, [group for group in groups if group.owner.name != "ECX"])
+    groups = five.visible.groups
+    titles = {group.owner.title for group in unnamed_alternatives(five.data, groups)}
+    less = unnamed_alternatives(five.data, [group for group in groups if group.owner.name != "ECX"])
     (new,) = {group.owner.title for group in less} - titles
     assert new.startswith("ECX by its position")
 
@@ -126,7 +136,7 @@ def test_warmth_far_from_twenty_degrees_hides_nothing(world: World) -> None:
     warm = world.plain.with_columns(
         {name: values + 15 for name, values in world.plain.columns.items() if name.startswith("temp_")}
     )
-    hidden = {candidate.name for candidate, _ in replace(world, plain=warm).gathered.invisible}
+    hidden = {candidate.name for candidate, _ in replace(world, plain=warm).visible.invisible}
     assert not hidden & {"spindle growth", "drift X", "thermal scale X", "artefact growth"}
 
 
@@ -147,7 +157,7 @@ def test_what_happens_in_three_directions_is_no_three_drifts(five: World) -> Non
 
 def test_an_artefact_that_grows_is_named(world: World) -> None:
     """About a point away from the middle of what was measured: 25 um/m K, with the temperature of the column."""
-    seen = world.view
+    seen = world.data
     warm = world.plain.columns["temp_column"] - world.plain.columns["temp_column"].mean()
     tip = world.machine.nominal(seen.q, world.plain.columns["tool_length"])[:, :3, 3]
     grown = -25e-3 * warm[:, None] * (tip - tip.mean(axis=0) - [60.0, -40.0, -90.0])

@@ -18,8 +18,8 @@ from numpy.random import Generator
 from diagnose.warmth import Warmth
 from measure.poses import machine
 from ncfix.diagnose.catalogue import Candidate, catalogue
-from ncfix.diagnose.groups import Gathered, gather
-from ncfix.diagnose.view import View, view
+from ncfix.diagnose.forms import VisibleForms, visible_forms
+from ncfix.diagnose.residual_data import ResidualData, residual_data
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import ConstantBasis
 from ncfix.measure.candidates import Room, candidates
@@ -69,21 +69,21 @@ class World:
         return cls(known, simulate(plan, known, Faults(0.0), seed), warmth)
 
     @cached_property
-    def view(self) -> View:
-        return view([self.plain], self.machine)
+    def data(self) -> ResidualData:
+        return residual_data([self.plain], self.machine)
 
     @cached_property
     def candidates(self) -> tuple[Candidate, ...]:
-        return catalogue(self.view.reach)
+        return catalogue(self.data.measured)
 
     @cached_property
-    def gathered(self) -> Gathered:
-        return gather(self.view, self.candidates)
+    def visible(self) -> VisibleForms:
+        return visible_forms(self.data, self.candidates)
 
     @cached_property
     def names(self) -> list[str]:
         """What may be hidden: all that the poses show, but for constants and what stands on the table."""
-        shown = {group.owner.name for group in self.gathered.groups if not (group.owner.constant or group.owner.grows)}
+        shown = {group.owner.name for group in self.visible.groups if not (group.owner.constant or group.owner.grows)}
         return sorted(each.name for each in self.candidates if each.name in shown and "location" not in each.family)
 
     @cached_property
@@ -91,8 +91,8 @@ class World:
         """Every axis as -1 ... 1."""
         found = {}
         for index, axis in enumerate(self.machine.axes):
-            low, high = self.view.reach.spans[axis.name]
-            found[axis.name] = (2 * self.view.q[:, index] / axis.unit - low - high) / (high - low)
+            low, high = self.data.measured.spans[axis.name]
+            found[axis.name] = (2 * self.data.q[:, index] / axis.unit - low - high) / (high - low)
         return found
 
     def candidate(self, name: str) -> Candidate:
@@ -103,13 +103,13 @@ class World:
         """What a hidden effect shows, (m,) um of this rms."""
         shown = self._shaped(self.candidate(name), random)
         swollen = 1 + SWELLS * waves(self.u[random.choice(list(self.u))], random, 1.2)
-        return self._sized(shown * swollen[self.view.row], size_um)
+        return self._sized(shown * swollen[self.data.row], size_um)
 
     def _shaped(self, candidate: Candidate, random: Generator) -> Array:
         kind, lead = candidate.name.split()[0], candidate.effects[0]
         if len(kind) == 3 and kind.startswith("E"):
-            unit = self.view.design([Effect(kind, (0.0,))])[:, 0]
-            return unit * self._curve(self.u[kind[2]], random)[self.view.row]
+            unit = self.data.design([Effect(kind, (0.0,))])[:, 0]
+            return unit * self._curve(self.u[kind[2]], random)[self.data.row]
         if candidate.family in THERMAL and candidate.name != "tool droop":
             return self._warmed(candidate, random)
         loading = candidate.loadings[random.integers(len(candidate.loadings))]
@@ -122,18 +122,18 @@ class World:
                 np.repeat([1.0, 0.35, 0.1, *(0.0,) * 5][: lead.basis.size // 2], 2), len(candidate.effects)
             )
             loading = np.eye(len(candidate.effects) * lead.basis.size)
-        return self.view.design(candidate.effects) @ (loading @ numbers)
+        return self.data.design(candidate.effects) @ (loading @ numbers)
 
     def _warmed(self, candidate: Candidate, random: Generator) -> Array:
         """The pattern of a thermal effect in space, with a course in time that is not the catalogue's."""
         still = {(e.name, e.times): replace(e, **STILL) for e in candidate.effects}
         parts = list(still.values())
         if candidate.name.startswith("thermal scale"):
-            held = float(random.uniform(*self.view.reach.spans[candidate.axis]))
+            held = float(random.uniform(*self.data.measured.spans[candidate.axis]))
             parts = [replace(each, times_center=held) for each in parts if each.times]
-        pattern = self.view.design(parts) @ random.normal(size=len(parts))
-        course = self.warmth.course(candidate.name, self.view.column("time_s"), random)
-        return pattern * (course - course.mean())[self.view.row]
+        pattern = self.data.design(parts) @ random.normal(size=len(parts))
+        course = self.warmth.course(candidate.name, self.data.column("time_s"), random)
+        return pattern * (course - course.mean())[self.data.row]
 
     @staticmethod
     def _curve(u: Array, random: Generator) -> Array:
@@ -145,8 +145,8 @@ class World:
 
     def clutter(self, random: Generator, size_um: float = 1.0) -> Array:
         """A little of everything."""
-        whole = np.zeros(len(self.view.y))
-        for group in self.gathered.groups:
+        whole = np.zeros(len(self.data.y))
+        for group in self.visible.groups:
             if not group.owner.grows:
                 shown = group.columns @ random.normal(size=group.columns.shape[1])
                 whole += self._sized(shown, random.normal() / np.sqrt(len(self._forms[group.owner.name])))
@@ -155,14 +155,14 @@ class World:
     @cached_property
     def _forms(self) -> dict[str, list[int]]:
         forms: dict[str, list[int]] = {}
-        for index, group in enumerate(self.gathered.groups):
+        for index, group in enumerate(self.visible.groups):
             forms.setdefault(group.owner.name, []).append(index)
         return forms
 
     def foreign(self, kind: str, size_um: float, random: Generator) -> Array:
         """Something that is in no catalogue."""
         places = np.stack(list(self.u.values()), axis=-1)
-        time = self.view.column("time_s")
+        time = self.data.column("time_s")
         clock = (time - time.min()) / np.ptp(time)
         ways = random.normal(size=3)
         first, second, third = places[:, random.choice(places.shape[1], 3, replace=False)].T
@@ -183,25 +183,25 @@ class World:
     def measured(self, shown_um: Array, random: Generator, stated: bool = False) -> Measurement:
         """The measurement with this error and noise; the noise stated, or to be told from repeats."""
         every = (shown_um + self._noise(random)).reshape(-1, 3) / 1e3
-        names = self.view.problem.observations[0].components
+        names = self.data.problem.observations[0].components
         data = self.plain.with_columns({n: self.plain.columns[n] + every[:, k] for k, n in enumerate(names)})
         silent = replace(data, headers=tuple(pair for pair in data.headers if pair[0] != "noise_um"))
         return silent.with_header("noise_um", f"{SIGMA_UM:g}") if stated else silent
 
     def _noise(self, random: Generator) -> Array:
-        count, time = self.view.count, self.view.column("time_s")
+        count, time = self.data.count, self.data.column("time_s")
         noise = SIGMA_UM * random.standard_t(5, (count, 3)) / np.sqrt(5 / 3)
         memory = np.exp(-np.diff(time, prepend=time[0]) / 900.0)
-        wander = np.zeros((count, 3))
+        drift = np.zeros((count, 3))
         for row in range(1, count):
             fresh = np.sqrt(1 - memory[row] ** 2) * random.normal(size=3)
-            wander[row] = memory[row] * wander[row - 1] + fresh
+            drift[row] = memory[row] * drift[row - 1] + fresh
         outlying = random.random((count, 3)) < 0.01
         far = SIGMA_UM * random.uniform(5, 15, (count, 3)) * random.choice([-1, 1], (count, 3))
-        return (noise + SIGMA_UM * random.choice([0.0, 0.15, 0.3]) * wander + outlying * far).ravel()
+        return (noise + SIGMA_UM * random.choice([0.0, 0.15, 0.3]) * drift + outlying * far).ravel()
 
     def _sized(self, shown: Array, size_um: float) -> Array:
-        rms = self.view.rms(shown)
+        rms = self.data.rms(shown)
         return shown * size_um / rms if rms > 0 else shown
 
 

@@ -402,10 +402,10 @@ def diagnose(
 ) -> int:
     """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
-    from ncfix.diagnose import result, words
     from ncfix.diagnose.checks import remarks
     from ncfix.diagnose.diagnosis import NOTHING
     from ncfix.diagnose.diagnosis import diagnose as diagnosed
+    from ncfix.diagnose.presentation import as_dict, text, with_provenance
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
     from ncfix.report.diagnosis import document
@@ -422,20 +422,20 @@ def diagnose(
         console.tell_some(each.remarks)
     with console.busy("diagnosing"):
         diagnosis = diagnosed(data, machine, without)
-    console.tell(*remarks(diagnosis.view, diagnosis.case.unheard_of))
+    console.tell(*remarks(diagnosis.data, diagnosis.case.unheard_of))
     written = None
     if machine_target is not None and diagnosis.machine is not None:
         sound(diagnosis.machine, machine_target.path, force)
-        machine_target.write(dumps(result.with_provenance(diagnosis)).encode())
+        machine_target.write(dumps(with_provenance(diagnosis)).encode())
         written = machine_target.path
     if next_target is not None:
         _write_next(diagnosis, next_target)
     if page_target is not None and form is not None:
         page_target.write(form(document(diagnosis)))
     if as_json:
-        console.put_json(**result.as_dict(diagnosis, written))
+        console.put_json(**as_dict(diagnosis, written))
     else:
-        console.put(words.text(diagnosis))
+        console.put(text(diagnosis))
         _say_written(diagnosis, output, written)
     return ExitCode.FINDINGS if check and diagnosis.verdict != NOTHING else ExitCode.DONE
 
@@ -454,7 +454,7 @@ def _write_next(diagnosis: Diagnosis, target: OutputTarget) -> None:
         return
     plan = diagnosis.proposal.plan
     table = target.path.endswith(".csv")
-    target.write((dumps(plan, ("dx", "dy", "dz")) if table else skeleton(plan, diagnosis.view.machine)).encode())
+    target.write((dumps(plan, ("dx", "dy", "dz")) if table else skeleton(plan, diagnosis.data.machine)).encode())
 
 
 def _say_written(diagnosis: Diagnosis, output: str | None, written: str | None) -> None:

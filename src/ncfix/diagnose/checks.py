@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import chdtrc
 
-from ncfix.diagnose import noise
-from ncfix.diagnose.misfit import misfit
-from ncfix.diagnose.view import View
+from ncfix.diagnose.noise import ENOUGH_REPEATS, repeat_scatter
+from ncfix.diagnose.residual_data import ResidualData, misfit
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.measure.calibrate import Problem
@@ -60,26 +59,26 @@ def sensible(measurements: Sequence[Measurement], machine: Machine) -> None:
         raise UsageError.of("NCF655", text, hint="calibrate the machine anew before anything is added")
 
 
-def enough(view: View) -> None:
+def enough(data: ResidualData) -> None:
     """Refuse too few values for the unknowns. Raises `UsageError` NCF650."""
-    free = int(np.linalg.matrix_rank(view.base))
-    if len(view.y) < free + SPARE:
-        text = f"{len(view.y)} values for {free} unknowns of set-up and constants"
+    free = int(np.linalg.matrix_rank(data.base))
+    if len(data.y) < free + SPARE:
+        text = f"{len(data.y)} values for {free} unknowns of set-up and constants"
         raise UsageError.of("NCF650", text, hint="measure more poses")
 
 
-def agreeing(view: View, residual: Array, sigma: float) -> None:
+def agreeing(data: ResidualData, residual: Array, sigma: float) -> None:
     """Refuse files that differ where they measured the same. Raises `UsageError` NCF656."""
-    if len(view.measurements) < 2:
+    if len(data.measurements) < 2:
         return
     apart, pairs = 0.0, 0
-    q = np.round(view.q, 6)
+    q = np.round(data.q, 6)
     places: dict[tuple[bytes, float, int], list[tuple[int, float]]] = {}
-    length = view.column("tool_length")
-    for value, row, part in zip(residual, view.row, view.component, strict=True):
+    length = data.column("tool_length")
+    for value, row, part in zip(residual, data.row, data.component, strict=True):
         if row >= 0:
             key = (q[row].tobytes(), float(length[row]), int(part))
-            places.setdefault(key, []).append((int(view.file[row]), float(value)))
+            places.setdefault(key, []).append((int(data.file[row]), float(value)))
     for found in places.values():
         by_file = {file: float(np.mean([v for f, v in found if f == file])) for file, _ in found}
         if len(by_file) > 1:
@@ -93,30 +92,30 @@ def agreeing(view: View, residual: Array, sigma: float) -> None:
         raise UsageError.of("NCF656", text, hint="diagnose the files one by one")
 
 
-def _misstated(view: View) -> list[Message]:
+def _misstated(data: ResidualData) -> list[Message]:
     """A noise that the files state and that repeats deny."""
-    squares, freedom = noise.repeats(view, view.row >= 0)
-    if freedom < noise.ENOUGH or any(each.noise[0] is None for each in view.measurements):
+    squares, freedom = repeat_scatter(data, data.row >= 0)
+    if freedom < ENOUGH_REPEATS or any(each.noise[0] is None for each in data.measurements):
         return []
     seen = float(np.sqrt(squares / freedom))
-    if 1 / MISSTATED < seen / view.sigma < MISSTATED:
+    if 1 / MISSTATED < seen / data.sigma < MISSTATED:
         return []
-    return [Message("NCF659", f"the files state {view.sigma:.2g} um of noise, repeats scatter by {seen:.2g} um")]
+    return [Message("NCF659", f"the files state {data.sigma:.2g} um of noise, repeats scatter by {seen:.2g} um")]
 
 
-def remarks(view: View, unheard_of: Sequence[str]) -> list[Message]:
+def remarks(data: ResidualData, unheard_of: Sequence[str]) -> list[Message]:
     """What the user should know: directions that never change or are not said, names that do not exist."""
     found = []
-    for axis in view.machine.axes:
-        if silent := view.unstated(axis):
+    for axis in data.machine.axes:
+        if silent := data.unstated(axis):
             text = f"{', '.join(silent)} does not say from where {axis.name} came, other files do"
             found.append(Message("NCF658", f"{text}: its backlash and play are not among the candidates"))
-    stated = {name for each in view.measurements for name in each.columns if name.startswith("dir_")}
-    fixed = [axis.name for axis in view.machine.axes if view.reach.moved(axis) and f"dir_{axis.name}" in stated]
-    fixed = [name for name in fixed if np.ptp(view.column(f"dir_{name}")) == 0]
+    stated = {name for each in data.measurements for name in each.columns if name.startswith("dir_")}
+    fixed = [axis.name for axis in data.machine.axes if data.measured.moved(axis) and f"dir_{axis.name}" in stated]
+    fixed = [name for name in fixed if np.ptp(data.column(f"dir_{name}")) == 0]
     if fixed:
         text = f"{', '.join(fixed)} came from one side only: backlash and play of {'it' if len(fixed) == 1 else 'them'}"
         found.append(Message("NCF653", f"{text} cannot show"))
-    found += _misstated(view)
+    found += _misstated(data)
     found += [Message("NCF657", f"there is no effect {name!r} in the catalogue of this machine") for name in unheard_of]
     return found

@@ -1,26 +1,304 @@
-"""The whole way from measurements and a machine to a verdict."""
+"""What a diagnosis says: the names, the gap, and everything a report needs.
+
+What the whole amounts to, in one of four words.
+
+From the effects that are there to a verdict, a machine file with them, and the gap before and after.
+
+The whole way from measurements and a machine to a verdict.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from ncfix.diagnose import checks, constants, gates, mistakes, outliers
-from ncfix.diagnose.background import everything_of
-from ncfix.diagnose.catalogue import catalogue, without
-from ncfix.diagnose.conclusion import concluded
-from ncfix.diagnose.evidence import Court
-from ncfix.diagnose.findings import Case, Diagnosis, Finding, Gap
-from ncfix.diagnose.groups import gather
-from ncfix.diagnose.rivals import rivals
-from ncfix.diagnose.selection import Selected, judged, select
-from ncfix.diagnose.verdict import AMBIGUOUS, FOUND, NOTHING, UNKNOWN
-from ncfix.diagnose.view import view
-from ncfix.diagnose.wandering import background
-from ncfix.diagnose.weighing import Scale
-from ncfix.machine import Machine
-from ncfix.measure.measurement import Measurement
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["AMBIGUOUS", "FOUND", "NOTHING", "UNKNOWN", "Diagnosis", "Finding", "Gap", "diagnose"]
+from ncfix.diagnose import checks
+from ncfix.diagnose.assessment import Plausibility, plausibility
+from ncfix.diagnose.catalogue import Candidate, catalogue, without
+from ncfix.diagnose.evidence import Comparison, Evidence, Member
+from ncfix.diagnose.forms import VisibleForms, scaled_axes, unnamed_alternatives, visible_forms
+from ncfix.diagnose.joint_fit import (
+    JointFit,
+    MovedConstant,
+    fitted,
+    held_out,
+    machine_with,
+    moved_constants,
+    passing,
+    unnamed_um,
+    visible_um,
+    with_firm_constants,
+)
+from ncfix.diagnose.mistakes import Mistake, find
+from ncfix.diagnose.next_poses import Proposal, proposed
+from ncfix.diagnose.noise import (
+    NoiseFloor,
+    beyond_noise,
+    downweighted,
+    estimated_background,
+    everything_covariance,
+    lack_of_fit,
+    noise_floor,
+)
+from ncfix.diagnose.residual_data import ResidualData, residual_data
+from ncfix.diagnose.residual_patterns import ResidualPattern, clustering, patterns
+from ncfix.diagnose.selection import (
+    Selected,
+    aliases,
+    findable_sizes,
+    select,
+    with_alternatives,
+    with_constants,
+    with_constants_free,
+)
+from ncfix.machine import Effect, Machine
+from ncfix.measure.measurement import Array, Measurement
+
+NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
+EXCESS_UM = 2.0
+"""What has no name decides nothing below this, rms: machines have a little of everything."""
+MUCH = 1 / 3
+"""Nor below this share of what all names together show."""
+LACKING = 1e-3
+"""Probability of what is left by chance, below which something is missing that follows no pattern either."""
+NO_PATTERN = "something that follows no pattern that was looked for"
+
+
+@dataclass(frozen=True, repr=False)
+class EffectFinding:
+    """One named effect.
+
+    candidate   what it is
+    odds        log odds against its not being there, given the others; p_value by chance for any name
+    aliases     names that explain its part nearly as well
+    size_um     rms of what it shows
+    effects     as they stand in the machine file; empty for what belongs to the measurement
+    shown       (m,) what it shows, um
+    judgement   whether its constants are such as machines have; None where there are none
+    """
+
+    candidate: Candidate
+    odds: float
+    p_value: float
+    aliases: tuple[str, ...]
+    size_um: float
+    effects: tuple[Effect, ...]
+    shown: Array
+    judgement: Plausibility | None = None
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Root mean square of residual lengths, um: before, after, the noise floor, and the first two on held-out poses."""
+
+    before: float
+    after: float
+    floor: float
+    holdout_before: float
+    holdout_after: float
+
+
+@dataclass(frozen=True, repr=False)
+class Case:
+    """What is asked: the data, the candidates, and the court where they are heard.
+
+    considered  all candidates; `unheard_of` names that were refused and do not exist
+    gathered    those that the data can show, and those that they cannot
+    outlying    (rows,) what was put aside
+    """
+
+    data: ResidualData
+    considered: tuple[Candidate, ...]
+    unheard_of: tuple[str, ...]
+    visible: VisibleForms
+    outlying: NDArray[np.bool_]
+    evidence: Evidence
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """(m,) values of rows that were not put aside."""
+        kept: NDArray[np.bool_] = ~self.outlying[np.maximum(self.data.row, 0)] & (self.data.row >= 0)
+        return kept
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis:
+    """What was found, and everything a report needs.
+
+    verdict        nothing-missing, found, ambiguous, unknown-effect
+    findings       likeliest first
+    rest           what has no name
+    machine        with the findings added, or None if there is nothing to add
+    before, after  (m,) residuals with the constants alone and with the findings, um; p_lack, p_left by chance
+    clustering     how much neighbouring residuals are alike, before and after
+    moved          constants of the machine file that the data put elsewhere; the gap before is after that
+    findable       name -> um rms from which on an effect would be found in these data; inf: never
+    """
+
+    case: Case
+    verdict: str
+    findings: tuple[EffectFinding, ...]
+    rest: Unexplained
+    gap: Gap
+    floor: NoiseFloor
+    machine: Machine | None
+    selected: Selected
+    before: Array
+    after: Array
+    p_lack: float | None
+    patterns: tuple[ResidualPattern, ...]
+    clustering: tuple[float, float]
+    moved: tuple[MovedConstant, ...]
+    findable: Mapping[str, float]
+    proposal: Proposal | None = None
+    mistake: Mistake | None = None
+
+    @property
+    def data(self) -> ResidualData:
+        """The data."""
+        return self.case.data
+
+    @property
+    def unknown_um(self) -> float:
+        """rms of what has no name."""
+        return self.rest.size_um
+
+    @property
+    def p_left(self) -> float | None:
+        """Probability of the residuals after by chance; None where the noise is not known."""
+        return self.rest.p_left
+
+
+@dataclass(frozen=True, slots=True)
+class Unexplained:
+    """What the names leave.
+
+    pattern_um  of it what rivals without a name explain, rms, and `titles` what those are
+    beyond_um   of it what is beyond the noise, and `p_left` how likely that is by chance, None where it is not known
+    """
+
+    pattern_um: float
+    titles: tuple[str, ...]
+    beyond_um: float
+    p_left: float | None
+
+    @property
+    def size_um(self) -> float:
+        """How much has no name, rms."""
+        lacking = self.p_left is not None and self.p_left < LACKING and self.beyond_um > EXCESS_UM
+        return max(self.pattern_um, self.beyond_um) if lacking else self.pattern_um
+
+    @property
+    def kind(self) -> str:
+        """What it depends on."""
+        return " and ".join(self.titles) or (NO_PATTERN if self.size_um else "")
+
+
+def verdict_of(
+    findings: Sequence[EffectFinding], rest: Unexplained, told_um: float, floor: NoiseFloor, noise_um: float
+) -> str:
+    """The verdict, where the names show `told_um`.
+
+    Without repeats a smooth rest may as well be the part's or the instrument's: only a large one decides.
+    """
+    doubtful = floor.source == "neighbours"
+    decides = rest.size_um > (max(EXCESS_UM, noise_um) if doubtful else EXCESS_UM)
+    if decides and rest.size_um >= (1.0 if doubtful else MUCH) * told_um * bool(findings):
+        return UNKNOWN
+    if not findings:
+        return NOTHING
+    return AMBIGUOUS if any(each.aliases for each in findings) else FOUND
+
+
+def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
+    """All that is said of a case in which these effects were selected.
+
+    Names are fitted without what has none: that shall explain only what they leave (Plumlee 2017).
+    """
+    evidence, data, keep = case.evidence, case.data, case.kept
+    every, told = list(selected.members.values()), [selected.members[name] for name in selected.named]
+    share = evidence.share(every)
+    joint = fitted(evidence, told, share)
+    sigma = _sigma(evidence, every, share)
+    checks.agreeing(data, joint.before, sigma)
+    floor = noise_floor(data, evidence.background, sigma, keep)
+    noise_um = data.rms(np.where(data.row >= 0, floor.sigma_um * data.relative, 0.0), keep)
+    machine, added = machine_with(evidence, told, with_firm_constants(evidence, told, share, joint))
+    findings = _findings(case, selected, joint, added)
+    rest = _rest(case, selected, joint, floor, noise_um)
+    places = scaled_axes(data)
+    return Diagnosis(
+        case=case,
+        verdict=verdict_of(findings, rest, visible_um(data, joint.together), floor, noise_um),
+        findings=findings,
+        rest=rest,
+        gap=_gap(case, told, joint, share, noise_um),
+        floor=floor,
+        machine=machine if any(added) else None,
+        selected=selected,
+        before=joint.before,
+        after=joint.after,
+        p_lack=lack_of_fit(floor, joint.before[keep], _constants(case)),
+        patterns=tuple(patterns(evidence.background, sigma)),
+        clustering=(
+            clustering(evidence.background, joint.before, places),
+            clustering(evidence.background, joint.after, places),
+        ),
+        moved=moved_constants(evidence, joint),
+        findable=findable_sizes(scale),
+        proposal=proposed(scale, selected, sigma) if told else None,
+    )
+
+
+def _findings(
+    case: Case, selected: Selected, joint: JointFit, added: Sequence[tuple[Effect, ...]]
+) -> tuple[EffectFinding, ...]:
+    """The names with what they show and add."""
+    found = []
+    for name, effects, shown in zip(selected.named, added, joint.shown, strict=True):
+        owner = case.evidence.groups[selected.members[name].group].owner
+        size, judgement = case.data.rms(shown, case.kept), plausibility(case.data, owner, effects)
+        alike = tuple(aliases(selected, name))
+        found.append(
+            EffectFinding(owner, selected.odds[name], selected.p_value(name), alike, size, effects, shown, judgement)
+        )
+    return tuple(found)
+
+
+def _rest(case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, noise_um: float) -> Unexplained:
+    """What has no name."""
+    evidence, keep = case.evidence, case.kept
+    every = list(selected.members.values())
+    whole = fitted(evidence, every, evidence.share(every))
+    parameters = _constants(case) + sum(map(len, joint.numbers)) / 2
+    return Unexplained(
+        unnamed_um(evidence, selected, whole, keep),
+        tuple(evidence.groups[selected.members[name].group].owner.title for name in selected.unnamed),
+        beyond_noise(floor, noise_um, case.data.rms(joint.after, keep)),
+        lack_of_fit(floor, joint.after[keep], parameters),
+    )
+
+
+def _gap(case: Case, told: Sequence[Member], joint: JointFit, share: float, noise_um: float) -> Gap:
+    data, keep = case.data, case.kept
+    held = held_out(case.evidence, told, share)
+    known = np.isfinite(held.without) & np.isfinite(held.with_all) & keep
+    before, after = data.rms(joint.before, keep), data.rms(joint.after, keep)
+    return Gap(before, after, noise_um, data.rms(held.without, known), data.rms(held.with_all, known))
+
+
+def _constants(case: Case) -> float:
+    """How many numbers are free anyway."""
+    return float(np.linalg.matrix_rank(case.data.base))
+
+
+def _sigma(evidence: Evidence, members: Sequence[Member], share: float) -> float:
+    """Noise of one value, um, with the members there."""
+    freedom, count = evidence.background.freedom, len(evidence.y)
+    return evidence.background.sigma * float(np.sqrt((evidence.squares(members, share) + freedom) / (count + freedom)))
 
 
 def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = ()) -> Diagnosis:
@@ -29,27 +307,37 @@ def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Seq
     Raises `UsageError` NCF630, NCF637 and NCF650 ... NCF659 where the data cannot carry a diagnosis.
     """
     checks.before(measurements, machine)
-    wrong = mistakes.find(measurements, machine, refused)
+    wrong = find(measurements, machine, refused)
     if wrong is not None:
         measurements, machine = wrong.measurements, wrong.machine
     else:
         checks.sensible(measurements, machine)
-    seen = view(measurements, machine)
+    seen = residual_data(measurements, machine)
     checks.enough(seen)
-    candidates, unheard_of = without(catalogue(seen.reach), refused)
-    gathered = gather(seen, candidates)
-    everything = everything_of(seen, gathered.groups)
-    groups = (*gathered.groups, *rivals(seen, gathered.groups))
-    relative, outlying = outliers.weighed(seen, everything, groups)
-    ground = background(seen, everything, relative, gathered.groups)
-    court = Court(ground, groups, len(gathered.groups))
-    case, scale = Case(seen, candidates, unheard_of, gathered, outlying, court), Scale(court)
+    candidates, unheard_of = without(catalogue(seen.measured), refused)
+    visible = visible_forms(seen, candidates)
+    everything = everything_covariance(seen, visible.groups)
+    groups = (*visible.groups, *unnamed_alternatives(seen, visible.groups))
+    relative, outlying = downweighted(seen, everything, groups)
+    background = estimated_background(seen, everything, relative, visible.groups)
+    evidence = Evidence(background, groups, len(visible.groups))
+    case, scale = Case(seen, candidates, unheard_of, visible, outlying, evidence), Comparison(evidence)
     found = concluded(case, scale, _selected(scale))
-    return mistakes.told(found, wrong) if wrong else found
+    return _with_mistake(found, wrong) if wrong else found
 
 
-def _selected(scale: Scale) -> Selected:
+def _selected(scale: Comparison) -> Selected:
     """What is there: curves and the like while lacking constants are free, then those, then what holds."""
-    freed = constants.freed(scale.court)
-    members = select(freed, (*freed.names, *freed.court.rivals))
-    return gates.passed(scale, judged(scale, constants.added(scale, members)))
+    freed = with_constants_free(scale.evidence)
+    members = select(freed, (*freed.names, *freed.evidence.alternatives))
+    return passing(scale, with_alternatives(scale, with_constants(scale, members)))
+
+
+def _with_mistake(diagnosis: Diagnosis, wrong: Mistake) -> Diagnosis:
+    """The diagnosis with the mistake as its first finding."""
+    candidate = Candidate(wrong.name, wrong.title, wrong.axis, "mistake", (), (), remedy="correct the mistake")
+    size = float(np.sqrt(max(wrong.before_um**2 - wrong.after_um**2, 0.0)))
+    first = EffectFinding(candidate, size**2, 0.0, wrong.aliases, size, (), np.zeros(len(diagnosis.data.y)))
+    verdict = (AMBIGUOUS if wrong.aliases else FOUND) if diagnosis.verdict == NOTHING else diagnosis.verdict
+    gap = replace(diagnosis.gap, before=wrong.before_um)
+    return replace(diagnosis, verdict=verdict, findings=(first, *diagnosis.findings), gap=gap, mistake=wrong)

@@ -1,29 +1,129 @@
-"""Evidence in closed form: how much likelier the data are if an effect is there.
+"""The noise in which an effect must show: of the instrument, and a little of everything that machines do.
+
+A real machine has many small effects at once, and an instrument wanders. So the residual is taken as base columns, plus
+noise, plus noise that lasts for some minutes, plus a little of every candidate together. In the coordinates `rotation`
+(orthogonal to the base, error contrasts of restricted likelihood; then principal axes of "everything") the covariance
+is diagonal for every share of that background: sigma^2 (1 + share^2 `spectrum`).
+
+Evidence in closed form: how much likelier the data are if an effect is there.
 
 In the coordinates of the background its covariance is diagonal for every share of "a little of everything". A form of
 an effect is a group of columns Z with independent numbers of variance s^2, a member; members that are there add
 Z Z' s^2 to the covariance, and the scale of the noise is integrated out. A group that is offered beside the members has
 log odds -1/2 ln|1 + s^2 B| - n/2 ln(1 - gain) with B = Z'V^-1 Z (MacKay 1992).
+
+One account of evidence: how well a set of effects explains the data, less what each of them must pay.
+
+The weight of a set is the log likelihood of the data with these effects there (evidence.py), less a price for each:
+
+    ln(names)         it was chosen from all names of the catalogue
+    ln(forms sizes)   and its form and size from those that it may have
+    SURE, FURTHER     ln 100 for the first, ln 20 for every further one
+    UNNAMED           ln 20 more for a rival without a name: of twenty effects that are missing one is in no catalogue
+
+The first two make the weights of all sets probabilities of one mixture, whose mean under noise alone is 1. So by
+Markov's inequality noise weighs more than an empty set in at most one of a hundred measurements, and more with a name
+too many than with the true set in at most one of twenty, of whatever design (e-values: Vovk and Wang 2021).
+
+An effect is never quite what the catalogue says: the true one may differ in shape by a smooth share (`MISSHAPEN`) of
+what it shows. What such a change explains is no reason for another name, nor for a rival.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
-from ncfix.diagnose.background import PRIOR, SHARES, Background, marginal
-from ncfix.diagnose.groups import Group
+from ncfix.diagnose.forms import EffectForm, shape_variations
+from ncfix.diagnose.residual_data import ResidualData
 from ncfix.measure.measurement import Array, Index
 
+SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
+"""Size of everything else together, against the noise of one value."""
+PRIOR = (0.3, 0.3, 0.25, 0.12, 0.03)
+"""How likely these are beforehand."""
 SIZES = (1.5, 3.0, 6.0, 12.0, 24.0)
 """um: sizes of an effect at the tool tip that are considered."""
 FALLEN = 12.0
 """A share of the background that is less likely than another by this log likelihood adds nothing."""
+Members = Mapping[str, "Member"]
+
+Blocks = list[tuple[Index, Index, Array]]
+"""For each width: numbers of the groups, their columns (g, w), their inner products (g, w, w)."""
+FALSE_ALARM = 0.01
+"""How often noise alone may name anything."""
+COMPANION = 0.05
+"""How often noise alone may bring a further name."""
+SURE, FURTHER = float(-np.log(FALSE_ALARM)), float(-np.log(COMPANION))
+UNNAMED = float(np.log(20.0))
+"""Log odds beforehand against what is in no catalogue."""
+MISSHAPEN = 0.2
+"""How much the shape of an effect may differ from that of the catalogue, as a share of what it shows."""
+USUAL_SHARE = SHARES[2]
+"""The share of the background at which it is asked what the members show."""
+
+
+@dataclass(frozen=True, repr=False)
+class Background:
+    """The coordinates and the likelihoods in them.
+
+    view      the data
+    relative  (m,) standard deviation of each value against that of a plain one, outliers very large
+    rotation  (m, n) to the n coordinates; its columns are in units of the noise
+    spectrum  (n,) variance of everything at a size of one noise, along the coordinates
+    sigma     um, standard deviation of one plain value before anything was looked at
+    freedom   degrees of freedom of that; the data have n of their own
+    wander    size of the instrument's wandering against the noise
+    everything  (m, m) covariance of a little of everything at 1 um, um^2
+    slow      (m, m) correlation of the wandering, in units of each value's noise
+    """
+
+    data: ResidualData
+    relative: Array
+    rotation: Array
+    spectrum: Array
+    sigma: float
+    freedom: float
+    drift: float
+    everything: Array
+    slow: Array | None
+    precisions: dict[float, Array] = field(default_factory=dict)
+
+    def precision(self, share: float) -> Array:
+        """The inverse of the covariance of all values with this share of everything, um^-2, (m, m); computed once."""
+        if share not in self.precisions:
+            inner = np.eye(len(self.relative)) + share**2 * in_noise(self.everything, self.relative)
+            if self.slow is not None:
+                inner = inner + self.drift**2 * self.slow
+            scale = self.sigma * self.relative
+            self.precisions[share] = np.linalg.inv(inner) / scale[:, None] / scale
+        return self.precisions[share]
+
+    def seen(self, columns: Array) -> Array:
+        """Columns (m, p) or values (m,) um in the coordinates, in units of `sigma`."""
+        scaled: Array = self.rotation.T @ columns / self.sigma
+        return scaled
+
+    def variance(self, share: float) -> Array:
+        """Variance along the coordinates in units of sigma^2, (n,)."""
+        return 1.0 + share**2 * self.spectrum
+
+
+def in_noise(covariance: Array, relative: Array) -> Array:
+    """A covariance (m, m) in units of each value's noise; `relative` (m,)."""
+    scaled: Array = covariance / relative[:, None] / relative
+    return scaled
+
+
+def marginal(squares: float, log_determinant: float, count: int, freedom: float) -> float:
+    """Log likelihood of `count` values, sum of squares in units of a variance known with `freedom`."""
+    return -0.5 * log_determinant - 0.5 * (count + freedom) * float(np.log((squares + freedom) / (count + freedom)))
 
 
 @dataclass(frozen=True)
@@ -35,7 +135,7 @@ class Member:
 
 
 @dataclass(frozen=True, repr=False)
-class Inner:
+class DataProducts:
     """Inner products of the data with the covariance of the background at one share.
 
     projected    (p,) with all columns; squares with themselves
@@ -47,12 +147,8 @@ class Inner:
     determinant: float
 
 
-Blocks = list[tuple[Index, Index, Array]]
-"""For each width: numbers of the groups, their columns (g, w), their inner products (g, w, w)."""
-
-
 @dataclass(frozen=True)
-class Heard:
+class CandidateOdds:
     """Log odds of every group per size beside some members, (groups, sizes)."""
 
     odds: Array
@@ -70,38 +166,38 @@ class Heard:
 
 
 @dataclass(repr=False)
-class Court:
+class Evidence:
     """All groups in the coordinates of the background, and the names that own them.
 
     groups  those with a name come first, `named` of them; then their rivals without one
     """
 
     background: Background
-    groups: tuple[Group, ...]
+    groups: tuple[EffectForm, ...]
     named: int
     columns: Array = field(init=False)
     bounds: Array = field(init=False)
     y: Array = field(init=False)
     forms: dict[str, list[int]] = field(init=False)
     names: tuple[str, ...] = field(init=False)
-    rivals: tuple[str, ...] = field(init=False)
-    inner: dict[float, Inner] = field(init=False, default_factory=dict)
+    alternatives: tuple[str, ...] = field(init=False)
+    inner: dict[float, DataProducts] = field(init=False, default_factory=dict)
     blocks: dict[float, Blocks] = field(init=False, default_factory=dict)
     pairs: dict[tuple[float, int, int], Array] = field(init=False, default_factory=dict)
     products: dict[tuple[float, int], Array] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         """Carry everything into the coordinates, once."""
-        none = np.zeros((len(self.background.view.y), 0))
+        none = np.zeros((len(self.background.data.y), 0))
         columns = np.concatenate([none, *(group.columns for group in self.groups)], axis=1)
         self.columns = self.background.seen(columns)
         self.bounds = np.concatenate([[0], np.cumsum([group.columns.shape[1] for group in self.groups])])
-        self.y = self.background.seen(self.background.view.y)
+        self.y = self.background.seen(self.background.data.y)
         self.forms = {}
         for index, group in enumerate(self.groups):
             self.forms.setdefault(group.owner.name, []).append(index)
         self.names = tuple(name for name, own in self.forms.items() if own[0] < self.named)
-        self.rivals = tuple(name for name, own in self.forms.items() if own[0] >= self.named)
+        self.alternatives = tuple(name for name, own in self.forms.items() if own[0] >= self.named)
 
     def constant(self, name: str) -> bool:
         """Whether a name is of a constant that the machine file lacks."""
@@ -111,7 +207,7 @@ class Court:
         """Where a group's columns are."""
         return slice(int(self.bounds[index]), int(self.bounds[index + 1]))
 
-    def heard(self, members: Sequence[Member], beside: Array | None = None) -> Heard:
+    def heard(self, members: Sequence[Member], beside: Array | None = None) -> CandidateOdds:
         """The odds of all groups beside these members, at their likeliest share of the background.
 
         beside  further columns in the coordinates that are there at unit size
@@ -130,7 +226,7 @@ class Court:
         for groups, places, blocks in self._blocks(share):
             lost = np.moveaxis(taken[:, places], 0, 1)
             odds[groups] = log_odds(blocks - np.swapaxes(lost, 1, 2) @ lost, projected[places], total, count)
-        return Heard(odds)
+        return CandidateOdds(odds)
 
     def likelihood(self, members: Sequence[Member], beside: Array | None = None) -> float:
         """Log likelihood of the data with these members there and no others, whatever the share of the background."""
@@ -210,12 +306,14 @@ class Court:
             self.pairs[key] = self.columns[:, self.part(first)].T @ weighed
         return self.pairs[key]
 
-    def _inner(self, share: float) -> Inner:
+    def _inner(self, share: float) -> DataProducts:
         """What the data show with this share of the background; computed once."""
         if share not in self.inner:
             variance = self.background.variance(share)
             weighed = self.y / variance
-            self.inner[share] = Inner(self.columns.T @ weighed, float(self.y @ weighed), float(np.log(variance).sum()))
+            self.inner[share] = DataProducts(
+                self.columns.T @ weighed, float(self.y @ weighed), float(np.log(variance).sum())
+            )
         return self.inner[share]
 
     def _blocks(self, share: float) -> Blocks:
@@ -272,3 +370,98 @@ def log_odds(inner: Array, projected: Array, total: float, count: float) -> Arra
         gain = (factor[..., width, :width] ** 2).sum(axis=-1)
         odds[..., k] = -occam - 0.5 * count * np.log1p(-np.minimum(gain / total, 1 - 1e-12))
     return odds
+
+
+def entry_price(count: int) -> float:
+    """What so many effects pay for being there."""
+    return SURE + (count - 1) * FURTHER if count else 0.0
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison:
+    """Weighs sets of effects; remembers what it has weighed.
+
+    free  what is there besides in any case, and no names to be found: constants that the machine file lacks
+    """
+
+    evidence: Evidence
+    free: tuple[Member, ...] = ()
+    weights: dict[frozenset[Member], float] = field(default_factory=dict)
+    sketches: dict[frozenset[Member], float] = field(default_factory=dict)
+    asked: dict[frozenset[Member], CandidateOdds] = field(default_factory=dict)
+    allowed: dict[frozenset[Member], Array | None] = field(default_factory=dict)
+
+    def weight(self, members: Members) -> float:
+        """Log likelihood of the data with these members, less their prices."""
+        key = frozenset(members.values())
+        if key not in self.weights:
+            self.weights[key] = self._likelihood(members) - self._paid(members)
+        return self.weights[key]
+
+    def sketched(self, members: Members) -> float:
+        """The same at first sight: of effects that are shaped as in the catalogue."""
+        return self._plain(members) - self._paid(members)
+
+    def _paid(self, members: Members) -> float:
+        return sum(map(self.price, members)) + entry_price(len(members))
+
+    def _plain(self, members: Members) -> float:
+        key = frozenset(members.values())
+        if key not in self.sketches:
+            self.sketches[key] = self.evidence.likelihood(self.all(members))
+        return self.sketches[key]
+
+    def _likelihood(self, members: Members) -> float:
+        """Of effects shaped as in the catalogue, or a little otherwise: either in half of all machines."""
+        plain, allowance = self._plain(members), self.allowance(members)
+        if allowance is None:
+            return plain
+        misshapen = self.evidence.likelihood(self.all(members), allowance)
+        return float(np.logaddexp(plain, misshapen) - np.log(2))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names to be found."""
+        free = {member.group for member in self.free}
+        return tuple(name for name in self.evidence.names if self.evidence.forms[name][0] not in free)
+
+    def all(self, members: Members) -> list[Member]:
+        """The members and what is free."""
+        return [*members.values(), *self.free]
+
+    def price(self, name: str) -> float:
+        """What an effect pays for what it was chosen from."""
+        chosen = np.log(len(self.evidence.forms[name]) * len(SIZES))
+        alternatives = self.evidence.alternatives
+        return float(
+            chosen + (np.log(len(alternatives)) + UNNAMED if name in alternatives else np.log(len(self.names)))
+        )
+
+    def heard(self, members: Members) -> CandidateOdds:
+        """The odds of everything beside these members."""
+        key = frozenset(members.values())
+        if key not in self.asked:
+            self.asked[key] = self.evidence.heard(self.all(members), self.allowance(members))
+        return self.asked[key]
+
+    def allowance(self, members: Members) -> Array | None:
+        """What the named members would show besides if their shapes differed a little, in the coordinates, (n, k)."""
+        key = frozenset(members.values())
+        if key not in self.allowed:
+            self.allowed[key] = self._allowance(members)
+        return self.allowed[key]
+
+    def _allowance(self, members: Members) -> Array | None:
+        evidence = self.evidence
+        named = [each for name, each in members.items() if name in evidence.names and not evidence.constant(name)]
+        if not named:
+            return None
+        every = self.all(members)
+        shown = evidence.shown(every, USUAL_SHARE)
+        whole = np.sum([each for member, each in zip(every, shown, strict=True) if member in named], axis=0)
+        return evidence.background.seen(MISSHAPEN * whole[:, None] * self._slow)
+
+    @cached_property
+    def _slow(self) -> Array:
+        """How a shape may differ, (m, k)."""
+        return shape_variations(self.evidence.background.data)

@@ -1,17 +1,64 @@
-"""How large the noise is, from what, and whether anything is left beyond it."""
+"""How much the instrument wanders, and the background that goes with that.
+
+A drift of hours looks like an instrument that wanders, as long as nothing else may explain it, and a wandering of that
+size then hides the drift. So each size of the wandering is weighed together with the names that act in the course of
+time and nothing else: the likeliest one after another, at the price of a name, as long as they pay. The course of a
+real effect is never quite what the catalogue says (`MISSHAPEN`), and what a name misses of it wanders, too.
+
+Values that neither the model nor any smooth effect explains: found by leaving each one out.
+
+The model that is asked is the base with a generous amount of everything, so that an effect that is really there makes
+no outliers. One that is many times the noise makes them all the same; so where more rows stand out than instruments
+fail, the effect that explains the data best is taken to be there as well, and it is asked again. Rows beyond `GROSS`
+are put aside and named; those beyond `TAIL` count less (long tails of the noise).
+
+How large the noise is, from what, and whether anything is left beyond it.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cholesky, eigh, lapack, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
-from ncfix.diagnose.background import Background
-from ncfix.diagnose.view import View
+from ncfix.diagnose.evidence import MISSHAPEN, SIZES, Background, entry_price, in_noise, log_odds, marginal
+from ncfix.diagnose.forms import EffectForm, shape_variations, without_lacking_constants
+from ncfix.diagnose.residual_data import ResidualData
 from ncfix.measure.measurement import Array, groups
+from ncfix.measure.solve import orthonormal
 
+REFLECTIONS = 64
+"""Reflections that are carried out together."""
+DRIFT_TIME = 900.0
+"""s: how long an instrument's wandering lasts."""
+DRIFT_SIZES = (0.0, 0.15, 0.35, 0.7)
+"""Its size against the noise."""
+EVERYTHING_SHARE = 0.35
+"""Size of everything else together, against the noise, while it is asked how much the instrument wanders."""
+MOST_COURSES = 4
+"""Names that are added at most."""
+UNKNOWN_NOISE = 1.0
+"""Degrees of freedom of what is known of the noise where nothing is."""
+STATED_NOISE = 200.0
+"""The same where the header of a file states it."""
+GROSS, TAIL = 5.0, 3.0
+GENEROUS_SHARE = 2.5
+"""Size of everything, against the noise, that may be there."""
+ASIDE = 1e3
+"""Factor on the standard deviation of what is put aside."""
+FAILED = 0.02
+"""Share of the rows that an instrument may spoil; where more stand out, an effect may be why."""
+LARGE = 8.0
+"""The sizes of `SIZES` times this, in noise, are those of effects that make rows stand out."""
+LIKELY = 10.0
+"""Log odds that such an effect must have."""
+MOST_EFFECTS = 5
+"""So many of them at most."""
 TAILS = 2.0
 """Variance of a standard deviation from repeats, times their freedom, over its square: Student's t with 5 degrees."""
 TRUSTED = 0.1
@@ -20,12 +67,252 @@ USUAL_UM = 1.0
 """rms of the little of everything that all machines have."""
 ASTRAY = 5.0
 """Standard deviations beyond which a repeat is not noise."""
-ENOUGH = 10
+ENOUGH_REPEATS = 10
 """Degrees of freedom of repeats from which on they say something."""
 
 
+@dataclass(frozen=True, repr=False)
+class Contrasts:
+    """An orthonormal basis of what is orthogonal to the base: `columns` (m, n), and as the reflections that make it."""
+
+    columns: Array
+    reflections: tuple[Array, Array]
+
+    def seen(self, values: Array) -> Array:
+        """Columns of values (m, p) as contrasts, (n, p); far quicker by a few reflections."""
+        columns = np.asfortranarray(values)
+        turned = lapack.dormqr("L", "T", *self.reflections, columns, REFLECTIONS * columns.shape[1])[0]
+        last: Array = turned[len(values) - self.columns.shape[1] :]
+        return last
+
+    def of(self, covariance: Array) -> Array:
+        """The covariance (m, m) of values as one of contrasts, (n, n)."""
+        return self.seen(self.seen(covariance).T)
+
+
+def error_contrasts(base: Array) -> Contrasts:
+    """Those of what is free."""
+    size = np.linalg.norm(base, axis=0)
+    scaled = base[:, size > 0] / size[size > 0]
+    basis = orthonormal(scaled)
+    reflections, _ = qr(basis, mode="raw", check_finite=False)
+    whole = lapack.dormqr("L", "N", *reflections, np.eye(len(basis), order="F"), REFLECTIONS * len(basis))[0]
+    return Contrasts(whole[:, basis.shape[1] :], reflections)
+
+
+def everything_covariance(data: ResidualData, named: Sequence[EffectForm]) -> Array:
+    """The covariance of a little of every candidate, of 1 um together, each name with the same share, um^2, (m, m).
+
+    But nothing of the constants that the machine file lacks: those are looked for, not taken for granted.
+    """
+    groups = [group for group in named if not group.owner.constant]
+    forms = Counter(group.owner.name for group in groups)
+    parts = [group.columns / np.sqrt(forms[group.owner.name] * len(forms)) for group in groups]
+    columns = without_lacking_constants(data, np.concatenate([np.zeros((len(data.y), 0)), *parts], axis=1), named)
+    covariance: Array = columns @ columns.T
+    return covariance
+
+
+def estimated_background(
+    data: ResidualData, everything: Array, relative: Array, named: Sequence[EffectForm] = ()
+) -> Background:
+    """Estimate how much the instrument wanders, where these names may act besides, and find the coordinates."""
+    sigma, freedom = _noise(data)
+    free = error_contrasts(data.base / relative[:, None])
+    left = free.columns
+    slow, drift = _drift_correlation(data, relative), 0.0
+    inner = free.of(in_noise(everything, relative))
+    if slow is not None:
+        seen = free.of(slow)
+        drift = _likeliest_drift(DriftLikelihood(free, sigma * relative, data.y, inner, seen, freedom), named)
+    if drift:
+        factor = np.linalg.cholesky(np.eye(left.shape[1]) + drift**2 * seen)
+        left = solve_triangular(factor, left.T, lower=True).T
+        inner = solve_triangular(factor, solve_triangular(factor, inner, lower=True).T, lower=True)
+    spectrum, vectors = eigh(inner, driver="evd")
+    rotation = (left @ vectors) / relative[:, None]
+    return Background(data, relative, rotation, np.maximum(spectrum, 0.0), sigma, freedom, drift, everything, slow)
+
+
+def _noise(data: ResidualData) -> tuple[float, float]:
+    """Noise of a plain value, um, and how well it is known."""
+    given = all(each.noise[0] is not None for each in data.measurements)
+    return data.sigma, STATED_NOISE if given else UNKNOWN_NOISE
+
+
+def _drift_correlation(data: ResidualData, relative: Array) -> Array | None:
+    """The correlation of values of one component by the time between them; None without a clock."""
+    time = data.column("time_s")
+    if np.ptp(time) == 0:
+        return None
+    own = time[np.maximum(data.row, 0)]
+    alike = (data.component[:, None] == data.component) & (data.row[:, None] >= 0)
+    lasting = np.where(alike, np.exp(-np.abs(own[:, None] - own) / DRIFT_TIME), 0.0)
+    return in_noise(lasting, relative)
+
+
+@dataclass(frozen=True, repr=False)
+class DriftLikelihood:
+    """How much does it wander?
+
+    free        contrasts, n of m values
+    scale       (m,) standard deviations of the values, um
+    y           (m,) the values, um
+    everything  (n, n) covariance of a little of everything at 1 um; slow: of the wandering at the size of the noise
+    freedom     of what is known of the noise
+    """
+
+    free: Contrasts
+    scale: Array
+    y: Array
+    everything: Array
+    slow: Array
+    freedom: float
+
+    def likelihood(self, size: float) -> float:
+        """Log likelihood of the data with a wandering of this size, that of the noise integrated out."""
+        factor = self._factor(size)
+        white = solve_triangular(factor, self._seen([self.y])[:, 0], lower=True, check_finite=False)
+        determinant = 2 * float(np.log(np.diag(factor)).sum())
+        return marginal(float(white @ white), determinant, len(white), self.freedom)
+
+    def white(self, size: float, columns: Sequence[Array]) -> Array:
+        """Columns of values, one beside the other, where noise, everything and such a wandering are one, (n, p)."""
+        white: Array = solve_triangular(self._factor(size), self._seen(columns), lower=True, check_finite=False)
+        return white
+
+    def _seen(self, columns: Sequence[Array]) -> Array:
+        return self.free.seen(np.column_stack(columns) / self.scale[:, None])
+
+    def _factor(self, size: float) -> Array:
+        covariance = np.eye(len(self.slow)) + EVERYTHING_SHARE**2 * self.everything + size**2 * self.slow
+        factor: Array = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
+        return factor
+
+
+def _likeliest_drift(asked: DriftLikelihood, named: Sequence[EffectForm]) -> float:
+    """The size that explains most; with names no more of it than without, and no less than what their courses miss."""
+    plain = [asked.likelihood(size) for size in DRIFT_SIZES]
+    most = int(np.argmax(plain)) + 1
+    beside = [_beside_names(asked, size, named) for size in DRIFT_SIZES[:most] if most > 1] or [(0.0, 0.0)]
+    best = int(np.argmax([own + gained for own, (gained, _) in zip(plain, beside, strict=False)]))
+    missed = MISSHAPEN * beside[best][1] / float(np.median(asked.scale))
+    return max(size for size in DRIFT_SIZES[:most] if size <= max(DRIFT_SIZES[best], missed))
+
+
+def _beside_names(asked: DriftLikelihood, size: float, named: Sequence[EffectForm]) -> tuple[float, float]:
+    """How much log likelihood names that act by time alone add to a wandering of this size, less what they pay; and
+    how much the largest shows, um rms.
+    """
+    courses = [group for group in named if group.owner.slow]
+    forms = Counter(group.owner.name for group in named)
+    prices = np.log([len(forms) * forms[group.owner.name] * len(SIZES) for group in courses])
+    ends = np.cumsum([1, *(group.columns.shape[1] for group in courses)])
+    white, gained, shown = asked.white(size, [asked.y, *(group.columns for group in courses)]), 0.0, 0.0
+    for count in range(1, MOST_COURSES + 1 if courses else 1):
+        odds = _odds(white, ends, asked.freedom) - prices[:, None]
+        best, large = np.unravel_index(int(odds.argmax()), odds.shape)
+        helped = float(odds[best, large]) - entry_price(count) + entry_price(count - 1)
+        if helped <= 0:
+            break
+        gained, shown = gained + helped, max(shown, SIZES[large])
+        white = _beside(white, SIZES[large] * white[:, ends[best] : ends[best + 1]])
+    return gained, shown
+
+
+def _odds(white: Array, ends: Array, freedom: float) -> Array:
+    """The log odds of every form in every size, (forms, sizes); data and columns are white, (n, 1 + p)."""
+    y, widths = white[:, 0], np.diff(ends)
+    found = np.empty((len(widths), len(SIZES)))
+    total, count = float(y @ y) + freedom, len(y) + freedom
+    for width in np.unique(widths):
+        alike = np.flatnonzero(widths == width)
+        stack = np.stack([white[:, ends[k] : ends[k + 1]] for k in alike])
+        turned = np.swapaxes(stack, 1, 2)
+        found[alike] = log_odds(turned @ stack, turned @ y, total, count)
+    return found
+
+
+def _beside(white: Array, there: Array) -> Array:
+    """The same, white where these columns are there at unit size besides."""
+    own, sizes, _ = np.linalg.svd(there, full_matrices=False)
+    less: Array = white - own @ ((1 - 1 / np.sqrt(1 + sizes**2))[:, None] * (own.T @ white))
+    return less
+
+
+def downweighted(
+    data: ResidualData, everything: Array, groups: Sequence[EffectForm]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Standard deviations against that of a plain value with outliers put aside, and which rows those are, (rows,).
+
+    `everything` is the covariance of a little of everything, um^2; `groups` are all effects that may be there.
+    """
+    there = GENEROUS_SHARE**2 * in_noise(everything, data.relative)
+    z = np.abs(leave_one_out(data, there))
+    for _ in range(MOST_EFFECTS):
+        if _standing_out(data, z).mean() <= FAILED:
+            break
+        effect = _likeliest_effect(data, there, np.maximum(1.0, z / TAIL), groups)
+        if effect is None:
+            break
+        there = there + effect @ effect.T
+        z = np.abs(leave_one_out(data, there))
+    gross, row = _standing_out(data, z), data.row
+    relative = data.relative * np.maximum(1.0, z / TAIL)
+    return np.where((row >= 0) & gross[np.maximum(row, 0)], ASIDE * data.relative, relative), gross
+
+
+def leave_one_out(data: ResidualData, there: Array) -> Array:
+    """For every value: what it is, minus what all others predict of it, over its standard deviation; (m,).
+
+    `there` is the covariance of what is there besides noise and base, in units of each value's noise, (m, m).
+    """
+    precision = _precision(data, np.eye(len(there)) + there)
+    z = precision @ (data.y / data.relative) / np.sqrt(np.maximum(np.diag(precision), 1e-12))
+    spread = float(np.median(np.abs(z))) / 0.6745
+    scaled: Array = z / (spread or 1.0)
+    return scaled
+
+
+def _precision(data: ResidualData, covariance: Array) -> Array:
+    """The inverse of a covariance in units of each value's noise, with the base free, (m, m)."""
+    base = orthonormal(data.base / data.relative[:, None])
+    precision = np.linalg.inv(covariance)
+    solved = precision @ base
+    return np.asarray(precision - solved @ np.linalg.solve(base.T @ solved, solved.T), dtype=np.float64)
+
+
+def _standing_out(data: ResidualData, z: Array) -> NDArray[np.bool_]:
+    """Rows with a value beyond `GROSS`."""
+    gross = np.zeros(data.count, dtype=bool)
+    gross[data.row[(z > GROSS) & (data.row >= 0)]] = True
+    return gross
+
+
+def _likeliest_effect(data: ResidualData, there: Array, wide: Array, groups: Sequence[EffectForm]) -> Array | None:
+    """The likeliest effect in its likeliest size, and what it may differ in shape: columns in units of each value's
+    noise, (m, k); None if none is likely.
+
+    Values count less as their noise is `wide`: what stands out for other reasons shall not bring an effect.
+    """
+    precision, y = _precision(data, np.diag(wide**2) + there), data.y / data.relative
+    total, count = float(y @ precision @ y), float(len(y) - data.base.shape[1])
+    best, found = LIKELY, None
+    for group in groups:
+        columns = LARGE * group.columns / data.relative[:, None]
+        solved = precision @ columns
+        odds = log_odds(columns.T @ solved, solved.T @ y, total, count)
+        if odds.max() > best:
+            best, found = float(odds.max()), SIZES[int(odds.argmax())] * columns
+    if found is None:
+        return None
+    solved = precision @ found
+    shown = found @ np.linalg.solve(np.eye(found.shape[1]) + found.T @ solved, solved.T @ y)
+    return np.concatenate([found, MISSHAPEN * shown[:, None] * shape_variations(data)], axis=1)
+
+
 @dataclass(frozen=True)
-class Floor:
+class NoiseFloor:
     """The noise floor.
 
     sigma_um  standard deviation of one value
@@ -40,32 +327,32 @@ class Floor:
     squares: float = 0.0
 
 
-def floor(view: View, ground: Background, sigma_um: float, keep: NDArray[np.bool_]) -> Floor:
+def noise_floor(data: ResidualData, background: Background, sigma_um: float, keep: NDArray[np.bool_]) -> NoiseFloor:
     """From repeats if there are enough, else as given, else as estimated from neighbouring poses."""
-    squares, freedom = repeats(view, keep)
-    if freedom >= ENOUGH:
-        return Floor(float(np.sqrt(squares / freedom)), "repeats", freedom, squares)
-    if all(each.noise[0] is not None for each in view.measurements):
-        return Floor(ground.sigma, "given", 0)
-    return Floor(sigma_um, "neighbours", 0)
+    squares, freedom = repeat_scatter(data, keep)
+    if freedom >= ENOUGH_REPEATS:
+        return NoiseFloor(float(np.sqrt(squares / freedom)), "repeats", freedom, squares)
+    if all(each.noise[0] is not None for each in data.measurements):
+        return NoiseFloor(background.sigma, "given", 0)
+    return NoiseFloor(sigma_um, "neighbours", 0)
 
 
-def beyond(floor: Floor, noise_um: float, left_um: float) -> float:
+def beyond_noise(noise_floor: NoiseFloor, noise_um: float, left_um: float) -> float:
     """What is left beyond the noise and what machines have of everything, um rms.
 
     Noise that comes from repeats with long tails is known to two standard deviations only, a given one to a tenth.
     """
-    doubt = 2 * np.sqrt(TAILS / floor.freedom) if floor.freedom else TRUSTED
+    doubt = 2 * np.sqrt(TAILS / noise_floor.freedom) if noise_floor.freedom else TRUSTED
     return float(np.sqrt(max(left_um**2 - (noise_um * (1 + doubt)) ** 2 - USUAL_UM**2, 0.0)))
 
 
-def repeats(view: View, keep: NDArray[np.bool_]) -> tuple[float, int]:
+def repeat_scatter(data: ResidualData, keep: NDArray[np.bool_]) -> tuple[float, int]:
     """Sum of squares about the means of values taken at one commanded state one after another, and its freedom."""
-    same = states(view)
+    same = states(data)
     keys = [
-        f"{same[row]} {name}" for row, name, kept in zip(view.row, view.names, keep, strict=True) if row >= 0 and kept
+        f"{same[row]} {name}" for row, name, kept in zip(data.row, data.names, keep, strict=True) if row >= 0 and kept
     ]
-    values = view.y[(view.row >= 0) & keep]
+    values = data.y[(data.row >= 0) & keep]
     if not keys:
         return 0.0, 0
     _, index = groups(keys)
@@ -83,11 +370,11 @@ def repeats(view: View, keep: NDArray[np.bool_]) -> tuple[float, int]:
     return float(((values - mean[index])[kept] ** 2).sum()), int(np.maximum(counts - 1, 0).sum())
 
 
-def states(view: View) -> list[int]:
+def states(data: ResidualData) -> list[int]:
     """Number of the commanded state of each row; rows of one state follow one another."""
     seen: list[int] = []
     number, before = -1, None
-    for each in view.measurements:
+    for each in data.measurements:
         names = [name for name in each.columns if name not in each.measured and not varying(name)]
         labels = [value for name, value in each.labels.items() if name != "repeat"]
         for i in range(len(each)):
@@ -98,16 +385,16 @@ def states(view: View) -> list[int]:
     return seen
 
 
-def lack_of_fit(floor: Floor, residual: Array, parameters: float) -> float | None:
+def lack_of_fit(noise_floor: NoiseFloor, residual: Array, parameters: float) -> float | None:
     """How likely residuals so much larger than the noise are by chance; None without repeats or a given noise."""
     n = len(residual)
     squares = float((residual**2).sum())
-    if floor.source == "repeats":
-        left = n - parameters - floor.freedom
-        ratio = ((squares - floor.squares) / left) / (floor.squares / floor.freedom)
-        return float(fdtrc(left, floor.freedom, ratio)) if left > 0 else None
-    if floor.source == "given":
-        return float(chdtrc(max(n - parameters, 1), squares / floor.sigma_um**2))
+    if noise_floor.source == "repeats":
+        left = n - parameters - noise_floor.freedom
+        ratio = ((squares - noise_floor.squares) / left) / (noise_floor.squares / noise_floor.freedom)
+        return float(fdtrc(left, noise_floor.freedom, ratio)) if left > 0 else None
+    if noise_floor.source == "given":
+        return float(chdtrc(max(n - parameters, 1), squares / noise_floor.sigma_um**2))
     return None
 
 

@@ -1,16 +1,36 @@
-"""Which effects are there: the set that weighs most, found by adding, exchanging and dropping one at a time."""
+"""Names that act in the same way in these data: what the one shows, the other can show, and the other way about.
+
+A spindle that grows and a frame that drifts along a tool that never turns differ in the course that is assumed of them,
+a bed and a ram that sag in the power of their curve. Odds between such names are odds of what is assumed.
+
+Which effects are there: the set that weighs most, found by adding, exchanging and dropping one at a time.
+
+Constants of the machine that its file lacks: where axes lie, gains. They go before all that is not one.
+
+Every machine has them, and almost any curve or sag looks like one in part. So names of other effects are looked for
+with all of them free; which constants are there is asked afterwards, beside what was found.
+
+What these data would have shown: how large an effect has to be so that it is found. Silence means no more than that.
+
+The numbers behind an effect of size s have variance s^2. With d the squares that each of its independent parts shows at
+a size of one, over the variance of noise and background, its log odds are 1/2 sum(s^2 d - ln(1 + s^2 d)) on average.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ncfix.diagnose.evidence import Court, Member
-from ncfix.diagnose.twins import acts_alike
-from ncfix.diagnose.weighing import Members, Scale, margin
+from ncfix.diagnose.evidence import SIZES, Comparison, Evidence, Member, Members, entry_price
+from ncfix.measure.measurement import Array
+from ncfix.measure.solve import orthonormal, without
 
+SAME = 0.8
+"""Share of what either may show, its squares beside what is free, that the other must be able to show."""
+TOLD_APART = 6.0
+"""Squared noise units of what the first shows that the second cannot, from which on data tell them apart."""
 MOST = 5
 """Effects that are taken to be there at most."""
 TRIED = 5
@@ -29,6 +49,44 @@ WEIGHED = 5
 """Of all changes so many, the best at first sight, are weighed with all care."""
 HELPS = 0.1
 """Log odds by which a change must help."""
+CONSTANT_UM = 300.0
+"""How far they may be off while they are free."""
+FEW_SHOWN = 0.5
+"""Share of all names that data must be able to show at the largest size, to show more than hardly anything."""
+
+
+def _acts_alike(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> bool:
+    """Whether a name has a form that can do what `own`, one of the members, does in these data."""
+    share = evidence.share(members)
+    first = _white(evidence, own.group, share)
+    shown = first @ evidence.numbers(members, share)[list(members).index(own)]
+    return any(act_alike(first, shown, _white(evidence, form, share)) for form in evidence.forms[other])
+
+
+def _white(evidence: Evidence, group: int, share: float) -> Array:
+    """The columns of a form in units of noise and background, (n, p)."""
+    white: Array = evidence.columns[:, evidence.part(group)] / np.sqrt(evidence.background.variance(share))[:, None]
+    return white
+
+
+def act_alike(first: Array, shown: Array, second: Array) -> bool:
+    """Whether the second columns can show what is shown, and either what the other may show."""
+    return _unexplained(shown, second) < TOLD_APART and min(_shared(first, second), _shared(second, first)) > SAME
+
+
+def _unexplained(shown: Array, by: Array) -> float:
+    """Squares of what is shown that columns of the largest size considered cannot show, and of the numbers behind them.
+
+    Without the latter a combination that hardly shows could stand for anything.
+    """
+    sized = SIZES[-1] * by
+    seen = sized.T @ shown
+    return float(shown @ shown - seen @ np.linalg.solve(np.eye(sized.shape[1]) + sized.T @ sized, seen))
+
+
+def _shared(columns: Array, by: Array) -> float:
+    """Share of the squares of some columns that others can show."""
+    return 1.0 - float((without(orthonormal(by), columns) ** 2).sum() / (columns**2).sum())
 
 
 @dataclass(frozen=True)
@@ -44,26 +102,26 @@ class Selected:
 
     members: dict[str, Member]
     odds: dict[str, float]
-    runners: dict[str, dict[str, float]]
-    rivals: frozenset[str] = frozenset()
-    twins: dict[str, frozenset[str]] = field(default_factory=dict)
+    runners_up: dict[str, dict[str, float]]
+    alternatives: frozenset[str] = frozenset()
+    acting_alike: dict[str, frozenset[str]] = field(default_factory=dict)
 
     @property
     def named(self) -> list[str]:
         """The members that have a name."""
-        return [name for name in self.members if name not in self.rivals]
+        return [name for name in self.members if name not in self.alternatives]
 
     @property
     def unnamed(self) -> list[str]:
         """The members that have none."""
-        return [name for name in self.members if name in self.rivals]
+        return [name for name in self.members if name in self.alternatives]
 
     def p_value(self, name: str) -> float:
         """A bound on the probability that noise alone gives any name such odds."""
         return float(np.exp(-max(self.odds[name], 0.0)))
 
 
-def select(scale: Scale, offered: Sequence[str], start: Members | None = None) -> dict[str, Member]:
+def select(scale: Comparison, offered: Sequence[str], start: Members | None = None) -> dict[str, Member]:
     """The members that weigh most together; those of `start` stay.
 
     When nothing helps any more each member is taken away in turn and may not come back, and it is looked whether
@@ -76,18 +134,18 @@ def select(scale: Scale, offered: Sequence[str], start: Members | None = None) -
         others = _less(members, out)
         found = _climbed(scale, [name for name in offered if name != out], others, fixed)
         members = _better(scale, members, found)
-    if any(name in scale.court.rivals for name in members if name not in fixed):
+    if any(name in scale.evidence.alternatives for name in members if name not in fixed):
         found = _climbed(scale, names_of(scale, offered), _together(scale, offered, fixed), fixed)
         if scale.weight(found) > scale.weight(members) - NEARLY:
             members = _better(scale, members, _climbed(scale, offered, found, fixed))
     return members
 
 
-def _better(scale: Scale, members: dict[str, Member], trial: dict[str, Member]) -> dict[str, Member]:
+def _better(scale: Comparison, members: dict[str, Member], trial: dict[str, Member]) -> dict[str, Member]:
     return trial if scale.weight(trial) > scale.weight(members) + HELPS else members
 
 
-def _together(scale: Scale, offered: Sequence[str], members: Members) -> dict[str, Member]:
+def _together(scale: Comparison, offered: Sequence[str], members: Members) -> dict[str, Member]:
     """Some names more, the likeliest one after another, whether they help or not."""
     names, found = names_of(scale, offered), dict(members)
     for _ in range(TOGETHER):
@@ -96,12 +154,12 @@ def _together(scale: Scale, offered: Sequence[str], members: Members) -> dict[st
     return found
 
 
-def names_of(scale: Scale, offered: Sequence[str]) -> list[str]:
+def names_of(scale: Comparison, offered: Sequence[str]) -> list[str]:
     """Those on offer that have a name."""
-    return [name for name in offered if name in scale.court.names]
+    return [name for name in offered if name in scale.evidence.names]
 
 
-def _climbed(scale: Scale, offered: Sequence[str], members: Members, fixed: Members) -> dict[str, Member]:
+def _climbed(scale: Comparison, offered: Sequence[str], members: Members, fixed: Members) -> dict[str, Member]:
     """The best of all changes, again and again until none helps."""
     while True:
         best = max(_promising(scale, _changes(scale, offered, members, fixed), members), key=scale.weight)
@@ -110,14 +168,14 @@ def _climbed(scale: Scale, offered: Sequence[str], members: Members, fixed: Memb
         members = best
 
 
-def _promising(scale: Scale, changes: list[dict[str, Member]], members: Members) -> list[dict[str, Member]]:
+def _promising(scale: Comparison, changes: list[dict[str, Member]], members: Members) -> list[dict[str, Member]]:
     """Those that leave effects away, and of the others the best at first sight."""
     fewer = [each for each in changes if len(each) <= len(members) and set(each) <= set(members)]
     other = [each for each in changes if each not in fewer]
     return fewer + sorted(other, key=scale.sketched, reverse=True)[:WEIGHED]
 
 
-def _changes(scale: Scale, offered: Sequence[str], members: Members, fixed: Members) -> list[dict[str, Member]]:
+def _changes(scale: Comparison, offered: Sequence[str], members: Members, fixed: Members) -> list[dict[str, Member]]:
     """One effect more, another in the place of one, or one less."""
     found = [dict(members)]
     if len(members) < MOST:
@@ -129,57 +187,59 @@ def _changes(scale: Scale, offered: Sequence[str], members: Members, fixed: Memb
     return found
 
 
-def likeliest(scale: Scale, offered: Sequence[str], members: Members) -> dict[str, Member]:
+def likeliest(scale: Comparison, offered: Sequence[str], members: Members) -> dict[str, Member]:
     """The effects that have the best odds beside some members, in their likeliest form and size."""
-    heard, court = scale.heard(members), scale.court
-    free = {name: heard.of(court.forms[name]) for name in offered if name not in members}
+    heard, evidence = scale.heard(members), scale.evidence
+    free = {name: heard.of(evidence.forms[name]) for name in offered if name not in members}
     order = sorted(free, key=lambda name: -free[name])
-    named = [name for name in order if name in court.names][:TRIED]
-    nameless = [name for name in order if name in court.rivals][: TRIED // 2]
-    return {name: heard.likeliest(court.forms[name])[0] for name in (*named, *nameless)}
+    named = [name for name in order if name in evidence.names][:TRIED]
+    nameless = [name for name in order if name in evidence.alternatives][: TRIED // 2]
+    return {name: heard.likeliest(evidence.forms[name])[0] for name in (*named, *nameless)}
 
 
-def judged(scale: Scale, members: Members) -> Selected:
+def with_alternatives(scale: Comparison, members: Members) -> Selected:
     """What else could stand in each member's place."""
-    court, members = scale.court, _formed(scale, members)
+    evidence, members = scale.evidence, _formed(scale, members)
     odds: dict[str, float] = {}
-    runners: dict[str, dict[str, float]] = {}
-    twins: dict[str, frozenset[str]] = {}
+    runners_up: dict[str, dict[str, float]] = {}
+    acting_alike: dict[str, frozenset[str]] = {}
     for name in members:
         others = _less(members, name)
-        sort = [each for each in _sort(court, name) if each not in others]
+        sort = [each for each in _sort(evidence, name) if each not in others]
         tried = {
-            each: scale.heard(others).likeliest(court.forms[each], FORMS) for each in likeliest(scale, sort, others)
+            each: scale.heard(others).likeliest(evidence.forms[each], FORMS) for each in likeliest(scale, sort, others)
         }
         tried[name] = [members[name]]
         heaviest = {each: max(scale.weight({**others, each: own}) for own in forms) for each, forms in tried.items()}
         gained = {each: weight - scale.weight(others) for each, weight in heaviest.items()}
-        paid = margin(len(members)) - margin(len(others))
+        paid = entry_price(len(members)) - entry_price(len(others))
         odds[name] = gained.pop(name) + paid
-        runners[name] = {each: value + paid for each, value in gained.items()}
-        near = [each for each, value in runners[name].items() if value > odds[name] - ASSUMED * ALIKE]
-        twins[name] = frozenset(each for each in near if acts_alike(court, scale.all(members), members[name], each))
+        runners_up[name] = {each: value + paid for each, value in gained.items()}
+        near = [each for each, value in runners_up[name].items() if value > odds[name] - ASSUMED * ALIKE]
+        acting_alike[name] = frozenset(
+            each for each in near if _acts_alike(evidence, scale.all(members), members[name], each)
+        )
     ranked = {name: members[name] for name in sorted(members, key=lambda name: -odds[name])}
-    return Selected(ranked, odds, runners, frozenset(court.rivals), twins)
+    return Selected(ranked, odds, runners_up, frozenset(evidence.alternatives), acting_alike)
 
 
-def _formed(scale: Scale, members: Members) -> dict[str, Member]:
+def _formed(scale: Comparison, members: Members) -> dict[str, Member]:
     """Each member in the heaviest of its likeliest forms, as others are weighed in its place.
 
     It came in with the form that was likeliest while the background had to explain it, too.
     """
     found = dict(members)
     for name in members:
-        forms = scale.heard(_less(found, name)).likeliest(scale.court.forms[name], FORMS)
+        forms = scale.heard(_less(found, name)).likeliest(scale.evidence.forms[name], FORMS)
         found = max([found, *({**found, name: form} for form in forms)], key=scale.weight)
     return found
 
 
-def _sort(court: Court, name: str) -> Sequence[str]:
+def _sort(evidence: Evidence, name: str) -> Sequence[str]:
     """What could stand in its place: rivals for a rival, constants for a constant."""
-    if name not in court.names:
-        return court.rivals
-    return [each for each in court.names if court.constant(each) == court.constant(name)]
+    if name not in evidence.names:
+        return evidence.alternatives
+    return [each for each in evidence.names if evidence.constant(each) == evidence.constant(name)]
 
 
 def _less(members: Members, out: str) -> dict[str, Member]:
@@ -188,6 +248,66 @@ def _less(members: Members, out: str) -> dict[str, Member]:
 
 def aliases(selected: Selected, name: str) -> list[str]:
     """Names that explain a member's part nearly as well, or act in the same way."""
-    rest, twins = selected.runners[name], selected.twins.get(name, frozenset())
-    found = [key for key in rest if rest[key] > selected.odds[name] - ALIKE * (ASSUMED if key in twins else 1.0)]
+    rest, acting_alike = selected.runners_up[name], selected.acting_alike.get(name, frozenset())
+    found = [key for key in rest if rest[key] > selected.odds[name] - ALIKE * (ASSUMED if key in acting_alike else 1.0)]
     return sorted(found, key=lambda key: -rest[key])
+
+
+def with_constants_free(evidence: Evidence) -> Comparison:
+    """A scale on which the lacking constants are as free as those that the file has."""
+    return Comparison(
+        evidence,
+        tuple(Member(evidence.forms[name][0], CONSTANT_UM) for name in evidence.names if evidence.constant(name)),
+    )
+
+
+def with_constants(scale: Comparison, members: Members) -> dict[str, Member]:
+    """The members and the constants that are there.
+
+    Constants are looked for beside what has no name, before other names have taken their part; with those they leave
+    only where the data speak against them.
+    """
+    evidence = scale.evidence
+    offered = [name for name in evidence.names if evidence.constant(name)]
+    if not offered:
+        return dict(members)
+    nameless = {name: member for name, member in members.items() if name in evidence.alternatives}
+    found = {**select(scale, offered, nameless), **members}
+    for name in offered:
+        less = {key: member for key, member in found.items() if key != name}
+        if name in found and scale.weight(less) - scale.price(name) > scale.weight(found):
+            found = less
+    return found
+
+
+def findable_sizes(scale: Comparison) -> dict[str, float]:
+    """The smallest of the sizes, um rms, at which an effect of each name would be found; inf where it is at none."""
+    share = scale.evidence.share([])
+    return {name: _smallest(scale.evidence, name, share, scale.price(name) + entry_price(1)) for name in scale.names}
+
+
+def _smallest(evidence: Evidence, name: str, share: float, needed: float) -> float:
+    """Of the form that shows best."""
+    strengths = [evidence.strength(group, share) for group in evidence.forms[name]]
+    enough = (size for size in SIZES if max(mean_odds(size**2 * each) for each in strengths) >= needed)
+    return next(enough, float("inf"))
+
+
+def mean_odds(shown: Array) -> float:
+    """The log odds that an effect has on average, by the variances (k,) that it shows over those of noise: s^2 d."""
+    return 0.5 * float((shown - np.log1p(shown)).sum())
+
+
+def shows_hardly_anything(sizes: Mapping[str, float], count: int) -> bool:
+    """Whether the data can show hardly any of so many effects."""
+    return sum(size <= SIZES[-1] for size in sizes.values()) < FEW_SHOWN * count
+
+
+def findable_in_words(sizes: Mapping[str, float], count: int) -> str:
+    """How many of so many names would have been found, at which size."""
+    found = [(size, sum(own <= size for own in sizes.values())) for size in SIZES]
+    steps = [(size, number) for k, (size, number) in enumerate(found) if number > (found[k - 1][1] if k else 0)]
+    if not steps:
+        return f"none of {count} effects would have been found, were it {SIZES[-1]:g} um rms"
+    first, *others = [f"from {size:g} um rms on {number}" for size, number in steps]
+    return f"what would have been found: {', '.join([f'{first} of {count} effects', *others])}"

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ncfix.diagnose.findings import Diagnosis, Finding
-from ncfix.diagnose.verdict import NOTHING
-from ncfix.diagnose.words import (
+from ncfix.diagnose.diagnosis import NOTHING, Diagnosis, EffectFinding
+from ncfix.diagnose.presentation import (
     NOISE,
     anew,
     carried,
@@ -48,7 +47,7 @@ def document(diagnosis: Diagnosis) -> Document:
         _residuals(diagnosis),
     ]
     sections += [_next(diagnosis), _unseen(diagnosis)]
-    title = f"Diagnosis of {diagnosis.view.machine.name}"
+    title = f"Diagnosis of {diagnosis.data.machine.name}"
     return Document(title, [section for section in sections if section.parts])
 
 
@@ -58,11 +57,11 @@ def _verdict(diagnosis: Diagnosis) -> Section:
         ("all rows", f"{gap.before:.2f}", f"{gap.after:.2f}", f"{gap.floor:.2f}"),
         ("poses held out", f"{gap.holdout_before:.2f}", f"{gap.holdout_after:.2f}", f"{gap.floor:.2f}"),
     ]
-    files = ", ".join(dict.fromkeys(each.path for each in diagnosis.view.measurements))
+    files = ", ".join(dict.fromkeys(each.path for each in diagnosis.data.measurements))
     noise = f"noise {diagnosis.floor.sigma_um:.2f} um a value, {NOISE[diagnosis.floor.source]}"
     parts: list[Part] = [
         Text(f"{diagnosis.verdict}: {verdict(diagnosis)}."),
-        Text(f"{diagnosis.view.count} rows of {files}; {noise}."),
+        Text(f"{diagnosis.data.count} rows of {files}; {noise}."),
         Table(("gap, um rms", "before", "after", "noise"), rows),
     ]
     if diagnosis.unknown_um:
@@ -98,7 +97,7 @@ def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
         yield from (Text(f"{each[0].upper()}{each[1:]}.") for each in anew(diagnosis))
 
 
-def _finding(diagnosis: Diagnosis, finding: Finding) -> Section:
+def _finding(diagnosis: Diagnosis, finding: EffectFinding) -> Section:
     candidate = finding.candidate
     parts: list[Part] = [Text(f"{candidate.title}. {why(diagnosis, finding)}.")]
     if finding.aliases:
@@ -113,22 +112,22 @@ def _finding(diagnosis: Diagnosis, finding: Finding) -> Section:
     return Section(candidate.name, [*parts, *_curve(diagnosis, finding), *_runners(diagnosis, finding)])
 
 
-def _runners(diagnosis: Diagnosis, finding: Finding) -> Iterator[Part]:
+def _runners(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
     """The names that did not win, by their evidence."""
-    runners = diagnosis.selected.runners.get(finding.candidate.name, {})
-    if runners:
-        best = sorted(runners, key=lambda each: -runners[each])[:RUNNERS]
-        rows = [(finding.candidate.name, f"{finding.odds:.1f}"), *((each, f"{runners[each]:.1f}") for each in best)]
+    runners_up = diagnosis.selected.runners_up.get(finding.candidate.name, {})
+    if runners_up:
+        best = sorted(runners_up, key=lambda each: -runners_up[each])[:RUNNERS]
+        rows = [(finding.candidate.name, f"{finding.odds:.1f}"), *((each, f"{runners_up[each]:.1f}") for each in best)]
         yield Text(f"Evidence, log odds, best of {len(diagnosis.case.considered)} (3 less is 20 times less likely):")
         yield Table(("name", "log odds"), rows)
 
 
-def _curve(diagnosis: Diagnosis, finding: Finding) -> Iterator[Part]:
+def _curve(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
     """Every component over its axis, with a band of two standard deviations; of what warms, what it shows in time."""
     for effect in finding.effects[:CURVES]:
         yield from _component(diagnosis, effect)
     if any((effect.signal or "").startswith(("temp_", "time_s")) for effect in finding.effects):
-        names = np.array(diagnosis.view.names)
+        names = np.array(diagnosis.data.names)
         shown = {
             each: np.where(names == each, finding.shown, np.nan) for each in dict.fromkeys(names[diagnosis.case.kept])
         }
@@ -136,7 +135,7 @@ def _curve(diagnosis: Diagnosis, finding: Finding) -> Iterator[Part]:
 
 
 def _component(diagnosis: Diagnosis, effect: Effect) -> Iterator[Part]:
-    span = diagnosis.view.reach.spans.get(effect.signal or "")
+    span = diagnosis.data.measured.spans.get(effect.signal or "")
     if effect.covariance is None or effect.times is not None or span is None:
         return
     x = np.linspace(*span, 121)
@@ -144,7 +143,7 @@ def _component(diagnosis: Diagnosis, effect: Effect) -> Iterator[Part]:
     variance = np.einsum("nk,kl,nl->n", design, np.asarray(effect.covariance), design)
     factor, unit = (1e6, "urad") if effect.rotational else (1e3, "um")
     value = factor * (design @ np.asarray(effect.coefficients))
-    over = with_unit(diagnosis.view.machine, effect.signal or "")
+    over = with_unit(diagnosis.data.machine, effect.signal or "")
     caption = f"{effect.name}, {unit} over {over}; band: two standard deviations"
     yield Plot(caption, [Line(x, value, 2 * factor * np.sqrt(np.maximum(variance, 0.0)))])
 
@@ -160,28 +159,28 @@ def _residuals(diagnosis: Diagnosis) -> Section:
 
 def _maps(diagnosis: Diagnosis) -> Iterator[Part]:
     """Residuals of all components over each axis that moved."""
-    view = diagnosis.view
+    data = diagnosis.data
     inside, every = diagnosis.case.kept, {"before": diagnosis.before, "after": diagnosis.after}
     sides = {label: values[inside] for label, values in every.items()}
     if not inside.any():
         return
     limit = float(np.quantile(np.abs(sides["before"]), EXTREME)) or 1.0
-    for index, axis in enumerate(view.machine.axes):
-        if view.reach.moved(axis):
-            x = view.q[view.row[inside], index] / axis.unit
+    for index, axis in enumerate(data.machine.axes):
+        if data.measured.moved(axis):
+            x = data.q[data.row[inside], index] / axis.unit
             dots = [Dots(x, np.clip(values, -limit, limit), label) for label, values in sides.items()]
-            yield Plot(f"um over {with_unit(view.machine, axis.name)}", dots)
+            yield Plot(f"um over {with_unit(data.machine, axis.name)}", dots)
     yield from _in_time(diagnosis, "um", {label: np.clip(each, -limit, limit) for label, each in every.items()})
 
 
 def _in_time(diagnosis: Diagnosis, what: str, values: Mapping[str, Array]) -> Iterator[Part]:
     """Values (m,) over the time at which they were measured; nothing without a clock."""
-    time = diagnosis.view.column("time_s")
+    time = diagnosis.data.column("time_s")
     if np.ptp(time) > 0:
         kept = diagnosis.case.kept
         hours = (time - time.min()) / HOUR
         known = {label: kept & np.isfinite(each) for label, each in values.items()}
-        dots = [Dots(hours[diagnosis.view.row[at]], values[label][at], label) for label, at in known.items()]
+        dots = [Dots(hours[diagnosis.data.row[at]], values[label][at], label) for label, at in known.items()]
         yield Plot(f"{what}, over time, h", dots)
 
 
@@ -189,7 +188,7 @@ def _next(diagnosis: Diagnosis) -> Section:
     proposal = diagnosis.proposal
     if proposal is None:
         return Section("To tell names apart", [])
-    head = Text(f"{', '.join((proposal.name, *proposal.rivals))}: {proposal.reason}.")
+    head = Text(f"{', '.join((proposal.name, *proposal.alternatives))}: {proposal.reason}.")
     if proposal.plan is None:
         words = "No measurement of this kind within the travels of the machine would tell them apart."
         return Section("To tell names apart", [head, Text(words)])
@@ -204,7 +203,7 @@ def _next(diagnosis: Diagnosis) -> Section:
 
 
 def _unseen(diagnosis: Diagnosis) -> Section:
-    names = ", ".join(candidate.name for candidate, _ in diagnosis.case.gathered.invisible)
+    names = ", ".join(candidate.name for candidate, _ in diagnosis.case.visible.invisible)
     count = int(diagnosis.case.outlying.sum())
     parts = [Text(f"Not visible with these poses: {names}.")] if names else []
     if count:

@@ -2,7 +2,40 @@
 
 from __future__ import annotations
 
-from ncfix.diagnose.catalogue.build import catalogue, without
-from ncfix.diagnose.catalogue.candidate import Candidate, Reach
+import re
+from collections.abc import Iterable, Sequence
 
-__all__ = ["Candidate", "Reach", "catalogue", "without"]
+from ncfix.diagnose.catalogue.candidate import Candidate, MeasuredRange
+from ncfix.diagnose.catalogue.geometric import linear_candidates, location_candidates, rotary_candidates
+from ncfix.diagnose.catalogue.thermal import thermal_candidates
+from ncfix.diagnose.catalogue.weight import weight_candidates
+from ncfix.plugins import called, handed, registry
+
+__all__ = ["Candidate", "MeasuredRange", "catalogue", "plain", "without"]
+
+
+def catalogue(measured: MeasuredRange) -> tuple[Candidate, ...]:
+    """Every effect with a name that this machine may have, those of plugins too.
+
+    A plugin's effect (hook `register_effects`) with a method `candidates(measured)` brings candidates of its own.
+    """
+    parts = (linear_candidates, rotary_candidates, weight_candidates, thermal_candidates, location_candidates)
+    found = [candidate for candidates in parts for candidate in candidates(measured)]
+    for name, plugin in registry("effects").items():
+        if hasattr(plugin, "candidates"):
+            brought = called("effects", name, plugin.candidates, measured, gives=Iterable)
+            found += [handed("effects", name, candidate, Candidate) for candidate in brought]
+    return tuple(found)
+
+
+def without(candidates: Sequence[Candidate], names: Sequence[str]) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
+    """The candidates but for those named, and the names that none of them has. Case, blank and hyphen do not count."""
+    refused = {plain(name): name for name in names}
+    kept = tuple(candidate for candidate in candidates if plain(candidate.name) not in refused)
+    there = {plain(candidate.name) for candidate in candidates}
+    return kept, tuple(name for key, name in refused.items() if key not in there)
+
+
+def plain(name: str) -> str:
+    """A name as it is compared."""
+    return re.sub(r"[\s_-]+", " ", name).strip().lower()

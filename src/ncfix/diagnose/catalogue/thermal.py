@@ -15,8 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from ncfix.diagnose.catalogue import shapes
-from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Candidate, Reach, across, along, stacked, weighed, zero
+from ncfix.diagnose.catalogue.candidate import (
+    LETTERS,
+    TURNS,
+    Candidate,
+    MeasuredRange,
+    across,
+    along,
+    spline,
+    stacked,
+    time_course,
+    weighed,
+    zero,
+)
 from ncfix.diagnose.catalogue.weight import by_foundation
 from ncfix.machine import Axis, Effect
 from ncfix.machine.axes import SPINDLE
@@ -80,24 +91,24 @@ class Drive:
     forms: tuple[Array, ...]
 
 
-def candidates(reach: Reach) -> Iterator[Candidate]:
+def thermal_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
     """All of them, if time or a temperature was logged."""
-    clocked = "time_s" in reach.columns and reach.clock[1] > reach.clock[0]
-    if not clocked and not reach.sensors:
+    clocked = "time_s" in measured.columns and measured.clock[1] > measured.clock[0]
+    if not clocked and not measured.sensors:
         return
-    inside = {name: FOREIGN if _of(name, HOT) else 1.0 for name in reach.sensors if not _of(name, AIR)}
-    around = {name: FOREIGN for name in reach.sensors if name not in inside}
-    driven = _drive(reach, inside | around, FRAMES, clocked)
-    yield _growth(reach, inside, clocked)
-    yield from _drifts(reach, driven, clocked)
-    for axis in reach.linear:
-        yield from _scales(reach, axis, driven)
+    inside = {name: FOREIGN if _of(name, HOT) else 1.0 for name in measured.sensors if not _of(name, AIR)}
+    around = {name: FOREIGN for name in measured.sensors if name not in inside}
+    driven = _drive(measured, inside | around, FRAMES, clocked)
+    yield _growth(measured, inside, clocked)
+    yield from _drifts(measured, driven, clocked)
+    for axis in measured.linear:
+        yield from _scales(measured, axis, driven)
         yield from _bends(axis, driven)
-    for axis in reach.rotary:
+    for axis in measured.rotary:
         yield _centre(axis, driven)
-    yield _artefact(reach, clocked)
+    yield _artefact(measured, clocked)
     if clocked:
-        yield from _slip(reach)
+        yield from _slip(measured)
 
 
 def _of(sensor: str, words: Sequence[str]) -> bool:
@@ -105,20 +116,20 @@ def _of(sensor: str, words: Sequence[str]) -> bool:
     return any(word in sensor.removeprefix("temp_").split("_") for word in words)
 
 
-def _growth(reach: Reach, inside: Mapping[str, float], clocked: bool) -> Candidate:
-    along_tool = int(np.abs(np.asarray(reach.machine.tool.direction)).argmax())
+def _growth(measured: MeasuredRange, inside: Mapping[str, float], clocked: bool) -> Candidate:
+    along_tool = int(np.abs(np.asarray(measured.machine.tool.direction)).argmax())
     title = "spindle growth: the spindle lengthens as it warms"
     own = {name: 1.0 if _of(name, HOT) or min(inside.values()) == 1.0 else FOREIGN for name in inside}
-    driven = _drive(reach, own, SPINDLES, clocked)
+    driven = _drive(measured, own, SPINDLES, clocked)
     parts: list[Parts] = [[(f"E{LETTERS[along_tool]}{SPINDLE}", {})]]
     return _driven("spindle growth", title, "", parts, driven, "spindle")
 
 
-def _drifts(reach: Reach, driven: Drive, clocked: bool) -> Iterator[Candidate]:
+def _drifts(measured: MeasuredRange, driven: Drive, clocked: bool) -> Iterator[Candidate]:
     """The frame moves along a base axis: with the machine's own heat, or with the hall's day."""
-    held = by_foundation(reach)
-    air = [name for name in reach.sensors if _of(name, AIR)]
-    outside = _drive(reach, dict.fromkeys(air, 1.0), OUTSIDE, clocked, _swing(reach, air))
+    held = by_foundation(measured)
+    air = [name for name in measured.sensors if _of(name, AIR)]
+    outside = _drive(measured, dict.fromkeys(air, 1.0), OUTSIDE, clocked, _swing(measured, air))
     for letter in LETTERS:
         parts: list[Parts] = [[(f"E{letter}0{held.name}", {"carried": True})]]
         title = f"drift of the frame along {letter} as the machine warms"
@@ -128,14 +139,14 @@ def _drifts(reach: Reach, driven: Drive, clocked: bool) -> Iterator[Candidate]:
             yield _driven(f"ambient swing {letter}", title, letter, parts, outside)
 
 
-def _scales(reach: Reach, axis: Axis, driven: Drive) -> Iterator[Candidate]:
+def _scales(measured: MeasuredRange, axis: Axis, driven: Drive) -> Iterator[Candidate]:
     """Positions of a linear axis stretch, from a place along its travel that nobody knows; none of a skewed axis."""
     own = along(axis)
     if own is None:
         return
     title, name = f"thermal scale of {axis.name}: positions stretch with temperature", f"E{LETTERS[own]}{axis.name}"
-    places = np.linspace(*reach.spans[axis.name], HOLDS).tolist()
-    fixed = [[(name, reach.factor(axis) | {"times_center": place}), (name, {})] for place in places]
+    places = np.linspace(*measured.spans[axis.name], HOLDS).tolist()
+    fixed = [[(name, measured.factor(axis) | {"times_center": place}), (name, {})] for place in places]
     yield _driven(f"thermal scale {axis.name}", title, axis.name, fixed, driven, among=[(1.0, BETWEEN)])
 
 
@@ -190,27 +201,27 @@ def _leading(count: int) -> list[list[float]]:
     return [[1.0 if part == leads else BESIDE for part in range(count)] for leads in range(count)]
 
 
-def _swing(reach: Reach, air: Sequence[str]) -> float:
+def _swing(measured: MeasuredRange, air: Sequence[str]) -> float:
     """How much the air swings, against what warms a machine."""
-    return max((reach.warmth[sensor][1] for sensor in air), default=0.0) / WARMER
+    return max((measured.warmth[sensor][1] for sensor in air), default=0.0) / WARMER
 
 
-def _drive(reach: Reach, sensors: Mapping[str, float], body: Body, clocked: bool, course: float = 1.0) -> Drive:
+def _drive(
+    measured: MeasuredRange, sensors: Mapping[str, float], body: Body, clocked: bool, course: float = 1.0
+) -> Drive:
     """Sensors with these variances, and courses of time of such a size besides: that of a body."""
     options: list[dict[str, Any]] = []
-    lags = LAGS if "time_s" in reach.columns else LAGS[:1]
+    lags = LAGS if "time_s" in measured.columns else LAGS[:1]
     for sensor in sensors:
-        each = {"basis": DEGREE, "input": sensor, "center": round(reach.warmth[sensor][0], 1), "scale": WARMER}
+        each = {"basis": DEGREE, "input": sensor, "center": round(measured.warmth[sensor][0], 1), "scale": WARMER}
         options += [each | ({"time_constant_s": lag} if lag else {}) for lag in lags]
     warm = weighed([variance for variance in sensors.values() for _ in lags])
     if not clocked:
         return Drive(tuple(options), (warm,))
-    first, last = reach.clock
+    first, last = measured.clock
     half = (last - first) / 2
-    options.append(
-        {"basis": shapes.spline(pieces=PIECES), "input": "time_s", "center": (first + last) / 2, "scale": half}
-    )
-    slow, quick = (course * shapes.wandering(length / half, PIECES) for length in (body.slow, body.quick))
+    options.append({"basis": spline(pieces=PIECES), "input": "time_s", "center": (first + last) / 2, "scale": half})
+    slow, quick = (course * time_course(length / half, PIECES) for length in (body.slow, body.quick))
     forms = [stacked(warm, np.sqrt(FREE) * slow), stacked(np.sqrt(BADLY) * warm, quick)]
     own = [float(_of(sensor, body.words)) for sensor in sensors for _ in lags]
     if any(own):
@@ -218,10 +229,10 @@ def _drive(reach: Reach, sensors: Mapping[str, float], body: Body, clocked: bool
     return Drive(tuple(options), tuple(forms))
 
 
-def _slip(reach: Reach) -> Iterator[Candidate]:
+def _slip(measured: MeasuredRange) -> Iterator[Candidate]:
     """Before and after a moment differ by a vector; the moment is found out."""
-    first, last = reach.clock
-    held = by_foundation(reach)
+    first, last = measured.clock
+    held = by_foundation(measured)
     moments = first + (last - first) * (np.arange(SLIPS) + 1) / (SLIPS + 1)
     effects = [
         Effect(f"E{letter}0{held.name}", (), PiecewiseConstant(positions=(float(t),)), input="time_s", carried=True)
@@ -240,10 +251,10 @@ def _slip(reach: Reach) -> Iterator[Candidate]:
     )
 
 
-def _artefact(reach: Reach, clocked: bool) -> Candidate:
+def _artefact(measured: MeasuredRange, clocked: bool) -> Candidate:
     """The balls on the table move apart as their plate warms: no error of the machine, and none in its file."""
-    drive = _drive(reach, dict.fromkeys(reach.sensors, 1.0), PLATE, clocked)
+    drive = _drive(measured, dict.fromkeys(measured.sensors, 1.0), PLATE, clocked)
     effects = zero([Effect(f"EX{SPINDLE}", (), **each) for each in drive.options])
     title = "artefact growth: the artefact or workpiece expands with temperature"
-    remedy, needs = "log the artefact's own temperature", reach.sensors
+    remedy, needs = "log the artefact's own temperature", measured.sensors
     return Candidate("artefact growth", title, "", "heat", effects, drive.forms[:1], needs, remedy, True)

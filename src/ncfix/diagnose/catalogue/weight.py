@@ -11,7 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Candidate, Reach, across, along, stacked, weighed, zero
+from ncfix.diagnose.catalogue.candidate import (
+    LETTERS,
+    TURNS,
+    Candidate,
+    MeasuredRange,
+    across,
+    along,
+    stacked,
+    weighed,
+    zero,
+)
 from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE, Axis
 from ncfix.machine.basis import Fourier, Polynomial
@@ -30,22 +40,22 @@ FREE_END = np.array([[1, 0.3], [2, 0.9], [1, 0.9], [0, 0.3], [0, 0]])
 MIRROR = np.diag([1.0, -1.0, 1.0, -1.0, 1.0])
 
 
-def candidates(reach: Reach) -> Iterator[Candidate]:
+def weight_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
     """All of them."""
-    for axis in reach.linear:
-        yield from _beam(reach, axis)
-        yield from _nod(reach, axis)
-        yield _foundation(reach, axis)
-    for axis in reach.rotary:
+    for axis in measured.linear:
+        yield from _beam(measured, axis)
+        yield from _nod(measured, axis)
+        yield _foundation(measured, axis)
+    for axis in measured.rotary:
         if along(axis) is not None:
             yield _table(axis)
-            yield from _unbalanced(reach, axis)
-            yield _sag(reach, axis)
-            yield from _twist(reach, axis)
-    yield from _droop(reach)
+            yield from _unbalanced(measured, axis)
+            yield _sag(measured, axis)
+            yield from _twist(measured, axis)
+    yield from _droop(measured)
 
 
-def _beam(reach: Reach, axis: Axis) -> Iterator[Candidate]:
+def _beam(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
     q, family = axis.name, f"{axis.name} weight"
     sorts: list[tuple[str, str, tuple[Array, ...], str]] = [
         ("bed sag", f"bed of {q} sags under the slide", (BOW,), "re-level the bed")
@@ -57,15 +67,15 @@ def _beam(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     if own is None:
         return
     for kind, title, forms, remedy in sorts:
-        effects, loadings = _deflected(reach, axis, own, forms)
+        effects, loadings = _deflected(measured, axis, own, forms)
         yield Candidate(f"{kind} {q}", title, q, family, effects, loadings, (), remedy)
 
 
 def _deflected(
-    reach: Reach, axis: Axis, own: int, forms: tuple[Array, ...]
+    measured: MeasuredRange, axis: Axis, own: int, forms: tuple[Array, ...]
 ) -> tuple[tuple[Effect, ...], tuple[Array, ...]]:
     """Shift across, its slope as a tilt, and the small shifts of a tilt about another point."""
-    span = reach.scaled(axis)
+    span = measured.scaled(axis)
     effects: list[Effect] = []
     parts: list[list[Array]] = []
     basis = Polynomial(degree=POWERS)
@@ -104,14 +114,14 @@ def _bent(form: Array) -> Array:
     return rest
 
 
-def _nod(reach: Reach, axis: Axis) -> Iterator[Candidate]:
+def _nod(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
     """A slide tilts by where another one is, the more the further out it is itself."""
-    others = [each for each in reach.linear if each is not axis and each.workpiece_side == axis.workpiece_side]
-    others = others or [each for each in reach.linear if each is not axis]
+    others = [each for each in measured.linear if each is not axis and each.workpiece_side == axis.workpiece_side]
+    others = others or [each for each in measured.linear if each is not axis]
     effects, count = [], 0
     for other in others:
         for turn in TURNS:
-            common = reach.scaled(axis) | reach.factor(other)
+            common = measured.scaled(axis) | measured.factor(other)
             for name in (
                 f"E{turn}{axis.name}",
                 *(f"E{x}{axis.name}" for x in LETTERS if TURNS[LETTERS.index(x)] != turn),
@@ -136,11 +146,11 @@ def _placed(block: Array, index: int, count: int) -> Array:
     return whole
 
 
-def _foundation(reach: Reach, axis: Axis) -> Candidate:
+def _foundation(measured: MeasuredRange, axis: Axis) -> Candidate:
     """The whole of one branch tilts against the other as the slide's mass moves; the pivot stays where it is."""
     basis = Polynomial(degree=(1, 2))
-    held = by_foundation(reach)
-    span = reach.scaled(axis)
+    held = by_foundation(measured)
+    span = measured.scaled(axis)
     effects = [Effect(f"E{turn}0{held.name}", (), basis, input=axis.name, carried=True, **span) for turn in TURNS]
     loading = weighed((1.0, 0.15) * 3)
     title = f"foundation or frame tilts as {axis.name} moves"
@@ -150,9 +160,9 @@ def _foundation(reach: Reach, axis: Axis) -> Candidate:
     )  # fmt: skip
 
 
-def by_foundation(reach: Reach) -> Axis:
+def by_foundation(measured: MeasuredRange) -> Axis:
     """An axis next to the foundation, on the tool's side if there is one."""
-    axes = reach.machine.axes
+    axes = measured.machine.axes
     tool = [axis for axis in axes if not axis.workpiece_side]
     return tool[0] if tool else axes[-1]
 
@@ -170,17 +180,17 @@ def _table(axis: Axis) -> Candidate:
     )  # fmt: skip
 
 
-def _unbalanced(reach: Reach, axis: Axis) -> Iterator[Candidate]:
+def _unbalanced(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
     """The load's weight turns the axis, once a turn, in proportion to the mass; not where it stands upright."""
     own = along(axis)
-    if own is None or "load_kg" not in reach.columns:
+    if own is None or "load_kg" not in measured.columns:
         return
     name, wave = f"E{TURNS[own]}{axis.name}", Fourier(order=(1,))
-    tilting = [other for other in reach.rotary if other is not axis]
+    tilting = [other for other in measured.rotary if other is not axis]
     effects = zero(
         [
             Effect(name, (), wave, **LOAD),
-            *(Effect(name, (), wave, **reach.factor(other)) for other in tilting),
+            *(Effect(name, (), wave, **measured.factor(other)) for other in tilting),
             Effect(name, (), wave),
         ]
     )
@@ -194,12 +204,12 @@ def _unbalanced(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     )  # fmt: skip
 
 
-def _sag(reach: Reach, axis: Axis) -> Candidate:
+def _sag(measured: MeasuredRange, axis: Axis) -> Candidate:
     """A swivelling body sags by its own weight and its load, as the sine and cosine of the angle."""
     first, second = across(axis)
     own = along(axis) or 0
     wave = Fourier(order=(1,))
-    loaded: list[dict[str, Any]] = [{}, LOAD] if "load_kg" in reach.columns else [{}]
+    loaded: list[dict[str, Any]] = [{}, LOAD] if "load_kg" in measured.columns else [{}]
     forms = ((TURNS[own],), (LETTERS[first], LETTERS[second]), (TURNS[first], TURNS[second]), (LETTERS[own],))
     names = [f"E{letter}{axis.name}" for form in forms for letter in form]
     effects = zero([Effect(name, (), wave, **state) for state in loaded for name in names])
@@ -219,16 +229,16 @@ def _sag(reach: Reach, axis: Axis) -> Candidate:
     )  # fmt: skip
 
 
-def _twist(reach: Reach, axis: Axis) -> Iterator[Candidate]:
+def _twist(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
     """Driven from one side, a trunnion twists: its angle lags the more the further along it one looks."""
     own = along(axis)
     line = np.abs(np.asarray(axis.direction))
-    others = [each for each in reach.linear if line @ np.abs(np.asarray(each.direction)) > 0.3]
+    others = [each for each in measured.linear if line @ np.abs(np.asarray(each.direction)) > 0.3]
     if own is None or not others:
         return
     name = f"E{TURNS[own]}{axis.name}"
-    loaded = "load_kg" in reach.columns
-    effects = zero([Effect(name, (), Fourier(order=(1,)), **reach.factor(other)) for other in others])
+    loaded = "load_kg" in measured.columns
+    effects = zero([Effect(name, (), Fourier(order=(1,)), **measured.factor(other)) for other in others])
     title = f"trunnion twist of {axis.name}: driven from one side, the angle lags along the axis"
     yield Candidate(
         f"trunnion twist {axis.name}", title, axis.name, f"{axis.name} weight", effects,
@@ -236,13 +246,13 @@ def _twist(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     )  # fmt: skip
 
 
-def _droop(reach: Reach) -> Iterator[Candidate]:
+def _droop(measured: MeasuredRange) -> Iterator[Candidate]:
     """Tool and holder hang by their weight; seen where the tool's way to the weight changes."""
-    heads = [axis for axis in reach.rotary if not axis.workpiece_side]
-    if "tool_length" not in reach.columns or not heads:
+    heads = [axis for axis in measured.rotary if not axis.workpiece_side]
+    if "tool_length" not in measured.columns or not heads:
         return
     long: dict[str, Any] = {"times": "tool_length", "times_center": 0.0, "times_scale": 100.0}
-    tool = int(np.abs(np.asarray(reach.machine.tool.direction)).argmax())
+    tool = int(np.abs(np.asarray(measured.machine.tool.direction)).argmax())
     names = [f"E{TURNS[k]}{SPINDLE}" for k in range(3) if k != tool]
     wave = Fourier(order=(1,))
     effects = zero([Effect(n, (), wave, input=head.name, **long) for head in heads for n in names])

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from ncfix.diagnose.background import Background
-from ncfix.diagnose.view import View
+from ncfix.diagnose.evidence import Background
+from ncfix.diagnose.residual_data import ResidualData
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import orthonormal, without
 
@@ -26,7 +26,7 @@ NEAR = 6
 
 
 @dataclass(frozen=True)
-class Pattern:
+class ResidualPattern:
     """One pattern: in words, its size (rms, um) and how unlikely it is by chance, all looked at considered."""
 
     text: str
@@ -34,18 +34,18 @@ class Pattern:
     p_value: float
 
 
-def patterns(ground: Background, sigma_um: float) -> list[Pattern]:
+def patterns(background: Background, sigma_um: float) -> list[ResidualPattern]:
     """The largest ones, those that explain the same left out.
 
     Each is judged by what the others leave, noise or not: beside a large error of another shape some pattern fits a
     little by chance, however small the noise.
     """
-    view = ground.view
-    weight = 1 / ground.relative
-    basis = orthonormal(view.base * weight[:, None])
-    y = without(basis, (view.y * weight)[:, None])[:, 0]
-    offered = list(_offered(view))
-    found: list[Pattern] = []
+    data = background.data
+    weight = 1 / background.relative
+    basis = orthonormal(data.base * weight[:, None])
+    y = without(basis, (data.y * weight)[:, None])[:, 0]
+    offered = list(_offered(data))
+    found: list[ResidualPattern] = []
     while len(found) < SHOWN and offered:
         gains = [(_gain(basis, y, column * weight), text, column * weight) for text, column in offered]
         most = max(gain for (gain, _), _, _ in gains)
@@ -57,7 +57,7 @@ def patterns(ground: Background, sigma_um: float) -> list[Pattern]:
             break
         left = without(basis, column[:, None])[:, 0]
         explained = left * (left @ y) / (left @ left)
-        found.append(Pattern(text.format(_signed(size)), view.rms(explained * ground.relative), p))
+        found.append(ResidualPattern(text.format(_signed(size)), data.rms(explained * background.relative), p))
         basis = np.column_stack([basis, left / np.linalg.norm(left)])
         y = y - explained
     return found
@@ -75,33 +75,33 @@ def _signed(size: float) -> str:
     return f"{size:+.1f} um"
 
 
-def _offered(view: View) -> Iterator[tuple[str, Array]]:
+def _offered(data: ResidualData) -> Iterator[tuple[str, Array]]:
     """(words with a place for the size, column) of everything that is looked at."""
-    names = list(dict.fromkeys(name for name, row in zip(view.names, view.row, strict=True) if row >= 0))
-    for text, feature in _features(view):
+    names = list(dict.fromkeys(name for name, row in zip(data.names, data.row, strict=True) if row >= 0))
+    for text, feature in _features(data):
         for name in names:
-            own = np.array([each == name for each in view.names]) & (view.row >= 0)
+            own = np.array([each == name for each in data.names]) & (data.row >= 0)
             if own.any() and np.ptp(feature) > 0:
-                yield f"{name} {text}", np.where(own, feature[np.maximum(view.row, 0)], 0.0)
+                yield f"{name} {text}", np.where(own, feature[np.maximum(data.row, 0)], 0.0)
 
 
-def _features(view: View) -> Iterator[tuple[str, Array]]:
+def _features(data: ResidualData) -> Iterator[tuple[str, Array]]:
     u, linear = {}, []
-    for index, axis in enumerate(view.machine.axes):
-        if view.reach.moved(axis):
-            low, high = view.reach.spans[axis.name]
-            u[axis.name] = (view.q[:, index] / axis.unit - (low + high) / 2) * 2 / (high - low)
+    for index, axis in enumerate(data.machine.axes):
+        if data.measured.moved(axis):
+            low, high = data.measured.spans[axis.name]
+            u[axis.name] = (data.q[:, index] / axis.unit - (low + high) / 2) * 2 / (high - low)
             if axis.rotary:
-                yield f"swings with {axis.name} once a turn ({{}})", np.cos(view.q[:, index])
-                yield f"swings with {axis.name} once a turn, a quarter later ({{}})", np.sin(view.q[:, index])
-                yield f"swings with {axis.name} twice a turn ({{}})", np.cos(2 * view.q[:, index])
+                yield f"swings with {axis.name} once a turn ({{}})", np.cos(data.q[:, index])
+                yield f"swings with {axis.name} once a turn, a quarter later ({{}})", np.sin(data.q[:, index])
+                yield f"swings with {axis.name} twice a turn ({{}})", np.cos(2 * data.q[:, index])
             else:
                 linear.append(axis.name)
                 yield f"grows with {axis.name} ({{}} from the middle to the end)", u[axis.name]
             yield f"is bowed along {axis.name} ({{}})", u[axis.name] ** 2 - 1 / 3
             yield f"is bent like an S along {axis.name} ({{}})", u[axis.name] ** 3 - 0.6 * u[axis.name]
-    for letter in view.machine.axis_names:
-        side = view.column(f"dir_{letter}")
+    for letter in data.machine.axis_names:
+        side = data.column(f"dir_{letter}")
         if np.ptp(side) > 0:
             yield f"depends on the direction of {letter} ({{}} when it moves in plus)", side
             for other in linear:
@@ -112,8 +112,8 @@ def _features(view: View) -> Iterator[tuple[str, Array]]:
     for k, first in enumerate(linear):
         for other in linear[k + 1 :]:
             yield f"grows with {first} where {other} is far out ({{}})", u[first] * u[other]
-    for name in ("time_s", "load_kg", "tool_length", *view.reach.sensors):
-        values = view.column(name)
+    for name in ("time_s", "load_kg", "tool_length", *data.measured.sensors):
+        values = data.column(name)
         if np.ptp(values) > 0:
             scaled = (2 * values - values.max() - values.min()) / np.ptp(values)
             yield f"changes with {name} ({{}} from the middle to the end)", scaled
@@ -122,22 +122,22 @@ def _features(view: View) -> Iterator[tuple[str, Array]]:
                     yield f"grows with {other} as {name} rises ({{}})", scaled * u[other]
 
 
-def clustering(ground: Background, residual: Array, places: Array) -> float:
+def clustering(background: Background, residual: Array, places: Array) -> float:
     """Moran's I of neighbouring poses: 0 for residuals that do not know of their neighbours, 1 for equal ones.
 
     residual (m,) um; places (n, k) of the rows. Source: Moran, "Notes on continuous stochastic phenomena" (1950).
     """
     from scipy.spatial import cKDTree
 
-    view = ground.view
-    if view.count <= NEAR + 1:
+    data = background.data
+    if data.count <= NEAR + 1:
         return 0.0
     _, near = cKDTree(places).query(places, k=NEAR + 1)
     total, count, square = 0.0, 0, 0.0
-    for name in dict.fromkeys(view.names):
-        own = np.array([each == name for each in view.names]) & (view.row >= 0)
-        value = np.full(view.count, np.nan)
-        value[view.row[own]] = residual[own] / ground.relative[own]
+    for name in dict.fromkeys(data.names):
+        own = np.array([each == name for each in data.names]) & (data.row >= 0)
+        value = np.full(data.count, np.nan)
+        value[data.row[own]] = residual[own] / background.relative[own]
         known = np.isfinite(value[near]).all(axis=1)
         products = value[near[known, :1]] * value[near[known, 1:]]
         total, count = total + float(products.sum()), count + products.size

@@ -1,13 +1,21 @@
-"""A diagnosis in words."""
+"""A diagnosis in words.
+
+A diagnosis as a JSON object, and its machine with provenance.
+"""
 
 from __future__ import annotations
 
-from ncfix.diagnose import power
-from ncfix.diagnose.addition import Moved
-from ncfix.diagnose.carriers import carriers, conditions
-from ncfix.diagnose.findings import Diagnosis, Finding
-from ncfix.diagnose.next_poses import Proposal
-from ncfix.diagnose.verdict import AMBIGUOUS, FOUND, NOTHING, UNKNOWN
+import datetime
+from typing import Any
+
+import numpy as np
+
+from ncfix.diagnose.assessment import carriers, conditions
+from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, EffectFinding
+from ncfix.diagnose.joint_fit import MovedConstant
+from ncfix.diagnose.next_poses import Proposal, as_objects
+from ncfix.diagnose.selection import findable_in_words, shows_hardly_anything
+from ncfix.machine import Machine
 
 SHOWN = 0.05
 """um and urad: what is smaller is not there."""
@@ -19,7 +27,6 @@ SAID = {
     AMBIGUOUS: "the model lacks something, and these data leave more than one name for it",
     UNKNOWN: "the model lacks something that is not in the catalogue",
 }
-
 NOISE = {
     "repeats": "from repeats",
     "given": "as the files state it",
@@ -76,18 +83,18 @@ def anew(diagnosis: Diagnosis) -> list[str]:
 def silence(diagnosis: Diagnosis) -> list[str]:
     """What it means that nothing was found."""
     count = len(diagnosis.case.considered)
-    lines = ["these data can show hardly anything"] if power.blind(diagnosis.findable, count) else []
-    return [*lines, power.said(diagnosis.findable, count)]
+    lines = ["these data can show hardly anything"] if shows_hardly_anything(diagnosis.findable, count) else []
+    return [*lines, findable_in_words(diagnosis.findable, count)]
 
 
-def constant(moved: Moved) -> str:
+def constant(moved: MovedConstant) -> str:
     """A constant of the file, and what the data say."""
     factor, unit = moved.unit
     file, data, sigma = (factor * value for value in (moved.file, moved.data, moved.sigma))
     return f"{moved.name}: {file:.4g} in the file, {data:.4g} +- {sigma:.2g} {unit} by the data"
 
 
-def constants(finding: Finding) -> str:
+def constants(finding: EffectFinding) -> str:
     """The largest error of the joint beside what machines have."""
     judged = finding.judgement
     if judged is None:
@@ -99,7 +106,7 @@ def constants(finding: Finding) -> str:
     return f"the joint's own error reaches {' and '.join(reached)} where it was measured{limit}" if reached else ""
 
 
-def odd(finding: Finding) -> str:
+def odd(finding: EffectFinding) -> str:
     """What is odd about the constants."""
     return (
         f"hardly plausible: {'; '.join(finding.judgement.remarks)}"
@@ -108,9 +115,9 @@ def odd(finding: Finding) -> str:
     )
 
 
-def carried(diagnosis: Diagnosis, finding: Finding) -> str:
+def carried(diagnosis: Diagnosis, finding: EffectFinding) -> str:
     """Which targets can carry the effect."""
-    machine = diagnosis.view.machine
+    machine = diagnosis.data.machine
     named = ", ".join(carriers(machine, finding.effects))
     given = ", ".join(conditions(machine, finding.effects))
     return f"can be carried by {named}" + (f", with {given} stated" if given else "") if named else ""
@@ -131,9 +138,13 @@ def _next(diagnosis: Diagnosis) -> list[str]:
     if p is None:
         return []
     if p.plan is None:
-        alike = ", ".join((p.name, *p.rivals))
+        alike = ", ".join((p.name, *p.alternatives))
         return ["", f"{alike}: {p.reason}; no measurement of this kind would tell them apart"]
-    lines = ["", f"to tell {p.name} from {', '.join(p.rivals)} ({p.reason}):", f"  {hope(p)}; --next FILE writes them"]
+    lines = [
+        "",
+        f"to tell {p.name} from {', '.join(p.alternatives)} ({p.reason}):",
+        f"  {hope(p)}; --next FILE writes them",
+    ]
     lines += [f"  {said}" for said in (unusual(p), hopeless(p)) if said]
     return lines
 
@@ -168,14 +179,126 @@ def hopeless(proposal: Proposal) -> str:
     return f"{', '.join(proposal.alike)}: no measurement of this kind would tell that apart" if proposal.alike else ""
 
 
-def why(diagnosis: Diagnosis, finding: Finding) -> str:
+def why(diagnosis: Diagnosis, finding: EffectFinding) -> str:
     """One sentence on why this name."""
     name = finding.candidate.name
     said = f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} (p = {finding.p_value:.1g})"
-    runners = diagnosis.selected.runners.get(name, {})
-    if not runners:
+    runners_up = diagnosis.selected.runners_up.get(name, {})
+    if not runners_up:
         return said
-    best = max(runners, key=lambda each: runners[each])
-    less = finding.odds - runners[best]
+    best = max(runners_up, key=lambda each: runners_up[each])
+    less = finding.odds - runners_up[best]
     beside = f"{abs(less):.0f} {'less' if less >= 0 else 'more'}"
     return f"{said}; next best of {len(diagnosis.case.considered)}: {best}, {beside}"
+
+
+def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:
+    """The fields of docs/formats.md, section 4, and some more."""
+    return {
+        "verdict": diagnosis.verdict,
+        "effects": [_effect(diagnosis, each) for each in diagnosis.findings],
+        "unknown": {"share_um": diagnosis.unknown_um, "where": diagnosis.rest.kind},
+        "gap_um": {name: getattr(diagnosis.gap, name) for name in diagnosis.gap.__dataclass_fields__},
+        "where": [{"text": p.text, "rms_um": p.rms_um, "p_value": p.p_value} for p in diagnosis.patterns],
+        "next_measurements": as_objects(diagnosis.proposal.plan)
+        if diagnosis.proposal and diagnosis.proposal.plan
+        else [],
+        "ambiguity": _ambiguity(diagnosis),
+        "machine": machine,
+        "noise": {
+            "sigma_um": diagnosis.floor.sigma_um,
+            "source": diagnosis.floor.source,
+            "freedom": diagnosis.floor.freedom,
+        },
+        "lack_of_fit": {"before": diagnosis.p_lack, "after": diagnosis.p_left},
+        "invisible": [{"name": c.name, "visible_share": share} for c, share in diagnosis.case.visible.invisible],
+        "findable_um": {name: size if np.isfinite(size) else None for name, size in diagnosis.findable.items()},
+        "considered": len(diagnosis.case.considered),
+        "outliers": _outliers(diagnosis),
+        "constants": [{"name": m.name, "file": m.file, "data": m.data, "sigma": m.sigma} for m in diagnosis.moved],
+    }
+
+
+def _effect(diagnosis: Diagnosis, finding: EffectFinding) -> dict[str, Any]:
+    return {
+        "name": finding.candidate.name,
+        "title": finding.candidate.title,
+        "axis": finding.candidate.axis or None,
+        "why": why(diagnosis, finding),
+        "size_um": finding.size_um,
+        "coefficients": [
+            {"name": each.name, "basis": each.basis.name, "labels": each.basis.labels, "values": each.coefficients}
+            for each in finding.effects
+        ],
+        "sigma": [
+            np.sqrt(np.maximum(np.diag(np.asarray(each.covariance)), 0.0)).tolist() if each.covariance else None
+            for each in finding.effects
+        ],
+        "log_odds": finding.odds,
+        "p_value": finding.p_value,
+        "aliases": list(finding.aliases),
+        "remedy": finding.candidate.remedy,
+        "plausible": _plausible(finding),
+        "targets": list(carriers(diagnosis.data.machine, finding.effects)),
+        "conditions": list(conditions(diagnosis.data.machine, finding.effects)),
+    }
+
+
+def _plausible(finding: EffectFinding) -> dict[str, Any] | None:
+    if finding.judgement is None:
+        return None
+    names, judged = ("um", "urad"), finding.judgement
+    bounds = dict(zip(names, judged.bounds, strict=True)) if judged.bounds else None
+    return {
+        "is": judged.plausible,
+        "largest": dict(zip(names, judged.largest, strict=True)),
+        "bounds": bounds,
+        "remarks": list(judged.remarks),
+    }
+
+
+def _ambiguity(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    if diagnosis.proposal is None:
+        return None
+    p = diagnosis.proposal
+    return {
+        "name": p.name,
+        "rivals": p.alternatives,
+        "reason": p.reason,
+        "alike": p.alike,
+        "stuck": p.stuck,
+        "told_apart": {
+            "now": p.before,
+            "after": p.after,
+            "chance": p.chance,
+            "times_each": p.times if p.plan is not None else None,
+        },
+        "beyond_travels_measured": list(p.beyond),
+        "tip_beyond": p.strays,
+        "new_tool_lengths": list(p.tools),
+    }
+
+
+def _outliers(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    places, first = [], 0
+    for each in diagnosis.data.measurements:
+        for row in np.flatnonzero(diagnosis.case.outlying[first : first + len(each)]):
+            place = each.place(int(row))
+            places.append({"path": place.path, "line": place.line})
+        first += len(each)
+    return places
+
+
+def with_provenance(diagnosis: Diagnosis) -> Machine:
+    """The machine with where its new effects come from."""
+    assert diagnosis.machine is not None
+    notes = {
+        "date": datetime.date.today(),
+        "source": ", ".join(dict.fromkeys(each.path for each in diagnosis.data.measurements)),
+        "diagnosed_from": diagnosis.data.machine.hash,
+        "added": ", ".join(each.candidate.name for each in diagnosis.findings),
+        "gap_before_um": round(diagnosis.gap.before, 3),
+        "gap_after_um": round(diagnosis.gap.after, 3),
+        "noise_um": round(diagnosis.gap.floor, 3),
+    }
+    return diagnosis.machine.replace(provenance={**diagnosis.machine.provenance, **notes})

@@ -2,6 +2,8 @@
 
 All values in um; one entry per measured value, m in all. `base` are the columns of what is free anyway: the unknowns of
 the set-ups, and the constants of the machine file (lines, squareness, gains), which a day and a set-up change.
+
+How well a machine file as it stands agrees with data: its constants nearly fixed, only the set-up free.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnose.catalogue.candidate import Reach
+from ncfix.diagnose.catalogue.candidate import MeasuredRange
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import SPINDLE, Axis
 from ncfix.machine.basis import ConstantBasis, Polynomial
@@ -26,12 +28,23 @@ STEPS = 6
 SETTLED_UM = 1e-3
 FAR = 1.0
 """How far from the middle of what was measured a workpiece is held, in times its size."""
-HARDLY = 1e-5
+UNTELLABLE = 1e-5
 """Singular values below this, of the largest, are taken for what cannot be told."""
+TIGHT_UM = 4.0
+"""How far each constant of a machine file may have moved since, at the tool tip."""
+FREE_UM = 500.0
+"""The same where they are free: no more, or what cannot be told runs away."""
+WIDE_UM = 1e5
+TRIM = 0.97
+"""Share of the values that count: the rest may be outliers."""
+EXACT_STEPS = 4
+"""Most steps of least squares on the exact model."""
+EXACT_SETTLED_UM = 0.05
+"""A step that changes no prediction by so much is the last one."""
 
 
 @dataclass(frozen=True, repr=False)
-class View:
+class ResidualData:
     """One entry per value.
 
     problem   the stacked observations with the free constants as unknown effects
@@ -153,7 +166,7 @@ class View:
         return float(np.sqrt((values[inside] ** 2).sum() / max(rows, 1)))
 
     @cached_property
-    def reach(self) -> Reach:
+    def measured(self) -> MeasuredRange:
         """What was measured."""
         units = np.array([axis.unit for axis in self.machine.axes])
         places = np.concatenate([*self._ends, self.q]) / units
@@ -167,7 +180,7 @@ class View:
         time = self.column("time_s")
         sensors = {name: self.column(name) for name in moving if name.startswith("temp_")}
         warmth = {name: (float(values.mean()), float(values.std())) for name, values in sensors.items()}
-        return Reach(self.machine, spans, frozenset(moving), (float(time.min()), float(time.max())), warmth)
+        return MeasuredRange(self.machine, spans, frozenset(moving), (float(time.min()), float(time.max())), warmth)
 
     def unstated(self, axis: Axis) -> list[str]:
         """The files that moved an axis and do not say from where it came, where others do."""
@@ -186,7 +199,7 @@ class View:
         return [end for each in self.problem.observations for end in getattr(each, "ends", [])]
 
 
-def view(measurements: Sequence[Measurement], machine: Machine) -> View:
+def residual_data(measurements: Sequence[Measurement], machine: Machine) -> ResidualData:
     """Fit what is free, and take everything else to first order about it."""
     selection = Selection(machine.effects, tuple(is_free(effect) for effect in machine.effects))
     problem = Problem.of(measurements, machine, selection)
@@ -200,7 +213,7 @@ def view(measurements: Sequence[Measurement], machine: Machine) -> View:
         if np.abs(base @ change).max(initial=0.0) < SETTLED_UM:
             break
     residual = problem.residual(coefficients, unknowns)
-    return View(problem, coefficients, unknowns, UM * residual, base, _rows(problem), relative)
+    return ResidualData(problem, coefficients, unknowns, UM * residual, base, _rows(problem), relative)
 
 
 def relative_noise(problem: Problem) -> Array:
@@ -220,7 +233,7 @@ def damped(columns: Array, y: Array) -> Array:
     size = np.sqrt((columns**2).mean(axis=0))
     size = np.where(size > 0, size, 1.0)
     left, values, right = np.linalg.svd(columns / size, full_matrices=False)
-    kept = values > HARDLY * values.max(initial=1e-300)
+    kept = values > UNTELLABLE * values.max(initial=1e-300)
     found: Array = right[kept].T @ ((left[:, kept].T @ y) / values[kept]) / size
     return found
 
@@ -240,3 +253,72 @@ def _rows(problem: Problem) -> Index:
         rows.append(np.where(each.rows < 0, -1, each.rows + first))
         first += len(each.measurement)
     return np.concatenate(rows)
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """A machine file against data.
+
+    problem   what is fitted: the set-up, constants of the file, and effects that are `loose` besides
+    relative  (m,) standard deviation of each value against that of a plain one
+    noise     of the instrument, um
+    loose     how many coefficients are free besides
+    """
+
+    problem: Problem
+    relative: Array
+    noise: float
+    loose: int
+
+    def left(self, prior_um: float = TIGHT_UM) -> float:
+        """Root mean square of residual values, um, without the largest; what constants moved is counted as misfit."""
+        return _fitted(self.problem, self.relative, self.noise, prior_um, self.loose)[0]
+
+    @property
+    def count(self) -> int:
+        """How many values count."""
+        return int(TRIM * len(self.relative))
+
+    @property
+    def free(self) -> float:
+        """The same with constants free."""
+        return self.left(FREE_UM)
+
+    @property
+    def coefficients(self) -> Array:
+        """Those that are loose."""
+        every = _fitted(self.problem, self.relative, self.noise, TIGHT_UM, self.loose)[1]
+        return every[len(every) - self.loose :]
+
+
+def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequence[Effect] = ()) -> Misfit:
+    """Ready to be asked."""
+    selection = Selection((*machine.effects, *loose), tuple(map(is_free, (*machine.effects, *loose))))
+    problem = Problem.of(measurements, machine, selection)
+    known = [each.sigma for each in problem.observations if each.noise_known]
+    sigma = UM * float(np.median(np.concatenate(known) if known else problem.sigma))
+    return Misfit(problem, relative_noise(problem), sigma, sum(effect.basis.size for effect in loose))
+
+
+def _fitted(problem: Problem, relative: Array, sigma: float, prior_um: float, free: int) -> tuple[float, Array]:
+    """Least squares with a prior on the constants, on the exact model."""
+    start, unknowns = problem.selection.start, problem.start
+    coefficients, k = start.copy(), len(unknowns)
+    for _ in range(EXACT_STEPS):
+        columns = UM * np.concatenate([problem.nuisance(unknowns), problem.design], axis=1) / relative[:, None]
+        size = np.sqrt((columns**2).mean(axis=0))
+        size = np.where(size > 0, size, 1.0)
+        allowed = np.full(columns.shape[1], WIDE_UM)
+        allowed[k : len(allowed) - free] = prior_um
+        pull = sigma / allowed
+        y = UM * problem.residual(coefficients, unknowns) / relative
+        back = -pull * size * np.concatenate([np.zeros(k), coefficients - start])
+        stacked = np.concatenate([columns / size, np.diag(pull)])
+        change = np.linalg.lstsq(stacked, np.concatenate([y, back]), rcond=1e-9)[0] / size
+        unknowns, coefficients = unknowns + change[:k], coefficients + change[k:]
+        if np.abs(columns @ change).max(initial=0.0) < EXACT_SETTLED_UM:
+            break
+    y = np.abs(UM * problem.residual(coefficients, unknowns) / relative)
+    y = np.sort(np.where(np.isfinite(y), y, 1e12))[: int(TRIM * len(y))]
+    moved = (pull * size * np.concatenate([np.zeros(k), coefficients - start]))[k:]
+    return float(np.sqrt(((y**2).sum() + (moved**2).sum()) / len(y))), coefficients

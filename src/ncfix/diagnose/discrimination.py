@@ -1,17 +1,25 @@
-"""Poses chosen by exchange, so that whichever name is true, rivals that are refitted to them still err."""
+"""Poses chosen by exchange, so that whichever name is true, rivals that are refitted to them still err.
+
+Each name in turn taken for the true one, and every other refitted to old and new rows together.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import ndtr
 
+from ncfix.diagnose.evidence import Evidence
+from ncfix.diagnose.forms import EffectForm
 from ncfix.diagnose.selection import ALIKE
-from ncfix.measure.measurement import Array
+from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.observation import Observation
+from ncfix.measure.observe import observe
 
 COUNT = 12
 """Poses that are chosen."""
@@ -23,10 +31,14 @@ LITTLE = 5e-3
 """A pass that gains less is the last one."""
 LEAN = 0.01
 """What an e-fold of what is told apart is worth where the chance is nearly one or nearly nothing anyway."""
+TOLD_APART = 6.0
+"""Squared noise units from which on a rival may be told apart: then the odds are 20 to 1 in one of two measurements."""
+WEAK = 1e-6
+"""Prior on what is free, so that unseen combinations do no harm."""
 
 
 @dataclass(frozen=True, repr=False)
-class Contest:
+class Discrimination:
     """One name against another that imitates it: information of the old rows, and the blocks of every pose on offer.
 
     matrix, vector, square  inner products of what may be refitted, of that with the signal, of the signal
@@ -77,7 +89,7 @@ class Contest:
         return white @ white.T, self.signal.ravel() - white @ solve_triangular(factor, self.vector, lower=True)
 
 
-Round = Sequence[Contest]
+Round = Sequence[Discrimination]
 """A name that may be the true one, against each of the others."""
 
 
@@ -131,3 +143,89 @@ def climbed(rounds: Sequence[Round], chosen: list[int]) -> list[int]:
         if value < before + LITTLE:
             break
     return chosen
+
+
+@dataclass(frozen=True, repr=False)
+class Hypothesis:
+    """A name with what it would be: its likeliest form, the numbers behind it, and all forms with their sizes in um."""
+
+    group: EffectForm
+    numbers: Array
+    forms: tuple[tuple[EffectForm, float], ...]
+
+
+@dataclass(frozen=True, repr=False)
+class HypothesisPairs:
+    """All contests between some names, over poses on offer.
+
+    names     the first is the one that was chosen
+    contests  for each name, were it true, one against each of the others in their order
+    count     poses on offer
+    """
+
+    names: tuple[str, ...]
+    contests: list[list[Discrimination]]
+    count: int
+
+    @staticmethod
+    def of(evidence: Evidence, sides: Sequence[Hypothesis], offered: Measurement, sigma: float) -> HypothesisPairs:
+        """Those between the sides; `sigma` is the noise of a value, um."""
+        new = observe(offered, evidence.background.data.machine)
+        pairs = [[(true, other) for other in sides if other is not true] for true in sides]
+        contests = [[_contest(evidence, new, *pair, sigma) for pair in own] for own in pairs]
+        return HypothesisPairs(tuple(side.group.owner.name for side in sides), contests, len(offered))
+
+    @cached_property
+    def able(self) -> list[list[bool]]:
+        """Whether all poses together would tell the other from the true one, for each contest."""
+        return [[each.told(range(self.count)) > TOLD_APART for each in own] for own in self.contests]
+
+    @cached_property
+    def useful(self) -> list[list[Discrimination]]:
+        """The contests that poses can decide, of the names that have any."""
+        kept = [list(compress(own, can)) for own, can in zip(self.contests, self.able, strict=True)]
+        return [own for own in kept if own]
+
+    @property
+    def told_from_first(self) -> tuple[str, ...]:
+        """The others that can be told from the first name, or it from them."""
+        ways = zip(self.names[1:], self.able[0], self.able[1:], strict=True)
+        return tuple(name for name, there, back in ways if there or back[0])
+
+    @property
+    def stuck(self) -> tuple[str, ...]:
+        """The names that some other would imitate at all poses, were they true."""
+        return tuple(name for name, can in zip(self.names, self.able, strict=True) if not all(can))
+
+
+def _contest(evidence: Evidence, new: Observation, true: Hypothesis, other: Hypothesis, sigma: float) -> Discrimination:
+    """Columns: set-up of the old rows, of the new ones, constants of the machine, the forms of the other."""
+    data = evidence.background.data
+    constants = data.problem.design.shape[1]
+    used = data.base.shape[1] - constants
+    setup = 1e3 * new.unknown_design(new.unknowns.start)
+    fresh, weight = setup.shape[1], 1 / (sigma * data.relative)
+    imitating = [size * group.columns for group, size in other.forms]
+    old = np.concatenate([data.base[:, :used], np.zeros((len(data.y), fresh)), data.base[:, used:], *imitating], axis=1)
+    imitating = [size * _shown(new, group) for group, size in other.forms]
+    kinematic = 1e3 * new.design(data.problem.selection.estimated)
+    rows = np.concatenate([np.zeros((len(setup), used)), setup, kinematic, *imitating], axis=1)
+    free = used + fresh + constants
+    scale = np.ones(old.shape[1])
+    scale[:free] = np.sqrt((old[:, :free] ** 2).mean(axis=0) + (rows[:, :free] ** 2).mean(axis=0))
+    scale = np.where(scale > 0, scale, 1.0)
+    prior = np.concatenate([np.full(free, WEAK), np.ones(old.shape[1] - free)])
+    old, rows = old / scale * weight[:, None], rows / scale / sigma
+    signal = (true.group.columns @ true.numbers) * weight
+    count = len(new.measurement)
+    return Discrimination(
+        old.T @ old + np.diag(prior), old.T @ signal, float(signal @ signal),
+        rows.reshape(count, -1, rows.shape[1]), (_shown(new, true.group) @ true.numbers / sigma).reshape(count, -1),
+    )  # fmt: skip
+
+
+def _shown(new: Observation, group: EffectForm) -> Array:
+    """What the numbers of a form show in the poses on offer, um."""
+    used = group.loading.any(axis=1)
+    shown: Array = 1e3 * new.design(group.owner.effects)[:, used] @ group.loading[used]
+    return shown

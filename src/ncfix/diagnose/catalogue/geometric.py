@@ -1,0 +1,246 @@
+"""Effects of linear axes by position and direction: curves, screws, lost motion. Rows 2 to 12 of the catalogue.
+
+Effects of rotary axes by angle and direction. Rows 21 to 27 and 37 of the catalogue.
+
+Where axes lie, and gains: constants that the machine file does not have. Rows 1, 7 and 20 of the catalogue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ncfix.diagnose.catalogue.candidate import (
+    LETTERS,
+    LOST,
+    SMOOTH,
+    TURNS,
+    Candidate,
+    MeasuredRange,
+    across,
+    along,
+    bent_loading,
+    harmonic_variances,
+    spline,
+    stacked,
+    turned_loading,
+    weighed,
+    zero,
+)
+from ncfix.machine import Effect
+from ncfix.machine.axes import Axis, component_title
+from ncfix.machine.basis import Backlash, Fourier, Periodic, Polynomial
+from ncfix.measure.measurement import Array
+
+PIVOT = 10.0
+"""mm: how far the point about which a slide tilts lies from the reference point stated, in each direction."""
+HALF = 0.5
+"""Of a play: how far its middle may lie from the zero of the axis."""
+PITCHES = (4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 25.0, 30.0, 32.0, 40.0)
+"""mm: usual screws, where the machine file does not say."""
+WORN = "re-measure the axis directly; a scale or guide that changes locally is worn"
+SLACK = "check nut preload, thrust bearings and coupling"
+GUIDE = "check the preload of the guide"
+ORDERS = (1, 2, 3, 4, 5, 6, 7, 8)
+SCALE_ORDERS = ORDERS[:4]
+"""Those of an encoder: more waves a turn are a worm's, which swells along the turn, too."""
+TEETH = tuple(range(5, 181))
+"""Errors per turn that a worm, gear or encoder may have."""
+ONE = (np.eye(1),)
+
+
+def linear_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
+    """All of them."""
+    for axis in measured.linear:
+        yield from _curves(measured, axis)
+        yield from _screw(measured, axis)
+        if f"dir_{axis.name}" in measured.columns:
+            yield from _lost(measured, axis)
+
+
+def _curves(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
+    span = measured.scaled(axis)
+    for component in LETTERS + TURNS:
+        name = f"E{component}{axis.name}"
+        parts = zero([Effect(each, (), spline(), **span) for each in (name, *swept(component, axis))])
+        shift = [bent_loading(length) for length in SMOOTH]
+        tilt = [turned_loading(length) for length in SMOOTH]
+        own = shift if component in LETTERS else tilt
+        loadings = tuple(stacked(a, *[PIVOT * b] * (len(parts) - 1)) for a, b in zip(own, shift, strict=True))
+        yield Candidate(
+            name, component_title(name, axis), axis.name, f"{axis.name} geometry", parts, loadings, (), WORN, lead=1
+        )
+
+
+def swept(component: str, axis: Axis) -> tuple[str, ...]:
+    """The shifts that come with a tilt if its pivot is not at the reference point; none for a shift."""
+    if component in LETTERS:
+        return ()
+    return tuple(f"E{letter}{axis.name}" for letter in LETTERS if letter != LETTERS[TURNS.index(component)])
+
+
+def _screw(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
+    own = along(axis)
+    if own is None:
+        return
+    name, span = f"E{LETTERS[own]}{axis.name}", measured.factor(axis)
+    low, high = measured.spans[axis.name]
+    pitches = (axis.pitch,) if axis.pitch else tuple(p for p in PITCHES if p < (high - low) / 3)
+    waves = [Effect(name, (), Periodic(order=(1, 2, 3), period=pitch)) for pitch in pitches]
+    waves += [replace(wave, **span) for wave in waves]
+    if not waves:
+        return
+    title = f"screw of {axis.name}: an error that repeats with its pitch"
+    remedy = "check the alignment of the screw's bearings and coupling"
+    loadings = tuple(_of_pitch(k, len(pitches)) for k in range(len(pitches)))
+    yield Candidate(f"pitch {axis.name}", title, axis.name, f"{axis.name} geometry", zero(waves), loadings, (), remedy)
+
+
+def _of_pitch(index: int, count: int) -> Array:
+    """The columns of one pitch: its harmonics, and the same growing along the screw."""
+    variances = np.zeros((2, count, 6))
+    variances[0, index] = harmonic_variances(3)
+    variances[1, index] = 0.3 * np.asarray(harmonic_variances(3))
+    whole = weighed(variances.ravel())
+    kept: Array = whole[:, whole.any(axis=0)]
+    return kept
+
+
+def _lost(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
+    span, needs = measured.scaled(axis), (f"dir_{axis.name}",)
+    play, family = Backlash(degree=(0, 1, 2)), f"{axis.name} reversal"
+    own = along(axis)
+    for component in LETTERS + TURNS:
+        symbol = f"E{component}{axis.name}"
+        tilt = component in TURNS
+        if not tilt and LETTERS.index(component) == own:
+            name, title, remedy = f"backlash {axis.name}", f"backlash of {axis.name}: lost motion at reversal", SLACK
+        else:
+            sort = "angular" if tilt else "lateral"
+            name, remedy = f"{sort} play {symbol}", GUIDE
+            way = f"about {LETTERS[TURNS.index(component)]}" if tilt else f"in {component}"
+            title = f"{sort} play of {axis.name} {way} at reversal"
+        parts = [Effect(each, (), play, **span) for each in (symbol, *swept(component, axis))]
+        loading = stacked(weighed(LOST), *[PIVOT * weighed(LOST)] * (len(parts) - 1))
+        if tilt:  # half of the play either way, or all of it one way: the zero may have been set on either side
+            parts, loading = [*parts, Effect(symbol, ())], stacked(loading, np.array([[HALF]]))
+        yield Candidate(name, title, axis.name, family, zero(parts), (loading,), needs, remedy, lead=1)
+
+
+def rotary_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
+    """All of them."""
+    for axis in measured.rotary:
+        own = along(axis)
+        if own is None:
+            continue
+        yield from _motions(axis, own)
+        yield _worm(axis, own)
+        if f"dir_{axis.name}" in measured.columns:
+            yield _backlash(measured, axis, own)
+        yield from _seat(measured, axis)
+
+
+def _motions(axis: Axis, own: int) -> Iterator[Candidate]:
+    """Radial, axial, wobble, encoder: one name each, whatever the order."""
+    q, first, second = axis.name, *across(axis)
+    bearing = "check the bearing and how its rings are seated"
+    sorts = (
+        (f"radial {q}", f"radial error motion of {q}: eccentric, oval", (LETTERS[first], LETTERS[second]), bearing),
+        (f"axial {q}", f"axial error motion of {q}: face run-out", (LETTERS[own],), bearing),
+        (f"wobble {q}", f"wobble of {q}: its axis tilts with the angle", (TURNS[first], TURNS[second]), bearing),
+        (
+            f"encoder {q}",
+            f"encoder of {q} out of centre: angular positioning",
+            (TURNS[own],),
+            "centre the encoder ring",
+        ),
+    )
+    for name, title, letters, remedy in sorts:
+        orders = SCALE_ORDERS if name.startswith("encoder") else ORDERS
+        effects = zero([Effect(f"E{letter}{q}", (), Fourier(order=orders)) for letter in letters])
+        loading = stacked(*[weighed(harmonic_variances(len(orders)))] * len(letters))
+        yield Candidate(name, title, q, f"{q} turning", effects, (loading,), (), remedy)
+
+
+def _worm(axis: Axis, own: int) -> Candidate:
+    """Many waves a turn: how many is found out."""
+    effect = zero([Effect(f"E{TURNS[own]}{axis.name}", (), Fourier(order=TEETH))])
+    columns = np.eye(2 * len(TEETH))
+    loadings: tuple[Array, ...] = tuple(columns[:, 2 * k : 2 * k + 2] for k in range(len(TEETH)))
+    title = f"worm or gear of {axis.name}: several waves a turn"
+    return Candidate(
+        f"worm {axis.name}", title, axis.name, f"{axis.name} turning", effect, loadings, (), "check the worm"
+    )
+
+
+def _backlash(measured: MeasuredRange, axis: Axis, own: int) -> Candidate:
+    effect = zero([Effect(f"E{TURNS[own]}{axis.name}", (), Backlash(degree=(0, 1, 2)), **measured.scaled(axis))])
+    title = f"backlash of {axis.name}: lost motion at reversal"
+    return Candidate(
+        f"backlash {axis.name}", title, axis.name, f"{axis.name} reversal", effect, (weighed(LOST),),
+        (f"dir_{axis.name}",), "adjust the worm or the drive's preload",
+    )  # fmt: skip
+
+
+def _seat(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
+    """The seat of a rotary axis yields with the place of a linear axis: of which one, and which way, is found out."""
+    if not measured.linear:
+        return
+    wave = Fourier(order=(1,))
+    places = [(other, letter) for other in measured.linear for letter in LETTERS]
+    effects = zero([Effect(f"E{letter}{axis.name}", (), wave, **measured.factor(other)) for other, letter in places])
+    columns = np.eye(2 * len(effects))
+    each = 2 * len(LETTERS)
+    every = [slice(each * k, each * (k + 1)) for k in range(len(measured.linear))]
+    single = [slice(2 * k, 2 * k + 2) for k in range(len(places))]
+    loadings = tuple(columns[:, part] for part in (*every, *single))
+    title = f"rotary seat of {axis.name}: an error of its turn that grows with a linear position"
+    name = f"rotary seat {axis.name}"
+    yield Candidate(name, title, axis.name, f"{axis.name} turning", effects, loadings, (), "check the seat")
+
+
+def location_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
+    """Those that the file lacks.
+
+    Gains, and lines of which the file says nothing, go before all other effects. Where it has some of the lines, what
+    it lacks says the same again for the most part: those are names like others.
+    """
+    known = {effect.name for effect in measured.machine.effects}
+    for axis in (*measured.linear, *measured.rotary):
+        for name in _lines(axis):
+            if name not in known:
+                title = component_title(name, axis)
+                remedy = "re-measure where the axis lies"
+                effect = zero([Effect(name, ())])
+                family, first = f"{axis.name} location", not _located(measured, axis)
+                yield Candidate(name, title, axis.name, family, effect, ONE, (), remedy, constant=first)
+    for axis in measured.linear:
+        own, name = along(axis), _gain(axis)
+        if own is not None and not any(_is_gain(effect, name) for effect in measured.machine.effects):
+            gain = zero([Effect(name, (), Polynomial(degree=(1,)), **measured.scaled(axis))])
+            title = f"scale of {axis.name}: positions too long or too short in proportion"
+            yield Candidate(
+                f"scale {axis.name}", title, axis.name, f"{axis.name} geometry", gain, ONE, (), "", constant=True
+            )
+
+
+def _gain(axis: Axis) -> str:
+    return f"E{LETTERS[along(axis) or 0]}{axis.name}"
+
+
+def _located(measured: MeasuredRange, axis: Axis) -> bool:
+    """Whether the file says where this axis lies; of linear axes, where any of them does."""
+    names = {axis.name} if axis.rotary else {each.name for each in measured.linear}
+    return any(effect.location and effect.joint in names for effect in measured.machine.effects)
+
+
+def _is_gain(effect: Effect, name: str) -> bool:
+    return effect.name == name and isinstance(effect.basis, Polynomial) and 1 in effect.basis.degree
+
+
+def _lines(axis: Axis) -> tuple[str, ...]:
+    """The location errors that an axis line can have."""
+    tilts = tuple(f"E{TURNS[k]}0{axis.name}" for k in across(axis))
+    return (*(f"E{LETTERS[k]}0{axis.name}" for k in across(axis)), *tilts) if axis.rotary else tilts

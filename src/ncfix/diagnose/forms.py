@@ -1,0 +1,419 @@
+"""Candidates as columns of the data: what each form of an effect would show, with a size of 1 um.
+
+The size is the root mean square over rows of the length of what a row shows, before anything else is fitted. So all
+effects compete on one scale, that of the tool tip.
+
+Whatever depends smoothly on pose or time, or on from where the axes came: rivals at the tool tip.
+
+Gaussian processes of three independent components, along the tool, the base or the workpiece.
+
+Whatever one joint may do: rivals by its own position, its direction, another axis, time.
+
+All its six errors at once, with the same share each, and each of them alone.
+
+Effects without a name, as rivals of those with one.
+
+They hold more than any name does and pay for it in the evidence; where such a rival explains the data better all the
+same, the effect is not in the catalogue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+
+from ncfix.diagnose.catalogue import Candidate
+from ncfix.diagnose.catalogue.candidate import (
+    LETTERS,
+    TURNS,
+    MeasuredRange,
+    bent_loading,
+    smooth_loading,
+    spline,
+    stacked,
+    weighed,
+    zero,
+)
+from ncfix.diagnose.residual_data import UNTELLABLE, ResidualData
+from ncfix.machine import Effect
+from ncfix.machine.axes import SPINDLE, Axis
+from ncfix.machine.basis import Backlash, Fourier, Polynomial
+from ncfix.measure.geometry import base_from_workpiece
+from ncfix.measure.measurement import Array
+from ncfix.measure.solve import orthonormal, without
+
+VISIBLE = 0.05
+"""Share of an effect's squares that must be left beside what is free."""
+NEGLIGIBLE = 3e-3
+"""Share of a form's squares that may be dropped."""
+UNSEEN_UM = 1e-9
+HOLD_POINTS = tuple(product((-0.5, 0.5), repeat=3))
+"""Where what grows is held, in times `view.FAR` its size: in the middle of each eighth of it."""
+HOLD_SPREAD = 0.5 / np.sqrt(3)
+"""How far from there it may be, rms, in each direction."""
+LEAD_SHARE = 0.5
+"""Share of a tilt's squares that must be the tilt, not the shifts of a pivot elsewhere: else it has no lever here."""
+UNNAMED_FAMILY = "unnamed"
+"""Family of the rivals."""
+POSE = Candidate("unknown by pose", "something that depends on where the axes are", "", UNNAMED_FAMILY, (), ())
+TIME = Candidate("unknown by time", "something that happens in the course of time", "", UNNAMED_FAMILY, (), ())
+DIRECTION = Candidate(
+    "unknown by way", "something that depends on from where the axes came", "", UNNAMED_FAMILY, (), ()
+)
+POSE_LENGTHS = (0.8, 1.6)
+"""Of half the travel of every axis at once."""
+PAIR_LENGTH = 0.7
+"""The same where two axes at a time matter."""
+JERK = 300.0
+"""s: over which a course of time bends that no warmth has."""
+TIME_LENGTHS = (1200.0, 2400.0, 7200.0)
+"""s: over which it bends, with kinks, as thermal effects of the catalogue do: a rival may do what they may."""
+STEP_MEMORY = 3600.0
+"""s: how long a step or a walk in time is remembered."""
+MOST_FUNCTIONS = 50
+"""Functions of pose or time that are kept, the smoothest."""
+DROPPED = 0.01
+"""Share of squares that may be dropped."""
+VARIATION_LENGTH = 1.0
+"""Of half the travel of an axis, and of the time: over which the shape of an effect may differ from the catalogue's."""
+VARIATIONS = 16
+"""Functions of them that are kept."""
+FULL_TURN = 270.0
+"""degree: an axis that turned further is taken for one that turns round and round."""
+JOINT_BEND = 0.4
+"""Length of the bends of what a joint may do, of half its travel; of what time does, `SLOW`."""
+TIME_BEND = 0.3
+WAVES = (1.0, 0.7, 0.5, 0.3, 0.2, 0.2)
+"""Variances of the waves a turn."""
+PLAY = (1.0, 1.0, 0.5, 0.3)
+JointPart = tuple[str, dict[str, Any], Array]
+"""Component, options of the effect, and the loading of its coefficients."""
+SAME_AS_NAME = 0.8
+"""Share of an error's squares, beside what is free, that makes it the same as a name."""
+
+
+@dataclass(frozen=True, repr=False)
+class EffectForm:
+    """One form of a candidate.
+
+    owner     the candidate
+    loading   (k, p) from p independent numbers to its coefficients, per um
+    columns   (m, p) what those show, um
+    """
+
+    owner: Candidate
+    loading: Array
+    columns: Array
+
+
+@dataclass(frozen=True, repr=False)
+class VisibleForms:
+    """The groups that the data show, and the candidates that they cannot show, with the share that is left."""
+
+    groups: tuple[EffectForm, ...]
+    invisible: tuple[tuple[Candidate, float], ...]
+
+
+def visible_forms(data: ResidualData, candidates: Sequence[Candidate]) -> VisibleForms:
+    """All forms of all candidates that can be seen."""
+    basis = orthonormal(data.base / data.relative[:, None])
+    groups: list[EffectForm] = []
+    invisible = []
+    every = data.design([effect for candidate in candidates for effect in candidate.effects])
+    ends = np.cumsum([0, *(sum(effect.basis.size for effect in each.effects) for each in candidates)])
+    for candidate, start, stop in zip(candidates, ends[:-1], ends[1:], strict=True):
+        design, loadings = every[:, start:stop], candidate.loadings
+        if candidate.grows:
+            design, loadings = data.expansion(candidate.effects), tuple(expansion_loadings(loadings))
+        forms = [form for loading in loadings if (form := _form(data, candidate, loading, design)) is not None]
+        shares = [_visible_share(basis, form.columns / data.relative[:, None]) for form in forms]
+        seen = [form for form, share in zip(forms, shares, strict=True) if share >= VISIBLE]
+        groups += seen
+        if not seen:
+            invisible.append((candidate, max(shares, default=0.0)))
+    return VisibleForms(tuple(groups), tuple(invisible))
+
+
+def expansion_loadings(loadings: Sequence[Array]) -> Iterator[Array]:
+    """Loadings of what grows from where it is held: there it stays, so all of it moves by one course.
+
+    One of `HOLDS` in turn; the true place is somewhere about it.
+    """
+    for course in loadings:
+        about = stacked(np.zeros((len(course), 0)), *[HOLD_SPREAD * course] * 3)
+        for place in HOLD_POINTS:
+            yield np.hstack([np.kron(np.array([[1.0], *([x] for x in place)]), course), about])
+
+
+def without_lacking_constants(data: ResidualData, columns: Array, named: Sequence[EffectForm]) -> Array:
+    """Columns without what constants that the machine file lacks would show: that is left to those."""
+    constants = [group.columns for group in named if group.owner.constant]
+    if not constants:
+        return columns
+    lacking = np.concatenate(constants, axis=1)
+    free = np.concatenate([data.base, lacking], axis=1) / data.relative[:, None]
+    size = np.linalg.norm(free, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    shares = np.linalg.lstsq(free / size, columns / data.relative[:, None], rcond=UNTELLABLE)[0] / size[:, None]
+    rest: Array = columns - lacking @ shares[data.base.shape[1] :]
+    return rest
+
+
+def _form(data: ResidualData, candidate: Candidate, loading: Array, design: Array) -> EffectForm | None:
+    """The form at a size of 1 um, with as few columns as it needs."""
+    used = loading.any(axis=1)
+    columns = design[:, used] @ loading[used]
+    size = data.rms(np.linalg.norm(columns, axis=1))
+    if size < UNSEEN_UM or _lead_squares(candidate, loading, design) < LEAD_SHARE * size**2 * data.count:
+        return None
+    turned = principal_rotation(columns / size)
+    return EffectForm(candidate, loading @ turned / size, columns @ turned / size)
+
+
+def _lead_squares(candidate: Candidate, loading: Array, design: Array) -> float:
+    """Squares of what the effect itself shows, without what comes with it; all of it where nothing does."""
+    if not candidate.lead:
+        return np.inf
+    own = slice(0, sum(effect.basis.size for effect in candidate.effects[: candidate.lead]))
+    return float(((design[:, own] @ loading[own]) ** 2).sum())
+
+
+def principal_rotation(columns: Array) -> Array:
+    """The rotation (p, r) to as few columns as carry nearly all of their squares."""
+    squares, turned = np.linalg.eigh(columns.T @ columns)
+    kept: Array = turned[:, np.cumsum(squares) > NEGLIGIBLE * squares.sum()]
+    return kept
+
+
+def _visible_share(basis: Array, columns: Array) -> float:
+    return float((without(basis, columns) ** 2).sum() / (columns**2).sum())
+
+
+def _smooth_fields(data: ResidualData) -> Iterator[EffectForm | None]:
+    """All of them; none where the data do not show the tool tip."""
+    tip = data.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in LETTERS]) / 1e3
+    if np.abs(tip).max() > 0:
+        for way in tip_frames(data, tip):
+            for owner, kernel in _kernels(data):
+                yield _at_tip(data, owner, way, kernel)
+
+
+def tip_frames(data: ResidualData, tip: Array) -> tuple[Array, ...]:
+    """What a shift of the tip along axes of the tool, of the base and of the workpiece shows, (m, 3) each.
+
+    Those that are one are there once: tool and base where nothing turns the tool, base and workpiece where nothing
+    turns the workpiece.
+    """
+    sides = [axis.workpiece_side for axis in data.machine.axes if axis.rotary]
+    found, row = [tip], np.maximum(data.row, 0)
+    observed = data.problem.observations
+    turned = np.concatenate([each.machine.nominal(each.q, each.state.tool_length)[:, :3, :3] for each in observed])
+    if not all(sides):
+        found.append(np.einsum("mj,mkj->mk", tip, (base_from_workpiece(data.machine, data.q) @ turned)[row]))
+    if any(sides):
+        found.append(np.einsum("mj,mkj->mk", tip, turned[row]))
+    return tuple(found)
+
+
+def _kernels(data: ResidualData) -> Iterator[tuple[Candidate, Array]]:
+    """Covariances of rows, (n, n)."""
+    u = scaled_axes(data)
+    for length in POSE_LENGTHS:
+        yield POSE, _squared_exponential(u, length)
+    single = [_squared_exponential(u[:, [k]], PAIR_LENGTH) for k in range(u.shape[1])]
+    if len(single) > 1:
+        yield POSE, sum((a * b for a, b in combinations(single, 2)), np.zeros_like(single[0]))
+    time = data.column("time_s")
+    if np.ptp(time) > 0:
+        yield TIME, _squared_exponential(time[:, None], JERK)
+        for length in TIME_LENGTHS:
+            apart = np.sqrt(3) * np.abs(time[:, None] - time) / length
+            yield TIME, (1 + apart) * np.exp(-apart)
+        yield TIME, np.exp(-np.abs(time[:, None] - time) / STEP_MEMORY)
+    sides = _directions(data)
+    if sides.shape[1]:
+        yield DIRECTION, (sides @ sides.T) * (1 + sum(single, np.zeros_like(single[0])))
+
+
+def _squared_exponential(u: Array, length: float) -> Array:
+    apart = ((u[:, None] - u) ** 2).sum(axis=-1)
+    kernel: Array = np.exp(-0.5 * apart / length**2)
+    return kernel
+
+
+def _directions(data: ResidualData) -> Array:
+    """Directions from which the axes came, those that changed, (n, k)."""
+    names = [f"dir_{axis.name}" for axis in data.machine.axes if f"dir_{axis.name}" in data.measured.columns]
+    return np.stack([data.column(name) for name in names], axis=-1) if names else np.zeros((data.count, 0))
+
+
+def scaled_axes(data: ResidualData) -> Array:
+    """The axes that moved, -1 ... 1 each; full turns as points of a circle, (n, k)."""
+    columns = []
+    for index, axis in enumerate(data.machine.axes):
+        values = data.q[:, index]
+        low, high = float(values.min()), float(values.max())
+        if not data.measured.moved(axis) or high == low:  # of a length both ends count for the reach, one is the row's
+            continue
+        if axis.rotary and high - low > 1.5 * np.pi:
+            columns += [np.cos(values), np.sin(values)]
+        else:
+            columns.append((2 * values - low - high) / (high - low))
+    return np.stack(columns, axis=-1) if columns else np.zeros((data.count, 1))
+
+
+def kernel_functions(kernel: Array, most: int = MOST_FUNCTIONS) -> Array:
+    """Functions (n, k) whose inner products are nearly this covariance."""
+    squares, vectors = np.linalg.eigh(kernel)
+    squares, vectors = squares[::-1][:most], vectors[:, ::-1][:, :most]
+    kept = squares > 1e-6 * squares[0]
+    found: Array = vectors[:, kept] * np.sqrt(squares[kept])
+    return found
+
+
+def shape_variations(data: ResidualData) -> Array:
+    """Smooth functions of each axis and of the time, of variance one together, (m, k)."""
+    time = data.column("time_s")
+    signals = [*scaled_axes(data).T, *([2 * (time - time.mean()) / np.ptp(time)] if np.ptp(time) > 0 else [])]
+    kernel = sum(np.exp(-0.5 * (u[:, None] - u) ** 2 / VARIATION_LENGTH**2) for u in signals) / len(signals)
+    return kernel_functions(np.asarray(kernel), VARIATIONS)[np.maximum(data.row, 0)]
+
+
+def _at_tip(data: ResidualData, owner: Candidate, way: Array, kernel: Array) -> EffectForm | None:
+    """Three independent components."""
+    own = kernel_functions(kernel)[np.maximum(data.row, 0)]
+    return combined_form(data, owner, [way[:, [k]] * own for k in range(way.shape[1])])
+
+
+def combined_form(data: ResidualData, owner: Candidate, parts: Sequence[Array]) -> EffectForm | None:
+    """The parts with the same share each, at a size of 1 um together, with as few columns as they need."""
+    sizes = [data.rms(np.linalg.norm(part, axis=1)) for part in parts]
+    columns = [part / size for part, size in zip(parts, sizes, strict=True) if size > 0]
+    if not columns:
+        return None
+    whole = np.concatenate(columns, axis=1) / np.sqrt(len(columns))
+    squares, vectors = np.linalg.eigh(whole.T @ whole)
+    kept = np.cumsum(squares) > DROPPED * squares.sum()
+    return EffectForm(owner, np.zeros((0, int(kept.sum()))), whole @ vectors[:, kept])
+
+
+def _joint_forms(data: ResidualData) -> Iterator[EffectForm | None]:
+    """Of every joint, by all it may depend on: its six errors with the same share each, and each alone."""
+    sorts = [(axis, *sort) for axis in _moved(data.measured) for sort in _sorts(data.measured, axis)]
+    parts = [part for _, _, components in sorts for component in components for part in component]
+    designs = _designs(data, [Effect(name, (), **options) for name, options, _ in parts])
+    shown = iter([design @ loading for design, (_, _, loading) in zip(designs, parts, strict=True)])
+    for axis, what, components in sorts:
+        own = [np.concatenate([next(shown) for _ in component], axis=1) for component in components]
+        yield combined_form(data, _something(axis, f"something of {axis.name}", what), own)
+        for component, part in zip(components, own, strict=True):
+            effects = zero([Effect(name, (), **options) for name, options, _ in component])
+            yield combined_form(data, replace(_something(axis, component[0][0], what), effects=effects), [part])
+
+
+def _designs(data: ResidualData, effects: Sequence[Effect]) -> list[Array]:
+    """What each effect's coefficients show."""
+    ends = np.cumsum([effect.basis.size for effect in effects])
+    return np.split(data.design(zero(effects)), ends[:-1], axis=1)
+
+
+def _something(axis: Axis, error: str, what: str) -> Candidate:
+    title = f"{error} by {what} that has no name in the catalogue"
+    return Candidate(f"unknown of {axis.name}", title, axis.name, UNNAMED_FAMILY, (), ())
+
+
+def _moved(measured: MeasuredRange) -> tuple[Axis, ...]:
+    return (*measured.linear, *measured.rotary)
+
+
+def _sorts(measured: MeasuredRange, axis: Axis) -> Iterator[tuple[str, list[list[JointPart]]]]:
+    """What each component may do: by position, direction, another axis, time."""
+    names = [f"E{letter}{axis.name}" for letter in LETTERS + TURNS]
+    options, loading = _curve(measured, axis)
+    yield "its position", [[(name, options, _curved(axis, name, loading))] for name in names]
+    if f"dir_{axis.name}" in measured.columns:
+        play = {"basis": Backlash(degree=(0, 1, 2, 3)), **measured.scaled(axis)}
+        yield "its direction", [[(name, play, weighed(PLAY))] for name in names]
+    others = [other for other in _moved(measured) if other is not axis]
+    for other in others:
+        yield f"its position and {other.name}", [[(name, options | measured.factor(other), loading)] for name in names]
+    for what, driven in (("time or heat", _warm(measured)), ("load", _loaded(measured))):
+        if driven:
+            yield what, [[(name, *each) for each in driven] for name in names]
+            product = [(options | measured.factor(axis), loading) for options, loading in driven]
+            yield f"its position and {what}", [[(name, *each) for each in product] for name in names]
+
+
+def _curve(measured: MeasuredRange, axis: Axis) -> tuple[dict[str, Any], Array]:
+    if axis.rotary and np.ptp(measured.spans[axis.name]) > FULL_TURN:
+        return {"basis": Fourier(order=tuple(range(1, len(WAVES) + 1)))}, weighed(np.repeat(WAVES, 2))
+    return {"basis": spline(), **measured.scaled(axis)}, smooth_loading(JOINT_BEND)
+
+
+def _curved(axis: Axis, name: str, loading: Array) -> Array:
+    """Without what is straight in a shift: that is where the axis lies, or its gain, and has a name of its own."""
+    return loading if axis.rotary or name[1] in TURNS else bent_loading(JOINT_BEND)
+
+
+def _warm(measured: MeasuredRange) -> list[tuple[dict[str, Any], Array]]:
+    """Time and temperatures as options of effects."""
+    found: list[tuple[dict[str, Any], Array]] = []
+    if "time_s" in measured.columns:
+        first, last = measured.clock
+        middle = {"center": (first + last) / 2, "scale": (last - first) / 2}
+        found.append(({"basis": spline(), "input": "time_s", **middle}, smooth_loading(TIME_BEND)))
+    for name in measured.sensors:
+        options = {"basis": Polynomial(degree=(1,)), "input": name, "center": measured.warmth[name][0], "scale": 5.0}
+        found.append((options, np.eye(1)))
+    return found
+
+
+def _loaded(measured: MeasuredRange) -> list[tuple[dict[str, Any], Array]]:
+    """The same of the load."""
+    options = {"basis": Polynomial(degree=(1,)), "input": "load_kg", "center": 0.0, "scale": 100.0}
+    return [(options, np.eye(1))] if "load_kg" in measured.columns else []
+
+
+def unnamed_alternatives(data: ResidualData, named: Sequence[EffectForm]) -> tuple[EffectForm, ...]:
+    """All of them, several forms each; none where the data do not show the tool tip.
+
+    What a constant that the machine file lacks would show is left to that: a rival has no part in it.
+    """
+    anywhere = list(_smooth_fields(data))
+    found = [group for group in (*anywhere, *(_joint_forms(data) if anywhere else ())) if group is not None]
+    if found and any(group.owner.constant for group in named):
+        columns = without_lacking_constants(data, np.concatenate([group.columns for group in found], axis=1), named)
+        ends = np.cumsum([group.columns.shape[1] for group in found])[:-1]
+        parts = np.split(columns, ends, axis=1)
+        found = [replace(group, columns=own) for group, own in zip(found, parts, strict=True)]
+    return tuple(_not_in_catalogue(data, found, named))
+
+
+def _not_in_catalogue(
+    data: ResidualData, groups: Sequence[EffectForm], named: Sequence[EffectForm]
+) -> list[EffectForm]:
+    """Without the single errors that a name holds already: those are that name with another shape, or course."""
+    basis = orthonormal(data.base / data.relative[:, None])
+    own: dict[str, list[Array]] = {}
+    for group in named:
+        left = without(basis, group.columns / data.relative[:, None])
+        span = orthonormal(left)
+        for key in _errors(group):
+            own.setdefault(key, []).append(span)
+    return [
+        group for group in groups if not _is_held(without(basis, group.columns / data.relative[:, None]), group, own)
+    ]
+
+
+def _errors(group: EffectForm) -> set[str]:
+    """The errors it consists of; and the course of time if it is nothing but one, wherever it acts."""
+    return {effect.name for effect in group.owner.effects} | ({"slow"} if group.owner.slow else set())
+
+
+def _is_held(left: Array, group: EffectForm, spans: Mapping[str, Sequence[Array]]) -> bool:
+    held = [((span.T @ left) ** 2).sum() for key in _errors(group) for span in spans.get(key, ())]
+    return bool(max(held, default=0.0) > SAME_AS_NAME * (left**2).sum())

@@ -1,0 +1,334 @@
+"""The named effects in the model: all coefficients fitted together, and the machine file that has them.
+
+Does it predict what was not used to find it? Whole regions of the poses are left out, one quarter at a time.
+
+What a name must show besides evidence: that it predicts, and that it matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnose.evidence import Background, Comparison, Evidence, Member
+from ncfix.diagnose.forms import EffectForm, scaled_axes
+from ncfix.diagnose.noise import ASIDE
+from ncfix.diagnose.residual_data import ResidualData
+from ncfix.diagnose.selection import Selected, with_alternatives
+from ncfix.machine import Effect, Machine
+from ncfix.machine.basis import Basis, Fourier, Polynomial
+from ncfix.machine.effects import Unit, units
+from ncfix.measure.measurement import Array, Index
+from ncfix.measure.solve import orthonormal, without
+
+Mask = NDArray[np.bool_]
+WIDE = 1e3
+"""um: how far a constant of the machine file may be off; wide enough to be no prior, and what cannot be seen stays."""
+TRACE = 1e-12
+FIRM = 3.0
+"""Standard deviations by which the data must ask for another constant; else the machine file keeps its own."""
+REGIONS = 16
+FOLDS = 4
+BLIND = 1e2
+"""Times the noise: a value predicted no better than this has a set-up that nothing else shares; it does not count."""
+MATERIAL_UM = 0.8
+"""An effect that moves the tool tip by less is not worth a name."""
+RATHER = 0.5
+"""An effect smaller than this share of what has no name is as good as part of it."""
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """Everything fitted at once.
+
+    constants   (k,) changes of the free constants of the machine file, from where the view has them
+    sigmas      (k,) their standard deviations
+    numbers     for each member (p,) the numbers behind its coefficients; `covariances` of them
+    shown       for each member (m,) what it shows, um
+    before      (m,) residual with the constants alone; after with the members
+    """
+
+    constants: Array
+    sigmas: Array
+    numbers: tuple[Array, ...]
+    covariances: tuple[Array, ...]
+    shown: tuple[Array, ...]
+    before: Array
+    after: Array
+
+    @property
+    def together(self) -> Array:
+        """What all members show, (m,) um."""
+        whole: Array = np.sum([np.zeros(len(self.before)), *self.shown], axis=0)
+        return whole
+
+
+def fitted(evidence: Evidence, members: Sequence[Member], share: float, stay: Mask | None = None) -> JointFit:
+    """The most probable coefficients of constants and members together, and the residuals.
+
+    stay  (k,) free constants that are left as the machine file has them; None: none
+    """
+    data, free = evidence.background.data, evidence.background.data.base
+    back = data.problem.selection.start - data.coefficients
+    loose = np.ones(len(back), dtype=bool) if stay is None else ~stay
+    kept = np.concatenate([np.ones(free.shape[1] - len(back), dtype=bool), loose])
+    y = data.y - free[:, ~kept] @ back[~loose]
+    lengths = _lengths(free[:, kept])
+    base, parts_of = free[:, kept] / lengths, [evidence.groups[m.group].columns for m in members]
+    columns, n = np.concatenate([base, *parts_of], axis=1), base.shape[1]
+    widths = [part.shape[1] for part in parts_of]
+    own = [np.full(width, m.size**-2) for m, width in zip(members, widths, strict=True)]
+    prior = np.concatenate([np.full(n, WIDE**-2), *own])
+    precision = evidence.background.precision(share)
+    z, spread = _solved(columns, y, precision, prior)
+    alone, _ = _solved(base, y, precision, prior[:n])
+    parts = [slice(a, b) for a, b in pairwise(n + np.cumsum([0, *widths]))]
+    numbers = tuple(z[part] for part in parts)
+    shown = tuple(part @ own_numbers for part, own_numbers in zip(parts_of, numbers, strict=True))
+    constants, sigmas = back.copy(), np.zeros(len(back))
+    constants[loose] = (z[:n] / lengths)[n - loose.sum() :]
+    sigmas[loose] = (np.sqrt(np.diag(spread)[:n]) / lengths)[n - loose.sum() :]
+    covariances = tuple(spread[part, part] for part in parts)
+    return JointFit(constants, sigmas, numbers, covariances, shown, y - base @ alone, y - columns @ z)
+
+
+def constant_changes(evidence: Evidence, joint: JointFit) -> Array:
+    """(k,) how far the data move the free constants from what the machine file says, in mm and rad."""
+    data = evidence.background.data
+    change: Array = data.coefficients + joint.constants - data.problem.selection.start
+    return change
+
+
+@dataclass(frozen=True, slots=True)
+class MovedConstant:
+    """A constant of the machine file that the data put elsewhere, surely: mm or rad, with its standard deviation.
+
+    unit  what these are multiplied with to be in the unit that people use, and its name
+    """
+
+    name: str
+    file: float
+    data: float
+    sigma: float
+    unit: Unit
+
+
+def moved_constants(evidence: Evidence, joint: JointFit) -> tuple[MovedConstant, ...]:
+    """The constants that the data move by more than three standard deviations."""
+    data = evidence.background.data
+    selection, change = data.problem.selection, constant_changes(evidence, joint)
+    said = [unit for effect in selection.estimated for unit in units(data.machine, effect)]
+    start = selection.start
+    return tuple(
+        MovedConstant(
+            selection.labels[k], float(start[k]), float(start[k] + change[k]), float(joint.sigmas[k]), said[k]
+        )
+        for k in np.flatnonzero(np.abs(change) > FIRM * joint.sigmas).tolist()
+    )
+
+
+def with_firm_constants(evidence: Evidence, members: Sequence[Member], share: float, joint: JointFit) -> JointFit:
+    """The fit in which constants stay that the data do not ask to change; the one given if it needs them changed.
+
+    A constant that the data hardly see takes any value that helps a little, and would do harm at other poses.
+    """
+    stay = np.abs(constant_changes(evidence, joint)) <= FIRM * joint.sigmas
+    held, precision = fitted(evidence, members, share, stay), evidence.background.precision(share)
+    worse, count = _misfit(held.after, precision) - _misfit(joint.after, precision), int(stay.sum())
+    return joint if worse > count + FIRM * np.sqrt(2 * count) else held
+
+
+def _misfit(residual: Array, precision: Array) -> float:
+    return float(residual @ precision @ residual)
+
+
+def _lengths(columns: Array) -> Array:
+    """Sizes of columns as root mean squares, one for those that are zero."""
+    size = np.sqrt((columns**2).mean(axis=0))
+    return np.where(size > 0, size, 1.0)
+
+
+def _solved(columns: Array, y: Array, precision: Array, prior: Array) -> tuple[Array, Array]:
+    weighed = precision @ columns
+    spread = np.linalg.inv(columns.T @ weighed + np.diag(prior))
+    found: Array = spread @ (weighed.T @ y)
+    return found, np.asarray(spread)
+
+
+def machine_with(
+    evidence: Evidence, members: Sequence[Member], joint: JointFit
+) -> tuple[Machine, list[tuple[Effect, ...]]]:
+    """The machine with constants changed and effects added; and the effects that each member brought."""
+    data = evidence.background.data
+    start = data.problem.selection.start
+    coefficients = data.coefficients + joint.constants
+    coefficients = np.where(np.isclose(coefficients, start, rtol=1e-9, atol=0.0), start, coefficients)
+    machine = data.problem.selection.machine(data.machine, coefficients.tolist())
+    added = [
+        effects_of(evidence.groups[m.group], numbers, spread)
+        for m, numbers, spread in zip(members, joint.numbers, joint.covariances, strict=True)
+    ]
+    every = (*machine.effects, *(effect for each in added for effect in each))
+    return machine.replace(effects=every), added
+
+
+def effects_of(group: EffectForm, numbers: Array, spread: Array) -> tuple[Effect, ...]:
+    """The effects of a form with their coefficients, without those that are zero; none for what is no error."""
+    if group.owner.grows:
+        return ()
+    values = group.loading @ numbers
+    covariance = group.loading @ spread @ group.loading.T
+    found, start = [], 0
+    for effect in group.owner.effects:
+        part = slice(start, start + effect.basis.size)
+        start = part.stop
+        own = np.abs(group.loading[part]).sum(axis=1) > TRACE * np.abs(group.loading).sum()
+        if own.any():
+            found.append(_trimmed(effect, values[part], covariance[part, part], own))
+    return tuple(found)
+
+
+def _trimmed(effect: Effect, values: Array, covariance: Array, own: Array) -> Effect:
+    """The effect with its coefficients; orders and powers that the form does not have are left out."""
+    basis, keep = _fewer(effect.basis, own)
+    even = (covariance + covariance.T)[np.ix_(keep, keep)] / 2
+    return replace(
+        effect, basis=basis, coefficients=tuple(float(v) for v in values[keep]),
+        covariance=tuple(tuple(float(v) for v in row) for row in even),
+    )  # fmt: skip
+
+
+def _fewer(basis: Basis, own: Array) -> tuple[Basis, Array]:
+    if isinstance(basis, Fourier):
+        pairs = [bool(pair.any()) for pair in own.reshape(-1, 2)]
+        orders = tuple(k for k, kept in zip(basis.order, pairs, strict=True) if kept)
+        return replace(basis, order=orders), np.repeat(pairs, 2)
+    if isinstance(basis, Polynomial):
+        return replace(basis, degree=tuple(k for k, kept in zip(basis.degree, own, strict=True) if kept)), own
+    return basis, np.ones(len(own), dtype=bool)
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Prediction errors of all values while they were held out, um, (m,); NaN where none was possible."""
+
+    without: Array
+    with_all: Array
+    less: tuple[Array, ...]
+    cell: Index
+
+
+def held_out(evidence: Evidence, members: Sequence[Member], share: float) -> HeldOut:
+    """Predict each region from the others: without members, with all, and with all but each one."""
+    background = evidence.background
+    data = background.data
+    cell = pose_regions(scaled_axes(data))[np.maximum(data.row, 0)]
+    base = WIDE * data.base / np.where((s := np.sqrt((data.base**2).mean(axis=0))) > 0, s, 1.0)
+    shown = [evidence.groups[m.group].columns * m.size for m in members]
+    models = [[], shown, *([*shown[:out], *shown[out + 1 :]] for out in range(len(shown)))]
+    tests = [(cell % FOLDS == fold) & (data.row >= 0) for fold in range(FOLDS)]
+    errors = [_predicted(background, np.concatenate([base, *model], axis=1), share, tests) for model in models]
+    return HeldOut(errors[0], errors[1], tuple(errors[2:]), cell)
+
+
+def _predicted(background: Background, signal: Array, share: float, tests: Sequence[NDArray[np.bool_]]) -> Array:
+    """Errors of the predictions of each fold from the others, for a signal whose columns are there at unit size.
+
+    With Q the inverse of the covariance of all values, the block of Q of a fold says what the others tell of it: with
+    the fold's values so replaced, Q y are the weights of the others, and the signal alone is carried over to the fold.
+    """
+    precision, y = background.precision(share), background.data.y
+    weighed = precision @ signal
+    inner = np.eye(signal.shape[1]) + signal.T @ weighed
+    inverse = precision - weighed @ np.linalg.solve(inner, weighed.T)
+    solved, error = inverse @ y, np.full(len(y), np.nan)
+    for test in tests:
+        if test.any() and not test.all():
+            spread = np.linalg.inv(inverse[np.ix_(test, test)])
+            missed = np.where(test, 0.0, y)
+            missed[test] = y[test] - spread @ solved[test]
+            others = np.where(test, 0.0, inverse @ missed)
+            told = np.diag(spread) < (BLIND * background.sigma * background.relative[test]) ** 2
+            error[test] = np.where(told, y[test] - signal[test] @ (signal.T @ others), np.nan)
+    error[background.relative > 0.1 * ASIDE] = np.nan
+    return error
+
+
+def pose_regions(u: Array, count: int = REGIONS) -> Index:
+    """Regions (n,) of poses u (n, k), with equally many rows: halved at the median of the widest way over and over."""
+    label = np.zeros(len(u), dtype=np.int64)
+    for _ in range(int(np.log2(count))):
+        new = np.empty_like(label)
+        for each in np.unique(label):
+            rows = np.flatnonzero(label == each)
+            wide = int(np.ptp(u[rows], axis=0).argmax())
+            order = np.argsort(u[rows, wide], kind="stable")
+            upper = np.zeros(len(rows), dtype=np.int64)
+            upper[order[len(rows) // 2 :]] = 1
+            new[rows] = 2 * each + upper
+        label = new
+    # neighbours go to different folds
+    return np.random.default_rng(0).permutation(count)[label] if count else label
+
+
+def prediction_gain(held: HeldOut, worse: Array) -> tuple[float, float]:
+    """How much larger the squares are with another model, per region, and the standard error of that."""
+    known = np.isfinite(held.with_all) & np.isfinite(worse)
+    per = [
+        float((worse[k] ** 2 - held.with_all[k] ** 2).sum())
+        for c in np.unique(held.cell)
+        if (k := known & (held.cell == c)).any()
+    ]
+    return float(np.mean(per)), float(np.std(per) / np.sqrt(max(len(per) - 1, 1)))
+
+
+def passing(scale: Comparison, selected: Selected) -> Selected:
+    """Without the names that do not predict held-out poses by more than one standard error, or are immaterial.
+
+    One leaves at a time, the least likely first: the others may then be needed more.
+    """
+    while failed := _failed(scale, selected):
+        weakest = min(failed, key=lambda name: selected.odds[name])
+        selected = with_alternatives(scale, {name: each for name, each in selected.members.items() if name != weakest})
+    return selected
+
+
+def _failed(scale: Comparison, selected: Selected) -> list[str]:
+    members, evidence = list(selected.members.values()), scale.evidence
+    if not selected.named:
+        return []
+    share = evidence.share(members)
+    held = held_out(evidence, members, share)
+    joint = fitted(evidence, members, share)
+    least = max(MATERIAL_UM, RATHER * unnamed_um(evidence, selected, joint))
+    found = []
+    for k, name in enumerate(selected.members):
+        mean, error = prediction_gain(held, held.less[k])
+        predicts = mean > error or _stands_behind(scale, selected, name)
+        if name in selected.named and (visible_um(evidence.background.data, joint.shown[k]) < least or not predicts):
+            found.append(name)
+    return found
+
+
+def unnamed_um(evidence: Evidence, selected: Selected, whole: JointFit, keep: Mask | None = None) -> float:
+    """How much of what the names leave something without a name explains, rms um; `whole` is the fit with both."""
+    if not selected.unnamed:
+        return 0.0
+    data, every = evidence.background.data, list(selected.members.values())
+    told = fitted(evidence, [selected.members[name] for name in selected.named], evidence.share(every))
+    return float(np.sqrt(max(data.rms(told.after, keep) ** 2 - data.rms(whole.after, keep) ** 2, 0.0)))
+
+
+def _stands_behind(scale: Comparison, selected: Selected, name: str) -> bool:
+    """Whether it is a constant beside effects that can do the same where it is left out."""
+    return scale.evidence.constant(name) and not all(scale.evidence.constant(each) for each in selected.named)
+
+
+def visible_um(data: ResidualData, shown: Array) -> float:
+    """The size of what an effect shows, (m,) um, beside what is free: rms over rows, um."""
+    free = orthonormal(data.base / data.relative[:, None])
+    return data.rms(without(free, (shown / data.relative)[:, None])[:, 0] * data.relative)
