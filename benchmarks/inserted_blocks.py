@@ -16,8 +16,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.proof import SelfCheckError
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import SelfCheckError, fix_program
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load

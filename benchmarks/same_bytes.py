@@ -29,7 +29,7 @@ from ncfix import fast
 from ncfix.cli import console
 from ncfix.cli.batch import FixJob
 from ncfix.cli.targets import OutputTarget
-from ncfix.compensate.options import FixOptions
+from ncfix.compensate import FixOptions
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
 from ncfix.control.setup_file import load as load_setup

@@ -13,9 +13,8 @@ from time import process_time
 from typing import Any
 
 from ncfix import fast
-from ncfix.compensate import corrector, plain, settle, stream
-from ncfix.compensate.options import FixOptions
-from ncfix.compensate.task import Task
+from ncfix.compensate import FixOptions, plain, solve, stream
+from ncfix.compensate.following import Task
 from ncfix.control import parts
 from ncfix.control.setup import Setup
 from ncfix.machine import load
@@ -33,12 +32,12 @@ STAGES: tuple[tuple[str, Any, str], ...] = (
     ("read the text (twice)", parts.PartReader, "read"),
     ("follow it (twice)", RS274Follower, "follow"),
     ("plan: correct ends, judge the path between them, split", plain.Planner, "plan"),
-    ("plan, the long way", corrector, "agree"),
-    ("write: which words change, digits", corrector, "written"),
-    ("write, the long way", settle, "emit"),
-    ("write: put the text together", corrector, "spliced"),
-    ("figures: tip errors before and after", corrector, "figures"),
-    ("figures, the long way", corrector, "path_error"),
+    ("plan, the long way", stream, "agree"),
+    ("write: which words change, digits", stream, "written"),
+    ("write, the long way", solve, "emit"),
+    ("write: put the text together", stream, "spliced"),
+    ("figures: tip errors before and after", stream, "figures"),
+    ("figures, the long way", stream, "path_error"),
 )
 
 

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load

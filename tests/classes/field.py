@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.compensate.following import follow
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.setup import Setup, Tool

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.fix import Fixed, FixOptions, fix_program
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_flat, fix_program
 from ncfix.compensate.following import kinematics_of
 from ncfix.control.moves import Kind, Moves
 from ncfix.control.setup import Setup, Tool

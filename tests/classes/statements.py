@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from classes.judging import SETUP, machine
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import kinematics_of
 from ncfix.control.moves import Kind
 from ncfix.control.trace import trace

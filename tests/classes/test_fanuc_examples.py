@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
 from ncfix.control.moves import Kind
 from ncfix.control.setup_file import load as load_setup

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from classes.judging import SHIFT, Case, followed, judged, machine
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.control.moves import Kind
 from ncfix.control.setup import Setup, Tool
 from ncfix.text.reader import read

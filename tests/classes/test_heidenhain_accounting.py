@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from classes.accounting import Account
+from ncfix.compensate import FixOptions
 from ncfix.compensate.account import FixReport
-from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow, placed
 from ncfix.compensate.plan.kinematics import joints_from_commands
 from ncfix.control.moves import Kind, Moves

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
 from ncfix.control.moves import Moves, Rule
 from ncfix.control.setup import Setup, Tool

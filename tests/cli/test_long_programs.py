@@ -68,7 +68,7 @@ def test_several_processes(jobs: int, part: int, long_program: Path, fix: Any, t
 
 def test_where_processes_cannot_be_forked(long_program: Path, fix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     shared_out = fix(PART, long_program, "--jobs", 2, "-o", "-").out
-    monkeypatch.setattr("ncfix.compensate.crew.FORKS", False)
+    monkeypatch.setattr("ncfix.compensate.workers.FORKS", False)
     monkeypatch.setattr("multiprocessing.get_context", None)
     assert fix(PART, long_program, "--jobs", 2, "-o", "-").out == shared_out
 

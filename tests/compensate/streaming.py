@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from ncfix.cli.streams import Outlet
-from ncfix.compensate.crew import Ground
-from ncfix.compensate.fix import fix_program
-from ncfix.compensate.options import FixOptions
-from ncfix.compensate.stream import Stream, Streamed, Task
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
+from ncfix.compensate.following import Task
+from ncfix.compensate.stream import Stream, Streamed
+from ncfix.compensate.workers import Ground
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from compensate.side import compared
-from ncfix.compensate.fix import fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
-from ncfix.compensate.options import FixOptions
 from ncfix.control.moves import Kind, Moves
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Machine, load

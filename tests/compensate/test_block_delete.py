@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ncfix.compensate import FixOptions
 from ncfix.compensate.checking import check_on
-from ncfix.compensate.fix import Fixed, FixOptions, fix_program
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate.driver import Fixed, fix_flat, fix_program
 from ncfix.compensate.following import traced
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import RefusedError, SourceError, UsageError

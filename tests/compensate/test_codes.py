@@ -11,7 +11,7 @@ from ncfix.compensate.codes import CODES
 
 def test_every_code_in_the_source_is_explained_and_every_explanation_is_used() -> None:
     folder = Path(next(iter(ncfix.compensate.__path__)))
-    sources = {path.name: path.read_text(encoding="utf-8") for path in folder.glob("*.py")}
+    sources = {path.name: path.read_text(encoding="utf-8") for path in folder.rglob("*.py")}
     used = {code for name, text in sources.items() if name != "codes.py" for code in re.findall(r"NCF4\d\d", text)}
     assert used == set(CODES)
 

@@ -10,9 +10,9 @@ import pytest
 from scipy.spatial import KDTree
 
 from compensate.side import compared
-from ncfix.compensate.fix import fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
-from ncfix.compensate.options import FixOptions
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load

@@ -20,11 +20,10 @@ from ncfix.cli import console
 from ncfix.cli.batch import FixJob
 from ncfix.cli.streams import Outlet, Source
 from ncfix.cli.targets import OutputTarget
-from ncfix.compensate import crew, fix
-from ncfix.compensate.corrector import Corrector, Done
-from ncfix.compensate.post import GoneError, Post, lines_between
-from ncfix.compensate.stream import Stream
-from ncfix.compensate.task import Task
+from ncfix.compensate import driver, workers
+from ncfix.compensate.following import Task
+from ncfix.compensate.stream import Corrector, Done, Stream
+from ncfix.compensate.workers import GoneError, Post, lines_between
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError, UsageError
 from ncfix.machine import Machine, load
@@ -141,7 +140,7 @@ def test_what_is_read_of_a_pipe_is_told(machine: Machine) -> None:
 
 def test_where_processes_cannot_be_forked_one_does_it_alone(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = streamed(program(5, 400, 0.0), machine, 1000)
-    monkeypatch.setattr(crew, "FORKS", False)
+    monkeypatch.setattr(workers, "FORKS", False)
     monkeypatch.delattr(os, "fork")
     assert streamed(program(5, 400, 0.0), machine, 1000, jobs=3) == expected
 
@@ -184,5 +183,5 @@ def test_a_tool_that_is_used_within_one_part(change: tuple[bytes, bytes], at: in
             Stream(task, io.BytesIO(source).read, lambda _: None, jobs).run()
         told.append([str(message) for message in caught.value.messages])
     with pytest.raises(NcfixError) as expected:
-        fix.fix_program(read(source, "p.ngc", "linuxcnc"), machine, setup, OPTIONS)
+        driver.fix_program(read(source, "p.ngc", "linuxcnc"), machine, setup, OPTIONS)
     assert told == [[str(message) for message in expected.value.messages]] * 3

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from compensate.cycles_at_random import LANGUAGES
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
 from ncfix.control.moves import Kind, Rule
 from ncfix.control.setup import Setup, Tool

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from compensate.streaming import run
-from ncfix.compensate import double, stream
-from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.task import Task
+from ncfix.compensate import FixOptions, following, stream
+from ncfix.compensate.driver import fix_program
+from ncfix.compensate.following import Task
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, load
@@ -91,7 +91,7 @@ def test_the_beginning_of_a_long_program_is_judged(machine: Machine, monkeypatch
     """As a whole and in parts: what comes behind those lines makes no difference."""
     once, _ = corrected(pocket(2, seed=1), machine)
     again = unstamped(once)
-    monkeypatch.setattr(double, "LOOKED", 10)
+    monkeypatch.setattr(following, "LOOKED", 10)
     monkeypatch.setattr(stream, "LOOKED", 10)
     _, codes = corrected(again, machine)
     assert "NCF438" not in codes

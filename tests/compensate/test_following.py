@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ncfix.compensate.fix import fix_program
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow, kinematics_of
 from ncfix.control.moves import Rule, TcpState
 from ncfix.control.setup import Setup, Tool

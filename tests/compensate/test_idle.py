@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from ncfix.compensate.fix import fix_program
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.plan.written import idle, without_idle
 from ncfix.control.setup import Setup
 from ncfix.machine import loads

@@ -11,12 +11,10 @@ import pytest
 
 from compensate.test_plain import AMONG, winding
 from compensate.test_stream import OPTIONS, SETUP, program, streamed
-from ncfix.compensate.corrector import Corrector
-from ncfix.compensate.crew import Ahead, Share
-from ncfix.compensate.partition import Part
-from ncfix.compensate.passage import Passage
-from ncfix.compensate.task import Task
-from ncfix.compensate.units import Units
+from ncfix.compensate.following import Task
+from ncfix.compensate.parts import Part, Units
+from ncfix.compensate.stream import Corrector
+from ncfix.compensate.workers import Ahead, Passage, Share
 from ncfix.control.moves import Moves
 from ncfix.control.parts import TABLES
 from ncfix.diagnostics import NcfixError

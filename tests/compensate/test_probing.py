@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from compensate.streaming import streamed
-from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import RefusedError
@@ -117,7 +118,7 @@ def test_probing_ends_where_the_setup_says_in_increments_and_inches_too() -> Non
 
 
 def test_flat_programs_would_lose_what_is_computed() -> None:
-    from ncfix.compensate.flat import fix_flat
+    from ncfix.compensate.driver import fix_flat
 
     text = LEVELLED.replace("Y30 Z#101\n", "#1=0\no1 repeat [2]\n#1=[#1+90]\nX#1 Z#101\no1 endrepeat\n")
     with pytest.raises(RefusedError) as caught:

@@ -9,7 +9,8 @@ import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, dense_errors, motions
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.plan.arcs import Closure
 from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.splitting import SHORTEST, WIDEST

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import ConstantBasis, Polynomial

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.compensate.fix import fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
-from ncfix.compensate.options import FixOptions
 from ncfix.control.moves import Kind
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load

@@ -9,7 +9,7 @@ import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions
-from ncfix.compensate.fix import fix_program
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.plan.deviation import FigureTally, Samples, path_error
 from ncfix.compensate.plan.path import plan, untouched
 from ncfix.compensate.plan.strategies import get_strategy

@@ -13,12 +13,11 @@ from hypothesis import strategies as st
 
 from compensate.streaming import run
 from ncfix import fast
+from ncfix.compensate import FixOptions
 from ncfix.compensate.checking import check_on
-from ncfix.compensate.fix import Fixed, FixOptions, fix_program
-from ncfix.compensate.flat import fix_flat
-from ncfix.compensate.following import follow
+from ncfix.compensate.driver import Fixed, fix_flat, fix_program
+from ncfix.compensate.following import Task, follow
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.task import Task
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError

@@ -43,7 +43,8 @@ from differential.judge import judge
 from differential.sinumerik_frames import Floats
 from differential.test_fanuc import Fanuc
 from differential.test_siemens import apart
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import load

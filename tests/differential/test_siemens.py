@@ -17,8 +17,8 @@ from differential import errors, sinumerik
 from differential.sinumerik_frames import Floats
 from differential.sinumerik_motions import Path as Way
 from differential.sinumerik_programs import Author, looped, patterned
-from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
 from ncfix.text.reader import read

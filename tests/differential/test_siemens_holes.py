@@ -19,7 +19,8 @@ from differential import errors, sinumerik
 from differential.sinumerik_frames import Floats
 from differential.sinumerik_holes import COMBINATIONS, HEAD, program
 from differential.test_siemens import AT_ENDS, LENGTHS, MACHINE, OFFSETS, SETUP, START
-from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.machine import Machine, load
 from ncfix.text.reader import read
 

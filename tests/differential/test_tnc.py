@@ -18,8 +18,8 @@ import pytest
 from differential import errors
 from differential.tnc import Floats, Tnc, Way
 from differential.tnc_programs import Maker
-from ncfix.compensate.fix import Fixed, FixOptions
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_flat
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
 from ncfix.text.reader import read

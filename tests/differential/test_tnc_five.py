@@ -13,7 +13,8 @@ from differential import errors
 from differential.test_tnc import ALONG, HALF, farthest
 from differential.tnc import Floats
 from differential.tnc_five import FiveAxisTnc, Travel, program
-from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
 from ncfix.text.reader import read

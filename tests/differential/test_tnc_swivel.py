@@ -16,8 +16,8 @@ from differential.dressing import dressed
 from differential.test_tnc import ALONG, PRESETS, farthest
 from differential.test_tnc_five import ENDS, LENGTHS, tips
 from differential.tnc_swivel import Swivel, SwivelMaker
-from ncfix.compensate.fix import Fixed, FixOptions
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_flat
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
 from ncfix.text.reader import read

@@ -27,7 +27,8 @@ from differential.test_siemens import apart
 from differential.test_tnc import PRESETS
 from differential.test_tnc_five import LENGTHS
 from differential.tnc_swivel import Swivel
-from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.compensate.following import follow
 from ncfix.control.moves import Kind, Rule
 from ncfix.control.passing import Pass

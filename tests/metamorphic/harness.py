@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import kinematics_of, placed, rotary_names
 from ncfix.compensate.plan.kinematics import joints_from_commands
 from ncfix.control.moves import Kind, Moves

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.compensate.fix import fix_program
-from ncfix.compensate.options import FixOptions
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
 from ncfix.text.reader import read

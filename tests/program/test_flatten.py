@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.control.flatten import flatten
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from classes.judging import machine
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup, Tool
 from ncfix.text.reader import read
 

@@ -25,7 +25,7 @@ from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
 
 if TYPE_CHECKING:
-    from ncfix.compensate.options import FixOptions
+    from ncfix.compensate import FixOptions
     from ncfix.compensate.stream import Stream
     from ncfix.control.setup import Setup
     from ncfix.machine import Machine
@@ -95,14 +95,14 @@ class FixJob:
                 yield self._in_parts(source, stream, outlet, find)
 
     def _whole(self, source: Source, text: bytes, find: Find) -> FixedText:
-        from ncfix.compensate.fix import fix_program
+        from ncfix.compensate.driver import fix_program
         from ncfix.text.reader import read
 
         path = shown(source.path)
         program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
         given = program, self.machine, self.setup, self.options, find
         if self.options.flatten:
-            from ncfix.compensate.flat import fix_flat
+            from ncfix.compensate.driver import fix_flat
 
             fixed = fix_flat(*given)
         else:
@@ -113,8 +113,8 @@ class FixJob:
     def _outlet(
         self, source: Source, target: OutputTarget, dialect: Dialect, find: Find, jobs: int
     ) -> Iterator[tuple[Stream, Outlet]]:
+        from ncfix.compensate.following import Task
         from ncfix.compensate.stream import Stream
-        from ncfix.compensate.task import Task
 
         if source.size is None or source.size >= part_bytes():
             fast.engage(console.forewarn)
@@ -127,7 +127,7 @@ class FixJob:
             yield stream, outlet
 
     def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find) -> FixedText:
-        from ncfix.compensate.post import GoneError
+        from ncfix.compensate.workers import GoneError
         from ncfix.control.parts import NotInPartsError
 
         _let_stay()

@@ -172,7 +172,7 @@ def fix(
 
 def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: dict[str, Any]) -> FixJob:
     from ncfix.cli.batch import FixJob
-    from ncfix.compensate.options import FixOptions
+    from ncfix.compensate import FixOptions
 
     if choices.pop("thesis"):
         choices["strategy"] = "thesis"

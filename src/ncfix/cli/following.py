@@ -21,9 +21,8 @@ if TYPE_CHECKING:
     from ncfix.compensate.block_delete import Position
     from ncfix.compensate.checking import Checked
     from ncfix.compensate.figures.simulation import Along
-    from ncfix.compensate.following import Followed
-    from ncfix.compensate.partition import Part, Parts
-    from ncfix.compensate.task import Task
+    from ncfix.compensate.following import Followed, Task
+    from ncfix.compensate.parts import Part, Parts
     from ncfix.control.moves import Trace
     from ncfix.control.setup import Setup
     from ncfix.machine import Machine
@@ -148,7 +147,7 @@ def dialect_in(following: Following, source: Source) -> Dialect:
 def task_of(following: Following, source: Source, dialect: Dialect, *beside: str) -> Task:
     """A long program on the machine; `beside`: files beside which its subprograms may be, too."""
     from ncfix.compensate.checking import OPTIONS
-    from ncfix.compensate.task import Task
+    from ncfix.compensate.following import Task
 
     assert following.machine is not None
     find, path = subprograms(following.setup, source.path, *beside), shown(source.path)
@@ -161,8 +160,8 @@ def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Pa
     Going through the parts raises what following does, and `NotInPartsError`.
     """
     from ncfix.compensate.checking import OPTIONS
-    from ncfix.compensate.partition import Parts
-    from ncfix.compensate.task import follower_of
+    from ncfix.compensate.following import follower_of
+    from ncfix.compensate.parts import Parts
     from ncfix.control.parts import NotInPartsError, PartReader
     from ncfix.text.language import Run
 

@@ -42,7 +42,7 @@ def looked_at(following: Following, path: str) -> LookedAt:
 
 def _in_parts(following: Following, source: Source) -> LookedAt:
     """While it is read; raises what that does, and `NotInPartsError`."""
-    from ncfix.compensate.survey import survey_alone, survey_on
+    from ncfix.compensate.checking import survey_alone, survey_on
 
     dialect = dialect_in(following, source)
     if following.machine is None:

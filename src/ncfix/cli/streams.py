@@ -17,8 +17,8 @@ from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
 
 if TYPE_CHECKING:
     from ncfix.compensate.account import FixReport
-    from ncfix.compensate.crew import Ground
     from ncfix.compensate.stream import Stamp
+    from ncfix.compensate.workers import Ground
 
 
 def part_bytes() -> int:
@@ -26,7 +26,7 @@ def part_bytes() -> int:
 
     A program of so many is long: a shorter one is read as a whole, and to load compiled kernels for it does not pay.
     """
-    from ncfix.compensate.task import PART_BYTES
+    from ncfix.compensate.following import PART_BYTES
 
     said = os.environ.get("NCFIX_PART_BYTES") or str(PART_BYTES)
     if not said.isdecimal() or int(said) < 1:
@@ -86,7 +86,7 @@ class Source:
 
     def ground(self, out: int) -> Ground:
         """What other processes need to read the text, too, and to write into the file `out`."""
-        from ncfix.compensate.crew import Ground
+        from ncfix.compensate.workers import Ground
 
         kept = self.kept is not None
         return Ground((self.kept or self.handle).fileno(), not kept, out)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ncfix.compensate.fix import Fixed
+    from ncfix.compensate.driver import Fixed
     from ncfix.compensate.following import Followed
     from ncfix.machine import Machine
     from ncfix.tables.compensation import Tables
@@ -103,7 +103,8 @@ def _other_tools(used: NDArray[np.float64], length: float) -> Iterator[str]:
 
 def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
     """The program as `ncfix fix` rewrites it under these settings of the control."""
-    from ncfix.compensate.fix import FixOptions, fix_program
+    from ncfix.compensate import FixOptions
+    from ncfix.compensate.driver import fix_program
 
     assert following.machine is not None
     options = FixOptions(strategy=settings["strategy"], tolerance_um=float(settings["tolerance_um"]))

@@ -20,7 +20,7 @@ from ncfix.cli.targets import STREAM, shown
 from ncfix.diagnostics import ExitCode, Message, SourceError
 
 if TYPE_CHECKING:
-    from ncfix.compensate.coverage import Why
+    from ncfix.compensate.account import Why
     from ncfix.compensate.figures.comparison import SideBySide
     from ncfix.text.tree import Program
 

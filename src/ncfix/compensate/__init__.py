@@ -1,1 +1,34 @@
 """Motions and a machine meet here: corrected motions, the text that says them, and the proof of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class FixOptions:
+    """Options of `fix`.
+
+    strategy       name of the strategy (`ncfix.compensate.plan.strategies`)
+    tolerance_um   how far the tool tip may leave the intended path, along the whole path
+    allow_refused  write the program even if motions had to be left uncorrected
+    force          correct a program that carries a stamp
+    split_rapids   hold the tolerance along rapids too, not only at their ends
+    flatten        write the program out flat where blocks are executed from several states (`driver.fix_flat`)
+    block_numbers  of blocks that are put in, in languages that number all: "same", "none", or "renumber" for all anew
+    verify         simulate the written program along the whole path (before and after figures)
+    """
+
+    strategy: str = "rotary-then-linear"
+    tolerance_um: float = 1.0
+    allow_refused: bool = False
+    force: bool = False
+    split_rapids: bool = False
+    flatten: bool = False
+    block_numbers: str = "same"
+    verify: bool = True
+
+    @property
+    def tolerance_mm(self) -> float:
+        """The tolerance in the internal unit."""
+        return self.tolerance_um * 1e-3

@@ -15,11 +15,11 @@ from itertools import combinations
 
 import numpy as np
 
+from ncfix.compensate import FixOptions
 from ncfix.compensate.account import Reason
-from ncfix.compensate.options import FixOptions
 from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.findings import Finding
-from ncfix.compensate.settle import Settled, settle
+from ncfix.compensate.solve import Settled, settle
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.standing import BLOCK_DELETE, named_switches

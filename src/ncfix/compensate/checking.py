@@ -1,21 +1,30 @@
-"""Looking at a program without writing it: what the control or a correction would stumble over."""
+"""Looking at a program without writing it: what the control or a correction would stumble over.
+
+A long program is looked at while it is read, in bounded memory. What a correction would refuse comes from correcting
+it; nothing is written.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
+from ncfix.compensate import FixOptions
 from ncfix.compensate.account import FixReport
 from ncfix.compensate.block_delete import Position, messages_of, most_moves, positions_of
-from ncfix.compensate.fix import fix_program, place_of
-from ncfix.compensate.following import Resolve, follow, placed
-from ncfix.compensate.options import FixOptions
-from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.driver import fix_program, place_of
+from ncfix.compensate.following import Resolve, Task, follow, placed, suspected
+from ncfix.compensate.parts import Part, Parts, Units
+from ncfix.compensate.plan.findings import Finding, Notes
 from ncfix.compensate.plan.limits import findings
 from ncfix.compensate.plan.path import untouched
+from ncfix.compensate.plan.strategies import get_strategy
+from ncfix.compensate.report import Tally
+from ncfix.compensate.stream import Corrector
+from ncfix.compensate.workers import Read, Share
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
@@ -120,3 +129,70 @@ def travel_findings(machine: Machine, moves: Moves) -> tuple[Finding, ...]:
     adrift = (moves.kind == Kind.ARC) & ~np.isfinite(moves.centre).all(axis=1)
     kept = (moves.rule == Rule.PASS) | ~np.isfinite(moves.end).all(axis=1) | adrift
     return findings(machine, moves, untouched(moves, kept).pieces)
+
+
+@dataclass(slots=True)
+class Survey:
+    """What has been found in the parts so far.
+
+    machine  with the workpiece in its place; None: nothing is asked of the travel
+    """
+
+    machine: Machine | None = None
+    moves: int = 0
+    stamp: tuple[Message, ...] = ()
+    refused: list[Message] = field(default_factory=list)
+    travel: Notes = field(default_factory=Notes)
+
+    def look(self, part: Part) -> None:
+        """Take in the next part."""
+        program, moves = part.program, part.moves
+        self.moves += len(moves)
+        self.stamp = self.stamp or stamped(program)
+        self.refused += refused(program, moves)
+        if self.machine is not None:
+            for finding in travel_findings(self.machine, moves):
+                self.travel.add(finding, program, moves)
+
+    def checked(self, parts: Parts, remarks: tuple[Message, ...] | None = None) -> Checked:
+        """What was found; `remarks` of a correction, else those of following the program."""
+        blocks = parts.blocks + parts.blocks_behind()
+        if remarks is None:
+            follower = parts.follower
+            remarks = (*follower.messages[len(follower.assumed) :], *self.refused)
+        return Checked(blocks, self.moves, together(self.stamp, remarks, self.travel.messages()))
+
+
+def survey_alone(parts: Parts, found: Iterable[Part]) -> Checked:
+    """As `check_alone`, of the parts of a program; raises what following does, and `NotInPartsError`."""
+    survey = Survey()
+    for part in found:
+        survey.look(part)
+    return survey.checked(parts)
+
+
+def survey_on(task: Task, read: Read) -> Checked:
+    """As `check_on`, of the text that is read; raises what correcting does, and `NotInPartsError`."""
+    if not task.machine.is_perfect:
+        return _survey_corrected(task, read)
+    units = Units.of(task, read)
+    survey = Survey(units.placed)
+    units.look = survey.look
+    for _ in units:
+        pass
+    return survey.checked(units)
+
+
+def _survey_corrected(task: Task, read: Read) -> Checked:
+    """On a machine with errors."""
+    task.check()
+    corrector, tally = Corrector(task, read), Tally(task.machine.least_increment[0])
+    survey = Survey(corrector.machine)
+    corrector.units.look = survey.look
+    for _, done in corrector.work(Share()):
+        tally.take(done.tally)
+    tally.notes = corrector.units.notes
+    suspicion = suspected(tally.numbers, tally.step, task.path, task.options.force)
+    messages = (*suspicion, *corrector.units.follower.messages)
+    report = tally.report(task.path, messages, get_strategy(task.options.strategy).leaves, task.options)
+    return survey.checked(corrector.units, remarks_of(report))

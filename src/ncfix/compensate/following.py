@@ -1,19 +1,40 @@
-"""A program followed on a certain machine: with the workpiece where the setup has it, and with every tool length."""
+"""A program followed on a certain machine, and whether it was corrected before.
+
+It is followed with the workpiece where the setup has it, and with every tool length.
+
+A program that was corrected carries a stamp. If that is gone, its numbers still tell: people and CAM systems write
+round numbers; a correction makes them crooked. If a program's coordinates are crooked, and become round when the errors
+of the machine are put into them, then it was written for these errors. Correcting it again would put the errors back
+in, the other way round, as large as they were, and nothing later on would show it. A number is round here if it lies
+within one step of the control's digits of a grid that is ten times coarser. Of numbers with all digits used as many
+become round as cease to be, by chance; nothing is said of them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix import __version__
+from ncfix.compensate import FixOptions
+from ncfix.compensate.plan.arrays import Array, Mask
 from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
+from ncfix.compensate.plan.strategies import get_strategy
+from ncfix.control.knowledge import PROBED
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState, Trace
+from ncfix.control.parts import Follower, NotInPartsError
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
-from ncfix.diagnostics import Message, UsageError
+from ncfix.diagnostics import Message, Place, RefusedError, UsageError
 from ncfix.machine import Machine
+from ncfix.text import stamp
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import Run, language_of
 from ncfix.text.tree import Program
 
 Resolve = Callable[[str], bytes | None]
@@ -138,3 +159,183 @@ def _tool_needed(program: Program, moves: Moves, tool: int, row: int) -> Message
 def _tool_assumed(program: Program, moves: Moves, tool: int, row: int) -> Message:
     text = f"the length of tool {tool} is not given and was taken as zero"
     return Message("NCF437", text, program.place(int(moves.block[row])), f"--tool {tool}=LENGTH")
+
+
+PART_BYTES = 3 << 20
+"""How much text is a part: the columns of a part take about thirty times as much memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What all parts of a program have in common.
+
+    resolve  gives the text of a subprogram file by its name
+    size     bytes of a part
+    head     the first bytes of the text, by which it is told what it is; those of the first part, if not given
+    """
+
+    machine: Machine
+    setup: Setup
+    options: FixOptions
+    resolve: Resolve | None
+    path: str
+    dialect: Dialect
+    size: int = PART_BYTES
+    head: bytes = b""
+
+    def __post_init__(self) -> None:
+        numbered = replace(self.dialect, block_numbers=self.options.block_numbers)
+        object.__setattr__(self, "dialect", numbered)
+
+    def follower(self) -> Follower:
+        """What follows the program; raises `NotInPartsError` if its language is followed as a whole."""
+        axes, rotary = self.machine.axis_names, rotary_names(self.machine)
+        kinematics = kinematics_of(self.machine)
+        return follower_of(self.dialect, Run(self.setup, axes, rotary, self.resolve, kinematics=kinematics))
+
+    def check(self) -> None:
+        """Raise `NotInPartsError` for what has to be looked at as a whole."""
+        strategy = get_strategy(self.options.strategy)
+        if strategy.corrects_orientation or not strategy.follows_path or self.machine.is_perfect:
+            raise NotInPartsError(f"the strategy {strategy.name} looks at the whole path at once")
+        if self.options.block_numbers == "renumber" and language_of(self.dialect).renumber is not None:
+            raise NotInPartsError("all blocks get new numbers")
+
+
+def follower_of(dialect: Dialect, run: Run) -> Follower:
+    """What follows a program part by part; raises `NotInPartsError` if its language is followed as a whole."""
+    make = language_of(dialect).follower
+    if make is None:
+        raise NotInPartsError(f"{dialect.title} is followed as a whole")
+    found: Follower = make(dialect, run)
+    return found
+
+
+COARSE = 10
+"""Steps of the grid of round numbers, in steps of the control's digits."""
+NEAR = 1.0
+"""Steps within which a number is on the grid; two roundings, of the number and of its correction, are less."""
+ENOUGH = 30
+"""Different numbers that have to become round."""
+SURE = 6.0
+"""Standard deviations by which more have to become round than cease to be; by chance, one program in 10^9."""
+LOOKED = 10_000
+"""Lines of a program that are looked at: parts of the usual size have more, so that nothing is in a pipe by then."""
+MOVED = 0.75
+"""Steps by which a number has to be corrected to say anything."""
+
+
+class Changed(Protocol):
+    """Motions (n), which of them are left as they are, and how the commands at their ends change, (n, n_axes)."""
+
+    @property
+    def moves(self) -> Moves:
+        """As programmed."""
+
+    @property
+    def kept(self) -> Mask:
+        """Those that are left, (n,)."""
+
+    @property
+    def shift(self) -> Array:
+        """What is added, (n, n_axes) mm and rad."""
+
+
+Numbers = Mapping[int, tuple[Array, Array]]
+"""Of each linear axis, by its column: the different commands (k,), and what is added to them (k,), mm."""
+
+
+def numbers_of(settled: Changed, step: float, among: Mask | bool = True) -> Numbers:
+    """The commands that change their axis and are corrected, of motions `among` (n,) which they shall be.
+
+    step  of the control's digits, mm
+    """
+    moves, change = settled.moves, settled.shift
+    new = np.abs(moves.end - moves.start) > step / 2
+    told = ~settled.kept & among
+    said = new & told[:, None] & (np.abs(change) > MOVED * step) & ~moves.rotary
+    rows = ((axis, np.flatnonzero(each)) for axis, each in enumerate(said.T))
+    return {axis: _different(moves.end[row, axis], change[row, axis], step) for axis, row in rows if len(row)}
+
+
+def numbers_at_the_beginning(program: Program, settled: Changed, step: float, own: Mask | bool = True) -> Numbers:
+    """The numbers in the first lines of a program, of which this is a part; `own` (n,) motions of the part."""
+    if program.first_line > LOOKED:
+        return {}
+    return numbers_of(settled, step, own & (program.lines(settled.moves.block) <= LOOKED))
+
+
+def numbers_together(one: Numbers, other: Numbers, step: float) -> Numbers:
+    """The different numbers of both; of equal ones those that come first."""
+    both = {axis: np.hstack([each[axis] for each in (one, other) if axis in each]) for axis in {**one, **other}}
+    return {axis: _different(values, change, step) for axis, (values, change) in both.items()}
+
+
+def suspected(numbers: Numbers, step: float, path: str, force: bool) -> tuple[Message, ...]:
+    """Raise RefusedError NCF438 for a program that seems to have been corrected before; with `force`, only say so."""
+    if not looks_corrected(numbers, step):
+        return ()
+    text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
+    message = Message("NCF438", text, Place(path), "fix the original program, or say --force if this is it")
+    if not force:
+        raise RefusedError((message,))
+    return (message,)
+
+
+def looks_corrected(numbers: Numbers, step: float) -> bool:
+    """Whether the program with these numbers seems to have been corrected before, for this machine.
+
+    step  of the control's digits, mm
+    """
+    gained, lost = 0, 0
+    for before, change in numbers.values():
+        crooked, straightened = ~_round(before, step), _round(before - change, step)
+        gained += int((straightened & crooked).sum())
+        lost += int((~straightened & ~crooked).sum())
+    return gained >= ENOUGH and gained - lost > SURE * math.sqrt(gained + lost)
+
+
+def _different(values: Array, change: Array, step: float) -> tuple[Array, Array]:
+    _, first = np.unique(np.rint(values / step), return_index=True)
+    return values[first], change[first]
+
+
+def _round(values: Array, step: float) -> Mask:
+    """Which of the values are near a grid of round numbers, wherever it begins: where most of these are."""
+    grid = COARSE * step
+    phase = np.exp(2j * np.pi * values / grid)
+    start = np.angle(phase.mean()) / (2 * np.pi) * grid
+    near: Mask = np.abs((values - start + grid / 2) % grid - grid / 2) <= NEAR * step
+    return near
+
+
+def refuse_stamped(program: Program, options: FixOptions) -> None:
+    """Raise RefusedError NCF430 for a program that carries a stamp, unless that is what the options want."""
+    block = stamp.find(program)
+    if block is not None and not options.force:
+        text = "the program has been corrected already; correcting it again would put the error back in"
+        raise RefusedError.of("NCF430", text, program.place(block), "fix the original program, or say --force")
+
+
+SHORT_LINE = 250
+"""Characters that a line may have on any control."""
+
+
+def stamp_of(
+    program: Program, machine: Machine, options: FixOptions, block_delete: str = "", assumed: tuple[str, ...] = ()
+) -> str:
+    """The text of the stamp that a corrected program gets.
+
+    block_delete  for which positions of its switches, in words; empty without
+    assumed       names what was taken as zero
+    """
+    words = (
+        f"ncfix {__version__} machine {machine.hash} strategy {options.strategy} tolerance {options.tolerance_um:g} um"
+    )
+    if block_delete:
+        words += f", {block_delete}"
+    if PROBED in assumed:
+        words += ", nominal probing"
+    if zeros := [each for each in assumed if each != PROBED]:
+        words += f", assumed zero: {', '.join(zeros)}"
+    return words[: min(program.dialect.line_limit or SHORT_LINE, SHORT_LINE) - 10]

@@ -21,8 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix import fast
-from ncfix.compensate.options import FixOptions
-from ncfix.compensate.partition import Part
+from ncfix.compensate import FixOptions
+from ncfix.compensate.parts import Part, Unit
 from ncfix.compensate.plan.arcs import Closure, fitted, full_circles
 from ncfix.compensate.plan.arrays import (
     Array,
@@ -36,7 +36,6 @@ from ncfix.compensate.plan.arrays import (
     picked,
     places,
     some,
-    squares,
 )
 from ncfix.compensate.plan.deviation import CORNER, SURE, led_bounds, looked_at, straight_bounds
 from ncfix.compensate.plan.ends import led_as_commands
@@ -49,18 +48,15 @@ from ncfix.compensate.plan.sampling import passed
 from ncfix.compensate.plan.segments import Segments, accelerations, arcs_within, skew, stays_within
 from ncfix.compensate.plan.splitting import Split
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
-from ncfix.compensate.plan.written import on_digits, rounding, standing_still
-from ncfix.compensate.settle import Settled, agree
-from ncfix.compensate.units import Unit
+from ncfix.compensate.plan.written import on_digits, rounding
+from ncfix.compensate.solve import Settled, agree
 from ncfix.control.moves import FeedMode, Kind, Moves, Rule
 from ncfix.control.parts import taken
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import MORE
 from ncfix.text.dialect import Dialect
-from ncfix.text.language import Language
-from ncfix.writer.bulk import Bulk
-from ncfix.writer.emit import Emission, emit
+from ncfix.writer.emit import Emission
 from ncfix.writer.pieces import Pieces
 
 
@@ -332,8 +328,7 @@ class Planner:
 
         Nothing if these arcs need more than that; the others as `_split`.
         """
-        moves = intent.moves
-        found = None
+        moves, found = intent.moves, None
         if not moves.tcp[0]:
             found = arcs_and_dwells(intent, real, plain, unit.part.program.dialect, self.demands.budget.rounding)
         if found is None or moves.kind[-1] == Kind.DWELL:
@@ -341,8 +336,7 @@ class Planner:
         turned, others = found
         uneasy = np.append(False, moves.kind[:-1] == Kind.DWELL)
         unknown = np.where(uneasy | turned.arc, np.inf, bound)
-        looked = self._split(intent, turned, unknown, moves.kind != Kind.DWELL, uneasy)
-        over, parts, _ = looked
+        over, parts, _ = looked = self._split(intent, turned, unknown, moves.kind != Kind.DWELL, uneasy)
         return (None, None) if over.size and parts is None else (others, looked)
 
     def _split(self, intent: Intent, real: Segments, bound: Array, among: Mask, uneasy: Mask | None = None) -> Looked:
@@ -355,7 +349,8 @@ class Planner:
         """
         moves, limit = intent.moves, self.demands.budget.path
         rows = np.flatnonzero(~(bound <= SURE * limit) & among)
-        rows = rows[self._followed(moves, rows)]
+        moving = some(np.abs(picked(moves.end, rows) - picked(moves.start, rows)) >= REST)
+        rows = rows[moving if self.demands.split_rapids else moving & (moves.kind[rows] != Kind.RAPID)]
         if not rows.size:
             return rows, None, ()
         worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool) if uneasy is None else uneasy, limit)
@@ -369,11 +364,6 @@ class Planner:
             return rows, None, findings
         parts = in_pieces(intent, real, rows, deviation, self.strategy, self.demands)
         return rows, parts if np.isfinite(parts.worst).all() else None, findings
-
-    def _followed(self, moves: Moves, rows: Index) -> Mask:
-        """Which of motions `rows` (k,) are looked at along their way."""
-        moving = some(np.abs(picked(moves.end, rows) - picked(moves.start, rows)) >= REST)
-        return moving if self.demands.split_rapids else moving & (moves.kind[rows] != Kind.RAPID)
 
     def _bounds(self, meant: Array, done: Array, tool_length: Array) -> Array:
         """What the deviation of the tip does not exceed along motions from pose to pose, (n,) mm.
@@ -469,8 +459,8 @@ def _may_be_planned(moves: Moves) -> bool:
     columns = moves.approach, moves.counted, moves.resting
     if special.any() or not all(each is None or not np.any(each) for each in columns):
         return False
-    timed = (moves.feed_mode == FeedMode.INVERSE_TIME).any()
-    return bool(not timed and (moves.placed is None or moves.placed.all()))
+    untimed = (moves.feed_mode != FeedMode.INVERSE_TIME).all()
+    return bool(untimed and (moves.placed is None or moves.placed.all()))
 
 
 def _are_straight(moves: Moves) -> Mask:
@@ -490,8 +480,7 @@ def pieces_of(real: Segments, over: Index, parts: Split | None, others: Others |
         counts[over] = parts.counts
     if others is not None:
         counts[others.rows] = others.counts
-    first, move = offsets(counts), owners(counts)
-    m = len(move)
+    first, move, m = offsets(counts), owners(counts), int(counts.sum())
     fraction, end = np.ones(m), picked(real.end, move)
     if parts is not None:
         at = _pieces_at(first, over, parts.counts)
@@ -509,24 +498,3 @@ def _pieces_at(first: Index, rows: Index, counts: Index) -> Index:
     """The pieces of motions `rows` (k,), of which there are so many."""
     at: Index = np.repeat(first[:-1][rows], counts) + places(counts)
     return at
-
-
-def written(language: Language, course: Course, position: Array, steps: Array) -> Emission | None:
-    """Write a part; None if any of it cannot be written, or would not move.
-
-    position  (n_axes,) the command at which the control stands
-    steps     (n_axes,) what the control can resolve, mm and rad
-    """
-    program, moves, pieces = course.part.program, course.part.moves, course.pieces
-    bulk = Bulk.among(language, program, moves, pieces, course.first, course.plain)
-    if bulk is None:
-        return None
-    emission = emit(program, moves, pieces, steps, done=position, bulk=bulk)
-    idle = not course.single and standing_still(pieces, emission.end, emission.start).any()
-    return None if emission.conflicts or idle else emission
-
-
-def largest_shift(course: Course, emission: Emission) -> float:
-    """The largest shift of the linear axes at the end of a motion, mm."""
-    moves = course.part.moves
-    return float(np.sqrt(squares((course.last(emission.end) - moves.end)[:, ~moves.rotary]).max()))

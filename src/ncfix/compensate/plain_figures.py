@@ -1,4 +1,4 @@
-"""The tip errors of a part of plain motions, before and after: mostly from what is known of their ends.
+"""Parts of plain motions as text, and their tip errors before and after: mostly from what is known of their ends.
 
 What the tip is off at an end was found when the end was corrected, and what is left is what the numbers that were
 written differ from those that were meant (see `written.Known`). Motions over which the error may bend are looked at
@@ -15,14 +15,49 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.compensate.plain import Course
-from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, greatest, lengths, owners, picked, places, totals
+from ncfix.compensate.plan.arrays import (
+    Array,
+    Index,
+    Mask,
+    batches,
+    greatest,
+    lengths,
+    owners,
+    picked,
+    places,
+    squares,
+    totals,
+)
 from ncfix.compensate.plan.deviation import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
 from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends_closely, even, features, passed
 from ncfix.compensate.plan.segments import Segments
-from ncfix.compensate.plan.written import TURNED, Known, Written
+from ncfix.compensate.plan.written import TURNED, Known, Written, standing_still
 from ncfix.control.moves import Kind
-from ncfix.writer.emit import Emission
+from ncfix.text.language import Language
+from ncfix.writer.bulk import Bulk
+from ncfix.writer.emit import Emission, emit
 from ncfix.writer.pieces import Pieces
+
+
+def written(language: Language, course: Course, position: Array, steps: Array) -> Emission | None:
+    """Write a part; None if any of it cannot be written, or would not move.
+
+    position  (n_axes,) the command at which the control stands
+    steps     (n_axes,) what the control can resolve, mm and rad
+    """
+    program, moves, pieces = course.part.program, course.part.moves, course.pieces
+    bulk = Bulk.among(language, program, moves, pieces, course.first, course.plain)
+    if bulk is None:
+        return None
+    emission = emit(program, moves, pieces, steps, done=position, bulk=bulk)
+    idle = not course.single and standing_still(pieces, emission.end, emission.start).any()
+    return None if emission.conflicts or idle else emission
+
+
+def largest_shift(course: Course, emission: Emission) -> float:
+    """The largest shift of the linear axes at the end of a motion, mm."""
+    moves = course.part.moves
+    return float(np.sqrt(squares((course.last(emission.end) - moves.end)[:, ~moves.rotary]).max()))
 
 
 def figures(course: Course, text: Emission, rapids: bool) -> PathError:

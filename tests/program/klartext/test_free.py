@@ -9,8 +9,8 @@ import random
 import numpy as np
 import pytest
 
-from ncfix.compensate.fix import FixOptions
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_flat
 from ncfix.control.moves import Kind, Rule
 from ncfix.text.reader import read
 from ncfix_heidenhain.klartext.free import Element, Leg, solved

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from ncfix.compensate.fix import FixOptions
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_flat
 from ncfix.control.moves import Kind, Rule
 from ncfix.text.reader import read
 from program.klartext.tnc import KNOWN, THREE, follow, program

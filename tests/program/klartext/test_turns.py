@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
 from ncfix.machine import load
 from ncfix.text.reader import read

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.compensate.fix import FixOptions
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_flat
 from ncfix.control.flatten import flatten
 from ncfix.diagnostics import RefusedError
 from ncfix.text.reader import read

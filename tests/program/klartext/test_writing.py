@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.proof import SelfCheckError
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import SelfCheckError, fix_program
 from ncfix.machine import loads
 from ncfix.text.reader import read
 from ncfix.text.writer import apply

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace

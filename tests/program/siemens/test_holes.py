@@ -8,8 +8,8 @@ from __future__ import annotations
 import pytest
 
 from classes.judging import SETUP, machine
-from ncfix.compensate.fix import Fixed, FixOptions, fix_program
-from ncfix.compensate.flat import fix_flat
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_flat, fix_program
 from ncfix.text.reader import read
 
 MODAL = "MCALL CYCLE81(50,0,2,-20)"

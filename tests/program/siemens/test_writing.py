@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from classes.judging import SETUP, machine
-from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import traced
 from ncfix.control.moves import Kind, Moves
 from ncfix.control.setup import Setup, Tool

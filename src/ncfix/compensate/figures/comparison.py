@@ -22,18 +22,18 @@ from functools import partial
 
 import numpy as np
 
-from ncfix.compensate.coverage import Why, not_looked_at
-from ncfix.compensate.crew import Read
+from ncfix.compensate.account import Why, not_looked_at
 from ncfix.compensate.figures.backlash import Bodies, Flank
 from ncfix.compensate.figures.curve import Curve, Samples, Stretches
 from ncfix.compensate.figures.nearest import Nearest, Search, over_holes, over_peaks
 from ncfix.compensate.figures.simulation import Along, actual_tip, lines_of
+from ncfix.compensate.following import Task
+from ncfix.compensate.parts import Units
 from ncfix.compensate.plan.arrays import Array, Index
 from ncfix.compensate.plan.intent import Intent, left_in_cuts
 from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.plan.written import rounding_of_arcs
-from ncfix.compensate.task import Task
-from ncfix.compensate.units import Units
+from ncfix.compensate.workers import Read
 from ncfix.control.moves import Moves
 from ncfix.control.parts import joined_moves, taken
 from ncfix.diagnostics import DifferenceError, Message

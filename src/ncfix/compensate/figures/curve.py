@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ncfix.compensate.coverage import at_measured_places
+from ncfix.compensate.account import at_measured_places
 from ncfix.compensate.figures.simulation import BATCH
 from ncfix.compensate.plan.arrays import Array, Index, Mask, every, finite, owners, picked, places, slices, some
 from ncfix.compensate.plan.intent import Intent

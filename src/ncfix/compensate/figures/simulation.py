@@ -14,16 +14,15 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from ncfix.compensate.crew import Read
-from ncfix.compensate.double import looks_corrected, numbers_of
-from ncfix.compensate.options import FixOptions
+from ncfix.compensate import FixOptions
+from ncfix.compensate.following import Task, looks_corrected, numbers_of
+from ncfix.compensate.parts import Units
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, distinct, owners, slices
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import commands_from_joints
 from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, closely, even, merged, with_kinks
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.task import Task
-from ncfix.compensate.units import Units
+from ncfix.compensate.workers import Read
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State

@@ -161,10 +161,8 @@ def deviations_seen(intent: Intent, real: Segments, rows: Index, uneasy: Mask, p
     counts, fraction = interior(intent, real, rows, per_bend, least)
     starts = np.flatnonzero(uneasy[rows])
     if starts.size:
-        extra = starts, np.full(len(starts), INSTANT)
-        counts, fraction = merged(len(rows), (owners(counts), fraction), extra)
-    move = rows[owners(counts)]
-    off = np.empty(len(move))
+        counts, fraction = merged(len(rows), (owners(counts), fraction), (starts, np.full(len(starts), INSTANT)))
+    move, off = rows[owners(counts)], np.empty(len(fraction))
     for part in slices(len(move), PLANNED_BATCH):
         off[part] = distance(intent, real, move[part], fraction[part])
     return largest(off, counts)
@@ -294,8 +292,7 @@ def path_error(
     """
     written = Written(Intent(machine, moves, state), pieces, moves.start if start is None else start)
     chosen = ~pieces.kept if rows is None else rows[pieces.move]
-    tally = FigureTally()
-    which = np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move])
+    tally, which = FigureTally(), np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move])
     for part in samples(written, which, density, tilts, known):
         tally.add(part)
     found = _beside(written, chosen)
@@ -370,7 +367,10 @@ def _uneasy(written: Written) -> Mask:
     Not behind rapids of which an axis is left where it stands: what that leaves is said by itself, and seen in a cut
     only where it has to be led aside (`_leaps`).
     """
-    found, moves = uneasy_starts(written.intent, _kept_motions(written)), written.intent.moves
+    moves = written.intent.moves
+    kept = np.ones(len(moves), dtype=bool)
+    kept[written.pieces.move] = written.pieces.kept
+    found = uneasy_starts(written.intent, kept)
     found[1:] |= (moves.kind[:-1] == Kind.RAPID) & ~some(moves.wordless[:-1])
     return found
 
@@ -454,12 +454,6 @@ def _way(written: Written, piece: Index) -> Array:
         radius = np.linalg.norm(vector_product(segments.normal[arc], spoke), axis=1)
         way[on_arc] = np.hypot(way[on_arc], radius * np.abs(segments.sweep[arc]))
     return np.repeat(way / counts, counts)
-
-
-def _kept_motions(written: Written) -> Mask:
-    kept = np.ones(len(written.intent.moves), dtype=bool)
-    kept[written.pieces.move] = written.pieces.kept
-    return kept
 
 
 def _early(at: tuple[float, int, float]) -> tuple[float, int, float]:

@@ -8,18 +8,25 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ncfix.compensate.account import NOTHING_SEEN, Account, FixReport, Refusal, with_what_is_left
-from ncfix.compensate.coverage import without_figure
-from ncfix.compensate.double import Numbers, numbers_at_the_beginning, together
-from ncfix.compensate.fix import largest_correction, refusals
-from ncfix.compensate.left import Left, joined, left_by_motion, left_where_they_stand
-from ncfix.compensate.options import FixOptions
-from ncfix.compensate.plan.arrays import Mask
+from ncfix.compensate import FixOptions
+from ncfix.compensate.account import (
+    NOTHING_SEEN,
+    Account,
+    FixReport,
+    Left,
+    Refusal,
+    joined,
+    left_where_they_stand,
+    with_what_is_left,
+    without_figure,
+)
+from ncfix.compensate.following import Numbers, numbers_at_the_beginning, numbers_together
+from ncfix.compensate.plan.arrays import Mask, lengths
 from ncfix.compensate.plan.deviation import Figures, PathError
 from ncfix.compensate.plan.findings import Notes
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.written import rounding_along
-from ncfix.compensate.settle import Settled, increments
+from ncfix.compensate.solve import Settled, increments
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
@@ -90,7 +97,7 @@ class Tally:
         moves = settled.moves
         plan, intent = settled.plan, Intent(machine, moves, State())
         self.rounding = max(self.rounding, rounding_along(intent, plan.pieces, plan.corners, own))
-        lacking = left_by_motion(settled, increments(machine), own)
+        lacking = settled.lacking(increments(machine), own)
         self.left = joined(self.left, left_where_they_stand(program, moves, lacking))
         self.unseen += without_figure(moves, settled.kept, lacking.axes if lacking else None, own)
         account = Account.of(moves, settled.kept, settled.reasons)
@@ -142,7 +149,7 @@ class Tally:
         self.left = joined(self.left, other.left)
         self.found.take(other.found)
         if other.numbers:
-            self.numbers = together(self.numbers, other.numbers, self.step)
+            self.numbers = numbers_together(self.numbers, other.numbers, self.step)
 
     def figures(self, errors: PathError, program: Program, moves: Moves) -> None:
         """Take in the tip errors of a part."""
@@ -180,3 +187,21 @@ class Tally:
             no_figure=self.unseen,
         )
         return with_what_is_left(report, options.tolerance_um)
+
+
+def refusals(program: Program, account: Account) -> list[Refusal]:
+    """What was refused, by line."""
+    blocks = sorted(account.refused)
+    lines = program.lines(np.array(blocks, dtype=np.int64)).tolist()
+    reasons = [account.refused[block] for block in blocks]
+    causes = program.lines(np.array([max(reason.cause, 0) for reason in reasons], dtype=np.int64)).tolist()
+    return [
+        Refusal(line, reason.code, reason.text if reason.cause < 0 else f"{reason.text} (line {cause})")
+        for line, reason, cause in zip(lines, reasons, causes, strict=True)
+    ]
+
+
+def largest_correction(moves: Moves, settled: Settled, own: Mask | None = None) -> float:
+    """The largest shift of a linear command, mm; of motions `own` (n,) if given."""
+    done = ~settled.kept if own is None else own & ~settled.kept
+    return float(np.nanmax(lengths(settled.shift[:, ~moves.rotary])[done], initial=0.0)) if done.any() else 0.0

@@ -4,19 +4,34 @@
 
 The text that comes out is read and followed again before anybody gets it: the control must understand exactly what the
 plan meant. If it would not, that is a fault of ncfix, and nothing is written.
+
+A long program is corrected while it is read: part after part, in memory that does not depend on its length. Every part
+goes through the same plan, emitter, checks and proof as a whole program does, and what comes out is the same, byte for
+byte. A part begins with the last motion of the one before it, which is written already: all that one part has to know
+of the earlier ones is what that motion left (`Before`). What cannot be done that way raises `NotInPartsError`, and the
+caller takes the program as a whole. Several processes can work on a program (see `workers`): each corrects parts in
+turn, and follows what it has to of others.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from ncfix import __version__
-from ncfix.compensate.account import NOTHING_SEEN, Account, FixReport, Refusal, with_what_is_left
+from ncfix.compensate import FixOptions
+from ncfix.compensate.account import (
+    NOTHING_SEEN,
+    Account,
+    FixReport,
+    either,
+    left_where_they_stand,
+    with_what_is_left,
+    without_figure,
+)
 from ncfix.compensate.block_delete import (
     Position,
     Readings,
@@ -30,32 +45,108 @@ from ncfix.compensate.block_delete import (
     stamped,
     worst_findings,
 )
-from ncfix.compensate.coverage import without_figure
-from ncfix.compensate.double import numbers_at_the_beginning, suspected
-from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
-from ncfix.compensate.left import either, left_by_motion, left_where_they_stand
-from ncfix.compensate.options import FixOptions
-from ncfix.compensate.plan.arrays import Mask, lengths
+from ncfix.compensate.following import (
+    Resolve,
+    kinematics_of,
+    numbers_at_the_beginning,
+    placed,
+    refuse_stamped,
+    rotary_names,
+    stamp_of,
+    suspected,
+    traced,
+    with_tool_lengths,
+)
+from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import Figures, PathError, path_error
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import rounding_along
-from ncfix.compensate.proof import SelfCheckError, proven
-from ncfix.compensate.settle import Settled, increments
-from ncfix.control.knowledge import PROBED
+from ncfix.compensate.report import largest_correction, refusals
+from ncfix.compensate.solve import Settled, differences, increments
+from ncfix.control.flatten import Flat, flatten
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
-from ncfix.diagnostics import Place, RefusedError
+from ncfix.diagnostics import Message, NcfixError, Place
 from ncfix.machine import Machine, State
 from ncfix.text import stamp
 from ncfix.text.language import language_of
+from ncfix.text.reader import read
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices, spliced
+from ncfix.writer.second_reading import SecondReading
+
+ATTEMPTS = 16
+"""The second attempt knows the frames that moved with the first, each further one a frame that depends on others."""
+
+Attempt = Callable[[Readings], tuple[Together, bytes]]
+Follow = Callable[[Program], Trace]
+
+
+class SelfCheckError(Exception):
+    """The text that was written does not mean what was planned: a fault of ncfix. Nothing may be written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proven:
+    """A text that a second reading has confirmed in each position of block delete, and what was settled for each."""
+
+    text: bytes
+    together: Together
+
+
+def proven(program: Program, attempt: Attempt, follows: Sequence[Follow]) -> Proven:
+    """Write, read what was written, and write again with what the reading taught, until both agree.
+
+    attempt  settles and writes, given what a control made of the last attempt in each position of block delete
+    follows  traces a program, in each of them
+
+    Raises `SelfCheckError` if they never agree.
+    """
+    readings: Readings = [None] * len(follows)
+    for _ in range(ATTEMPTS):
+        together, text = attempt(readings)
+        if text == program.source:
+            return Proven(text, together)
+        pairs = [
+            (own, _read_and_followed(program, text, own, follow))
+            for own, follow in zip(together.settled, follows, strict=True)
+        ]
+        wrong = [_wrong(*each) for each in pairs]
+        if not any(each.any() for each in wrong):
+            return Proven(text, together)
+        readings = [SecondReading.of(again, own.plan.pieces) for own, again in pairs]
+    at = next(k for k, each in enumerate(wrong) if each.any())
+    raise SelfCheckError(_what_is_wrong(program, *pairs[at], int(np.argmax(wrong[at]))))
+
+
+def _wrong(settled: Settled, again: Moves) -> Mask:
+    wrong = differences(settled, again)
+    assert wrong is not None, "the numbers of motions have been compared"
+    return wrong
+
+
+def _what_is_wrong(program: Program, settled: Settled, again: Moves, piece: int) -> str:
+    """Where a piece would lead, and was not meant to."""
+    move = int(settled.plan.pieces.move[piece])
+    line = program.line(int(settled.moves.block[move]))
+    meant = settled.moves.end[move] if settled.plan.pieces.kept[piece] else settled.emission.end[piece]
+    return f"line {line} would lead to {again.end[piece]}, not to {meant}"
+
+
+def _read_and_followed(program: Program, text: bytes, settled: Settled, follow: Follow) -> Moves:
+    try:
+        again = follow(read(text, program.path, program.dialect)).moves
+    except NcfixError as error:
+        raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
+    pieces = settled.plan.pieces
+    if len(again) != len(pieces):
+        raise SelfCheckError(f"the corrected program has {len(again)} motions, {len(pieces)} were written")
+    return again
+
 
 ASTRAY = 1.0
 """mm; no correction and no remainder of one is so large."""
-
-__all__ = ["FixOptions", "Fixed", "fix_program"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,43 +213,11 @@ def _numbered(program: Program, text: bytes) -> bytes:
     return text if renumber is None or program.dialect.block_numbers != "renumber" else renumber(text)
 
 
-def refuse_stamped(program: Program, options: FixOptions) -> None:
-    """Raise RefusedError NCF430 for a program that carries a stamp, unless that is what the options want."""
-    block = stamp.find(program)
-    if block is not None and not options.force:
-        text = "the program has been corrected already; correcting it again would put the error back in"
-        raise RefusedError.of("NCF430", text, program.place(block), "fix the original program, or say --force")
-
-
 def _written(program: Program, splices: Splices, words: str) -> bytes:
     """The corrected text, with a stamp of these words."""
     if not len(splices):
         return program.source
     return spliced(program.source, Splices.joined([splices, Splices.of([stamp.insertion(program, words)])]))
-
-
-SHORT_LINE = 250
-"""Characters that a line may have on any control."""
-
-
-def stamp_of(
-    program: Program, machine: Machine, options: FixOptions, block_delete: str = "", assumed: tuple[str, ...] = ()
-) -> str:
-    """The text of the stamp that a corrected program gets.
-
-    block_delete  for which positions of its switches, in words; empty without
-    assumed       names what was taken as zero
-    """
-    words = (
-        f"ncfix {__version__} machine {machine.hash} strategy {options.strategy} tolerance {options.tolerance_um:g} um"
-    )
-    if block_delete:
-        words += f", {block_delete}"
-    if PROBED in assumed:
-        words += ", nominal probing"
-    if zeros := [each for each in assumed if each != PROBED]:
-        words += f", assumed zero: {', '.join(zeros)}"
-    return words[: min(program.dialect.line_limit or SHORT_LINE, SHORT_LINE) - 10]
 
 
 def _errors(machine: Machine, settled: Settled, split_rapids: bool) -> PathError:
@@ -212,7 +271,7 @@ def _report(
     options: FixOptions,
 ) -> FixReport:
     every, steps = together.settled, increments(machine)
-    lacking = [left_by_motion(each, steps) for each in every]
+    lacking = [each.lacking(steps) for each in every]
     left = either([left_where_they_stand(program, each.moves, own) for each, own in zip(every, lacking, strict=True)])
     account = Account.together([Account.of(each.moves, each.kept, each.reasons) for each in every])
     no_figure = Counter[str]()
@@ -259,19 +318,58 @@ def _rounding(machine: Machine, settled: Settled) -> float:
     return rounding_along(Intent(machine, settled.moves, State()), settled.plan.pieces, settled.plan.corners)
 
 
-def refusals(program: Program, account: Account) -> list[Refusal]:
-    """What was refused, by line."""
-    blocks = sorted(account.refused)
-    lines = program.lines(np.array(blocks, dtype=np.int64)).tolist()
-    reasons = [account.refused[block] for block in blocks]
-    causes = program.lines(np.array([max(reason.cause, 0) for reason in reasons], dtype=np.int64)).tolist()
-    return [
-        Refusal(line, reason.code, reason.text if reason.cause < 0 else f"{reason.text} (line {cause})")
-        for line, reason, cause in zip(lines, reasons, causes, strict=True)
-    ]
+FLATTENED = "NCF445"
+ONE_POSITION = "NCF447"
 
 
-def largest_correction(moves: Moves, settled: Settled, own: Mask | None = None) -> float:
-    """The largest shift of a linear command, mm; of motions `own` (n,) if given."""
-    done = ~settled.kept if own is None else own & ~settled.kept
-    return float(np.nanmax(lengths(settled.shift[:, ~moves.rotary])[done], initial=0.0)) if done.any() else 0.0
+def fix_flat(
+    program: Program, machine: Machine, setup: Setup, options: FixOptions, resolve: Resolve | None = None
+) -> Fixed:
+    """As `fix_program`; where that refuses motions, the program is written out flat and corrected so.
+
+    The flat program is kept only if it helps. The report speaks of the lines of the original. A flat program has the
+    numbers of one position of block delete, so a program that is to be right in several stays as it is.
+    Raises what `fix_program` and `flatten` raise.
+    """
+    fixed = fix_program(program, machine, setup, options, resolve)
+    if not fixed.report.refused:
+        return fixed
+    if len(fixed.report.block_delete) > 1:
+        text = "not written out flat: its numbers would be those of one position of block delete"
+        note = Message(ONE_POSITION, text, Place(program.path), "--block-skip on or off says which one")
+        return replace(fixed, report=replace(fixed.report, warnings=(note, *fixed.report.warnings)))
+    steps = steps_of(machine)
+    flat = flatten(program, setup, machine.axis_names, rotary_names(machine), steps, resolve, kinematics_of(machine))
+    again = fix_program(flat.program, machine, setup, options, resolve)
+    if {each.line for each in fixed.report.refused} <= {flat.lines[each.line - 1] for each in again.report.refused}:
+        return fixed
+    return replace(again, changed=True, report=in_lines(again, flat, program))
+
+
+def in_lines(fixed: Fixed, flat: Flat, program: Program) -> FixReport:
+    """The report of a flat program with the lines of the original."""
+    refused = tuple(replace(each, line=flat.lines[each.line - 1]) for each in fixed.report.refused)
+    text = f"the program is written out flat: {len(program)} lines become {len(flat.lines)}"
+    note = Message(FLATTENED, text, Place(program.path), "blocks executed several times are corrected one by one")
+    after = dict(fixed.report.error_after_um)
+    if after.get("where"):
+        after["where"] = flat.lines[int(after["where"] or 1) - 1]
+    warnings = (note, *(placed_in_original(each, flat) for each in fixed.report.warnings))
+    return replace(fixed.report, refused=refused, error_after_um=after, warnings=warnings)
+
+
+def placed_in_original(message: Message, flat: Flat) -> Message:
+    """A message with the line of the original."""
+    place = message.place
+    if place is None or not 1 <= place.line <= len(flat.lines):
+        return message
+    return replace(message, place=replace(place, line=flat.lines[place.line - 1]))
+
+
+def steps_of(machine: Machine) -> dict[str, float]:
+    """The least increment of each axis, mm or degree."""
+    linear, rotary = machine.least_increment
+    return {
+        name: float(np.degrees(rotary)) if turning else linear
+        for name, turning in zip(machine.axis_names, machine.rotary.tolist(), strict=True)
+    }

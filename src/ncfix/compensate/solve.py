@@ -2,7 +2,14 @@
 
 A block that is executed from several states may need another correction each time; a refused arc must begin where it
 began. Both show only when the text is written, and both change what the other motions have to do. So plan and emitter
-take turns until nothing more has to be kept; motions are only ever added to those that are, so this ends.
+take turns until nothing more has to be kept; motions are only ever added to those that are, so this ends: a fixed
+point.
+
+A part of a program goes through the same rounds as the part before it, with what that one left in each (`Before`): what
+has to be left shows by and by, and motions behind it are planned before that, too. So a part refuses what the whole
+program would, and no less.
+
+What was written is read again. The new text must say what the plan meant (`differences`).
 """
 
 from __future__ import annotations
@@ -13,15 +20,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ncfix.compensate.account import Reason
-from ncfix.compensate.before import Before, Round
-from ncfix.compensate.coverage import at_measured_places
+from ncfix.compensate import FixOptions
+from ncfix.compensate.account import Lacking, Reason, at_measured_places
 from ncfix.compensate.following import kinematics_of
-from ncfix.compensate.options import FixOptions
-from ncfix.compensate.plan.arcs import Closure
-from ncfix.compensate.plan.arrays import Array, Index, Mask, picked
+from ncfix.compensate.plan.arcs import Closure, across
+from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.limits import findings, led_astray
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
@@ -34,6 +40,72 @@ from ncfix.text.tree import Program
 from ncfix.writer.emit import Emission, emit
 from ncfix.writer.pinning import LED, PINNED, closure_of_refusals
 from ncfix.writer.second_reading import SecondReading
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """The last motion of a part in one round: the plans that are made until nothing speaks against one, and its text.
+
+    kept      (k,) in each plan, whether that motion is left as it was
+    shift     (k, n_axes) how far off the axes stand at its start then, mm and rad
+    position  (n_axes,) the command at its end, as written
+    """
+
+    kept: Mask
+    shift: Array
+    position: Array
+
+    def shortened(self) -> Round:
+        """Without plans that only repeat the one before."""
+        changes = np.append(True, (self.kept[1:] != self.kept[:-1]) | (self.shift[1:] != self.shift[:-1]).any(axis=1))
+        count = int(np.flatnonzero(changes)[-1]) + 1
+        return Round(self.kept[:count], self.shift[:count], self.position)
+
+    def goes_on(self, other: Round) -> bool:
+        """Whether another round, behind this one, only repeats its end."""
+        same = len(other.kept) == 1 and other.kept[0] == self.kept[-1] and (other.shift[0] == self.shift[-1]).all()
+        return bool(same and np.array_equal(other.position, self.position, equal_nan=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """The last motion of the part before, with which a part begins once more.
+
+    rounds     in each round, see there; behind the last it stays as it is
+    direction  (n_axes,) in which the axes came to its start
+    """
+
+    rounds: tuple[Round, ...]
+    direction: Signs
+
+    @classmethod
+    def steady(cls, shift: Array, direction: Signs, position: Array) -> Before:
+        """It was never left as it was; arrays (n_axes,) as in `Round`."""
+        return cls((Round(np.zeros(1, dtype=bool), shift[None], position),), direction)
+
+    @classmethod
+    def of(cls, rounds: tuple[Round, ...], direction: Signs) -> Before:
+        """From all rounds of a part."""
+        found: list[Round] = []
+        for each in map(Round.shortened, rounds):
+            if not found or not found[-1].goes_on(each):
+                found.append(each)
+        return cls(tuple(found), direction)
+
+    def in_round(self, number: int) -> Round:
+        """What it was in a round, counted from 0."""
+        return self.rounds[min(number, len(self.rounds) - 1)]
+
+    @property
+    def kept(self) -> bool:
+        """Whether it was left as it was in the end."""
+        return bool(self.rounds[-1].kept[-1])
+
+    @property
+    def position(self) -> Array:
+        """(n_axes,) the command at its end, as written."""
+        return self.rounds[-1].position
+
 
 RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
 NONE: Mapping[int, Reason] = MappingProxyType({})
@@ -75,6 +147,23 @@ class Settled:
         last = np.searchsorted(self.plan.pieces.move, np.arange(len(self.moves)), side="right") - 1
         change: Array = picked(self.emission.end, last) - self.moves.end
         return change
+
+    def lacking(self, steps: Array, own: Mask | None = None) -> Lacking | None:
+        """The axes that were left, of motions `own` (n,) if given; `steps` (n_axes,) what the control resolves.
+
+        None if there are none.
+        """
+        moves, known = self.moves, self.plan.known
+        wordless = moves.wordless
+        if known is None or not wordless.any():
+            return None
+        off = np.abs(known.end - moves.end - self.shift)
+        if known.beside is not None:
+            off = np.maximum(off, known.beside)
+        lacking = wordless & (off >= steps / 2) & ~self.kept[:, None]
+        if own is not None:
+            lacking &= own[:, None]
+        return Lacking(lacking, off)
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,3 +348,71 @@ def _explain_findings(reasons: dict[int, Reason], found: tuple[Finding, ...], mo
                 _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
     for row in np.flatnonzero(refused):
         _explain(reasons, [int(moves.block[row])], CODE_OF_RULE, "no correction was found for it")
+
+
+SAME = 1e-6
+"""mm and rad; the emitter's book and a second reading differ by floating-point noise only."""
+STRAY = 1.0
+"""mm and rad; more than earlier corrections can shift a motion that is kept (or `STRAYS` times the largest of them)."""
+STRAYS = 10.0
+TURN = 1.0
+"""rad; a corrected arc turns by what it did but for little, or else by a full turn more or less."""
+
+
+def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask | None:
+    """Pieces that the control would understand otherwise than they were meant; None if their number differs.
+
+    own  (m,) pieces that stand in the text that was read; all if not given
+    """
+    emission, pieces = settled.emission, settled.plan.pieces
+    rows = np.arange(len(pieces)) if own is None else np.flatnonzero(own)
+    if len(again) != len(rows):
+        return None
+    meant = emission.end if own is None else picked(emission.end, rows)
+    differs: Mask = differ(again.end, meant) | _strayed(settled, again, rows)
+    if not pieces.arc.any():
+        return differs
+    arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
+    if not arcs.size:
+        return differs
+    off = again.centre[arcs] - emission.centre[rows[arcs]]
+    off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
+    off = across(off, again.normal[arcs])  # the height of a centre means nothing
+    differs[arcs[differ(off, np.zeros_like(off))]] = True
+    differs[arcs] |= np.abs(again.sweep[arcs] - _sweeps(settled)[rows[arcs]]) > TURN
+    return differs
+
+
+def _sweeps(settled: Settled) -> Array:
+    """(m,) about how far each piece of an arc turns, rad: its share of what its motion does."""
+    pieces = settled.plan.pieces
+    before = np.where(np.diff(pieces.move, prepend=-1) == 0, np.append(0.0, pieces.fraction[:-1]), 0.0)
+    sweep: Array = settled.moves.sweep[pieces.move] * (pieces.fraction - before)
+    return sweep
+
+
+def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
+    """Motions that are kept, and that the new text leads elsewhere: what they rely on was not kept."""
+    pieces, ends = settled.plan.pieces, settled.moves.end
+    if not pieces.kept.any():
+        return np.zeros(len(rows), dtype=bool)
+    kept = pieces.kept[rows]
+    own = np.flatnonzero(kept)
+    off = np.abs(again.end[own] - ends[pieces.move[rows[own]]])
+    if not (off > STRAY).any():
+        return np.zeros_like(kept)
+    last = np.flatnonzero(pieces.fraction == 1)
+    shifts = np.abs(picked(pieces.end, last) - picked(ends, pieces.move[last]))
+    most = max(STRAY, STRAYS * float(np.max(shifts[np.isfinite(shifts)], initial=0.0)))
+    kept[own] = (off > most).any(axis=1)
+    return kept
+
+
+def differ(found: Array, meant: Array) -> Mask:
+    """Rows of commands (m, n_axes) that are not the same but for noise."""
+    with np.errstate(invalid="ignore"):
+        off = found - meant
+        same = np.asarray(np.abs(off, out=off) <= SAME)
+    if not same.all():
+        same = same | (found == meant) | (np.isnan(found) & np.isnan(meant))
+    return ~every(same)
