@@ -83,7 +83,7 @@ def in_another_process(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, i
         (Corrector, "_corrected", killed),
         (Corrector, "_follow_on", killed),
         (Connection, "send_bytes", killed_in_a_message),
-        (crew, "_work", lambda *_: None),
+        (workers, "_work", lambda *_: None),
     ],
 )
 def test_a_process_that_is_gone(
