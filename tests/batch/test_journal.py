@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.batch.journal import Journal, Noted, Record, digest_of, text_digest
+from ncfix.batch.work import Journal, JournalRecord, RecordingFinder, digest_of, text_digest
 
 
 @pytest.fixture
@@ -17,19 +17,19 @@ def output(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def record(output: Path) -> Record:
+def record(output: Path) -> JournalRecord:
     digest = digest_of(str(output))
     assert digest
-    return Record("part.nc", "key", digest, {"100": text_digest(b"M99\n"), "200": ""}, {"output": str(output)})
+    return JournalRecord("part.nc", "key", digest, {"100": text_digest(b"M99\n"), "200": ""}, {"output": str(output)})
 
 
 def find(name: str) -> bytes | None:
     return {"100": b"M99\n"}.get(name)
 
 
-def test_what_was_noted_is_read_again(tmp_path: Path, record: Record) -> None:
+def test_what_was_noted_is_read_again(tmp_path: Path, record: JournalRecord) -> None:
     journal = Journal(str(tmp_path))
-    journal.add(Record("part.nc", "old", "0"))
+    journal.add(JournalRecord("part.nc", "old", "0"))
     journal.add(record)
     assert journal.records() == {"part.nc": record}
     journal.finish()
@@ -38,16 +38,16 @@ def test_what_was_noted_is_read_again(tmp_path: Path, record: Record) -> None:
 
 
 @pytest.mark.parametrize("cut", [1, 20, 60])
-def test_a_line_that_was_cut_off_spoils_no_other(tmp_path: Path, record: Record, cut: int) -> None:
+def test_a_line_that_was_cut_off_spoils_no_other(tmp_path: Path, record: JournalRecord, cut: int) -> None:
     journal = Journal(str(tmp_path))
     journal.add(record)
     whole = Path(journal.path).read_bytes()
     Path(journal.path).write_bytes(whole + whole[:cut])
-    journal.add(Record("other.nc", "key", "0"))
+    journal.add(JournalRecord("other.nc", "key", "0"))
     assert set(journal.records()) == {"part.nc", "other.nc"}
 
 
-def test_a_record_holds_while_nothing_has_changed(output: Path, record: Record) -> None:
+def test_a_record_holds_while_nothing_has_changed(output: Path, record: JournalRecord) -> None:
     assert record.holds("key", str(output), find)
     assert not record.holds("another", str(output), find)
     assert not record.holds("key", str(output), lambda _: None)
@@ -59,7 +59,7 @@ def test_a_record_holds_while_nothing_has_changed(output: Path, record: Record) 
 
 
 def test_subprograms_that_were_looked_for_are_noted() -> None:
-    noted = Noted(find)
+    noted = RecordingFinder(find)
     assert noted("100") == b"M99\n"
     assert noted("300") is None
     assert noted.called == {"100": text_digest(b"M99\n"), "300": ""}

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from ncfix.batch.journal import NAME
+from ncfix.batch.work import JOURNAL
 from ncfix.diagnostics import ExitCode
 
 COUNT = 6
@@ -96,7 +96,7 @@ def test_a_killed_batch_goes_on_to_the_same_bytes(ncfix: Any, shop: Any, parts: 
     running = subprocess.Popen(
         [sys.executable, "-m", "ncfix", *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
-    while running.poll() is None and not (out / NAME).exists():
+    while running.poll() is None and not (out / JOURNAL).exists():
         time.sleep(0.001)
     os.kill(running.pid, signal.SIGKILL)
     running.wait()
@@ -108,7 +108,7 @@ def test_a_killed_batch_goes_on_to_the_same_bytes(ncfix: Any, shop: Any, parts: 
 
 
 def test_the_journal_says_what_need_not_be_done_again(ncfix: Any, shop: Any, parts: Path) -> None:
-    from ncfix.batch.journal import Journal
+    from ncfix.batch.work import Journal
 
     out = shop.folder / "out"
     command = ("fix", parts, "-m", shop.machine, "-o", out, "--assume-zero", "--json")

@@ -22,8 +22,8 @@ from ncfix.machine.basis import Backlash
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.reader import reads
 from ncfix.measure.synthetic import Faults, simulate
-from ncfix.report import html, markdown
 from ncfix.report.diagnosis import document
+from ncfix.report.rendering import html, markdown
 
 NOISE_UM = 2.0
 
@@ -105,7 +105,7 @@ def test_nothing_missing_does_not_hide_constants_that_are_wrong(known: Machine) 
     assert found.machine is None
     assert "but constants of the machine file are not what the data say" in text(found).splitlines()[0]
     assert "ncfix calibrate" in text(found)
-    assert "ncfix calibrate" in markdown.rendered(document(found)).decode()
+    assert "ncfix calibrate" in markdown(document(found)).decode()
 
 
 def test_a_laser_says_the_direction_of_its_runs_by_a_column_of_its_own() -> None:
@@ -136,12 +136,12 @@ def test_every_kind_of_measurement_can_be_diagnosed(kind: str) -> None:
     worn = known.replace(effects=(*known.effects, Effect("EXX", (0.02,), Backlash())))
     found = diagnose([simulate(plan(known, kind, 60, 1), worn, Faults(1.5), 1)], known)
     assert all("backlash X" in (each.candidate.name, *each.aliases) for each in found.findings)
-    assert as_dict(found)["verdict"] in markdown.rendered(document(found)).decode()
+    assert as_dict(found)["verdict"] in markdown(document(found)).decode()
 
 
 def test_the_report_and_the_text_name_it(backlash: Diagnosis) -> None:
     assert "backlash X" in text(backlash)
-    page, plain_page = (form.rendered(document(backlash)).decode() for form in (html, markdown))
+    page, plain_page = (form(document(backlash)).decode() for form in (html, markdown))
     assert "backlash X" in page
     assert page.count("<svg") >= 5
     assert page.count("<circle") > 100

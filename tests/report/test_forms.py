@@ -9,18 +9,21 @@ import numpy as np
 import pytest
 
 from ncfix.diagnostics import UsageError
-from ncfix.report import frame, html, markdown
-from ncfix.report.document import Document, Dots, Line, Plot, Section, Table, Text
-from ncfix.report.forms import form_of
+from ncfix.report.document import Document, Dots, Line, Paragraph, Plot, ReportSection, Table
+from ncfix.report.rendering import HEIGHT, UP, WIDTH, PlotAxes, form_of, html, markdown, ticks
 
 X = np.linspace(-10.0, 10.0, 5)
 NASTY = "<script>alert('a|b')</script> & \"EXX\""
 DOCUMENT = Document(
     NASTY,
     [
-        Section("Errors", [Text(NASTY), Table(("name", NASTY), [("EXX", "1"), (NASTY, "2")]), Table((), [("a", "b")])]),
-        Section("Curves", [Plot("um over X", [Line(X, X**2, 0.5 * abs(X), "up"), Line(X, -(X**2), label="down")])]),
-        Section("Flat", [Plot("um over Y", [Line(X, 0 * X), Dots(X, X - 3.0, "residual")])]),
+        ReportSection(
+            "Errors", [Paragraph(NASTY), Table(("name", NASTY), [("EXX", "1"), (NASTY, "2")]), Table((), [("a", "b")])]
+        ),
+        ReportSection(
+            "Curves", [Plot("um over X", [Line(X, X**2, 0.5 * abs(X), "up"), Line(X, -(X**2), label="down")])]
+        ),
+        ReportSection("Flat", [Plot("um over Y", [Line(X, 0 * X), Dots(X, X - 3.0, "residual")])]),
     ],
 )
 
@@ -48,7 +51,7 @@ class Balanced(HTMLParser):
 
 
 def test_a_page_is_well_formed_and_stands_alone() -> None:
-    text = html.rendered(DOCUMENT).decode()
+    text = html(DOCUMENT).decode()
     page = Balanced()
     page.feed(text)
     assert (page.open, page.wrong) == ([], [])
@@ -58,16 +61,16 @@ def test_a_page_is_well_formed_and_stands_alone() -> None:
 
 
 def test_a_plot_holds_its_curves_their_bands_and_zero() -> None:
-    drawn = frame.Frame.around([Line(X, X + 20.0, np.full(5, 3.0))])
+    drawn = PlotAxes.around([Line(X, X + 20.0, np.full(5, 3.0))])
     assert drawn.across == (-10.0, 10.0)
     assert drawn.up == (0.0, 33.0)
     places = [tuple(map(float, each.split(","))) for each in drawn.points(X, X + 20.0).split()]
-    assert all(0 <= a <= frame.WIDTH and 0 <= b <= frame.HEIGHT for a, b in places)
+    assert all(0 <= a <= WIDTH and 0 <= b <= HEIGHT for a, b in places)
     assert [b for _, b in places] == sorted((b for _, b in places), reverse=True)
 
 
 def test_markdown_has_rows_of_one_width_and_the_extremes_of_curves() -> None:
-    text = markdown.rendered(DOCUMENT).decode()
+    text = markdown(DOCUMENT).decode()
     for row in re.findall(r"^\|.*\|$", text, re.MULTILINE):
         assert len(re.findall(r"(?<!\\)\|", row)) == 3
     assert "<script>" not in text
@@ -76,9 +79,9 @@ def test_markdown_has_rows_of_one_width_and_the_extremes_of_curves() -> None:
 
 
 def test_the_suffix_says_the_form() -> None:
-    assert form_of("a/b.html")(DOCUMENT) == html.rendered(DOCUMENT)
-    assert form_of("page")(DOCUMENT) == html.rendered(DOCUMENT)
-    assert form_of("PAGE.MD")(DOCUMENT) == markdown.rendered(DOCUMENT)
+    assert form_of("a/b.html")(DOCUMENT) == html(DOCUMENT)
+    assert form_of("page")(DOCUMENT) == html(DOCUMENT)
+    assert form_of("PAGE.MD")(DOCUMENT) == markdown(DOCUMENT)
     with pytest.raises(UsageError) as caught:
         form_of("page.docx")
     assert caught.value.code == "NCF018"
@@ -94,14 +97,14 @@ def test_the_suffix_says_the_form() -> None:
     ],
 )
 def test_ticks_stand_at_round_numbers_within_the_axis(low: float, high: float, expected: list[float]) -> None:
-    assert frame.ticks(low, high, 6).tolist() == pytest.approx(expected, abs=1e-12)
+    assert ticks(low, high, 6).tolist() == pytest.approx(expected, abs=1e-12)
 
 
 def test_ticks_of_any_range_are_few_and_inside() -> None:
     for power in range(-12, 12):
         for low, width in ((0.0, 1.0), (-3.3, 7.7), (100.0, 0.9)):
             ends = low * 10.0**power, (low + width) * 10.0**power
-            found = frame.ticks(*ends, frame.UP)
-            assert 2 <= len(found) <= 2 * frame.UP
+            found = ticks(*ends, UP)
+            assert 2 <= len(found) <= 2 * UP
             assert ends[0] - 1e-9 * width * 10.0**power <= found.min()
             assert found.max() <= ends[1] + 1e-9 * width * 10.0**power

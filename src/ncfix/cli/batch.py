@@ -15,8 +15,16 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from ncfix import __version__, fast, files
-from ncfix.batch.journal import Find, Journal, Noted, Record, digest_of, text_digest
-from ncfix.batch.work import Staff, each
+from ncfix.batch.work import (
+    ExecutorMaker,
+    Find,
+    Journal,
+    JournalRecord,
+    RecordingFinder,
+    digest_of,
+    results_in_order,
+    text_digest,
+)
 from ncfix.cli import console
 from ncfix.cli.console import owned
 from ncfix.cli.options import dialect_of, subprograms
@@ -71,7 +79,7 @@ class FixJob:
 
     def outcome(self, target: OutputTarget, jobs: int = 1) -> FixOutcome:
         """Fix one program and say what came of it; an error, and a fault of ncfix, ends this program only."""
-        find = Noted(subprograms(self.setup, target.source))
+        find = RecordingFinder(subprograms(self.setup, target.source))
         try:
             with console.busy(f"fixing {shown(target.source)}"), self.fixed(target, find, jobs) as fixed:
                 return replace(_written(fixed, target, self.options), called=find.called)
@@ -242,7 +250,7 @@ class Batch:
     folder: str | None
     resume: bool
 
-    def run(self, jobs: int, make: Staff) -> Iterator[FixOutcome]:
+    def run(self, jobs: int, make: ExecutorMaker) -> Iterator[FixOutcome]:
         """What becomes of them, in their order; each is noted as soon as it is done."""
         journal = Journal(self.folder) if self.folder is not None and len(self.targets) > 1 else None
         if journal is not None:
@@ -258,27 +266,27 @@ class Batch:
         if journal is not None:
             journal.finish()
 
-    def _fresh(self, rest: Sequence[OutputTarget], jobs: int, make: Staff) -> Iterator[FixOutcome]:
+    def _fresh(self, rest: Sequence[OutputTarget], jobs: int, make: ExecutorMaker) -> Iterator[FixOutcome]:
         if jobs == 1 or len(rest) <= 1 or any(target.source == STREAM for target in rest):
             for target in rest:
                 yield self.job.outcome(target, jobs)
             return
-        for outcome, said in each(self.job.heard, rest, make, jobs, _lost):
+        for outcome, said in results_in_order(self.job.heard, rest, make, jobs, _lost):
             for line in said:
                 console.say(line)
             yield outcome
 
-    def _holds(self, target: OutputTarget, record: Record | None) -> bool:
+    def _holds(self, target: OutputTarget, record: JournalRecord | None) -> bool:
         if record is None:
             return False
         return record.holds(self.job.key(target), target.path, subprograms(self.job.setup, target.source))
 
-    def _record(self, target: OutputTarget, outcome: FixOutcome) -> Record:
+    def _record(self, target: OutputTarget, outcome: FixOutcome) -> JournalRecord:
         digest = digest_of(target.path) or ""
-        return Record(target.name, self.job.key(target), digest, outcome.called, outcome.entry)
+        return JournalRecord(target.name, self.job.key(target), digest, outcome.called, outcome.entry)
 
 
-def _kept(target: OutputTarget, record: Record) -> FixOutcome:
+def _kept(target: OutputTarget, record: JournalRecord) -> FixOutcome:
     console.say(f"{visible(shown(target.source))} -> {visible(target.path)}: done before")
     return FixOutcome(ExitCode.DONE, {**record.entry, "resumed": True}, record.called)
 

@@ -150,7 +150,7 @@ def fix(
     Programs are never changed where they are unless --in-place says so. Exit code 4: motions were refused and nothing
     was written.
     """
-    from ncfix.batch.work import staff
+    from ncfix.batch.work import executor_of
     from ncfix.cli.batch import Batch
 
     outputs = Outputs(output, in_place, force, resume)
@@ -160,7 +160,7 @@ def fix(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     job = _job(machine_path, dialect, given, {**choices, "force": force})
     outcomes = list(
-        Batch(job, wanted, outputs.folder(programs), resume).run(processes_for(jobs, wanted), staff(executor))
+        Batch(job, wanted, outputs.folder(programs), resume).run(processes_for(jobs, wanted), executor_of(executor))
     )
     if len(outcomes) > 1:
         written = sum(outcome.entry["output"] is not None for outcome in outcomes)

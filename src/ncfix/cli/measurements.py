@@ -409,7 +409,7 @@ def diagnose(
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
     from ncfix.report.diagnosis import document
-    from ncfix.report.forms import form_of
+    from ncfix.report.rendering import form_of
 
     each_once(measured)
     inputs = (*measured, machine_path)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from ncfix.batch.gathering import gathered
+from ncfix.batch.programs import program_files
 from ncfix.cli import console
 from ncfix.cli.following import Following, dialect_in, parts_of, task_of, through
 from ncfix.cli.options import PATH, dialect_option, force_option, json_option, optional_machine_option, table_option
@@ -70,7 +70,7 @@ def check(
     findings.
     """
     following = Following.of(machine_path, dialect, given)
-    outcomes = [_outcome(following, program.path) for program in gathered(programs)]
+    outcomes = [_outcome(following, program.path) for program in program_files(programs)]
     if as_json:
         console.put_json(files=[outcome.entry for outcome in outcomes])
     return max(outcome.code for outcome in outcomes)

@@ -14,7 +14,7 @@ from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 from ncfix.diagnostics import Place, SourceError
 
 if TYPE_CHECKING:
-    from ncfix.report.document import Section
+    from ncfix.report.document import ReportSection
 
 DEEPEST = 64
 """How deep the lists and objects of a result lie in one another at most."""
@@ -31,7 +31,7 @@ def report(sources: tuple[str, ...], output: str, force: bool) -> None:
     result: its tables.
     """
     from ncfix.report.document import Document
-    from ncfix.report.forms import form_of
+    from ncfix.report.rendering import form_of
 
     target = targets([STREAM], Outputs(output, force=force), sources)[0]
     form = form_of(output)
@@ -41,15 +41,15 @@ def report(sources: tuple[str, ...], output: str, force: bool) -> None:
         target.write(form(Document(title, found)))
 
 
-def _sections(path: str) -> list[Section]:
+def _sections(path: str) -> list[ReportSection]:
     """What one file has to say: a machine if it is TOML, a result if it is JSON."""
     text = read(path)
     if text.lstrip().startswith(b"{"):
-        from ncfix.report.result import sections as of_result
+        from ncfix.report.content import result_sections as of_result
 
         return of_result(_result(text, path), shown(path))
     from ncfix.machine import loads
-    from ncfix.report.machine import sections as of_machine
+    from ncfix.report.content import machine_sections as of_machine
 
     return of_machine(loads(text, shown(path)), shown(path))
 

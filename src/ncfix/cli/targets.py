@@ -11,7 +11,7 @@ from typing import IO
 from weakref import WeakSet
 
 from ncfix import files, inputs
-from ncfix.batch.gathering import Gathered, gathered
+from ncfix.batch.programs import ProgramFile, program_files
 from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
 
@@ -136,7 +136,9 @@ def targets(
     """
     folder = outputs.folder(given)
     _check_choices(outputs, folder)
-    programs = gathered(given, folder) if folders else [Gathered(path, os.path.basename(path)) for path in given]
+    programs = (
+        program_files(given, folder) if folders else [ProgramFile(path, os.path.basename(path)) for path in given]
+    )
     if outputs.in_place:
         found = [OutputTarget(program.path, program.path, in_place=True) for program in programs]
     else:
@@ -184,7 +186,7 @@ def _check_choices(outputs: Outputs, folder: str | None) -> None:
         raise UsageError.of("NCF016", "--resume goes on with a folder of outputs, and there is none", hint="-o FOLDER")
 
 
-def _target(program: Gathered, outputs: Outputs, folder: str | None) -> OutputTarget:
+def _target(program: ProgramFile, outputs: Outputs, folder: str | None) -> OutputTarget:
     if folder is not None:
         if program.path == STREAM:
             hint = f"-o {os.path.join(folder, 'NAME')}"

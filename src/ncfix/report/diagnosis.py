@@ -25,7 +25,7 @@ from ncfix.diagnose.presentation import (
 from ncfix.machine import Effect
 from ncfix.machine.effects import with_unit
 from ncfix.measure.measurement import Array
-from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
+from ncfix.report.document import Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
 
 HOUR = 3600.0
 CURVES = 4
@@ -51,7 +51,7 @@ def document(diagnosis: Diagnosis) -> Document:
     return Document(title, [section for section in sections if section.parts])
 
 
-def _verdict(diagnosis: Diagnosis) -> Section:
+def _verdict(diagnosis: Diagnosis) -> ReportSection:
     gap = diagnosis.gap
     rows = [
         ("all rows", f"{gap.before:.2f}", f"{gap.after:.2f}", f"{gap.floor:.2f}"),
@@ -60,25 +60,28 @@ def _verdict(diagnosis: Diagnosis) -> Section:
     files = ", ".join(dict.fromkeys(each.path for each in diagnosis.data.measurements))
     noise = f"noise {diagnosis.floor.sigma_um:.2f} um a value, {NOISE[diagnosis.floor.source]}"
     parts: list[Part] = [
-        Text(f"{diagnosis.verdict}: {verdict(diagnosis)}."),
-        Text(f"{diagnosis.data.count} rows of {files}; {noise}."),
+        Paragraph(f"{diagnosis.verdict}: {verdict(diagnosis)}."),
+        Paragraph(f"{diagnosis.data.count} rows of {files}; {noise}."),
         Table(("gap, um rms", "before", "after", "noise"), rows),
     ]
     if diagnosis.unknown_um:
-        parts.append(Text(f"{rest(diagnosis).capitalize()}."))
+        parts.append(Paragraph(f"{rest(diagnosis).capitalize()}."))
     parts += [
-        Text(f"{each[0].upper()}{each[1:]}.") for each in (silence(diagnosis) if diagnosis.verdict == NOTHING else [])
+        Paragraph(f"{each[0].upper()}{each[1:]}.")
+        for each in (silence(diagnosis) if diagnosis.verdict == NOTHING else [])
     ]
-    return Section("Verdict", [*parts, *_chances(diagnosis), *_moved(diagnosis)])
+    return ReportSection("Verdict", [*parts, *_chances(diagnosis), *_moved(diagnosis)])
 
 
 def _chances(diagnosis: Diagnosis) -> Iterator[Part]:
     """Whether the gap is more than noise."""
     if diagnosis.p_lack is None or diagnosis.p_left is None:
-        yield Text("Whether what is left is more than noise cannot be said: there are no repeats and no stated noise.")
+        yield Paragraph(
+            "Whether what is left is more than noise cannot be said: there are no repeats and no stated noise."
+        )
         return
     before, after = _chance(diagnosis.p_lack), _chance(diagnosis.p_left)
-    yield Text(f"Noise alone would leave a gap as large as before with {before}, after with {after}.")
+    yield Paragraph(f"Noise alone would leave a gap as large as before with {before}, after with {after}.")
 
 
 def _chance(p: float) -> str:
@@ -92,24 +95,24 @@ def _p(value: float) -> str:
 def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
     """What the file says otherwise of where axes lie, and of gains."""
     if diagnosis.moved:
-        yield Text("Constants of the machine file that the data put elsewhere (the gap before is after that):")
+        yield Paragraph("Constants of the machine file that the data put elsewhere (the gap before is after that):")
         yield Table((), [(constant(each),) for each in diagnosis.moved])
-        yield from (Text(f"{each[0].upper()}{each[1:]}.") for each in anew(diagnosis))
+        yield from (Paragraph(f"{each[0].upper()}{each[1:]}.") for each in anew(diagnosis))
 
 
-def _finding(diagnosis: Diagnosis, finding: EffectFinding) -> Section:
+def _finding(diagnosis: Diagnosis, finding: EffectFinding) -> ReportSection:
     candidate = finding.candidate
-    parts: list[Part] = [Text(f"{candidate.title}. {why(diagnosis, finding)}.")]
+    parts: list[Part] = [Paragraph(f"{candidate.title}. {why(diagnosis, finding)}.")]
     if finding.aliases:
-        parts.append(Text(f"With these data it may as well be: {', '.join(finding.aliases)}."))
+        parts.append(Paragraph(f"With these data it may as well be: {', '.join(finding.aliases)}."))
     if candidate.remedy:
-        parts.append(Text(f"Remedy: {candidate.remedy}."))
+        parts.append(Paragraph(f"Remedy: {candidate.remedy}."))
     parts += [
-        Text(f"{said.capitalize()}.")
+        Paragraph(f"{said.capitalize()}.")
         for said in (constants(finding), odd(finding), carried(diagnosis, finding))
         if said
     ]
-    return Section(candidate.name, [*parts, *_curve(diagnosis, finding), *_runners(diagnosis, finding)])
+    return ReportSection(candidate.name, [*parts, *_curve(diagnosis, finding), *_runners(diagnosis, finding)])
 
 
 def _runners(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
@@ -118,7 +121,9 @@ def _runners(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
     if runners_up:
         best = sorted(runners_up, key=lambda each: -runners_up[each])[:RUNNERS]
         rows = [(finding.candidate.name, f"{finding.odds:.1f}"), *((each, f"{runners_up[each]:.1f}") for each in best)]
-        yield Text(f"Evidence, log odds, best of {len(diagnosis.case.considered)} (3 less is 20 times less likely):")
+        yield Paragraph(
+            f"Evidence, log odds, best of {len(diagnosis.case.considered)} (3 less is 20 times less likely):"
+        )
         yield Table(("name", "log odds"), rows)
 
 
@@ -148,13 +153,13 @@ def _component(diagnosis: Diagnosis, effect: Effect) -> Iterator[Part]:
     yield Plot(caption, [Line(x, value, 2 * factor * np.sqrt(np.maximum(variance, 0.0)))])
 
 
-def _where(diagnosis: Diagnosis) -> Section:
+def _where(diagnosis: Diagnosis) -> ReportSection:
     rows = [(pattern.text, f"{pattern.rms_um:.1f}", f"{_p(pattern.p_value)}") for pattern in diagnosis.patterns]
-    return Section("Where", [Table(("pattern", "um rms", "p by chance"), rows)] if rows else [])
+    return ReportSection("Where", [Table(("pattern", "um rms", "p by chance"), rows)] if rows else [])
 
 
-def _residuals(diagnosis: Diagnosis) -> Section:
-    return Section("Residuals before and after", list(_maps(diagnosis)))
+def _residuals(diagnosis: Diagnosis) -> ReportSection:
+    return ReportSection("Residuals before and after", list(_maps(diagnosis)))
 
 
 def _maps(diagnosis: Diagnosis) -> Iterator[Part]:
@@ -184,28 +189,28 @@ def _in_time(diagnosis: Diagnosis, what: str, values: Mapping[str, Array]) -> It
         yield Plot(f"{what}, over time, h", dots)
 
 
-def _next(diagnosis: Diagnosis) -> Section:
+def _next(diagnosis: Diagnosis) -> ReportSection:
     proposal = diagnosis.proposal
     if proposal is None:
-        return Section("To tell names apart", [])
-    head = Text(f"{', '.join((proposal.name, *proposal.alternatives))}: {proposal.reason}.")
+        return ReportSection("To tell names apart", [])
+    head = Paragraph(f"{', '.join((proposal.name, *proposal.alternatives))}: {proposal.reason}.")
     if proposal.plan is None:
         words = "No measurement of this kind within the travels of the machine would tell them apart."
-        return Section("To tell names apart", [head, Text(words)])
+        return ReportSection("To tell names apart", [head, Paragraph(words)])
     names = [name for name in proposal.plan.columns if not name.startswith(("temp_", "time_s"))]
     rows = [[f"{proposal.plan.columns[name][k]:g}" for name in names] for k in range(len(proposal.plan))]
     said = [
-        Text(f"{each[0].upper()}{each[1:]}.")
+        Paragraph(f"{each[0].upper()}{each[1:]}.")
         for each in (hope(proposal), unusual(proposal), hopeless(proposal))
         if each
     ]
-    return Section("To tell names apart", [head, *said, Table(names, rows)])
+    return ReportSection("To tell names apart", [head, *said, Table(names, rows)])
 
 
-def _unseen(diagnosis: Diagnosis) -> Section:
+def _unseen(diagnosis: Diagnosis) -> ReportSection:
     names = ", ".join(candidate.name for candidate, _ in diagnosis.case.visible.invisible)
     count = int(diagnosis.case.outlying.sum())
-    parts = [Text(f"Not visible with these poses: {names}.")] if names else []
+    parts = [Paragraph(f"Not visible with these poses: {names}.")] if names else []
     if count:
-        parts.append(Text(f"{count} rows were put aside as outliers; --json lists them."))
-    return Section("What was not considered", parts)
+        parts.append(Paragraph(f"{count} rows were put aside as outliers; --json lists them."))
+    return ReportSection("What was not considered", parts)

@@ -9,7 +9,7 @@ from ncfix.machine.se3 import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class Paragraph:
     """A paragraph."""
 
     words: str
@@ -55,11 +55,11 @@ class Plot:
     drawn: Sequence[Line | Dots]
 
 
-Part = Text | Table | Plot
+Part = Paragraph | Table | Plot
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class ReportSection:
     """A heading and what belongs to it."""
 
     heading: str
@@ -71,4 +71,4 @@ class Document:
     """A report."""
 
     title: str
-    sections: Sequence[Section]
+    sections: Sequence[ReportSection]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.batch.gathering import gathered
+from ncfix.batch.programs import program_files
 from ncfix.diagnostics import SourceError, UsageError
 
 
@@ -23,23 +23,23 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_folder_stands_for_the_programs_below_it(folder: Path) -> None:
-    found = gathered([str(folder)], apart=str(folder / "out"))
+    found = program_files([str(folder)], apart=str(folder / "out"))
     assert [each.name for each in found] == ["b.nc", "a/C.NGC", "a/deep/d.mpf"]
     assert [Path(each.path) for each in found] == [folder / each.name for each in found]
 
 
 def test_outputs_of_another_name_are_programs_too(folder: Path) -> None:
-    assert "out/g.nc" in {each.name for each in gathered([str(folder)])}
+    assert "out/g.nc" in {each.name for each in program_files([str(folder)])}
 
 
 def test_files_are_taken_whatever_they_are_called(folder: Path) -> None:
-    (found,) = gathered([str(folder / "a" / "notes.txt")])
+    (found,) = program_files([str(folder / "a" / "notes.txt")])
     assert found.name == "notes.txt"
 
 
 def test_a_folder_without_programs_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError) as caught:
-        gathered([str(tmp_path)])
+        program_files([str(tmp_path)])
     assert caught.value.code == "NCF014"
     assert ".nc" in str(caught.value)
 
@@ -54,4 +54,4 @@ def test_a_folder_that_cannot_be_read_is_not_passed_over(folder: Path, monkeypat
 
     monkeypatch.setattr(os, "scandir", locked)
     with pytest.raises(SourceError, match=r"deep: NCF002: cannot be read: Permission denied"):
-        gathered([str(folder)])
+        program_files([str(folder)])

@@ -12,7 +12,7 @@ from ncfix.plugins import registry
 
 
 @dataclass(frozen=True, slots=True)
-class Gathered:
+class ProgramFile:
     """A program, and the name under which its output is written in an output folder.
 
     path  as the user wrote it, or below the folder that the user named
@@ -23,7 +23,7 @@ class Gathered:
     name: str
 
 
-def gathered(given: Iterable[str], apart: str | None = None) -> list[Gathered]:
+def program_files(given: Iterable[str], apart: str | None = None) -> list[ProgramFile]:
     """The programs that `given` names, folders with all that is below them, in the order of names.
 
     apart  a folder that is left out: that of the outputs
@@ -32,9 +32,9 @@ def gathered(given: Iterable[str], apart: str | None = None) -> list[Gathered]:
     devices and `.orig` files are none. Raises `UsageError` NCF014 for a folder without any, `SourceError` NCF002 for
     one that cannot be read.
     """
-    found: list[Gathered] = []
+    found: list[ProgramFile] = []
     for path in given:
-        found.extend(_below(path, apart) if os.path.isdir(path) else [Gathered(path, os.path.basename(path))])
+        found.extend(_below(path, apart) if os.path.isdir(path) else [ProgramFile(path, os.path.basename(path))])
     return found
 
 
@@ -43,9 +43,9 @@ def suffixes() -> frozenset[str]:
     return frozenset(suffix.lower() for dialect in registry("dialects").values() for suffix in dialect.suffixes)
 
 
-def _below(folder: str, apart: str | None) -> list[Gathered]:
+def _below(folder: str, apart: str | None) -> list[ProgramFile]:
     known = suffixes()
-    found = [Gathered(path, os.path.relpath(path, folder)) for path in _files(folder, apart) if _is(path, known)]
+    found = [ProgramFile(path, os.path.relpath(path, folder)) for path in _files(folder, apart) if _is(path, known)]
     if not found:
         hint = f"programs in folders have one of these suffixes: {' '.join(sorted(known))}; or name the files"
         raise UsageError.of("NCF014", "there is no program in this folder", Place(folder), hint)

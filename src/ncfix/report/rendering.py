@@ -1,0 +1,201 @@
+"""A report as a file: one HTML page with plots as SVG that loads nothing from elsewhere, or Markdown.
+
+The suffix of the file says which; plugins bring further forms.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from html import escape
+from itertools import cycle
+
+import numpy as np
+
+from ncfix.diagnostics import Place, UsageError
+from ncfix.machine.se3 import Array
+from ncfix.plugins import called, registry
+from ncfix.report.document import Document, Dots, Line, Paragraph, Part, Plot, Table
+
+WIDTH, HEIGHT = 520, 190
+LEFT, RIGHT, TOP, BOTTOM = 52, 12, 10, 24
+"""Pixels round the axes, for the numbers."""
+ACROSS, UP = 7, 5
+"""Ticks that there are about."""
+ROUND = (1.0, 2.0, 5.0, 10.0)
+COLOURS = ("#2c6fb5", "#b5452c", "#3f8f3f", "#7a4fa0")
+NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?")
+"""Cells that stand to the right under their header."""
+STYLE = (
+    "body{font:15px/1.45 sans-serif;max-width:74em;margin:2em auto;padding:0 1em;color:#222}"
+    "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.2em .8em;border-bottom:1px solid #ccc;text-align:left}"
+    "td.n{text-align:right}svg{background:#fafafa}figure{display:inline-block;margin:.4em 1em .6em 0}"
+    "figcaption{font-size:13px;color:#444}"
+    "@media print{section{break-inside:avoid}}"
+)
+Rendering = Callable[[Document], bytes]
+"""Makes a file's content of a report."""
+
+
+def form_of(path: str) -> Rendering:
+    """The form that a file's suffix stands for; raises `UsageError` NCF018. Without a suffix, HTML."""
+    suffix = os.path.splitext(path)[1].lower() or ".html"
+    known: dict[str, Rendering] = registry("reporters", {".html": html, ".md": markdown})
+    if suffix not in known:
+        raise UsageError.of("NCF018", f"a report cannot be a {suffix} file", Place(path), f"one of {' '.join(known)}")
+    return partial(called, "reporters", suffix, known[suffix], gives=bytes)
+
+
+def html(document: Document) -> bytes:
+    """The page, UTF-8."""
+    title = escape(document.title)
+    body = "\n".join(
+        f"<section><h2>{escape(section.heading)}</h2>\n" + "\n".join(map(_html_part, section.parts)) + "</section>"
+        for section in document.sections
+    )
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
+        f"</head>\n<body><h1>{title}</h1>\n{body}\n</body></html>\n"
+    ).encode()
+
+
+def _html_part(part: Part) -> str:
+    match part:
+        case Paragraph(words):
+            return f"<p>{escape(words)}</p>"
+        case Table():
+            return _html_table(part)
+        case Plot():
+            return _html_plot(part)
+
+
+def _html_table(table: Table) -> str:
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in table.header)
+    rows = "".join(f"<tr>{''.join(_html_cell(cell, bool(head)) for cell in row)}</tr>" for row in table.rows)
+    return f"<table>{f'<tr>{head}</tr>' if head else ''}{rows}</table>"
+
+
+def _html_cell(text: str, aligned: bool) -> str:
+    opened = '<td class="n">' if aligned and NUMBER.fullmatch(text) else "<td>"
+    return f"{opened}{escape(text)}</td>"
+
+
+def _html_plot(plot: Plot) -> str:
+    frame = PlotAxes.around(plot.drawn)
+    inside = "".join(_drawn(frame, each, colour) for each, colour in zip(plot.drawn, cycle(COLOURS), strict=False))
+    caption = f"<figcaption>{escape(plot.caption)}{_legend(plot.drawn)}</figcaption>"
+    return f"<figure>{frame.around_it(inside)}{caption}</figure>"
+
+
+def _drawn(frame: PlotAxes, what: Line | Dots, colour: str) -> str:
+    if isinstance(what, Dots):
+        places = (place.split(",") for place in frame.points(what.x, what.y).split())
+        return "".join(f'<circle cx="{a}" cy="{b}" r="1.5" fill="{colour}" opacity=".5"/>' for a, b in places)
+    curve = f'<polyline points="{frame.points(what.x, what.y)}" fill="none" stroke="{colour}"/>'
+    if what.spread is None:
+        return curve
+    upper, lower = frame.points(what.x, what.y + what.spread), frame.points(what.x[::-1], (what.y - what.spread)[::-1])
+    return f'<polygon points="{upper} {lower}" fill="{colour}" opacity=".2"/>{curve}'
+
+
+def _legend(drawn: Sequence[Line | Dots]) -> str:
+    named = [
+        f'<span style="color:{colour}">{escape(each.label)}</span>'
+        for each, colour in zip(drawn, cycle(COLOURS), strict=False)
+        if each.label
+    ]
+    return f" ({', '.join(named)})" if named else ""
+
+
+def markdown(document: Document) -> bytes:
+    """The text, UTF-8; of plots the extremes."""
+    lines = [f"# {_escaped(document.title)}"]
+    for section in document.sections:
+        lines += [f"\n## {_escaped(section.heading)}\n", *(f"{_markdown_part(part)}\n" for part in section.parts)]
+    return "\n".join(lines).encode()
+
+
+def _markdown_part(part: Part) -> str:
+    match part:
+        case Paragraph(words):
+            return _escaped(words)
+        case Table(header, rows):
+            width = max([len(header), *map(len, rows)])
+            cells = [list(header) or [""] * width, ["---"] * width, *rows]
+            return "\n".join(f"| {' | '.join(map(_escaped, row))} |" for row in cells)
+        case Plot(caption, drawn):
+            return f"{_escaped(caption)}: {'; '.join(map(_extremes, drawn))}"
+
+
+def _extremes(what: Line | Dots) -> str:
+    label = f"{_escaped(what.label)} " if what.label else ""
+    return f"{label}{what.y.min():+.3g} to {what.y.max():+.3g}"
+
+
+def _escaped(text: str) -> str:
+    """Text that means nothing else in Markdown."""
+    for mark in "\\`*_[]<>|#":
+        text = text.replace(mark, f"\\{mark}")
+    return text
+
+
+class PlotAxes:
+    """A plot's axes: what is across and what is up."""
+
+    def __init__(self, across: tuple[float, float], up: tuple[float, float]) -> None:
+        self.across, self.up = across, up
+
+    @classmethod
+    def around(cls, drawn: Sequence[Line | Dots]) -> PlotAxes:
+        """Axes that hold everything, lines with their bands, and zero."""
+        x = np.concatenate([each.x for each in drawn])
+        edges = np.concatenate([edge for each in drawn for edge in _edges(each)])
+        up = min(0.0, float(edges.min())), max(0.0, float(edges.max()))
+        return cls((float(x.min()), float(x.max())), up)
+
+    def points(self, x: Array, y: Array) -> str:
+        """Places as SVG has them."""
+        return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(self._x(x).tolist(), self._y(y).tolist(), strict=True))
+
+    def _x(self, x: Array) -> Array:
+        left, right = self.across
+        return LEFT + (WIDTH - LEFT - RIGHT) * (x - left) / max(right - left, 1e-12)
+
+    def _y(self, y: Array) -> Array:
+        low, high = self.up
+        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (y - low) / max(high - low, 1e-12)
+
+    def around_it(self, inside: str) -> str:
+        """The figure with its scales and its zero line."""
+        box = f'viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}"'
+        return f'<svg {box} role="img" font-size="11" fill="#555">{"".join(self._scales())}{inside}</svg>'
+
+    def _scales(self) -> Iterator[str]:
+        floor = HEIGHT - BOTTOM
+        across, up = ticks(*self.across, ACROSS), ticks(*self.up, UP)
+        for value, x in zip(across.tolist(), self._x(across).tolist(), strict=True):
+            yield f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{floor}" stroke="#e4e4e4"/>'
+            yield f'<text x="{x:.1f}" y="{floor + 15}" text-anchor="middle">{value:g}</text>'
+        for value, y in zip(up.tolist(), self._y(up).tolist(), strict=True):
+            colour = "#e4e4e4" if value else "#999"
+            yield f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}" stroke="{colour}"/>'
+            yield f'<text x="{LEFT - 5}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
+
+
+def ticks(low: float, high: float, count: int) -> Array:
+    """Round numbers from low to high, about so many; of a range without width its only value."""
+    if not high > low:
+        return np.array([low])
+    rough = (high - low) / count
+    power = 10.0 ** np.floor(np.log10(rough))
+    step = power * min(ROUND, key=lambda each: abs(np.log(each * power / rough)))
+    numbers = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+    return np.asarray(numbers * step, dtype=np.float64).round(15) + 0.0
+
+
+def _edges(what: Line | Dots) -> tuple[Array, ...]:
+    if isinstance(what, Dots) or what.spread is None:
+        return (what.y,)
+    return what.y - what.spread, what.y + what.spread
