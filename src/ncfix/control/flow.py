@@ -209,25 +209,23 @@ class Flow(Generic[U]):
     def follow(self, operations: Iterable[Operation]) -> bool:
         """Execute operations until one leads elsewhere; whether none has."""
         for operation in operations:
-            match operation:
-                case Let(do):
-                    do()
-                case Jump(to, when, out):
-                    if when is None or when():
-                        self.jump(to() if callable(to) else to, out=out)
-                        return False
-                case Repeat():
-                    if self._repeat(operation):
-                        return False
-                case Call(enter):
-                    call = enter()
-                    if call is not None:
-                        self.enter(call)
-                        return False
-                case Return(when, kind):
-                    if when is None or when():
-                        self.finish(kind)
-                        return False
+            if isinstance(operation, Let):
+                operation.do()
+            elif isinstance(operation, Jump):
+                if operation.when is None or operation.when():
+                    self.jump(operation.to() if callable(operation.to) else operation.to, out=operation.out)
+                    return False
+            elif isinstance(operation, Repeat):
+                if self._repeat(operation):
+                    return False
+            elif isinstance(operation, Call):
+                call = operation.enter()
+                if call is not None:
+                    self.enter(call)
+                    return False
+            elif operation.when is None or operation.when():
+                self.finish(operation.kind)
+                return False
         return True
 
     def jump(self, block: int | None, *, out: bool = False) -> None:
