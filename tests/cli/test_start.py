@@ -10,7 +10,7 @@ FAMILIES = {"ncfix_iso.rs274", "ncfix_fanuc.macro", "ncfix_siemens.sinumerik", "
 ELSEWHERE = {
     "scipy", "rich", "sympy", "numba", "llvmlite", "multiprocessing", "concurrent.futures", "numpy.ma",
     "ncfix.diagnose", "ncfix.measure", "ncfix.report", "ncfix.machine.symbolic", "ncfix.kernel",
-    "ncfix_iso.rs274.unroll",
+    "ncfix_iso.rs274.flatten",
     "ncfix.control.setup_file", "ncfix.control.tool_table",
 }  # fmt: skip
 """What none of the verbs below needs for a program of a page and a machine with a few errors."""

@@ -124,6 +124,7 @@ STOPS = {
     "G65P7": "NCF231",
     "M98P1\nM30\nO1\nG0X1.\nO2\nM99": "NCF242",
     "M98P1\nM30\nO1\nM98P1\nM99": "NCF232",
+    "N1M97P1": "NCF232",
     "N1GOTO1": "NCF233",
 }
 

@@ -50,7 +50,7 @@ def follow(program: Program, run: Run) -> Trace:
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """The blocks of a program of this family as they are executed."""
-    from ncfix_iso.rs274.unroll import unrolled
+    from ncfix_iso.rs274.flatten import unrolled
 
     return unrolled(following(program, run), steps, limit)
 

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from functools import partial
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import INDEX
 from ncfix.control.faults import Fault
@@ -34,6 +34,9 @@ from ncfix_heidenhain.klartext.tools import call_tool, define_tool
 from ncfix_heidenhain.klartext.units import KlartextUnit
 from ncfix_heidenhain.klartext.unread import unread_line
 
+if TYPE_CHECKING:
+    from ncfix_heidenhain.klartext.flatten import KlartextFlattener
+
 WRITTEN_AT_RUN_TIME = "NCF237"
 AT_RUN_TIME = "NCF277"
 ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
@@ -45,19 +48,12 @@ NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "
 """Addresses in motion blocks that lead nowhere."""
 
 
-class Recorder(Protocol):
-    """Takes note of blocks that are executed; see `unroll`."""
-
-    def note(self, unit: KlartextUnit, block: int, control: Control, row: int) -> None:
-        """A block is about to be executed; `row` is the block of the main program that led to it."""
-
-
 class KlartextInterpreter(Interpreter[KlartextUnit]):
     """Follows one program."""
 
     control: Control
     flow: KlartextFlow
-    recorder: Recorder | None
+    watcher: KlartextFlattener | None
 
     def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
@@ -102,7 +98,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     def lane_is_open(self, plan: Plan) -> bool:
         """See `Interpreter`."""
         unit, closed = self.no_lane
-        return self.recorder is None and not (unit is self.flow.unit and self.flow.block in closed)
+        return self.watcher is None and not (unit is self.flow.unit and self.flow.block in closed)
 
     def run_lane(self, unit: KlartextUnit, block: int, plan: Plan) -> int:
         """See `Interpreter`."""
@@ -116,8 +112,8 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         """Execute a block; True if the program ends there."""
         control, flow = self.control, self.flow
         control.scope.numbers, control.scope.first = unit.numbers, unit.first[block]
-        if self.recorder is not None:
-            self.recorder.note(unit, block, control, control.row_block)
+        if self.watcher is not None:
+            self.watcher.note(unit, block)
         if plan.statement is not None:
             return self.state(plan, flow)
         if plan.flow is not None:
@@ -161,7 +157,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         assert plan.test is not None
         value, at_runtime = self.control.scope.value_of(plan.test)
         if at_runtime:
-            code = AT_RUN_TIME if self.recorder is None else WRITTEN_AT_RUN_TIME
+            code = AT_RUN_TIME if self.watcher is None else WRITTEN_AT_RUN_TIME
             lacking = self.control.scope.parameters.lacking
             text = f"where the program goes on depends on {lacking}, which is known only at run time"
             raise Fault(code, text, f'variables."{lacking}" in the setup file gives it a value')

@@ -13,13 +13,13 @@ from ncfix.text.tree import Program
 from ncfix_heidenhain.klartext.blocks import parse_block
 from ncfix_heidenhain.klartext.bulk import in_bulk, one_by_one
 from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.flatten import unrolled
 from ncfix_heidenhain.klartext.following import KlartextFollower
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import layout_of, uses_comma
 from ncfix_heidenhain.klartext.numbering import renumbered
 from ncfix_heidenhain.klartext.render import render
 from ncfix_heidenhain.klartext.shapes import scan, split
-from ncfix_heidenhain.klartext.unroll import unrolled
 
 
 def following(program: Program, run: Run) -> KlartextInterpreter:

@@ -25,7 +25,7 @@ from ncfix_iso.rs274.settings import unknown_code
 from ncfix_iso.rs274.wordcheck import check_words
 
 if TYPE_CHECKING:
-    from ncfix_iso.rs274.unroll import Recorder
+    from ncfix_iso.rs274.flatten import RS274Flattener
 
 CALL, RETURN = 980, 990
 PROGRAM_ENDS = (20, 300)
@@ -47,7 +47,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
     """Follows one program."""
 
     control: Control
-    recorder: Recorder | None
+    watcher: RS274Flattener | None
 
     def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
@@ -88,8 +88,8 @@ class RS274Interpreter(Interpreter[RS274Unit]):
 
     def note_stretch(self, unit: RS274Unit, block: int, done: int) -> None:
         """See `Interpreter`."""
-        if self.recorder:
-            self.recorder.stretch(unit, block, done)
+        if self.watcher:
+            self.watcher.stretch(unit, block, done)
 
     def end_of_text(self) -> bool:
         """The text is over without M2, M30 or `%`."""
@@ -104,13 +104,13 @@ class RS274Interpreter(Interpreter[RS274Unit]):
     def execute(self, plan: Plan, unit: RS274Unit, block: int) -> bool:
         """Execute a block; True if the program ends there."""
         if plan.tape:
-            if self.recorder:
-                self.recorder.whole(unit, block)
+            if self.watcher:
+                self.watcher.whole(unit, block)
             return self.at_tape(unit, block)
         if plan.flow is not None:
             self.span = plan.flow.span
-            if self.recorder and not self.flow.calls:
-                self.recorder.head(unit, block, plan.flow.keyword)
+            if self.watcher and not self.flow.calls:
+                self.watcher.head(unit, block, plan.flow.keyword)
             operations = unit.operations.get(block)
             if operations is None:
                 operations = unit.operations[block] = self.flow.lowered(plan.flow, unit, block)
@@ -122,9 +122,9 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         begins = plan.flow is not None and plan.flow.keyword == "program"
         if self.control.rules.strict or not begins or not has_words(plan):
             return False
-        written, self.recorder = self.recorder, None  # the line has been written as it stands
+        written, self.watcher = self.watcher, None  # the line has been written as it stands
         ended = self.execute_words(plan, index)
-        self.recorder = written
+        self.watcher = written
         return ended
 
     def at_tape(self, unit: RS274Unit, block: int) -> bool:
@@ -160,8 +160,8 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         self.settings(codes, block)
         if motion is not None:
             self.move(block, codes, motion)
-        if self.recorder:
-            self.recorder.words(self.flow.unit, index, plan, codes, block)
+        if self.watcher:
+            self.watcher.words(self.flow.unit, index, plan, codes, block)
         return self.after(codes, block)
 
     def motion_of(self, plan: Plan, codes: Codes) -> int | None:

@@ -64,7 +64,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """The blocks of a program of this family as they are executed."""
-    from ncfix_iso.rs274.unroll import unrolled
+    from ncfix_iso.rs274.flatten import unrolled
 
     return unrolled(following(program, run), steps, limit)
 

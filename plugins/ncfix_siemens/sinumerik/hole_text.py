@@ -16,9 +16,9 @@ from ncfix.control.moves import CycleCall
 from ncfix.text.number_style import NumberStyle
 from ncfix.text.tree import Program, Word
 from ncfix.writer.target import LINE, Rendered, Target
+from ncfix_siemens.sinumerik.flatten import argument, written
 from ncfix_siemens.sinumerik.layout import END_OF_SUBPROGRAM, SinumerikLayout
 from ncfix_siemens.sinumerik.render import SinumerikRenderer
-from ncfix_siemens.sinumerik.unroll import argument, written
 
 FloatArray = NDArray[np.float64]
 

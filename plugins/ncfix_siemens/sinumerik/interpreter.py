@@ -9,7 +9,7 @@ from operator import or_
 
 import numpy as np
 
-from ncfix.control.flatten import RUNTIME, FlatLine
+from ncfix.control.flatten import RUNTIME
 from ncfix.control.flow import Call
 from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Moves
@@ -20,6 +20,7 @@ from ncfix.text.language import Run
 from ncfix.text.tree import Program
 from ncfix_siemens.sinumerik.calling import call_word, ran_elsewhere
 from ncfix_siemens.sinumerik.destination import Words
+from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.heading import note_stretch
 from ncfix_siemens.sinumerik.increments import stand
@@ -32,7 +33,6 @@ from ncfix_siemens.sinumerik.statements import Turn, act, finish_block, say
 from ncfix_siemens.sinumerik.synchronous import is_harmless
 from ncfix_siemens.sinumerik.undecided import DECIDED_AT_RUNTIME, bypassed, demoted, sweep
 from ncfix_siemens.sinumerik.unit import HEAD, PROCEDURE, SinumerikUnit, units_of
-from ncfix_siemens.sinumerik.unroll import Recorder
 from ncfix_siemens.sinumerik.vectors import run_vectors
 
 NOT_UNDERSTOOD = "NCF250"
@@ -64,7 +64,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
 
     control: Sinumerik
     flow: SinumerikFlow
-    recorder: Recorder | None
+    watcher: SinumerikFlattener | None
 
     def __init__(self, control: Sinumerik, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
@@ -132,7 +132,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         except AtRuntimeError:
             if self.in_parts:
                 raise NotInPartsError("what is executed is decided at run time") from None
-            if self.recorder is not None:
+            if self.watcher is not None:
                 raise SourceError.of(RUNTIME, DECIDED_AT_RUNTIME, self.place()) from None
             self.again = sweep(self.flow)
             return True
@@ -140,12 +140,6 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
     def moves(self) -> Moves:
         """The motions of the program, when it has been followed."""
         return all_or_none(demoted(self.control.moves(), self.again), self.main.program)
-
-    def unrolled(self, recorder: Recorder) -> list[FlatLine]:
-        """The blocks of the program as they are executed; raises SourceError NCF237 where that is not known before."""
-        self.recorder = recorder
-        self.run()
-        return recorder.out.lines
 
     def run_lane(self, unit: SinumerikUnit, block: int, plan: Plan) -> int:
         """See `Interpreter`; blocks that point the tool go in a lane of their own."""
@@ -156,7 +150,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
     def lane_is_open(self, plan: Plan) -> bool:
         """See `Interpreter`."""
         control = self.control
-        if plan.lane is None or self.recorder is not None:
+        if plan.lane is None or self.watcher is not None:
             return False
         if (control.modal.incremental and control.counted != control.footing) or control.cornered:
             return False
@@ -201,9 +195,8 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         self.span = None
         if turn.subprogram is None:
             call_word(control, turn, self.find)
-        if self.recorder is not None:
-            main, line = not flow.calls, self.place().line
-            self.recorder.record(control, unit, block, turn, main=main, line=line)
+        if self.watcher is not None:
+            self.watcher.record(unit, block, turn, main=not flow.calls)
         finish_block(control, turn)
         if turn.elsewhere:
             ran_elsewhere(control, turn.elsewhere, changes_tool=control.tools.selected != 0)
@@ -225,7 +218,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             try:
                 goes_on = flow.follow(lowered)
             except AtRuntimeError:
-                if self.recorder is not None or not bypassed(self.control, flow, step, steps):
+                if self.watcher is not None or not bypassed(self.control, flow, step, steps):
                     raise
                 goes_on = False
             if not goes_on or step.keyword in ("if", "case"):

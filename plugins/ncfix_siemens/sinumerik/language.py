@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.finish import finished
-from ncfix.control.flat_lines import FlatLines
 from ncfix.control.flatten import FlatLine
 from ncfix.control.moves import Moves, Trace
 from ncfix.text.language import ArcLayout, BulkLayout, Language, Run
@@ -19,6 +18,7 @@ from ncfix.text.shapes import split_blocks
 from ncfix.text.tree import Program, Word
 from ncfix.writer.pieces import Pieces
 from ncfix_siemens.sinumerik.blocks import parse_block
+from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 from ncfix_siemens.sinumerik.following import SinumerikFollower, runs_straight_on
 from ncfix_siemens.sinumerik.hole_text import render
 from ncfix_siemens.sinumerik.interpreter import SinumerikInterpreter
@@ -28,7 +28,6 @@ from ncfix_siemens.sinumerik.orientation import VECTOR
 from ncfix_siemens.sinumerik.plans import fixed_centre
 from ncfix_siemens.sinumerik.scanning import scan
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.unroll import Recorder
 
 SPATIAL = frozenset("XYZ")
 
@@ -48,7 +47,10 @@ def follow(program: Program, run: Run) -> Trace:
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """The blocks of a program of this family as they are executed."""
-    return following(program, run).unrolled(Recorder(steps, FlatLines(limit)))
+    walk = following(program, run)
+    walk.watcher = SinumerikFlattener(walk.control, steps, limit)
+    walk.run()
+    return walk.watcher.lines
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:

@@ -1,27 +1,29 @@
 """A program made flat: every block that the control executes written out once, in order, with numbers for expressions.
 
 A block that is executed from several states (in a loop, a subprogram, a repeated cycle) can be corrected for one of
-them only. In the flat program each execution is a block of its own. The language writes it (`Language.unroll`) while
-it follows the program; here it is read and followed again, and must make the same motions.
+them only. In the flat program each execution is a block of its own. It is written while the program is followed
+(`Flattener`, of which each language has its own); then it is read and followed again, and must make the same motions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ncfix.control.faults import Fault
 from ncfix.control.moves import Kind, Kinematics, Moves, Rule
 from ncfix.control.trace import trace
 from ncfix.diagnostics import RefusedError, SourceError
 from ncfix.text.language import Resolve, Run, language_of
 from ncfix.text.reader import read
-from ncfix.text.tree import Program
+from ncfix.text.tree import Assignment, Command, Flow, Item, Opaque, Program, Span, Word
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup
+    from ncfix.control.unit import TextUnit
 
 RUNTIME, TOO_LONG, NOT_FLAT = "NCF237", "NCF238", "NCF239"
 LINES = 500_000
@@ -58,6 +60,109 @@ class Unroll(Protocol):
         limit: int,
     ) -> Sequence[FlatLine]:
         """The lines of the flat program."""
+
+
+class Change(NamedTuple):
+    """Text of a block to be replaced: from `start` up to `stop`, places in the source."""
+
+    start: int
+    stop: int
+    text: str = ""
+
+
+class Flattener:
+    """Watches the interpreter, and writes down every block as it is executed.
+
+    One walk over the items of a block puts numbers in the place of formulas, and drops what only leads elsewhere. What
+    becomes of a word, an assignment, a name or other text (None: it stays), and how numbers look, a language says.
+
+    steps  axis letter -> least increment of its axis, mm or degree
+    limit  of lines; `lines` are those so far
+    unit, block  what is executed; `line`: of the main program, that block or the one that has called
+    with_blank   the blank before an item that is dropped falls away, too
+    """
+
+    with_blank = False
+
+    def __init__(self, steps: Mapping[str, float], limit: int) -> None:
+        self.steps, self.limit = steps, limit
+        self.lines: list[FlatLine] = []
+        self.line = 1
+        self.unit: TextUnit[Any]
+        self.block = 0
+
+    def watch(self, unit: TextUnit[Any], block: int) -> None:
+        """A block is executed."""
+        self.unit, self.block = unit, block
+        if not unit.external:
+            self.line = unit.program.line(block)
+
+    def write(self, text: str, below: int = 0) -> None:
+        """One line more, from `below` lines further down in the original; raises `Fault` NCF238 beyond the limit."""
+        if len(self.lines) >= self.limit:
+            hint = "a program so long is better corrected where it is made"
+            raise Fault(TOO_LONG, f"written out flat the program has more than {self.limit} lines", hint)
+        self.lines.append(FlatLine(text, self.line + below))
+
+    def changes(self) -> list[Change]:
+        """What becomes of the items of the block."""
+        found = map(self.rewritten, self.unit.program.items_of(self.block))
+        return [change for change in found if change is not None]
+
+    def rewritten(self, item: Item) -> Change | None:
+        """What becomes of an item."""
+        match item:
+            case Word():
+                return self.word(item)
+            case Assignment():
+                return self.assignment(item)
+            case Command():
+                return self.command(item)
+            case Opaque():
+                return self.opaque(item)
+            case Flow():
+                return self.dropped(item)
+        return None
+
+    def word(self, word: Word) -> Change | None:
+        """What becomes of a word."""
+        return None
+
+    def assignment(self, item: Assignment) -> Change | None:
+        """What becomes of an assignment."""
+        return None
+
+    def command(self, command: Command) -> Change | None:
+        """What becomes of a name."""
+        return None
+
+    def opaque(self, item: Opaque) -> Change | None:
+        """What becomes of text that is not taken apart."""
+        return None
+
+    def replaced(self, span: Span, text: str) -> Change:
+        """Other text in the place of a span of the block."""
+        return Change(*self.unit.program.span(self.block, span), text)
+
+    def dropped(self, item: Item) -> Change:
+        """An item falls away."""
+        program = self.unit.program
+        start, stop = program.span(self.block, item.span)
+        if self.with_blank and start > int(program.blocks[self.block, 0]) and program.source[start - 1] in b" \t":
+            start -= 1
+        return Change(start, stop)
+
+    def text(self, changes: Iterable[Change]) -> str:
+        """The text of the block with changes made, as Latin-1; one that lies within another does not count."""
+        program = self.unit.program
+        at, stop = map(int, program.blocks[self.block])
+        text = ""
+        for change in sorted(changes, key=lambda each: (each.start, each.stop)):
+            if change.start < at and change.stop <= at:
+                continue
+            text += program.source[at : max(at, change.start)].decode("latin-1") + change.text
+            at = change.stop
+        return text + program.source[at:stop].decode("latin-1")
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,7 +36,7 @@ class Interpreter(ABC, Generic[U]):
     flow      where execution stands
     files     the texts of subprograms, by their names
     span      what of the block is looked at, for messages
-    recorder  writes blocks down as they are executed, if anybody wants that
+    watcher   writes blocks down as they are executed, if the program is to be written out flat
     in_parts  the text comes part by part; `first` and `last`: this is the first, the last of them
     ended     the program has ended
     """
@@ -51,7 +51,7 @@ class Interpreter(ABC, Generic[U]):
         self.in_parts = in_parts
         self.files: dict[str, U | None] = {}
         self.span: Span | None = None
-        self.recorder: Any = None
+        self.watcher: Any = None
         self.first = self.last = True
         self.ended = False
         self._recurrence = Recurrence()

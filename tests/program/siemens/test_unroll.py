@@ -36,3 +36,10 @@ def test_assignments(text: str, lines: list[str]) -> None:
 def test_what_is_known_at_run_time_only_and_counts_on_others() -> None:
     with pytest.raises(RefusedError, match="is set to is known only at run time"):
         flat("FOR R1=1 TO 2\nR8=$AA_IW[X]+R1\nENDFOR")
+
+
+def test_blocks_of_a_subprogram_file_come_from_the_line_that_calls_it() -> None:
+    program = read(b"G0 X1\n\nSUBX\nG0 X4\nM30\n", "part.mpf", "siemens")
+    files = {"SUBX.SPF": b"; far from here\n\n\n\nG0 X2\nG0 X3\nM17\n"}
+    found = flatten(program, KNOWN, ("X", "Y", "Z"), frozenset(), dict.fromkeys("XYZ", 1e-3), files.get)
+    assert list(found.lines) == [1, 3, 3, 4, 5]

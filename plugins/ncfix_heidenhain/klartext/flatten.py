@@ -7,13 +7,12 @@ stays as it is; a jump that depends on it cannot be written out.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from ncfix.control.flat_lines import Change, FlatLines, changed
-from ncfix.control.flatten import FlatLine
+from ncfix.control.flatten import Change, FlatLine, Flattener
 from ncfix.text.number_style import decimals_for
-from ncfix.text.tree import Assignment, Constant, Expression, Literal, Opaque, Program, Span, Text, Word
-from ncfix_heidenhain.klartext.calculate import Scope, compiled
+from ncfix.text.tree import Assignment, Constant, Expression, Literal, Opaque, Span, Text, Word
+from ncfix_heidenhain.klartext.calculate import compiled
 from ncfix_heidenhain.klartext.contours import written_out
 from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING
@@ -39,31 +38,23 @@ SHARED = ("Q200", "Q203", "Q204")
 NOT_WRITTEN = ("CALL PGM", "SEL PGM", "CALL SELECTED", "FN 14")
 
 
-@dataclass(slots=True)
-class Recorder:
-    """Writes down blocks as they are executed.
+class KlartextFlattener(Flattener):
+    """See `Flattener`; `style`: of numbers."""
 
-    main   the program that is written out
-    steps  axis letter -> least increment
-    style  of numbers
-    out    the lines so far
-    """
+    def __init__(self, control: Control, steps: Mapping[str, float], limit: int, style: Style) -> None:
+        super().__init__(steps, limit)
+        self.control, self.style = control, style
 
-    main: Program
-    steps: Mapping[str, float]
-    style: Style
-    out: FlatLines
-
-    def note(self, unit: KlartextUnit, block: int, control: Control, row: int) -> None:
-        """Write down a block that is about to be executed; `row` is the block of the main program that led to it."""
-        plan = unit.plan(block)
-        if plan.flow is not None or (plan.statement is not None and self.is_left_out(unit, block)):
+    def note(self, unit: KlartextUnit, block: int) -> None:
+        """Write down a block that is about to be executed."""
+        self.watch(unit, block)
+        plan, control = unit.plan(block), self.control
+        if plan.flow is not None or (plan.statement is not None and self.is_left_out(plan.statement)):
             return
         holes = self.holes(plan, control) or written_out(control, unit, block, self.point)
-        text = "\n".join(holes) if holes else self.flat_text(unit.program, block, control.scope)
-        line = unit.program.line(block) if not unit.external else self.line_of_call(row)
+        text = "\n".join(holes) if holes else self.text(self.changes()).lstrip(" \t")
         for offset, part in enumerate(text.splitlines()):
-            self.out.write(part.rstrip(), line + (offset if not unit.external and not holes else 0))
+            self.write(part.rstrip(), offset if not unit.external and not holes else 0)
 
     def holes(self, plan: Plan, control: Control) -> list[str]:
         """The holes of a pattern one by one; empty for other blocks, and where they are not known."""
@@ -102,55 +93,47 @@ class Recorder:
         """A number without zeros at its end."""
         return self.style.number(value, OTHERS).rstrip("0").rstrip(".,")
 
-    def line_of_call(self, row: int) -> int:
-        """The line of the main program from which another one was called."""
-        return self.main.line(row)
-
-    def is_left_out(self, unit: KlartextUnit, block: int) -> bool:
+    def is_left_out(self, statement: tuple[str, Span]) -> bool:
         """Whether a statement is not written: program ends, and what only makes sense with labels and calls."""
-        statement = unit.plan(block).statement
-        assert statement is not None
-        text = " ".join(unit.program.slice(block, statement[1]).upper().split())
+        text = " ".join(self.unit.program.slice(self.block, statement[1]).upper().split())
         return statement[0] == "program" or text.startswith(NOT_WRITTEN)
 
-    def flat_text(self, program: Program, block: int, scope: Scope) -> str:
-        """The text of a block with numbers for its formulas, and without its number."""
-        edits: list[Change] = []
-        for item in program.items_of(block):
-            if isinstance(item, Word) and item.address == "N":
-                edits.append(Change(*program.span(block, item.span)))
-            elif isinstance(item, Word) and not isinstance(item.value, (Literal, Constant, Text)):
-                found = self.number(program, block, item.value_span, item.value, scope, self.digits(item.address))
-                unsigned = item.address[0] in UNSIGNED
-                edits += [each._replace(text=each.text.lstrip("+")) if unsigned else each for each in found]
-            elif isinstance(item, Assignment) and not isinstance(item.value, (Literal, Text)):
-                found = self.number(program, block, item.span, item.value, scope, OTHERS)
-                name = program.slice(block, item.span).split("=")[0].strip()
-                edits += [each._replace(text=f"{name} = {each.text}") for each in found]
-        return changed(program, block, edits).lstrip(" \t")
+    def word(self, word: Word) -> Change | None:
+        """Numbers for formulas; the block's own number falls away."""
+        if word.address == "N":
+            return self.dropped(word)
+        if isinstance(word.value, (Literal, Constant, Text)):
+            return None
+        text = self.number(word.value, self.digits(word.address))
+        if text is None:
+            return None
+        return self.replaced(word.value_span, text.lstrip("+") if word.address[0] in UNSIGNED else text)
+
+    def assignment(self, item: Assignment) -> Change | None:
+        """The value for the formula."""
+        text = None if isinstance(item.value, (Literal, Text)) else self.number(item.value, OTHERS)
+        name = self.unit.program.slice(self.block, item.span).split("=")[0].strip()
+        return None if text is None else self.replaced(item.span, f"{name} = {text}")
 
     def digits(self, address: str) -> int:
         """Digits after the point of a word."""
         step = self.steps.get(address.removeprefix("I"))
         return OTHERS if step is None else max(LEAST, decimals_for(step))
 
-    def number(
-        self, program: Program, block: int, span: Span, value: Expression, scope: Scope, digits: int
-    ) -> list[Change]:
-        """The change that puts a number in the place of a formula; none where it is known only at run time."""
-        found, at_runtime = scope.value_of(compiled(value))
+    def number(self, value: Expression, digits: int) -> str | None:
+        """The number that a formula comes to; None where it is known only at run time."""
+        found, at_runtime = self.control.scope.value_of(compiled(value))
         if at_runtime:
-            return []
-        text = self.short(found) if digits == OTHERS else self.style.number(found, digits)
-        return [Change(*program.span(block, span), text)]
+            return None
+        return self.short(found) if digits == OTHERS else self.style.number(found, digits)
 
 
 def unrolled(
     interpreter: KlartextInterpreter, steps: Mapping[str, float], limit: int, comma: bool
 ) -> Sequence[FlatLine]:
     """Follow a program and write down its blocks; raises SourceError NCF237 and NCF238."""
-    recorder = Recorder(interpreter.main.program, steps, Style(comma), FlatLines(limit))
-    interpreter.recorder = recorder
+    flattener = KlartextFlattener(interpreter.control, steps, limit, Style(comma))
+    interpreter.watcher = flattener
     interpreter.run()
     program = interpreter.main.program
     first = next(block for block in program if "BEGIN" in program.text_of(block).upper())
@@ -163,4 +146,4 @@ def unrolled(
     ]
     head = FlatLine(names[0], program.line(first))
     tail = FlatLine(names[0].upper().replace("BEGIN", "END", 1), program.line(last))
-    return [head, *recorder.out.lines, tail]
+    return [head, *flattener.lines, tail]

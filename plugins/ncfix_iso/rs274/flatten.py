@@ -9,19 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y
 from ncfix.control.faults import Fault
-from ncfix.control.flat_lines import Change, FlatLines, changed
-from ncfix.control.flatten import RUNTIME, FlatLine
+from ncfix.control.flatten import RUNTIME, Change, FlatLine, Flattener
 from ncfix.control.places import mask_of
+from ncfix.control.unit import TextUnit
 from ncfix.diagnostics import SourceError
 from ncfix.text.number_style import decimals_for
-from ncfix.text.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Parameter, Word
+from ncfix.text.tree import Assignment, Comment, Constant, Literal, Opaque, Parameter, Word
 from ncfix_iso.rs274.control import RUNTIME_BRANCH, Block, Control
-from ncfix_iso.rs274.plans import POLAR, Codes, Plan, RS274Unit
+from ncfix_iso.rs274.plans import POLAR, Codes, Plan
 
 if TYPE_CHECKING:
     from ncfix_iso.rs274.interpreter import RS274Interpreter
@@ -40,80 +39,83 @@ OTHER_DECIMALS, VARIABLE_DECIMALS = 4, 6
 LENGTHS = frozenset((*CENTRE_LETTERS, "R", "Q"))
 
 
-@dataclass(slots=True)
-class Recorder:
-    """Writes blocks down.
+class RS274Flattener(Flattener):
+    """See `Flattener`.
 
-    steps  axis letter -> least increment of its axis, mm or degree
-    out    the lines so far
-    carry  axis letter -> what rounding has left over, program units
+    carry   axis letter -> what rounding has left over, program units
     headed  a program number has been written
+    plan, codes, values  of the block that has been executed
     """
 
-    control: Control
-    steps: Mapping[str, float]
-    out: FlatLines
-    carry: dict[str, float] = field(default_factory=dict)
-    headed: bool = False
-    line: int = 1
+    with_blank = True
+    plan: Plan
+    codes: Codes
+    values: Block
+
+    def __init__(self, control: Control, steps: Mapping[str, float], limit: int) -> None:
+        super().__init__(steps, limit)
+        self.control = control
+        self.carry: dict[str, float] = {}
+        self.headed = False
 
     # -- what the interpreter tells -----------------------------------------------------------------------------------
 
-    def write(self, text: str) -> None:
-        """One line."""
-        self.out.write(text, self.line)
-
-    def whole(self, unit: RS274Unit, block: int) -> None:
+    def whole(self, unit: TextUnit[Plan], block: int) -> None:
         """A block as it stands."""
-        self.line = unit.program.line(block) if not unit.external else self.line
+        self.watch(unit, block)
         self.write(unit.program.text_of(block))
 
-    def head(self, unit: RS274Unit, block: int, keyword: str) -> None:
+    def head(self, unit: TextUnit[Plan], block: int, keyword: str) -> None:
         """The number of the main program; those of others, and all other flow control, fall away."""
         if keyword == "program" and not self.headed and not unit.external:
             self.headed = True
             self.whole(unit, block)
 
-    def stretch(self, unit: RS274Unit, start: int, count: int) -> None:
+    def stretch(self, unit: TextUnit[Plan], start: int, count: int) -> None:
         """Blocks of plain words."""
         for block in range(start, start + count):
-            self.line = unit.program.line(block) if not unit.external else self.line
-            self.put(unit, block, [self.removal(unit, block, word) for word in numbers_of(unit, block)])
+            self.watch(unit, block)
+            self.put([self.dropped(word) for word in self.template_words() if word.address == "N"])
 
-    def words(self, unit: RS274Unit, index: int, plan: Plan, codes: Codes, block: Block) -> None:
+    def template_words(self) -> tuple[Word, ...]:
+        """The words of the block as they are written."""
+        return self.unit.program.templates[self.unit.template[self.block]].words
+
+    def words(self, unit: TextUnit[Plan], index: int, plan: Plan, codes: Codes, block: Block) -> None:
         """A block of words that has been executed."""
-        self.line = unit.program.line(index) if not unit.external else self.line
-        self.check(plan, block)
+        self.watch(unit, index)
+        self.plan, self.codes, self.values = plan, codes, block
+        self.check()
         if self.control.left_out:
-            words = [word for word in unit.program.templates[unit.template[index]].words if not is_setting(word)]
-            self.put(unit, index, [self.removal(unit, index, word) for word in words])
+            self.put([self.dropped(word) for word in self.template_words() if not is_setting(word)])
             self.control.left_out = False
             return
         holes, self.control.ends = self.control.ends or [], []
-        changes = [self.of_item(unit, index, item, codes, block) for item in unit.program.items_of(index)]
-        made = [change for change in changes if change is not None]
-        made += self.absent(unit, index, plan, block)
+        made = [*self.changes(), *self.absent()]
         motion = self.control.modal.motion if codes.motion is None else codes.motion
         drills = holes and motion in self.control.rules.cycles and not codes.takes
         polar = bool(block.values.keys() & POLAR)
         if drills and (polar or len(holes) > 1 or self.control.modal.incremental):
-            self.cycle(unit, index, plan, block, made, holes)
+            self.cycle(made, holes)
         elif polar:
-            self.polar(unit, index, block, made)
+            self.polar(made)
         else:
-            self.put(unit, index, made)
+            self.put(made)
 
-    def polar(self, unit: RS274Unit, index: int, block: Block, changes: list[Change]) -> None:
+    def polar(self, changes: list[Change]) -> None:
         """A block with polar words: X and Y of where it leads, absolute."""
-        incremental = self.control.modal.incremental
-        written = unit.program.templates[unit.template[index]].words
-        words = [w for w in written if w.address in POLAR or w.address in INDEX or (incremental and is_distance(w))]
-        stop = end_of_words(unit, index)
+        incremental, block = self.control.modal.incremental, self.values
+        words = [
+            word
+            for word in self.template_words()
+            if word.address in POLAR or word.address in INDEX or (incremental and is_distance(word))
+        ]
+        stop = self.end_of_words()
         if incremental or not {"@", "^"} <= block.values.keys():
             self.must_stand(mask_of((X, Y)))
         others = "".join(x for x in LETTERS if x in self.steps and (x in "XY" or block.axes >> INDEX[x] & 1))
         text = (" G90" if incremental else "") + self.place(self.control.position, others)
-        self.put(unit, index, [*self.without(unit, index, words, changes), Change(stop, stop, text)])
+        self.put([*self.without(words, changes), Change(stop, stop, text)])
         if incremental:
             self.write("G91")
 
@@ -125,35 +127,27 @@ class Recorder:
             what = f"the program has not said where the axis {LETTERS[index]} stands"
             raise Fault(RUNTIME, f"{what}, so it cannot be written out flat")
 
-    def check(self, plan: Plan, block: Block) -> None:
+    def check(self) -> None:
         """Raise `Fault` where the values of a block depend on the machine at run time."""
+        block = self.values
         if block.runtime or self.control.refusal == RUNTIME_BRANCH:
             what = f"the word {min(block.runtime)}" if block.runtime else "which blocks are executed"
             raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
 
     # -- items --------------------------------------------------------------------------------------------------------
 
-    def of_item(self, unit: RS274Unit, index: int, item: Item, codes: Codes, block: Block) -> Change | None:
-        """What becomes of an item: None if it stays as it is."""
-        match item:
-            case Word():
-                return self.of_word(unit, index, item, codes, block)
-            case Assignment():
-                return self.of_assignment(unit, index, item)
-            case Flow():
-                return self.removal(unit, index, item)
-            case Opaque(kind, _) if kind not in KEPT:
-                return self.removal(unit, index, item)
-        return None
+    def opaque(self, item: Opaque) -> Change | None:
+        """See `Flattener`."""
+        return None if item.kind in KEPT else self.dropped(item)
 
-    def of_assignment(self, unit: RS274Unit, index: int, item: Assignment) -> Change:
-        """An assignment falls away, unless the control does something with it (offsets, for one) or keeps it."""
+    def assignment(self, item: Assignment) -> Change:
+        """It falls away, unless the control does something with it (offsets, for one) or keeps it."""
         target, rules = item.target, self.control.rules
         if isinstance(target, Parameter) and isinstance(target.index, Literal):
-            number = round(float(unit.program.values_of(index)[target.index.slot]))
+            number = round(float(self.unit.program.values_of(self.block)[target.index.slot]))
             if rules.system(number) or rules.lasting(number):
-                return Change(*unit.program.span(index, item.span), f"#{number}={self.value_of(number)}")
-        return self.removal(unit, index, item)
+                return self.replaced(item.span, f"#{number}={self.value_of(number)}")
+        return self.dropped(item)
 
     def value_of(self, number: int) -> str:
         """The value of a parameter as text; raises `Fault` where it depends on the machine at run time."""
@@ -164,50 +158,38 @@ class Recorder:
         value = parameters.numbered(number)
         return "#0" if math.isnan(value) else trimmed(value, VARIABLE_DECIMALS)
 
-    def of_word(self, unit: RS274Unit, index: int, word: Word, codes: Codes, block: Block) -> Change | None:
+    def word(self, word: Word) -> Change | None:
         """What becomes of a word."""
-        letter = word.address
-        called = not DROPPED_CODES["M"].isdisjoint(codes.m.values())
-        if letter == "N" or (called and letter in CALL_WORDS):
-            return self.removal(unit, index, word)
+        letter, values = word.address, self.values.values
+        called = not DROPPED_CODES["M"].isdisjoint(self.codes.m.values())
         if letter in "GM":
-            return self.of_code(unit, index, word)
-        if letter not in block.values:
-            return self.removal(unit, index, word)
-        written = isinstance(word.value, Literal) and not self.is_changed(unit, index, word, block)
-        if written:
+            return self.code(word)
+        if letter == "N" or (called and letter in CALL_WORDS) or letter not in values:
+            return self.dropped(word)
+        if isinstance(word.value, Literal) and not self.is_changed(word, word.value):
             return None
-        return Change(*unit.program.span(index, word.value_span), self.number(letter, block.values[letter]))
+        return self.replaced(word.value_span, self.number(letter, values[letter]))
 
-    def is_changed(self, unit: RS274Unit, index: int, word: Word, block: Block) -> bool:
+    def is_changed(self, word: Word, number: Literal) -> bool:
         """Whether a word with a plain number means another value than what is written (polar coordinates)."""
-        if not isinstance(word.value, Literal) or word.value.pointless:
+        if number.pointless:
             return word.address in "XYZ" and "polar" in self.control.suspended
-        return bool(unit.program.values_of(index)[word.value.slot] != block.values[word.address])
+        return bool(self.unit.program.values_of(self.block)[number.slot] != self.values.values[word.address])
 
-    def of_code(self, unit: RS274Unit, index: int, word: Word) -> Change | None:
+    def code(self, word: Word) -> Change | None:
         """What becomes of a G or M word."""
         if isinstance(word.value, Constant):
             dropped = round(10 * word.value.value) in DROPPED_CODES[word.address]
-            return self.removal(unit, index, word) if dropped else None
+            return self.dropped(word) if dropped else None
         value = self.control.rules.compiled(word.value, word.address)(self.control)
-        if math.isnan(value):
-            return self.removal(unit, index, word)
-        return Change(*unit.program.span(index, word.value_span), f"{value:g}")
+        return self.dropped(word) if math.isnan(value) else self.replaced(word.value_span, f"{value:g}")
 
-    def removal(self, unit: RS274Unit, index: int, item: Item) -> Change:
-        """Take an item out, with the blank before it."""
-        start, stop = unit.program.span(index, item.span)
-        first = int(unit.program.blocks[index, 0])
-        if start > first and unit.program.source[start - 1 : start] in (b" ", b"\t"):
-            start -= 1
-        return Change(start, stop)
-
-    def absent(self, unit: RS274Unit, index: int, plan: Plan, block: Block) -> list[Change]:
+    def absent(self) -> list[Change]:
         """Words that a block means and does not have: the other coordinate of a polar one."""
-        letters = [letter for letter in block.values if letter not in plan.letters and letter in INDEX]
-        stop = end_of_words(unit, index)
-        return [Change(stop, stop, " " + letter + self.number(letter, block.values[letter])) for letter in letters]
+        values = self.values.values
+        letters = [letter for letter in values if letter not in self.plan.letters and letter in INDEX]
+        stop = self.end_of_words()
+        return [Change(stop, stop, " " + letter + self.number(letter, values[letter])) for letter in letters]
 
     # -- numbers ------------------------------------------------------------------------------------------------------
 
@@ -228,18 +210,16 @@ class Recorder:
 
     # -- cycles -------------------------------------------------------------------------------------------------------
 
-    def cycle(
-        self, unit: RS274Unit, index: int, plan: Plan, block: Block, changes: list[Change], holes: list[Vector]
-    ) -> None:
+    def cycle(self, changes: list[Change], holes: list[Vector]) -> None:
         """The holes of a block, one block each, in absolute coordinates."""
-        drop = [word for word in plan.template.words if is_place(word, self.control)]
-        stop = end_of_words(unit, index)
+        drop = [word for word in self.template_words() if is_place(word, self.control)]
+        stop = self.end_of_words()
         incremental = self.control.modal.incremental
         level = self.control.modal.cycle.level / self.control.modal.unit
-        over, depth = self.letters_of_holes(block)
+        over, depth = self.letters_of_holes(self.values)
         mode = " G90" if incremental or any(is_distance(word) for word in drop) else ""
         first = mode + self.place(holes[0], over + depth) + " R" + self.number_at("R", level)
-        self.put(unit, index, [*self.without(unit, index, drop, changes), Change(stop, stop, first)])
+        self.put([*self.without(drop, changes), Change(stop, stop, first)])
         for hole in holes[1:]:
             self.write(self.place(hole, over).strip())
         if incremental:
@@ -276,30 +256,36 @@ class Recorder:
 
     # -- lines --------------------------------------------------------------------------------------------------------
 
-    def without(self, unit: RS274Unit, index: int, words: list[Word], changes: list[Change]) -> list[Change]:
+    def without(self, words: list[Word], changes: list[Change]) -> list[Change]:
         """The changes of a block from which some words fall away."""
-        spans = {unit.program.span(index, word.span) for word in words}
-        kept = [change for change in changes if not inside(change, spans)]
-        return kept + [self.removal(unit, index, word) for word in words]
+        spans = {self.unit.program.span(self.block, word.span) for word in words}
+        return [change for change in changes if not inside(change, spans)] + list(map(self.dropped, words))
 
-    def put(self, unit: RS274Unit, index: int, changes: list[Change]) -> None:
+    def end_of_words(self) -> int:
+        """Where further words of a block go: after its last word, before a comment."""
+        program = self.unit.program
+        items = [item for item in program.items_of(self.block) if not isinstance(item, Comment)]
+        ends = (program.span(self.block, item.span)[1] for item in items)
+        return max(ends, default=int(program.blocks[self.block, 0]))
+
+    def put(self, changes: list[Change]) -> None:
         """Write a block with changes made; not if nothing is left of it."""
-        text = changed(unit.program, index, changes)
+        text = self.text(changes)
         if text.strip() or not (changes or text):
             self.write(text.strip() if changes else text)
 
 
 def unrolled(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int) -> list[FlatLine]:
     """Run an interpreter and write down what it executes; raises SourceError where no flat program can say it."""
-    recorder = Recorder(interpreter.control, steps, FlatLines(limit))
-    interpreter.recorder, interpreter.control.ends = recorder, []
+    flattener = RS274Flattener(interpreter.control, steps, limit)
+    interpreter.watcher, interpreter.control.ends = flattener, []
     interpreter.run()
     if why := interpreter.control.unwritten:
         raise SourceError.of(RUNTIME, f"{why}, so the program cannot be written out flat", interpreter.place())
-    lines = recorder.out.lines
+    lines = flattener.lines
     begins, ends = (lines[at].text.lstrip()[:1] == "%" if lines else False for at in (0, -1))
     if begins and (not ends or len(lines) == 1):
-        recorder.write("%")
+        flattener.write("%")
     return lines
 
 
@@ -310,18 +296,6 @@ def trimmed(value: float, decimals: int) -> str:
         text = text.rstrip("0")
     text = text if "." in text else text + "."
     return "0." if text in ("-0.", "-.") else text
-
-
-def numbers_of(unit: RS274Unit, block: int) -> list[Word]:
-    """The N word of a block, if it has one."""
-    return [word for word in unit.program.templates[unit.template[block]].words if word.address == "N"]
-
-
-def end_of_words(unit: RS274Unit, index: int) -> int:
-    """Where further words of a block go: after its last word, before a comment."""
-    items = unit.program.items_of(index)
-    words = [unit.program.span(index, item.span)[1] for item in items if not isinstance(item, Comment)]
-    return max(words, default=int(unit.program.blocks[index, 0]))
 
 
 def is_setting(word: Word) -> bool:

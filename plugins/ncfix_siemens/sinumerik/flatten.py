@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.faults import Fault
-from ncfix.control.flat_lines import Change, FlatLines, changed
-from ncfix.control.flatten import RUNTIME
+from ncfix.control.flatten import RUNTIME, Change, Flattener
 from ncfix.text.number_style import decimals_for
 from ncfix.text.tree import (
     Assignment,
@@ -22,13 +20,10 @@ from ncfix.text.tree import (
     Command,
     Constant,
     Expression,
-    Flow,
-    Item,
     Literal,
     NamedParameter,
     Opaque,
     Parameter,
-    Span,
     Text,
     Unary,
     Word,
@@ -53,77 +48,63 @@ ENDS = frozenset({2.0, 17.0, 30.0})
 """M codes with which a subprogram ends."""
 
 
-@dataclass(slots=True)
-class Recorder:
-    """Writes blocks down.
+class SinumerikFlattener(Flattener):
+    """See `Flattener`.
 
-    steps  axis letter -> least increment of its axis, mm or degree
-    out    the lines so far
+    turn  the block as it is executed; `main`: no subprogram is
     """
 
-    steps: Mapping[str, float]
-    out: FlatLines
+    turn: Turn
+    main: bool
 
-    def record(self, scope: Sinumerik, unit: SinumerikUnit, block: int, turn: Turn, *, main: bool, line: int) -> None:
+    def __init__(self, control: Sinumerik, steps: Mapping[str, float], limit: int) -> None:
+        super().__init__(steps, limit)
+        self.control = control
+
+    def record(self, unit: SinumerikUnit, block: int, turn: Turn, *, main: bool) -> None:
         """Write a block down as it is executed."""
-        changes = []
-        for item in unit.plan(block).template.items:
-            new = self.rewritten(scope, item, turn, main=main)
-            if new is not None:
-                first, last = unit.program.span(block, new[0])
-                words = new[1]
-                if words is None:
-                    words = self.number(item, turn, unit.program.slice(block, new[0]))
-                changes.append(Change(first, last, words))
-        text = changed(unit.program, block, changes).strip()
+        self.watch(unit, block)
+        self.turn, self.main = turn, main
+        text = self.text(self.changes()).strip()
         if text.split(";")[0].strip() or (main and text):
-            self.out.write(text, line)
-        for point in scope.pattern[1:]:
-            self.out.write(self.place(scope, point), line)
-        scope.pattern = ()
+            self.write(text)
+        for point in self.control.pattern[1:]:
+            self.write(self.place(point))
+        self.control.pattern = ()
 
-    def rewritten(self, scope: Sinumerik, item: Item, turn: Turn, *, main: bool) -> tuple[Span, str | None] | None:
-        """The stretch of an item that changes and what it becomes (None: a number); None where the item stays."""
-        match item:
-            case Flow():
-                return item.span, ""
-            case Assignment():
-                return self.assignment(scope, item, turn)
-            case Word():
-                return self.word(item, turn, main=main)
-            case Command():
-                return self.command(scope, item, turn)
-            case Opaque() if item.kind in ("program head", "external") and not (main and is_head(turn)):
-                return item.span, ""
-        return None
+    def opaque(self, item: Opaque) -> Change | None:
+        """Heads of subprograms fall away."""
+        leads = item.kind in ("program head", "external") and not (self.main and is_head(self.turn))
+        return self.dropped(item) if leads else None
 
-    def word(self, word: Word, turn: Turn, *, main: bool) -> tuple[Span, str | None] | None:
+    def word(self, word: Word) -> Change | None:
         """What becomes of a word."""
+        turn = self.turn
         repeats = any(getattr(step, "keyword", "").startswith("repeat") for step in turn.plan.steps)
         dropped = word.address in ("N", ":") or (word.address == "P" and (turn.subprogram is not None or repeats))
         dropped |= word.address == "L" and turn.subprogram is not None
-        dropped |= word.address == "M" and not main and isinstance(word.value, Constant) and word.value.value in ENDS
-        if dropped:
-            return word.span, ""
-        return None if is_plain(word.value) else (word.value_span, None)
+        ends = isinstance(word.value, Constant) and word.value.value in ENDS
+        if dropped or (word.address == "M" and not self.main and ends):
+            return self.dropped(word)
+        return None if is_plain(word.value) else self.replaced(word.value_span, self.number(word))
 
-    def assignment(self, scope: Sinumerik, item: Assignment, turn: Turn) -> tuple[Span, str | None] | None:
+    def assignment(self, item: Assignment) -> Change | None:
         """What becomes of an assignment; the block has been executed, so the variable has its value already."""
-        step = next(step for step in turn.plan.steps if isinstance(step, Letting) and step.span == item.span)
-        variables = scope.variables
+        step = next(step for step in self.turn.plan.steps if isinstance(step, Letting) and step.span == item.span)
+        variables = self.control.variables
         if variables.scope_of(step.name) is not None:
-            return item.span, ""
+            return self.dropped(item)
         parts = indices(item.target)
         if is_plain(item.value) and all(map(is_index, parts)):
             return None
-        places = [number(part(scope)) for part in step.index]
+        places = [number(part(self.control)) for part in step.index]
         known = tuple(place for place in places if place is not None)
         value = variables.value((step.name, known) if known else step.name)
         if value is None and not any(has_value(variables, name) for name in names_in(item.value)):
             return None
         if value is None or len(known) < len(places) or step.value is None:
             raise Fault(RUNTIME, f"what {step.name.upper()} is set to is known only at run time")
-        return item.span, f"{self.target(step.name, known)}={assigned(value)}"
+        return self.replaced(item.span, f"{self.target(step.name, known)}={assigned(value)}")
 
     def target(self, name: str, places: tuple[float, ...]) -> str:
         """What gets a value, as it is written."""
@@ -131,33 +112,35 @@ class Recorder:
             return f"R{places[0]:.0f}"
         return name.upper() + (f"[{','.join(written(place, 0) for place in places)}]" if places else "")
 
-    def number(self, item: Item, turn: Turn, text: str) -> str:
+    def number(self, word: Word) -> str:
         """The value of a computed word as it is written, within its brackets if it has a form."""
-        assert isinstance(item, Word)
-        if item.address in turn.words.texts:
-            return f'"{turn.words.texts[item.address]}"'
-        value = turn.words.values.get(item.address)
+        words, text = self.turn.words, self.unit.program.slice(self.block, word.value_span)
+        if word.address in words.texts:
+            return f'"{words.texts[word.address]}"'
+        value = words.values.get(word.address)
         if value is None:
-            raise Fault(RUNTIME, f"the value of {item.address} is known only at run time")
-        step = self.steps.get(item.address)
+            raise Fault(RUNTIME, f"the value of {word.address} is known only at run time")
+        step = self.steps.get(word.address)
         digits = OTHER_DECIMALS if step is None else decimals_for(step) + MORE_DECIMALS
         shown = written(value, digits)
-        found = FORM.match(text) if isinstance(item.value, Call) and item.value.name in FORMS else None
+        found = FORM.match(text) if isinstance(word.value, Call) and word.value.name in FORMS else None
         return shown if found is None else text[: found.start("value")] + shown + text[found.end("value") :]
 
-    def place(self, scope: Sinumerik, point: tuple[float, float]) -> str:
+    def place(self, point: tuple[float, float]) -> str:
         """The rapid to a place of a pattern of holes."""
-        letters = [LETTERS[index] for index in (scope.modal.plane.first, scope.modal.plane.second)]
+        plane = self.control.modal.plane
+        letters = [LETTERS[index] for index in (plane.first, plane.second)]
         digits = [decimals_for(self.steps[letter]) + MORE_DECIMALS for letter in letters]
         words = zip(letters, point, digits, strict=True)
         return " ".join(["G0", *(f"{letter}{written(value, places)}" for letter, value, places in words)])
 
-    def command(self, scope: Sinumerik, command: Command, turn: Turn) -> tuple[Span, str | None] | None:
+    def command(self, command: Command) -> Change | None:
         """What becomes of a name."""
+        turn, scope = self.turn, self.control
         if command.name in ("def", "ret") or (turn.called is not None and turn.called.span == command.span):
-            return command.span, ""
+            return self.dropped(command)
         if command.name in PATTERNS and scope.pattern:
-            return command.span, self.place(scope, scope.pattern[0])
+            return self.replaced(command.span, self.place(scope.pattern[0]))
         if all(part is None or is_plain(part) for part in command.arguments):
             return None
         step = next(step for step in turn.plan.steps if isinstance(step, Calling) and step.span == command.span)
@@ -165,9 +148,9 @@ class Recorder:
             None if part is None else value(scope) for value, part in zip(step.arguments, step.written, strict=True)
         ]
         if all(value is not None or part is None for value, part in zip(values, step.written, strict=True)):
-            return command.span, f"{command.name.upper()}({','.join(map(argument, values))})"
+            return self.replaced(command.span, f"{command.name.upper()}({','.join(map(argument, values))})")
         if command.name in HARMLESS:
-            return command.span, ""
+            return self.dropped(command)
         raise Fault(RUNTIME, f"an argument of {command.name.upper()} is known only at run time")
 
 
