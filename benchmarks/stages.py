@@ -15,11 +15,10 @@ from typing import Any
 from ncfix import fast
 from ncfix.compensate import FixOptions, plain, solve, stream
 from ncfix.compensate.following import Task
-from ncfix.control import parts
+from ncfix.control import following, parts
 from ncfix.control.setup import Setup
 from ncfix.machine import load
 from ncfix.text import dialects
-from ncfix_iso.rs274.following import RS274Follower
 
 SETUP = Setup(work_offsets={"G54": dict.fromkeys("XYZBC", 0.0)}, assume_zero=True)
 MACHINE = Path(__file__).with_name("five_axis.toml")
@@ -30,7 +29,7 @@ SHOWN = 16
 
 STAGES: tuple[tuple[str, Any, str], ...] = (
     ("read the text (twice)", parts.PartReader, "read"),
-    ("follow it (twice)", RS274Follower, "follow"),
+    ("follow it (twice)", following.Follower, "follow"),
     ("plan: correct ends, judge the path between them, split", plain.Planner, "plan"),
     ("plan, the long way", stream, "agree"),
     ("write: which words change, digits", stream, "written"),

@@ -48,6 +48,9 @@ class MacroControl(Control):
         self.dynamic = False
         self.vectors = False
 
+    def lasting(self) -> None:
+        """Not said."""
+
     @property
     def probes_nominally(self) -> bool:
         """Never: variables hold where the machine stands, besides what a probe finds."""

@@ -85,6 +85,11 @@ class MacroInterpreter(RS274Interpreter):
             flow.begin_at_heads(self.main)
         return flow
 
+    @property
+    def to_the_last(self) -> bool:
+        """See `Interpreter`: a subprogram that was looked for in files may stand behind the end of the program."""
+        return self.flow.looked
+
     def next_part(self, program: Program, blocks: int) -> None:
         """See `Interpreter`."""
         super().next_part(program, blocks)

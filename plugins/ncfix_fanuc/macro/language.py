@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.finish import finished
+from ncfix.control.following import Follower
 from ncfix.control.moves import Kind, Moves, Trace
+from ncfix.text.dialect import Dialect
 from ncfix.text.language import BulkLayout, Run
 from ncfix.text.layout import CENTRE_LETTERS, Layout
 from ncfix.text.shapes import Scan, scan
-from ncfix.text.tree import Literal, Program
+from ncfix.text.tree import Flow, Literal, Program, Template
 from ncfix.writer.pieces import Pieces
 from ncfix_fanuc.macro.blocks import parse_block
 from ncfix_fanuc.macro.control import MacroControl
-from ncfix_fanuc.macro.corners import axes_of_corner, has_corners
-from ncfix_fanuc.macro.following import MacroFollower, runs_straight_on
+from ncfix_fanuc.macro.corners import CORNER, axes_of_corner, has_corners, letters_of
 from ncfix_fanuc.macro.interpreter import MacroInterpreter
 from ncfix_fanuc.macro.render import render
 from ncfix_fanuc.macro.rules import RULES
@@ -28,6 +30,17 @@ from ncfix_iso.rs274.language import RS274, writable
 if TYPE_CHECKING:
     from ncfix.control.flatten import FlatLine
     from ncfix.text.language import Language
+
+
+ELSEWHERE = frozenset({970, 990})
+"""M97 calls what stands in the text, M99 would end a subprogram in it."""
+
+
+def runs_straight_on(template: Template) -> bool:
+    """Whether a block of this shape has nothing to do with others elsewhere in the text, as jumps and corners have."""
+    flows = [item.keyword for item in template.items if isinstance(item, Flow)]
+    free = ELSEWHERE.isdisjoint(template.m_codes) and CORNER.isdisjoint(letters_of(template))
+    return free and all(keyword == "program" for keyword in flows)
 
 
 def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
@@ -39,6 +52,14 @@ def following(program: Program, run: Run) -> MacroInterpreter:
     """The control's walk through a program, before its first step."""
     control = MacroControl(run, program.dialect)
     return MacroInterpreter(control, program, run)
+
+
+def follower(dialect: Dialect, run: Run) -> Follower:
+    """See `Language`.
+
+    That the text has no subprogram of a number that was found in a file is certain only at its end.
+    """
+    return Follower(MacroControl(run, dialect), run, partial(MacroInterpreter, in_parts=True))
 
 
 def follow(program: Program, run: Run) -> Trace:
@@ -89,7 +110,7 @@ FANUC: Language = replace(
     bulk=in_bulk,
     one_by_one=one_by_one,
     unroll=unroll,
-    follower=MacroFollower,
+    follower=follower,
     straight=runs_straight_on,
     semantics=frozenset(RULES),
 )

@@ -8,29 +8,34 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ncfix.control.coordinates import INDEX
 from ncfix.control.faults import Fault
 from ncfix.control.flow import Return
 from ncfix.control.interpreter import NO_END, Interpreter
+from ncfix.control.moves import Moves
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.places import mask_of
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
 from ncfix.text.reach import UNREAD
-from ncfix.text.tree import Opaque, Program
+from ncfix.text.tree import Command, Opaque, Program, Template
 from ncfix_heidenhain.klartext import cycles, lines, tilting, trans_cycles
 from ncfix_heidenhain.klartext.calculate import Evaluate
 from ncfix_heidenhain.klartext.codes import after_motion, before_motion
 from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.flow import PROGRAM, KlartextFlow
 from ncfix_heidenhain.klartext.lane import run_lane
-from ncfix_heidenhain.klartext.layout import CORNERS
+from ncfix_heidenhain.klartext.layout import CORNERS, axis_numbers, poles_move
 from ncfix_heidenhain.klartext.paths import PATHS, astray
 from ncfix_heidenhain.klartext.plans import Plan
+from ncfix_heidenhain.klartext.poles import relies_at_once
 from ncfix_heidenhain.klartext.statements import statement
 from ncfix_heidenhain.klartext.step import Step, refuse
 from ncfix_heidenhain.klartext.targets import Words, axis_letters, set_pole
 from ncfix_heidenhain.klartext.tools import call_tool, define_tool
+from ncfix_heidenhain.klartext.turns import FULL
 from ncfix_heidenhain.klartext.units import KlartextUnit
 from ncfix_heidenhain.klartext.unread import unread_line
 
@@ -48,8 +53,23 @@ NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "
 """Addresses in motion blocks that lead nowhere."""
 
 
+POLES = frozenset({"c", "cc", "cp", "ctp", "lp"})
+"""Path functions that set a pole or go by one; approaches and departures in polar words do, too."""
+
+
+def has_to_do_with_poles(template: Template) -> bool:
+    """Whether blocks of a shape set a pole or may go by one."""
+    names = (item.name for item in template.items if isinstance(item, Command))
+    return any(name in POLES or name.startswith(("appr p", "dep p")) for name in names)
+
+
 class KlartextInterpreter(Interpreter[KlartextUnit]):
-    """Follows one program."""
+    """Follows one program.
+
+    comma   the parts so far have decimal commas; None before the first one
+    shapes  how many shapes have been looked at, and
+    polar   those of them that have to do with poles
+    """
 
     control: Control
     flow: KlartextFlow
@@ -58,6 +78,9 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
         self.axes = mask_of(control.machine)
+        self.comma: bool | None = None
+        self.shapes = 0
+        self.polar: list[int] = []
         self.no_lane: tuple[KlartextUnit | None, range] = None, range(0)
         control.locate = lambda: Place(program.path, 1)
         try:
@@ -273,3 +296,39 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         else:
             return
         control.path.corner = False
+
+    # -- a part of a program -----------------------------------------------------------------------------------------
+
+    def check_part(self, program: Program) -> None:
+        """See `Interpreter`: the writing of a block goes by the manner of numbers, and poles, elsewhere in the text."""
+        self._check_manner(program.source)
+        self._check_poles(program)
+
+    def _check_manner(self, source: bytes) -> None:
+        """Raise `NotInPartsError` where numbers have points and commas."""
+        commas, points = axis_numbers(source)
+        if (commas and points) or self.comma not in (None, bool(commas)):
+            raise NotInPartsError("the program has decimal points and commas")
+        self.comma = bool(commas)
+
+    def _check_poles(self, program: Program) -> None:
+        """Raise `NotInPartsError` where a pole was set in an earlier part, or counts from where the tool stands."""
+        templates = program.templates
+        self.polar += [shape for shape in range(self.shapes, len(templates)) if has_to_do_with_poles(templates[shape])]
+        self.shapes = len(templates)
+        blocks = np.flatnonzero(np.isin(program.template, self.polar)) if self.polar else np.empty(0, np.int64)
+        if not len(blocks):
+            return
+        relies = not self.first and relies_at_once(program.text_of(int(blocks[0])).encode("latin-1"))
+        if relies or poles_move(program.source):
+            raise NotInPartsError("what a pole is depends on an earlier part")
+
+    def check_motions(self, program: Program, moves: Moves) -> None:
+        """See `Interpreter`: where a rotary axis comes from beyond zero or a full turn, and stays within them."""
+        for column in np.flatnonzero(moves.rotary).tolist() if len(moves) else ():
+            words = program.column(moves.axes[column])
+            words = words[~np.isnan(words)]
+            offset = moves.frames[int(moves.frame[0])].offset[column]
+            began = math.degrees(moves.start[0, column] - offset)
+            if len(words) and (began < 0.0 <= words.min() or words.max() < FULL <= began):
+                raise NotInPartsError(f"{moves.axes[column]} comes back from beyond a turn")

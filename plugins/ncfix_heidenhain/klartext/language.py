@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 from ncfix.control.finish import finished
 from ncfix.control.flatten import FlatLine
+from ncfix.control.following import Follower
 from ncfix.control.moves import Trace
+from ncfix.text.dialect import Dialect
 from ncfix.text.language import Language, Run
 from ncfix.text.reach import whole_text
 from ncfix.text.tree import Program
@@ -14,7 +17,6 @@ from ncfix_heidenhain.klartext.blocks import parse_block
 from ncfix_heidenhain.klartext.bulk import in_bulk, one_by_one
 from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.flatten import unrolled
-from ncfix_heidenhain.klartext.following import KlartextFollower
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import layout_of, uses_comma
 from ncfix_heidenhain.klartext.numbering import renumbered
@@ -26,6 +28,11 @@ def following(program: Program, run: Run) -> KlartextInterpreter:
     """The control's walk through a program, before its first step."""
     control = Control(run, program.dialect)
     return KlartextInterpreter(control, program, run)
+
+
+def follower(dialect: Dialect, run: Run) -> Follower:
+    """See `Language`."""
+    return Follower(Control(run, dialect), run, partial(KlartextInterpreter, in_parts=True))
 
 
 def follow(program: Program, run: Run) -> Trace:
@@ -53,5 +60,5 @@ KLARTEXT = Language(
     one_by_one=one_by_one,
     renumber=renumbered,
     unroll=unroll,
-    follower=KlartextFollower,
+    follower=follower,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ncfix.control import control as shared
 from ncfix.control import rollover
@@ -13,9 +13,19 @@ from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_iso.rs274.expressions import Evaluate
 from ncfix_iso.rs274.groups import RULES, Rules
-from ncfix_iso.rs274.parameters import Parameters
+from ncfix_iso.rs274.parameters import Parameters, Store
 
 RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
+
+
+PASSING = frozenset(
+    {
+        *("setup", "kinematics", "dialect", "rules", "builder", "locate"),
+        *("knowledge", "modal", "parameters", "position"),
+        *("budget", "row_block", "numbers", "first"),
+    }
+)
+"""Of a control: what never changes, what `lasting` looks into or a checkpoint says, and what each block sets anew."""
 
 
 @dataclass(slots=True)
@@ -68,6 +78,23 @@ class Control(shared.Control):
         if not self.rules.strict:
             rollover.watch(self)
         self.refresh()
+
+    def lasting(self) -> str | None:
+        """See `Control`."""
+        modal, parameters, knowledge = self.modal, self.parameters, self.knowledge
+        cycle = replace(modal.cycle, initial=None)
+        kept = [each for name, each in vars(self).items() if name not in PASSING]
+        kept.append(replace(modal, motion=0, straight=0, feed=0.0, feed_given=False, cycle=cycle))
+        kept += (parameters.scopes, parameters.returned, knowledge.missing, knowledge.assumed)
+        return repr(kept)
+
+    def set_variables(self) -> Store:
+        """See `Control`: the numbered parameters."""
+        return self.parameters.numbers.copy()
+
+    def take_variables(self, variables: Store) -> None:
+        """See `Control`."""
+        self.parameters.numbers = variables.copy()
 
     @property
     def closure_mm(self) -> float:

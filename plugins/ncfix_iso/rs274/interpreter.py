@@ -64,6 +64,11 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         predefined.install(control, flow)
         return flow
 
+    @property
+    def to_the_last(self) -> bool:
+        """See `Interpreter`: o-words are not in parts."""
+        return False
+
     def spellings(self, name: str) -> Iterable[str]:
         """See `Interpreter`."""
         return (name, f"O{name:0>4}", f"O{name}") if name.isdigit() else (name,)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ncfix.control.finish import finished
+from ncfix.control.following import Follower
 from ncfix.control.moves import Trace
+from ncfix.text.dialect import Dialect
 from ncfix.text.language import BulkLayout, Language, Run
 from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
 from ncfix.text.reach import tape_end
@@ -17,7 +20,6 @@ from ncfix.writer.render import BlockRenderer
 from ncfix.writer.target import Rendered, Target
 from ncfix_iso.rs274.blocks import parse_block
 from ncfix_iso.rs274.control import Control
-from ncfix_iso.rs274.following import RS274Follower
 from ncfix_iso.rs274.groups import RULES
 from ncfix_iso.rs274.interpreter import RS274Interpreter
 
@@ -29,6 +31,11 @@ def following(program: Program, run: Run) -> RS274Interpreter:
     """The control's walk through a program, before its first step."""
     control = Control(run, program.dialect)
     return RS274Interpreter(control, program, run)
+
+
+def follower(dialect: Dialect, run: Run) -> Follower:
+    """See `Language`."""
+    return Follower(Control(run, dialect), run, partial(RS274Interpreter, in_parts=True))
 
 
 def follow(program: Program, run: Run) -> Trace:
@@ -82,6 +89,6 @@ RS274 = Language(
     unroll=unroll,
     arc_pieces=True,
     bulk=in_bulk,
-    follower=RS274Follower,
+    follower=follower,
     semantics=frozenset(RULES),
 )

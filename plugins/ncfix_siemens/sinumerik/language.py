@@ -4,28 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.finish import finished
 from ncfix.control.flatten import FlatLine
+from ncfix.control.following import Follower
 from ncfix.control.moves import Moves, Trace
+from ncfix.text import reach
+from ncfix.text.dialect import Dialect
 from ncfix.text.language import ArcLayout, BulkLayout, Language, Run
 from ncfix.text.layout import arc_layout, bulk_layout
 from ncfix.text.reach import whole_text
 from ncfix.text.shapes import split_blocks
-from ncfix.text.tree import Program, Word
+from ncfix.text.tree import Program, Template, Word
 from ncfix.writer.pieces import Pieces
 from ncfix_siemens.sinumerik.blocks import parse_block
 from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
-from ncfix_siemens.sinumerik.following import SinumerikFollower, runs_straight_on
 from ncfix_siemens.sinumerik.hole_text import render
 from ncfix_siemens.sinumerik.interpreter import SinumerikInterpreter
 from ncfix_siemens.sinumerik.layout import SinumerikLayout, layout_of
 from ncfix_siemens.sinumerik.numbering import renumbered
 from ncfix_siemens.sinumerik.orientation import VECTOR
 from ncfix_siemens.sinumerik.plans import fixed_centre
+from ncfix_siemens.sinumerik.poles import polar_words
 from ncfix_siemens.sinumerik.scanning import scan
 from ncfix_siemens.sinumerik.state import Sinumerik
 
@@ -36,6 +40,19 @@ def following(program: Program, run: Run) -> SinumerikInterpreter:
     """The control's walk through a program, before its first step."""
     control = Sinumerik(run, program.dialect)
     return SinumerikInterpreter(control, program, run)
+
+
+def runs_straight_on(template: Template) -> bool:
+    """Whether a block of this shape has nothing to do with others elsewhere in the text.
+
+    Where a block has only one of AP and RP, all blocks that have them depend on each other.
+    """
+    return reach.runs_straight_on(template) and len(polar_words(template)) != 1
+
+
+def follower(dialect: Dialect, run: Run) -> Follower:
+    """See `Language`."""
+    return Follower(Sinumerik(run, dialect), run, partial(SinumerikInterpreter, in_parts=True))
 
 
 def follow(program: Program, run: Run) -> Trace:
@@ -107,6 +124,6 @@ SINUMERIK = Language(
     bulk=in_bulk,
     one_by_one=one_by_one,
     renumber=renumbered,
-    follower=SinumerikFollower,
+    follower=follower,
     straight=runs_straight_on,
 )

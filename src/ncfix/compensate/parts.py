@@ -17,8 +17,9 @@ from ncfix.compensate.plan.arrays import Index
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.workers import Passage, Read, Share
+from ncfix.control.following import Follower
 from ncfix.control.moves import Kind, Moves, Rule, Trace
-from ncfix.control.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
+from ncfix.control.parts import NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine, State
@@ -125,7 +126,7 @@ class Parts:
 
     def _passage(self, program: Program, moves: Moves) -> Passage | None:
         """What others have to know of a part; None if they have to follow it."""
-        remains = None if self.sided else self.follower.remains(moves)
+        remains = None if self.sided else self.follower.checkpoint(moves)
         if remains is None:
             return None
         begin = int(program.blocks[-1, 0])

@@ -25,7 +25,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from ncfix.compensate.solve import Before
-from ncfix.control.parts import Remains
+from ncfix.control.following import Checkpoint
 from ncfix.host import tie
 from ncfix.plugins import blamed
 
@@ -140,7 +140,7 @@ class Passage:
     lines: int
     blocks: int
     led: bool
-    remains: Remains
+    remains: Checkpoint
 
 
 Result = TypeVar("Result")

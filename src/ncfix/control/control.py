@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 from ncfix.control import contour, tcp
 from ncfix.control.builder import Builder, Style
@@ -72,6 +73,17 @@ class Control(Standing):
         self.whole = self.at_corner = False
         self.beside = 0
         self.handedness = 1.0
+
+    def lasting(self) -> str | None:
+        """All that the control keeps, but for what a `Checkpoint` says, so that it can be compared; None: not said."""
+        return None
+
+    def set_variables(self) -> Any:
+        """The variables that the program may have set, to go from one process to another."""
+        return None
+
+    def take_variables(self, variables: Any) -> None:
+        """Go on with variables that another process has handed on."""
 
     @property
     def closure_mm(self) -> float:

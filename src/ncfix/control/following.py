@@ -1,8 +1,9 @@
-"""Following a program part by part: the control keeps its state, the interpreter goes on where it was."""
+"""Following a program part by part, and what goes on from one part to the next: one for all languages."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,29 +14,47 @@ from ncfix.control.control import Control
 from ncfix.control.finish import check_reach
 from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Kind, Moves
-from ncfix.control.parts import NotInPartsError, Remains
+from ncfix.control.parts import NotInPartsError
 from ncfix.diagnostics import Message
 from ncfix.text.language import Run
 from ncfix.text.tree import Program
 
 
-class PartFollower(ABC):
-    """What the followers of all languages do alike; see `parts.Follower`."""
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """The state in which a part leaves a control, before its last block, where it has changed nothing else for good.
 
-    def __init__(self, control: Control, run: Run) -> None:
-        self.control = control
-        self.run = run
+    It goes from one process to another.
+
+    position    (n_axes,) the command, mm and rad
+    feed        the feed in force; `feed_given`: there is one
+    motion      the motion code in force, in tenths
+    variables   those that the program may have set, as the language has them
+    """
+
+    position: list[float]
+    feed: float
+    feed_given: bool
+    motion: int
+    variables: Any
+
+
+class Follower:
+    """Follows a program that comes in parts: the control keeps its state, the interpreter goes on where it was.
+
+    walk     makes the interpreter, given the first part
+    watched  it is to be found out what the next part leaves behind
+    """
+
+    def __init__(self, control: Control, run: Run, walk: Callable[[Any, Program, Run], Interpreter[Any]]) -> None:
+        self.control, self.run, self.walk = control, run, walk
         self.interpreter: Interpreter[Any] | None = None
         self.watched = self.unchanged = False
 
-    @abstractmethod
-    def begin(self, program: Program) -> Interpreter[Any]:
-        """What goes through the program, of which this is the first part."""
-
     @property
     def to_the_last(self) -> bool:
-        """What stands behind the end of the program matters."""
-        return False
+        """What stands behind the end of the program matters: something was looked for that may be there."""
+        return self.interpreter is not None and self.interpreter.to_the_last
 
     @property
     def ended(self) -> bool:
@@ -43,29 +62,31 @@ class PartFollower(ABC):
         return self.interpreter is not None and self.interpreter.ended
 
     def follow(self, program: Program, last: bool) -> Moves:
-        """The motions of the next part."""
-        begun = self.lasting() if self.watched and self.interpreter is not None else None
-        if self.interpreter is None:
-            self.interpreter = self.begin(program)
+        """The motions of the next part; `last`: nothing comes after it."""
+        control, interpreter = self.control, self.interpreter
+        begun = control.lasting() if self.watched and interpreter is not None else None
+        if interpreter is None:
+            interpreter = self.interpreter = self.walk(control, program, self.run)
         else:
-            self.interpreter.next_part(program, self.run.budget(program))
-        self.control.builder.clear()
-        self.interpreter.last = last
-        self.interpreter.run()
-        if self.control.switches:
+            interpreter.next_part(program, self.run.budget(program))
+        control.builder.clear()
+        interpreter.check_part(program)
+        interpreter.last = last
+        interpreter.run()
+        if control.switches:
             raise NotInPartsError("blocks with / may be skipped, and all positions of block delete are looked at")
-        moves = self.control.moves()
+        moves = control.moves()
         check_reach(program, moves)
-        rollover.say(self.control, program)
-        self.unchanged = begun is not None and begun == self.lasting()
+        rollover.say(control, program)
+        interpreter.check_motions(program, moves)
+        self.unchanged = begun is not None and begun == control.lasting()
         return moves
 
-    def lasting(self) -> str | None:
-        """All that the control keeps, but for what `Remains` says, so that it can be compared; None: not said."""
-        return None
+    def checkpoint(self, moves: Moves) -> Checkpoint | None:
+        """What the part that was followed last, with these motions, has left; None if there is more to it than that.
 
-    def remains(self, moves: Moves) -> Remains | None:
-        """What the part left behind, if its last two blocks are straight motions, and no more than that has changed."""
+        Its last two blocks have to be straight motions.
+        """
         control, modal = self.control, self.control.modal
         if not self.unchanged or control.unknown or control.builder.winding is not None or len(moves) < 2:
             return None
@@ -73,29 +94,26 @@ class PartFollower(ABC):
         if not straight.all() or moves.block[-2] + 1 != moves.block[-1] or _changes_tools(moves):
             return None
         before = moves.start[-1].tolist(), float(moves.feed[-2]), modal.feed_given, int(moves.modal[-2])
-        return Remains(*before, self.parameters())
+        return Checkpoint(*before, control.set_variables())
 
-    def resume(self, remains: Remains) -> None:
-        """Go on behind what has been followed elsewhere."""
+    def resume(self, state: Checkpoint) -> None:
+        """Go on as if a part had been followed up to its last block, which comes next."""
         modal = self.control.modal
-        self.stand(np.array(remains.position))
-        modal.feed, modal.feed_given = remains.feed, remains.feed_given
-        modal.motion = modal.straight = remains.motion
+        self.stand(np.array(state.position))
+        modal.feed, modal.feed_given = state.feed, state.feed_given
+        modal.motion = modal.straight = state.motion
         modal.cycle.initial = None
-
-    def parameters(self) -> Any:
-        """What the program may have set, to go from one process to another."""
-        return None
+        self.control.take_variables(state.variables)
 
     def stand(self, position: NDArray[np.float64]) -> None:
-        """Take the axes to a command (n_axes,), mm and rad."""
+        """Take the axes to a command (n_axes,), mm and rad, where the corrected program has left them."""
         self.control.position = list(self.control.position)
         for column, value in zip(self.control.builder.columns, position.tolist(), strict=True):
             self.control.position[column] = value
 
     @property
     def lacking(self) -> tuple[Message, ...]:
-        """What has been missing so far."""
+        """What the program used so far and the setup does not give, and axes that the machine lacks."""
         return (*self.control.foreign.values(), *self.control.knowledge.missing.values())
 
     @property
@@ -105,7 +123,7 @@ class PartFollower(ABC):
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What was taken as zero so far."""
+        """What was taken as zero so far, in words."""
         return tuple(self.control.knowledge.assumed)
 
 

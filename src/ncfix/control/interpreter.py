@@ -18,6 +18,7 @@ from ncfix.control.control import Control
 from ncfix.control.faults import Fault
 from ncfix.control.flow import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.control.lane import run_lane
+from ncfix.control.moves import Moves
 from ncfix.control.unit import TextUnit
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
@@ -96,6 +97,19 @@ class Interpreter(ABC, Generic[U]):
 
     def note_stretch(self, unit: U, block: int, done: int) -> None:
         """Blocks from `block` on have been taken at once."""
+
+    # -- what a language says of parts --------------------------------------------------------------------------------
+
+    @property
+    def to_the_last(self) -> bool:
+        """What stands behind the end of the program matters: something was looked for that may be there."""
+        return True
+
+    def check_part(self, program: Program) -> None:
+        """Raise `NotInPartsError` where what is in a part depends on an earlier one in a way that is not kept."""
+
+    def check_motions(self, program: Program, moves: Moves) -> None:
+        """The same, when the part has been followed."""
 
     # -- where we are -------------------------------------------------------------------------------------------------
 

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import Moves
-from ncfix.diagnostics import Message
 from ncfix.text.content import check_content, check_zeros, header_length
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Language, language_of
@@ -27,64 +26,6 @@ TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles",
 
 class NotInPartsError(Exception):
     """The program cannot be taken part by part: it has to be read as a whole."""
-
-
-@dataclass(frozen=True, slots=True)
-class Remains:
-    """What a part that changed nothing else for good leaves in a control, as it was before the last block of the part.
-
-    position    (n_axes,) the command, mm and rad
-    feed        the feed in force; `feed_given`: there is one
-    motion      the motion code in force, in tenths
-    parameters  those that the program may have set, as the language has them
-    """
-
-    position: list[float]
-    feed: float
-    feed_given: bool
-    motion: int
-    parameters: Any
-
-
-class Follower(Protocol):
-    """Follows a program part by part.
-
-    watched  it is to be found out what the next part leaves behind
-    """
-
-    watched: bool
-
-    @property
-    def ended(self) -> bool:
-        """The control has come to the end of the program."""
-
-    @property
-    def to_the_last(self) -> bool:
-        """What stands behind the end of the program matters: something was looked for that may be there."""
-
-    def follow(self, program: Program, last: bool) -> Moves:
-        """The motions of the next part; `last`: nothing comes after it."""
-
-    def remains(self, moves: Moves) -> Remains | None:
-        """What the part that was followed last left, given its motions; None if there is more to it than that."""
-
-    def resume(self, remains: Remains) -> None:
-        """Go on as if a part had been followed up to its last block, which comes next."""
-
-    def stand(self, position: NDArray[np.float64]) -> None:
-        """Take the axes to a command (n_axes,), mm and rad, where the corrected program has left them."""
-
-    @property
-    def lacking(self) -> tuple[Message, ...]:
-        """What the program used so far and the setup does not give, and axes that the machine lacks."""
-
-    @property
-    def messages(self) -> tuple[Message, ...]:
-        """What there is to say so far."""
-
-    @property
-    def assumed(self) -> tuple[str, ...]:
-        """What was taken as zero so far, in words."""
 
 
 @dataclass(slots=True)

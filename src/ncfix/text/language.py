@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ncfix.control.flatten import Unroll
+    from ncfix.control.following import Follower
     from ncfix.control.moves import Kinematics, Moves, Trace
-    from ncfix.control.parts import Follower
     from ncfix.control.setup import Setup
     from ncfix.text.build import Parsed
     from ncfix.text.dialect import Dialect
