@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -295,7 +296,7 @@ def component_title(name: str, axis: Axis | None = None) -> str:
     return _rotary_motion(component, joint, axis) if turns else _linear_motion(component, joint)
 
 
-def component_names(joints: str = "XYZABC" + SPINDLE) -> tuple[str, ...]:
+def component_names(joints: Iterable[str] = "XYZABC" + SPINDLE) -> tuple[str, ...]:
     """The components of these joints: error motions first, then location errors."""
     return tuple(f"E{component}{zero}{joint}" for joint in joints for zero in ("", "0") for component in COMPONENTS)
 

@@ -61,7 +61,8 @@ class TomlTable:
         """The raw value, or None; a required key that is missing is noted."""
         if not self.has(key):
             if required:
-                self.report.note("NCF303", self.path, f"key {key!r} is missing", _close(key, self.values, self.asked))
+                hint = did_you_mean(key, [each for each in self.values if each not in self.asked])
+                self.report.note("NCF303", self.path, f"key {key!r} is missing", hint)
             return None
         return self.values[key]
 
@@ -86,6 +87,31 @@ class TomlTable:
         if value is None:
             return None
         return float(value) if self._finite(key, value, "a number") else None
+
+    def positive(self, key: str) -> float | None:
+        """A number above zero; one that is not is noted, and returned."""
+        value = self.number(key)
+        if value is not None and value <= 0:
+            self.note("NCF305", key, f"{value:g} is not positive")
+        return value
+
+    def range(self, key: str, hint: str = "") -> tuple[float, float] | None:
+        """Two numbers, the lower one first; `hint` is for those that are not."""
+        values = self.numbers(key, count=2)
+        if values is None:
+            return None
+        low, high = values
+        if low >= high:
+            self.note("NCF308", key, f"empty range: {low:g} is not below {high:g}", hint)
+        return low, high
+
+    def choice(self, key: str, *options: str, required: bool = False, hint: str | None = None) -> str | None:
+        """One of two words; without a `hint` the nearer one is named."""
+        value = self.text(key, required)
+        if value is not None and value not in options:
+            meant = did_you_mean(value, options) if hint is None else hint
+            self.note("NCF304", key, f"{value!r} is neither {' nor '.join(options)}", meant)
+        return value
 
     def integer(self, key: str, required: bool = False) -> int | None:
         """A whole number."""
@@ -157,14 +183,13 @@ class TomlTable:
     def close(self) -> None:
         """Note the keys that nobody asked for."""
         for key in self.values:
-            if key not in self.asked:
-                self.note("NCF302", key, f"unknown key {key!r}", self._meant(key))
-
-    def _meant(self, key: str) -> str:
-        """What an unknown key may be meant for: a key that is missing here, one that is there, or one of the file."""
-        if self.path and key in self.report.top:
-            return f"it belongs above the first table; here it is a key of {dotted(self.path)}"
-        return did_you_mean(key, self.asked - self.values.keys()) or did_you_mean(key, self.asked)
+            if key in self.asked:
+                continue
+            if self.path and key in self.report.top:
+                meant = f"it belongs above the first table; here it is a key of {dotted(self.path)}"
+            else:
+                meant = did_you_mean(key, self.asked - self.values.keys()) or did_you_mean(key, self.asked)
+            self.note("NCF302", key, f"unknown key {key!r}", meant)
 
     def _finite(self, key: str, value: object, wanted: str) -> bool:
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -206,7 +231,3 @@ def did_you_mean(word: str, words: Iterable[str]) -> str:
     small = {each.lower(): each for each in words}
     close = get_close_matches(word.lower(), small, 1, 0.6)
     return f"did you mean {small[close[0]]!r}?" if close else ""
-
-
-def _close(word: str, words: Iterable[str], known: set[str]) -> str:
-    return did_you_mean(word, [each for each in words if each not in known])

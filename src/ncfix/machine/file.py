@@ -23,7 +23,6 @@ from ncfix.files import READING
 from ncfix.inputs import MOST_SAID, taken
 from ncfix.machine.axes import (
     BASE_AXES,
-    COMPONENTS,
     DEGREE,
     NAME,
     ORIGIN,
@@ -35,6 +34,7 @@ from ncfix.machine.axes import (
     Topology,
     Triad,
     Vector,
+    component_names,
     parse_topology,
 )
 from ncfix.machine.basis import Basis, check_shapes
@@ -53,6 +53,9 @@ EXACT = 1e-14
 """A vector this near to unit length is left as it is written."""
 TILTED = 1e-6
 """Error axes that are this far from orthonormal are a mistake."""
+INPUT = re.compile(r"[a-z][a-z0-9_]*")
+SMALLEST_SCALE = 1e-9
+"""In the unit of what is scaled: mm, degree, K, s."""
 
 
 def load(path: str | Path) -> Machine:
@@ -81,15 +84,29 @@ def loads(source: str | bytes, path: str = "<machine>") -> Machine:
 
 
 def _machine(root: TomlTable) -> Machine | None:
-    _schema(root)
+    if root.integer("ncfix") not in (None, SCHEMA):
+        text = f"schema version {root.values['ncfix']}, this ncfix reads {SCHEMA}"
+        root.note("NCF317", "ncfix", text, "a newer ncfix may read it")
     name = root.text("name") or Path(root.report.path).stem
-    order = _topology(root)
-    axes = _axes(root, order)
-    tool = _tool(root)
+    order = None
+    if (chain := root.text("topology", required=True)) is not None:
+        order, wrong = parse_topology(chain)
+        for fault in wrong:
+            root.note("NCF306", "topology", f"{chain!r}: {fault}", 'it reads like "w C B F X Y Z t"')
+    axes, tool = _axes(root, order), Tool()
+    if (section := root.table("tool")) is not None:
+        direction = _unit(section, required=False, default=(0.0, 0.0, 1.0))
+        tool = Tool(direction, _vector(section, "point", ORIGIN))
+        section.close()
+
+    def physical() -> Mapping[str, PhysicalEffect]:
+        """Those that this machine can have; none if it cannot be built yet."""
+        if order is None or any(letter not in axes for letter in order.axes):
+            return {}
+        return library(Machine("", str(order), tuple(axes[letter] for letter in order.axes), tool))
+
     known = order.axes if order else tuple(axes)
-    physical = _physical(order, axes, tool)
-    found = [read_effects(section, known, axes, physical) for section in root.tables("effect")]
-    effects = tuple(effect for each in found for effect in each)
+    found = [_effects(section, known, axes, physical) for section in root.tables("effect")]
     control = root.text("control")
     increment = _pair(root, "least_increment", DEFAULT_INCREMENT)
     correction = _pair(root, "max_correction", DEFAULT_CORRECTION)
@@ -98,50 +115,16 @@ def _machine(root: TomlTable) -> Machine | None:
     root.close()
     if root.report.messages or order is None:
         return None
-    columns = tuple(axes[letter] for letter in order.axes)
+    columns, effects = tuple(axes[letter] for letter in order.axes), tuple(effect for each in found for effect in each)
     notes = dict(provenance.values) if provenance else {}
     machine = Machine(name, str(order), columns, tool, effects, control, increment, correction, offset, notes)
-    _check_sizes(machine, found, root.report)
-    return machine
-
-
-def _check_sizes(machine: Machine, tables: list[tuple[Effect, ...]], report: Report) -> None:
-    """Note effects that are not finite at the ends of the travel: no machine has them, no arithmetic survives them."""
-    for index, effects in enumerate(tables):
+    for index, each in enumerate(found):  # no machine has effects that are not finite, no arithmetic survives them
         with np.errstate(all="ignore"):
-            finite = [np.isfinite(at_the_ends(machine, effect)).all() for effect in effects]
+            finite = [np.isfinite(at_the_ends(machine, effect)).all() for effect in each]
         if not all(finite):
             hint = "see center, scale and degree: a power of u = (x - center) / scale grows beyond all numbers"
-            report.note("NCF305", ("effect", index), "the effect is not finite at the ends of the travel", hint)
-
-
-def _physical(order: Topology | None, axes: dict[str, Axis], tool: Tool) -> Callable[[], Mapping[str, PhysicalEffect]]:
-    """The physical effects that this machine can have, once somebody asks; none if it cannot be built yet."""
-
-    def found() -> Mapping[str, PhysicalEffect]:
-        if order is None or any(letter not in axes for letter in order.axes):
-            return {}
-        return library(Machine("", str(order), tuple(axes[letter] for letter in order.axes), tool))
-
-    return found
-
-
-def _schema(root: TomlTable) -> None:
-    version = root.integer("ncfix")
-    if version is not None and version != SCHEMA:
-        root.note(
-            "NCF317", "ncfix", f"schema version {version}, this ncfix reads {SCHEMA}", "a newer ncfix may read it"
-        )
-
-
-def _topology(root: TomlTable) -> Topology | None:
-    text = root.text("topology", required=True)
-    if text is None:
-        return None
-    order, wrong = parse_topology(text)
-    for fault in wrong:
-        root.note("NCF306", "topology", f"{text!r}: {fault}", 'it reads like "w C B F X Y Z t"')
-    return order
+            root.report.note("NCF305", ("effect", index), "the effect is not finite at the ends of the travel", hint)
+    return machine
 
 
 def _axes(root: TomlTable, order: Topology | None) -> dict[str, Axis]:
@@ -154,66 +137,27 @@ def _axes(root: TomlTable, order: Topology | None) -> dict[str, Axis]:
         section = tables.table(letter)
         if section is not None:
             axes[letter] = _axis(section, letter, order is not None and letter in order.workpiece)
-    if order is not None:
-        _same_axes(root, tables, order)
+    for letter in order.axes if order else ():
+        if letter not in tables.values:
+            root.note("NCF307", "topology", f"axis {letter} has no table [axis.{letter}]")
+    for letter in tables.values if order else ():
+        if order and letter not in order.axes:
+            hint = "S is the spindle, not an axis" if letter == "S" else did_you_mean(letter, order.axes)
+            tables.note("NCF307", letter, f"axis {letter} is not in the topology {str(order)!r}", hint)
     return axes
 
 
-def _same_axes(root: TomlTable, tables: TomlTable, order: Topology) -> None:
-    for letter in order.axes:
-        if letter not in tables.values:
-            root.note("NCF307", "topology", f"axis {letter} has no table [axis.{letter}]")
-    for letter in tables.values:
-        if letter not in order.axes:
-            hint = "S is the spindle, not an axis" if letter == "S" else did_you_mean(letter, order.axes)
-            tables.note("NCF307", letter, f"axis {letter} is not in the topology {str(order)!r}", hint)
-
-
 def _axis(section: TomlTable, letter: str, workpiece_side: bool) -> Axis:
-    rotary = _rotary(section)
+    rotary = section.choice("type", "linear", "rotary", required=True) == "rotary"
     direction = _unit(section, required=True, default=(1.0, 0.0, 0.0))
     point = _vector(section, "point", ORIGIN)
-    limits = _range(section, rotary)
+    low, high = section.range("range", "omit it for an endless axis") or (-np.inf, np.inf)
+    limits = (low * DEGREE, high * DEGREE) if rotary else (low, high)
     triad = _triad(section)
-    moving = _moving(section)
-    pitch = _positive(section, "pitch")
+    moving = section.choice("error_frame", "fixed", "moving", hint="fixed is the default") == "moving"
+    pitch = section.positive("pitch")
     section.close()
     return Axis(letter, rotary, workpiece_side, direction, point, limits, triad, moving, pitch)
-
-
-def _rotary(section: TomlTable) -> bool:
-    kind = section.text("type", required=True)
-    if kind not in (None, "linear", "rotary"):
-        section.note(
-            "NCF304", "type", f"{kind!r} is neither linear nor rotary", did_you_mean(kind, ["linear", "rotary"])
-        )
-    return kind == "rotary"
-
-
-def _moving(section: TomlTable) -> bool:
-    frame = section.text("error_frame")
-    if frame not in (None, "fixed", "moving"):
-        section.note("NCF304", "error_frame", f"{frame!r} is neither fixed nor moving", "fixed is the default")
-    return frame == "moving"
-
-
-def _range(section: TomlTable, rotary: bool) -> tuple[float, float]:
-    limits = section.numbers("range", count=2)
-    if limits is None:
-        return -np.inf, np.inf
-    low, high = limits
-    if low >= high:
-        section.note("NCF308", "range", f"empty range: {low:g} is not below {high:g}", "omit it for an endless axis")
-    return (low * DEGREE, high * DEGREE) if rotary else (low, high)
-
-
-def _tool(root: TomlTable) -> Tool:
-    section = root.table("tool")
-    if section is None:
-        return Tool()
-    tool = Tool(_unit(section, required=False, default=(0.0, 0.0, 1.0)), _vector(section, "point", ORIGIN))
-    section.close()
-    return tool
 
 
 def _vector(section: TomlTable, key: str, default: Vector) -> Vector:
@@ -239,22 +183,16 @@ def _triad(section: TomlTable) -> Triad:
     if rows is None:
         return BASE_AXES
     matrix = np.array(rows)
-    if np.abs(matrix @ matrix.T - np.eye(3)).max() > TILTED or np.linalg.det(matrix) < 0:
+    off = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    if off > TILTED or np.linalg.det(matrix) < 0:
         text = "the rows are not a right-handed triad of perpendicular unit vectors"
         section.note("NCF313", "error_axes", text, "the third row is the first cross the second")
         return BASE_AXES
-    if np.abs(matrix @ matrix.T - np.eye(3)).max() > EXACT:
+    if off > EXACT:
         left, _, right = np.linalg.svd(matrix)
         rows = tuple(tuple(float(value) for value in row) for row in left @ right)
     x, y, z = ((row[0], row[1], row[2]) for row in rows)
     return x, y, z
-
-
-def _positive(section: TomlTable, key: str) -> float | None:
-    value = section.number(key)
-    if value is not None and value <= 0:
-        section.note("NCF305", key, f"{value:g} is not positive")
-    return value
 
 
 def _pair(root: TomlTable, key: str, default: tuple[float, float]) -> tuple[float, float]:
@@ -262,71 +200,66 @@ def _pair(root: TomlTable, key: str, default: tuple[float, float]) -> tuple[floa
     section = root.table(key)
     if section is None:
         return default
-    linear, rotary = _positive(section, "linear"), _positive(section, "rotary")
+    linear, rotary = section.positive("linear"), section.positive("rotary")
     section.close()
     return default[0] if linear is None else linear, default[1] if rotary is None else rotary * DEGREE
 
 
-INPUT = re.compile(r"[a-z][a-z0-9_]*")
-SMALLEST_SCALE = 1e-9
-"""In the unit of what is scaled: mm, degree, K, s."""
+# -- effects -----------------------------------------------------------------------------------------------------------
 
 
-def read_effects(
+def _effects(
     section: TomlTable,
     letters: tuple[str, ...],
     axes: Mapping[str, Axis],
     physical: Callable[[], Mapping[str, PhysicalEffect]],
 ) -> tuple[Effect, ...]:
-    """The effects that a table stands for: one of an ISO 230-1 component, those of a physical effect by its name."""
+    """The effects that a table stands for: one of an ISO 230-1 component, those of a physical effect by its name.
+
+    Nothing if something is wrong (then it is noted).
+    """
+    before = len(section.report.messages)
     name = section.values.get("name")
     if isinstance(name, str) and not NAME.fullmatch(name):
         named = physical()
         if name in named:
-            return read_named(section, named[name])
+            return _of_physical(section, named[name])
         if near := get_close_matches(name, named, 1):
             text = f"{name!r} is not an effect of this machine"
             section.note("NCF309", "name", text, f"did you mean {near[0]!r}? `ncfix effects -m FILE` lists them")
             return ()
-    found = read_effect(section, letters, axes)
-    return () if found is None else (found,)
-
-
-def read_effect(section: TomlTable, letters: tuple[str, ...], axes: Mapping[str, Axis]) -> Effect | None:
-    """The effect, or None if something is wrong with it (then it is noted)."""
-    before = len(section.report.messages)
-    name = _name(section, letters)
+    name = _component(section, letters)
     kind = _kind(section)
     basis = _basis(section, kind) if kind is not None else None
     coefficients = section.numbers("coefficients", required=True)
-    if basis is not None and coefficients is not None:
-        _count(section, basis, coefficients)
-    size = len(coefficients) if coefficients is not None else 0
-    options = _options(section, letters, size)
+    if basis is not None and coefficients is not None and len(coefficients) != basis.size:
+        text = f"{len(coefficients)} coefficients, the basis {basis.name} has {basis.size}"
+        section.note("NCF311", "coefficients", text, f"one each for {', '.join(basis.labels[:12])}")
+    options = _options(section, letters, len(coefficients or ()))
     if name is not None and basis is not None and ("input" in options or not section.has("input")):
-        _fits(section, Effect(name, coefficients or (), basis, **options), axes)
+        _check_fit(section, Effect(name, coefficients or (), basis, **options), axes)
     if kind is not None:
         section.close()
     if name is None or basis is None or coefficients is None or len(section.report.messages) > before:
-        return None
-    return Effect(name, coefficients, basis, **options)
+        return ()
+    return (Effect(name, coefficients, basis, **options),)
 
 
-def _name(section: TomlTable, letters: tuple[str, ...]) -> str | None:
+def _component(section: TomlTable, letters: tuple[str, ...]) -> str | None:
+    """The name of an ISO 230-1 component."""
     name = section.text("name", required=True)
     if name is None:
         return None
     match = NAME.fullmatch(name)
-    if match and (match[3] in letters or match[3] == SPINDLE):
+    if match and match[3] in (*letters, SPINDLE):
         return name
-    joints = (*letters, SPINDLE)
+    text = f"{name!r} is not an effect of this machine"
     if match:
         hint = f"axes of this machine: {' '.join(letters)}, and {SPINDLE} for the spindle"
-        section.note("NCF309", "name", f"{name!r} is not an effect of this machine: it has no axis {match[3]}", hint)
-        return None
-    names = [f"E{component}{zero}{joint}" for joint in joints for zero in ("", "0") for component in COMPONENTS]
-    hint = did_you_mean(name, names) or "`ncfix effects` lists them"
-    section.note("NCF309", "name", f"{name!r} is not an effect of this machine", hint)
+        section.note("NCF309", "name", f"{text}: it has no axis {match[3]}", hint)
+    else:
+        hint = did_you_mean(name, component_names((*letters, SPINDLE))) or "`ncfix effects` lists them"
+        section.note("NCF309", "name", text, hint)
     return None
 
 
@@ -370,21 +303,14 @@ def _parameter(section: TomlTable, parameter: Field[Any]) -> Any:
     return readers[parameter.metadata["kind"]](parameter.name, required=True)
 
 
-def _count(section: TomlTable, basis: Basis, coefficients: tuple[float, ...]) -> None:
-    if len(coefficients) != basis.size:
-        text = f"{len(coefficients)} coefficients, the basis {basis.name} has {basis.size}"
-        section.note("NCF311", "coefficients", text, f"one each for {', '.join(basis.labels[:12])}")
-
-
 def _options(section: TomlTable, letters: tuple[str, ...], size: int) -> dict[str, Any]:
-    reference = section.numbers("reference", count=3)
     options = {
+        "reference": section.numbers("reference", count=3),
         "covariance": _covariance(section, size),
-        "reference": reference,
-        "range": _effect_range(section),
+        "range": section.range("range"),
         "input": _signal(section, "input", letters),
         "times": _signal(section, "times", letters),
-        "time_constant_s": _positive(section, "time_constant_s"),
+        "time_constant_s": section.positive("time_constant_s"),
         "carried": section.flag("carried"),
         "center": section.number("center"),
         "scale": _scale(section, "scale"),
@@ -392,16 +318,6 @@ def _options(section: TomlTable, letters: tuple[str, ...], size: int) -> dict[st
         "times_scale": _scale(section, "times_scale"),
     }
     return {key: value for key, value in options.items() if value is not None}
-
-
-def _effect_range(section: TomlTable) -> tuple[float, float] | None:
-    limits = section.numbers("range", count=2)
-    if limits is None:
-        return None
-    low, high = limits
-    if low >= high:
-        section.note("NCF308", "range", f"empty range: {low:g} is not below {high:g}")
-    return low, high
 
 
 def _signal(section: TomlTable, key: str, letters: tuple[str, ...]) -> str | None:
@@ -421,11 +337,8 @@ def _scale(section: TomlTable, key: str) -> float | None:
 
 
 def _covariance(section: TomlTable, size: int) -> Matrix | None:
-    if not size:
-        section.get("covariance")
-        return None
-    rows = section.rows("covariance", (size, size))
-    if rows is None:
+    rows = section.rows("covariance", (size, size)) if size else section.get("covariance")
+    if rows is None or not size:
         return None
     matrix = np.array(rows)
     largest = float(np.abs(matrix).max())
@@ -436,39 +349,47 @@ def _covariance(section: TomlTable, size: int) -> Matrix | None:
     return rows
 
 
-def _fits(section: TomlTable, effect: Effect, axes: Mapping[str, Axis]) -> None:
+def _check_fit(section: TomlTable, effect: Effect, axes: Mapping[str, Axis]) -> None:
     """Note what this basis and these options cannot do for this component."""
+
+    def note(key: str, text: str, hint: str = "") -> None:
+        section.note("NCF315", key if key in section.values else "name", text, hint)
+
     name, basis, source = effect.name, effect.basis, effect.input
     own = None if effect.location or effect.joint == SPINDLE else effect.joint
     if basis.needs_signal and source is None and own is None:
-        _misfit(section, "basis", f"{name} has no position for {basis.name} to depend on", "give `input`")
+        note("basis", f"{name} has no position for {basis.name} to depend on", "give `input`")
     if basis.needs_direction and source not in axes and own is None:
-        _misfit(section, "basis", f"{name} has no direction of motion", "give an axis as `input`")
+        note("basis", f"{name} has no direction of motion", "give an axis as `input`")
     axis = axes.get(source or effect.joint)
     if basis.rotary_only and (axis is None or not axis.rotary) and (axis is not None or source is not None):
-        _misfit(section, "basis", f"{basis.name} needs the angle of a rotary axis", "use `periodic` with a `period`")
+        note("basis", f"{basis.name} needs the angle of a rotary axis", "use `periodic` with a `period`")
     if effect.carried and not effect.location:
-        _misfit(section, "carried", f"{name} is not a location error", "`carried` is for names like EC0Y")
+        note("carried", f"{name} is not a location error", "`carried` is for names like EC0Y")
     if effect.time_constant_s is not None and source is None:
-        _misfit(section, "time_constant_s", "a lag acts on an `input`, and there is none")
+        note("time_constant_s", "a lag acts on an `input`, and there is none")
 
 
-def _misfit(section: TomlTable, key: str, text: str, hint: str = "") -> None:
-    section.note("NCF315", key if key in section.values else "name", text, hint)
-
-
-def read_named(section: TomlTable, named: PhysicalEffect) -> tuple[Effect, ...]:
-    """The effects that it is made of; nothing if something is wrong (then it is noted)."""
-    section.text("name")
+def _of_physical(section: TomlTable, named: PhysicalEffect) -> tuple[Effect, ...]:
+    """The effects that a physical effect is made of; nothing if something is wrong (then it is noted)."""
     before = len(section.report.messages)
+    section.text("name")
     values = section.numbers("coefficients", required=True)
     constant = section.number("time_constant_s")
     reference = section.numbers("reference", count=3)
     size = sum(effect.basis.size for effect in named.effects)
     if values is not None and len(values) != size:
-        section.note("NCF311", "coefficients", f"{len(values)} coefficients, {named.name} has {size}", _parts(named))
-    if constant is not None:
-        _check_lag(section, named, constant)
+        parts = ", ".join(f"{e.name} {label}" for e in named.effects for label in e.basis.labels)
+        text = f"{len(values)} coefficients, {named.name} has {size}"
+        section.note("NCF311", "coefficients", text, f"one each for {parts}")
+    lagging = {effect.time_constant_s for effect in named.effects}
+    if constant is not None and lagging == {None}:
+        section.note("NCF315", "time_constant_s", f"{named.name} follows nothing after a time")
+    elif constant is not None and len(lagging) > 1:
+        text = f"{named.name} has several time constants"
+        section.note("NCF315", "time_constant_s", text, "write its components one by one: `ncfix effects` shows them")
+    elif constant is not None and constant <= 0:
+        section.note("NCF305", "time_constant_s", f"{constant:g} is not positive")
     section.close()
     if values is None or len(section.report.messages) > before:
         return ()
@@ -480,18 +401,3 @@ def read_named(section: TomlTable, named: PhysicalEffect) -> tuple[Effect, ...]:
         lag = effect.time_constant_s if constant is None else constant
         found.append(replace(effect, coefficients=own, time_constant_s=lag, reference=point))
     return tuple(found)
-
-
-def _check_lag(section: TomlTable, named: PhysicalEffect, constant: float) -> None:
-    lagging = {effect.time_constant_s for effect in named.effects}
-    if lagging == {None}:
-        section.note("NCF315", "time_constant_s", f"{named.name} follows nothing after a time")
-    elif len(lagging) > 1:
-        text = f"{named.name} has several time constants"
-        section.note("NCF315", "time_constant_s", text, "write its components one by one: `ncfix effects` shows them")
-    elif constant <= 0:
-        section.note("NCF305", "time_constant_s", f"{constant:g} is not positive")
-
-
-def _parts(named: PhysicalEffect) -> str:
-    return "one each for " + ", ".join(f"{e.name} {label}" for e in named.effects for label in e.basis.labels)

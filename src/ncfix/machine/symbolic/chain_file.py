@@ -99,9 +99,7 @@ def _variable(tables: TomlTable, name: str) -> Variable | None:
     section = tables.table(name)
     if section is None:
         return None
-    size = section.text("size", required=True)
-    if size not in (None, "large", "small"):
-        section.note("NCF304", "size", f"{size!r} is neither large nor small")
+    size = section.choice("size", "large", "small", required=True, hint="")
     angle, value, sign = section.flag("angle"), section.number("value"), section.integer("sign")
     if sign not in (None, 1, -1):
         section.note("NCF304", "sign", f"{sign} is neither 1 nor -1")
