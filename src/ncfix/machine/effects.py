@@ -9,8 +9,9 @@ section 2.5, rule 1).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import combinations
 from math import nan
 from typing import Protocol
 
@@ -70,8 +71,15 @@ def library(machine: Machine) -> dict[str, PhysicalEffect]:
     """Every physical effect that this machine can have, by name; those of plugins too."""
     found = [each for axis in machine.axes for each in _of_axis(axis)]
     found += [each for pair in _carried(machine) for each in _dead_weight(*pair)]
-    found += _of_spindle(machine)
-    return {each.name: each for each in (*found, *_of_plugins(machine, {each.name for each in found}))}
+    known = {each.name: each for each in (*found, *_of_spindle(machine))}
+    for name, plugin in registry("effects").items():
+        if hasattr(plugin, "effects"):
+            brought = called("effects", name, plugin.effects, machine, gives=Iterable)
+            effects = tuple(handed("effects", name, each, Effect) for each in brought)
+            if effects and name not in known:
+                needs = tuple(getattr(plugin, "needs", ()))
+                known[name] = PhysicalEffect(name, plugin.title, effects, nan, (), needs)
+    return known
 
 
 @lru_cache(maxsize=1)
@@ -80,113 +88,80 @@ def kinds() -> dict[str, type[Basis]]:
     return registry("bases", {basis.name: basis for basis in (*SMOOTH, *PIECEWISE)})
 
 
-def _of_plugins(machine: Machine, taken: set[str]) -> Iterator[PhysicalEffect]:
-    for name, plugin in registry("effects").items():
-        effects = _brought(name, plugin, machine) if hasattr(plugin, "effects") else ()
-        if effects and name not in taken:
-            yield PhysicalEffect(name, plugin.title, effects, nan, (), tuple(getattr(plugin, "needs", ())))
-
-
-def _brought(name: str, plugin: PluginEffect, machine: Machine) -> tuple[Effect, ...]:
-    found = called("effects", name, plugin.effects, machine, gives=Iterable)
-    return tuple(handed("effects", name, each, Effect) for each in found)
-
-
 def _of_axis(axis: Axis) -> Iterator[PhysicalEffect]:
     component = _along(axis)
     if component is None:
         return
     name, q = f"E{component}{axis.name}", axis.name
     center, scale = _span(axis)
-    sides, lever = (f"dir_{q}",), 1 / LEVER if axis.rotary else 1.0
-    play = Effect(name, (0.0,), Backlash())
-    yield PhysicalEffect(
-        f"backlash-{q}", f"play of {q} when it reverses", (play,), 0.01 * lever, (*SEEN, "axis"), sides
-    )
-    worn = Effect(name, (0.0,) * 3, Backlash(degree=(0, 1, 2)), center=center, scale=scale)
-    yield PhysicalEffect(
-        f"worn-{q}", f"play of {q} that differs along it", (worn,), 0.01 * lever, (*SEEN, "axis"), sides
-    )
-    wound = Effect(name, (0.0,), Backlash(degree=(1,)), center=center, scale=scale)
-    yield PhysicalEffect(
-        f"wind-up-{q}", f"play of {q} that grows along its screw", (wound,), 0.005 * lever, (*SEEN, "axis"), sides
-    )
+    lever = 1 / LEVER if axis.rotary else 1.0
+    for kind, degree, largest, title in (
+        ("backlash", (0,), 0.01, "when it reverses"),
+        ("worn", (0, 1, 2), 0.01, "that differs along it"),
+        ("wind-up", (1,), 0.005, "that grows along its screw"),
+    ):
+        play = Effect(name, (0.0,) * len(degree), Backlash(degree), *((center, scale) if any(degree) else ()))
+        sides = (f"dir_{q}",)
+        yield PhysicalEffect(f"{kind}-{q}", f"play of {q} {title}", (play,), largest * lever, (*SEEN, "axis"), sides)
     if axis.pitch is not None:
         screw = Effect(name, (0.0,) * 4, Periodic(order=(1, 2), period=axis.pitch))
-        yield PhysicalEffect(
-            f"screw-{q}", f"screw of {q}, once and twice a turn", (screw,), 0.003 * lever, (*SEEN, "axis")
-        )
-    if not axis.rotary:
-        sensor = f"temp_{q.lower()}"
-        warm = Effect(name, (0.0,), LINEAR, center, scale, times=sensor, times_center=WARM, times_scale=1.0)
-        yield PhysicalEffect(f"expansion-{q}", f"scale of {q} that grows with {sensor}", (warm,), 0.02, SEEN, (sensor,))
-    if axis.workpiece_side and not axis.rotary:
-        for load, what in ("load_kg", "the workpiece"), ("load_kgm", "the workpiece's moment, mass times height"):
-            tilts = tuple(_loaded(f"E{turn}{q}", center, scale, load) for turn in "ABC")
-            kind = "load" if load == "load_kg" else "moment"
+        title = f"screw of {q}, once and twice a turn"
+        yield PhysicalEffect(f"screw-{q}", title, (screw,), 0.003 * lever, (*SEEN, "axis"))
+    if axis.rotary:
+        return
+    sensor = f"temp_{q.lower()}"
+    warm = Effect(name, (0.0,), LINEAR, center, scale, times=sensor, times_center=WARM, times_scale=1.0)
+    yield PhysicalEffect(f"expansion-{q}", f"scale of {q} that grows with {sensor}", (warm,), 0.02, SEEN, (sensor,))
+    if axis.workpiece_side:  # linear in the load and along the axis (Soons, section 2.6)
+        for kind, load, what in (
+            ("load", "load_kg", "the workpiece"),
+            ("moment", "load_kgm", "the workpiece's moment, mass times height"),
+        ):
+            by_load = Effect(
+                "", (0.0,) * 2, Polynomial((0, 1)), center, scale, times=load, times_center=0, times_scale=1
+            )
+            tilts = tuple(replace(by_load, name=f"E{turn}{q}") for turn in "ABC")
             yield PhysicalEffect(f"{kind}-{q}", f"guide of {q} that tilts under {what}", tilts, 1e-4, SEEN, (load,))
-
-
-def _loaded(name: str, center: float, scale: float, load: str) -> Effect:
-    """Linear in the load and along the axis (Soons, section 2.6)."""
-    basis = Polynomial(degree=(0, 1))
-    return Effect(name, (0.0, 0.0), basis, center, scale, times=load, times_center=0.0, times_scale=1.0)
 
 
 def _dead_weight(own: Axis, carried: Axis) -> Iterator[PhysicalEffect]:
     """f(own) times the position of what it carries: the part that is not of either axis alone."""
     center, scale = _span(own)
     middle, half = _span(carried)
-    for turn in "ABC":
+    basis = Polynomial(degree=(1, 2))
+    for turn, about in zip("ABC", "XYZ", strict=True):
+        component = f"E{turn}{own.name}"
         bent = Effect(
-            f"E{turn}{own.name}",
-            (0.0, 0.0),
-            Polynomial(degree=(1, 2)),
-            center,
-            scale,
-            times=carried.name,
-            times_center=middle,
-            times_scale=half,
+            component, (0.0,) * 2, basis, center, scale, times=carried.name, times_center=middle, times_scale=half
         )
-        name = f"weight-E{turn}{own.name}-{carried.name}"
-        title = f"tilt of {own.name} about {'XYZ'['ABC'.index(turn)]} by the weight of {carried.name}"
-        yield PhysicalEffect(name, title, (bent,), 5e-5, SEEN)
+        title = f"tilt of {own.name} about {about} by the weight of {carried.name}"
+        yield PhysicalEffect(f"weight-{component}-{carried.name}", title, (bent,), 5e-5, SEEN)
 
 
 def _of_spindle(machine: Machine) -> Iterator[PhysicalEffect]:
     along = "XYZ"[int(np.abs(np.asarray(machine.tool.direction)).argmax())]
-    warm, late = "temp_spindle", 1800.0
+    warm, late, seen = "temp_spindle", 1800.0, SEEN[:3]
     grown = Effect(f"E{along}{SPINDLE}", (0.0,), LINEAR, center=WARM, input=warm)
-    yield PhysicalEffect("spindle-growth", f"spindle that grows with {warm}", (grown,), 0.05, SEEN[:3], (warm,))
-    lagged = Effect(f"E{along}{SPINDLE}", (0.0,), LINEAR, center=WARM, input=warm, time_constant_s=late)
+    yield PhysicalEffect("spindle-growth", f"spindle that grows with {warm}", (grown,), 0.05, seen, (warm,))
+    lagged = replace(grown, time_constant_s=late)
     title = f"spindle that grows after {warm}, time constant {late:g} s"
-    yield PhysicalEffect("spindle-growth-late", title, (lagged,), 0.05, SEEN[:3], (warm, "time_s"))
+    yield PhysicalEffect("spindle-growth-late", title, (lagged,), 0.05, seen, (warm, "time_s"))
+    hours = " and ".join(f"{seconds / HOUR:g} h" for seconds in STATES_S)
     for axis in "XYZ":
         moved = Effect(f"E{axis}{SPINDLE}", (0.0,), LINEAR, scale=HOUR, input="time_s")
-        yield PhysicalEffect(
-            f"drift-{axis}", f"structure that drifts in {axis}, per hour", (moved,), 0.03, SEEN[:3], ("time_s",)
-        )
-        states = tuple(
-            Effect(f"E{axis}{SPINDLE}", (0.0,), LINEAR, center=WARM, input="temp_structure", time_constant_s=constant)
-            for constant in STATES_S
-        )
-        hours = " and ".join(map(_hours, STATES_S))
+        title = f"structure that drifts in {axis}, per hour"
+        yield PhysicalEffect(f"drift-{axis}", title, (moved,), 0.03, seen, ("time_s",))
+        heated = Effect(moved.name, (0.0,), LINEAR, center=WARM, input="temp_structure")
+        states = tuple(replace(heated, time_constant_s=constant) for constant in STATES_S)
         title = f"structure that moves in {axis} after temp_structure, two thermal states, {hours}"
-        yield PhysicalEffect(f"warming-{axis}", title, states, 0.03, SEEN[:3], ("temp_structure", "time_s"))
-
-
-def _hours(seconds: float) -> str:
-    return f"{seconds / HOUR:g} h"
+        yield PhysicalEffect(f"warming-{axis}", title, states, 0.03, seen, ("temp_structure", "time_s"))
 
 
 def _carried(machine: Machine) -> Iterator[tuple[Axis, Axis]]:
     """Pairs of linear axes of one branch: one, and one that it carries."""
     for held in (True, False):
-        outward = [axis for axis in machine.axes if axis.workpiece_side == held and not axis.rotary]
-        if held:
-            outward.reverse()
-        for index, own in enumerate(outward):
-            yield from ((own, other) for other in outward[index + 1 :])
+        branch = [axis for axis in machine.axes if axis.workpiece_side == held and not axis.rotary]
+        yield from combinations(branch[::-1] if held else branch, 2)
 
 
 def runs_ahead(axis: Axis, effect: Effect) -> bool:
@@ -222,11 +197,14 @@ def extent(machine: Machine, effect: Effect) -> tuple[float, float] | None:
 
     None where that has no answer: it depends on a signal that is no axis, or on an axis without a range.
     """
-    signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
-    if any(signal.axis is None for signal in signals):
+    axes = _axes_of(machine, effect)
+    if None in axes:
         return None
-    axes = sorted({signal.axis for signal in signals if signal.axis is not None})
-    q = _grid(machine, axes)
+    columns = sorted({axis for axis in axes if axis is not None})
+    mesh = np.meshgrid(*(travel(machine, axis) for axis in columns))
+    q = np.zeros((mesh[0].size if mesh else 1, len(machine.axes)))
+    for axis, places in zip(columns, mesh, strict=True):
+        q[:, axis] = places.ravel()
     if not np.isfinite(q).all():
         return None
     values = [_values(machine, effect, q, way) for way in ((-1, 1) if effect.basis.needs_direction else (0,))]
@@ -238,31 +216,32 @@ def at_the_ends(machine: Machine, effect: Effect) -> Array:
 
     None of them where it depends on a signal that is no axis.
     """
-    if any(signal is not None and signal.axis is None for signal in signals_of(machine.axes, effect)):
+    if None in _axes_of(machine, effect):
         return np.empty(0)
     ranges = machine.ranges
     return _values(machine, effect, np.where(np.isfinite(ranges), ranges, [0.0, 2 * np.pi]).T, 1)
+
+
+def _axes_of(machine: Machine, effect: Effect) -> list[int | None]:
+    """The axes (columns) that an effect depends on; None for a signal that is no axis."""
+    return [signal.axis for signal in signals_of(machine.axes, effect) if signal is not None]
+
+
+def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array:
+    found: Array = np.asarray(effect.coefficients) @ functions_at(machine, effect, q, State(direction=direction))
+    return found
+
+
+def functions_at(machine: Machine, effect: Effect, q: Array, state: State, inputs: Iterable[str] = ()) -> Array:
+    """The functions of an effect (k, n) at positions (n, n_axes), if it depends on no other `inputs` than these."""
+    _, poses = flatten(q, state, machine.axes, frozenset(inputs))
+    return dependence_of(machine.axes, effect).rows(poses)
 
 
 def with_unit(machine: Machine, name: str) -> str:
     """The name of an axis with the unit of its positions; that of a signal as it is."""
     units = {axis.name: "degree" if axis.rotary else "mm" for axis in machine.axes}
     return f"{name}, {units[name]}" if name in units else name
-
-
-def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array:
-    _, poses = flatten(q, State(direction=direction), machine.axes, frozenset())
-    found: Array = np.asarray(effect.coefficients) @ dependence_of(machine.axes, effect).rows(poses)
-    return found
-
-
-def _grid(machine: Machine, axes: list[int]) -> Array:
-    """Positions over the travel of these axes, the others at zero, shape (n, n_axes)."""
-    columns = [travel(machine, axis) for axis in axes]
-    places = np.stack([each.ravel() for each in np.meshgrid(*columns)], axis=-1) if columns else np.empty((1, 0))
-    q = np.zeros((len(places), len(machine.axes)))
-    q[:, axes] = places
-    return q
 
 
 def travel(machine: Machine, axis: int) -> Array:
@@ -295,7 +274,7 @@ def travel_of(axis: Axis) -> str:
 
 def title_of(machine: Machine, effect: Effect) -> str:
     """What an effect is."""
-    return component_title(effect.name, {axis.name: axis for axis in machine.axes}.get(effect.joint))
+    return component_title(effect.name, machine.axis(effect.joint))
 
 
 def depends_on(effect: Effect) -> str:
@@ -338,17 +317,13 @@ class TipCurve:
 def effect_curves(machine: Machine, effect: Effect) -> list[EffectCurve]:
     """An effect over its travel, once for each direction of approach if that matters.
 
-    None if it depends on no axis, on two things at once, or on an axis without a range.
+    Empty if it depends on no axis, on two things at once, or on an axis without a range.
     """
-    signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
-    if len(signals) != 1 or signals[0].axis is None:
-        return []
-    q = _moved(machine, signals[0].axis)
-    if q is None:
-        return []
-    return [
-        _curve(machine, effect, q, signals[0].axis, way) for way in ((1, -1) if effect.basis.needs_direction else (0,))
-    ]
+    match _axes_of(machine, effect):
+        case [int(axis)] if (q := _moved(machine, axis)) is not None:
+            ways = (1, -1) if effect.basis.needs_direction else (0,)
+            return [_curve(machine, effect, q, axis, way) for way in ways]
+    return []
 
 
 def tip_curves(machine: Machine, tool_length: float = 0.0) -> list[TipCurve]:
@@ -364,8 +339,7 @@ def tip_curves(machine: Machine, tool_length: float = 0.0) -> list[TipCurve]:
 
 
 def _curve(machine: Machine, effect: Effect, q: Array, axis: int, direction: int) -> EffectCurve:
-    _, poses = flatten(q, State(direction=direction), machine.axes, frozenset())
-    rows = dependence_of(machine.axes, effect).rows(poses)
+    rows = functions_at(machine, effect, q, State(direction=direction))
     value: Array = np.asarray(effect.coefficients) @ rows
     sigma = None
     if effect.covariance is not None:
@@ -378,14 +352,10 @@ def _moved(machine: Machine, axis: int) -> Array | None:
     x = travel(machine, axis)
     if not np.isfinite(x).all():
         return None
-    q = np.tile([_middle(machine, index) for index in range(len(machine.axes))], (len(x), 1))
+    middle = [float(low + high) / 2 if np.isfinite([low, high]).all() else 0.0 for low, high in machine.ranges]
+    q = np.tile(middle, (len(x), 1))
     q[:, axis] = np.sort(x)
     return q
-
-
-def _middle(machine: Machine, axis: int) -> float:
-    low, high = machine.ranges[axis]
-    return float(low + high) / 2 if np.isfinite([low, high]).all() else 0.0
 
 
 UM, URAD = 1e3, 1e6
@@ -407,43 +377,23 @@ def units(machine: Machine, effect: Effect) -> tuple[Unit, ...]:
     """
     size, name = (URAD, "urad") if effect.rotational else (UM, "um")
     factor, times = _per(machine, effect.times, effect.times_scale or effect.scale)
+    powers = effect.basis.degree if isinstance(effect.basis, Polynomial | Backlash) else (0,) * effect.basis.size
     found = []
-    for power in _powers(effect):
+    for power in powers:
         each, signal = _per(machine, effect.signal, effect.scale) if power else (1.0, "")
-        below = [_power(signal, power), times]
-        found.append((size * each**power * factor, _ratio(name, [part for part in below if part])))
+        below = [f"{signal}^{power}" if signal and power > 1 else signal, times]
+        shown = " ".join(part for part in below if part)
+        unit = f"{name}/({shown})" if " " in shown else f"{name}/{shown}" if shown else name
+        found.append((size * each**power * factor, unit))
     return tuple(found)
-
-
-def _powers(effect: Effect) -> tuple[int, ...]:
-    """To which power of u each coefficient belongs; 0 where it is of the size of the function itself."""
-    if isinstance(effect.basis, Polynomial | Backlash):
-        return effect.basis.degree
-    return (0,) * effect.basis.size
 
 
 def _per(machine: Machine, signal: str | None, scale: float) -> Unit:
     """From "per u" to "per unit of the signal"; no unit where u is a share of a travel, or of who knows what."""
-    if signal is None:
-        return 1.0, ""
-    unit, size = _unit_of(machine, signal, scale)
-    return (size / scale, unit) if unit else (1.0, "")
-
-
-def _unit_of(machine: Machine, signal: str, scale: float) -> tuple[str, float]:
+    unit, size = "", 1.0
     if signal in machine.axis_names:
-        rotary = bool(machine.rotary[machine.axis_names.index(signal)])
-        return (("deg", 1.0) if rotary else ("m", METRE)) if np.isclose(scale, 1.0) else ("", 1.0)
-    return KELVIN if signal.startswith("temp_") else COUNTED.get(signal, ("", 1.0))
-
-
-def _power(unit: str, power: int) -> str:
-    return f"{unit}^{power}" if unit and power > 1 else unit
-
-
-def _ratio(name: str, below: list[str]) -> str:
-    """um, um/m, um/(m K)."""
-    if not below:
-        return name
-    joined = " ".join(below)
-    return f"{name}/({joined})" if " " in joined else f"{name}/{joined}"
+        if np.isclose(scale, 1.0):
+            unit, size = ("deg", 1.0) if machine.rotary[machine.axis_names.index(signal)] else ("m", METRE)
+    elif signal is not None:
+        unit, size = KELVIN if signal.startswith("temp_") else COUNTED.get(signal, ("", 1.0))
+    return (size / scale, unit) if unit else (1.0, "")

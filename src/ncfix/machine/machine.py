@@ -70,6 +70,10 @@ class Machine:
         """The letters of the axes, in the order of the columns of q."""
         return tuple(axis.name for axis in self.axes)
 
+    def axis(self, name: str) -> Axis | None:
+        """The axis with this letter; None for a name that is none."""
+        return next((axis for axis in self.axes if axis.name == name), None)
+
     @cached_property
     def rotary(self) -> NDArray[np.bool_]:
         """Which axes are rotary, shape (n_axes,)."""

@@ -11,18 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
 from ncfix.diagnostics import Message, Place, RefusedError
 from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, large_size
-from ncfix.machine.effects import travel
+from ncfix.machine.effects import functions_at, travel
 from ncfix.machine.error_model import signals_of
-from ncfix.machine.linear import dependence_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
-from ncfix.machine.state import State, flatten
+from ncfix.machine.state import State
 
 BEYOND = 10.0
 """Times what is much: no machine that runs is so wrong."""
@@ -92,21 +91,16 @@ Fault = tuple[str, str, str, bool]
 
 
 def much(machine: Machine, name: str) -> float:
-    """What is much of an error component on this machine, mm or rad."""
-    location, joint = len(name) == 4, name[-1]
-    axis = next((each for each in machine.axes if each.name == joint), None)
-    size = float(large_size(name)) * (ARM if is_arm(machine) else 1.0)
+    """What is much of an error component on this machine, mm or rad.
+
+    Rotary joints in a row that carry the tool or the workpiece, as in a robot, make an arm.
+    """
+    location, axis = len(name) == 4, machine.axis(name[-1])
+    held = [each.workpiece_side for each in machine.axes if each.rotary]
+    size = float(large_size(name)) * (ARM if max(held.count(True), held.count(False)) >= JOINTS else 1.0)
     if axis is not None and not axis.rotary and not location:
         return size * max(1.0, _travel_mm(axis) / METRE)
-    if name[1] in "XYZ":
-        return size * max(1.0, reach(machine) / METRE)
-    return size
-
-
-def is_arm(machine: Machine) -> bool:
-    """Whether rotary joints in a row carry the tool or the workpiece, as in a robot."""
-    held = [axis.workpiece_side for axis in machine.axes if axis.rotary]
-    return max(held.count(True), held.count(False)) >= JOINTS
+    return size * max(1.0, reach(machine) / METRE) if name[1] in "XYZ" else size
 
 
 def reach(machine: Machine) -> float:
@@ -129,81 +123,53 @@ def functions(machine: Machine, effect: Effect) -> Array:
     effect = replace(effect, time_constant_s=None)
     signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
     axes = sorted({signal.axis for signal in signals if signal.axis is not None})
-    inputs = sorted({name for signal in signals for name in signal.inputs})
-    courses = [_course(machine, axis, effect) for axis in axes]
-    sides = [np.asarray(_about(effect, name)) for name in inputs]
+    about = {each.name: (each.center - each.scale, each.center, each.center + each.scale) for each in signals}
+    inputs = sorted({each.name for each in signals if each.axis is None})
+    places = [travel(machine, axis) for axis in axes]
+    places = [each if np.isfinite(each).all() else np.array([-1, 0, 1]) * UNLIMITED_MM for each in places]
+    places = [each[:: 6 if effect.times is not None else 1] for each in places]  # fewer where there are two
     ways = np.array([-1.0, 1.0]) if effect.basis.needs_direction else np.zeros(1)
-    mesh = [each.ravel() for each in np.meshgrid(*courses, *sides, ways)]
+    mesh = [each.ravel() for each in np.meshgrid(*places, *(np.asarray(about[name]) for name in inputs), ways)]
     q = np.zeros((mesh[0].size, len(machine.axes)))
-    q[:, axes] = np.stack(mesh[: len(axes)], axis=-1) if axes else q[:, axes]
+    for axis, each in zip(axes, mesh, strict=False):
+        q[:, axis] = each
     values = dict(zip(inputs, mesh[len(axes) : -1], strict=True))
-    state = State(values.get("tool_length", 0.0), mesh[-1][:, None], values)
-    _, poses = flatten(q, state, machine.axes, frozenset(inputs))
-    rows: Array = dependence_of(machine.axes, effect).rows(poses)
-    return np.asarray(rows)
-
-
-def _course(machine: Machine, axis: int, effect: Effect) -> Array:
-    """Positions of an axis to look at, fewer where there are two."""
-    places = travel(machine, axis)
-    if not np.isfinite(places).all():
-        places = np.array([-UNLIMITED_MM, 0.0, UNLIMITED_MM])
-    return places[:: 6 if effect.times is not None else 1]
-
-
-def _about(effect: Effect, name: str) -> tuple[float, float, float]:
-    """A signal at its centre, and one scale to either side."""
-    if name == effect.times:
-        center = effect.center if effect.times_center is None else effect.times_center
-        scale = effect.scale if effect.times_scale is None else effect.times_scale
-    else:
-        center, scale = effect.center, effect.scale
-    return center - scale, center, center + scale
+    return functions_at(machine, effect, q, State(values.get("tool_length", 0.0), mesh[-1][:, None], values), inputs)
 
 
 def _sizes(machine: Machine) -> Iterator[Fault]:
-    """Errors that are much, by name; functions of the same axes add up."""
-    for name in dict.fromkeys(effect.name for effect in machine.effects):
-        size = max(_largest(machine, group) for group in _alike(machine, name))
-        limit = much(machine, name)
-        if size > limit:
-            yield _said(name, size, limit, component_title(name, _axis(machine, name[-1])))
-
-
-def _axis(machine: Machine, joint: str) -> Axis | None:
-    return next((axis for axis in machine.axes if axis.name == joint), None)
-
-
-def _alike(machine: Machine, name: str) -> list[list[Effect]]:
-    """The effects of a name, those together that depend on the same and on nothing but axes."""
-    groups: dict[object, list[Effect]] = {}
+    """Errors that are much, by name; those that depend on the same and on nothing but one axis add up."""
+    groups: dict[str, dict[object, list[Effect]]] = {}
     for index, effect in enumerate(machine.effects):
-        if effect.name == name:
-            signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
-            plain = len(signals) == 1 and not signals[0].inputs and not effect.basis.needs_direction
-            groups.setdefault(signals[0].axis if plain else (index,), []).append(effect)
-    return list(groups.values())
+        signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
+        plain = len(signals) == 1 and not signals[0].inputs and not effect.basis.needs_direction
+        same = groups.setdefault(effect.name, {})
+        same.setdefault(signals[0].axis if plain else (index,), []).append(effect)
+    for name, same in groups.items():
+        size, limit, angle = (
+            max(_largest(machine, each) for each in same.values()),
+            much(machine, name),
+            name[1] in "ABC",
+        )
+        if size <= limit:
+            continue
+        hint, impossible = "", size > BEYOND * limit
+        text = f"{name}, {component_title(name, machine.axis(name[-1]))}: {sized(size, angle)} is"
+        if impossible:
+            meant = [f"{size:.4g} {unit}" for unit, factor in UNITS[angle] if LEAST * limit <= size * factor <= limit]
+            hint = f"is {' or '.join(meant)} meant? Coefficients are in {'rad' if angle else 'mm'}"
+            hint = hint if meant else "see the unit, and `center`, `scale` and `range`"
+            yield "NCF320", f"{text} {size / limit:.3g} times what is much, {sized(limit, angle)}", hint, True
+        else:
+            yield "NCF320", f"{text} much, and more than {sized(limit, angle)}", "", False
 
 
 def _largest(machine: Machine, effects: Sequence[Effect]) -> float:
     """The largest size of the sum, mm or rad; of functions at places of their own the sum of the sizes is taken."""
     values = [np.asarray(effect.coefficients) @ functions(machine, effect) for effect in effects]
-    together = (
-        sum(values) if len({each.shape for each in values}) == 1 else np.array([sum(np.abs(v).max() for v in values)])
-    )
-    return float(np.abs(together).max(initial=0.0))
-
-
-def _said(name: str, size: float, limit: float, title: str) -> Fault:
-    angle = name[1] in "ABC"
-    impossible = size > BEYOND * limit
-    text = f"{name}, {title}: {sized(size, angle)} is much, and more than {sized(limit, angle)}"
-    if impossible:
-        text = f"{name}, {title}: {sized(size, angle)} is {size / limit:.3g} times what is much, {sized(limit, angle)}"
-    meant = [f"{size:.4g} {unit}" for unit, factor in UNITS[angle] if LEAST * limit <= size * factor <= limit]
-    hint = f"is {' or '.join(meant)} meant? Coefficients are in {'rad' if angle else 'mm'}"
-    hint = hint if impossible and meant else "see the unit, and `center`, `scale` and `range`" if impossible else ""
-    return "NCF320", text, hint, impossible
+    if len({each.shape for each in values}) > 1:
+        values = [np.abs(each).max(keepdims=True) for each in values]
+    return float(np.abs(sum(values)).max(initial=0.0))
 
 
 def sized(value: float, angle: bool) -> str:
@@ -221,33 +187,20 @@ def _span(machine: Machine) -> Iterator[Fault]:
     linear = [axis for axis in machine.axes if not axis.rotary and axis.name in "XYZ"]
     directions = np.array([axis.direction for axis in linear]).reshape(-1, 3)
     if len(linear) > 1 and np.linalg.svd(directions, compute_uv=False).min() < PLANE:
-        names = " and ".join(axis.name for axis in _dependent(linear))
-        text = f"{names} do not span {'a plane' if len(_dependent(linear)) == 2 else 'space'}: one moves as others do"
+        parallel = (
+            [a, b] for a, b in combinations(linear, 2) if np.linalg.norm(np.cross(a.direction, b.direction)) < PLANE
+        )
+        dependent = next(parallel, linear)
+        names = " and ".join(axis.name for axis in dependent)
+        text = f"{names} do not span {'a plane' if len(dependent) == 2 else 'space'}: one moves as others do"
         yield "NCF321", text, "see their `direction`", True
     for first, second in pairwise(machine.axes):
-        if (
-            first.rotary
-            and second.rotary
-            and first.workpiece_side == second.workpiece_side
-            and _one_line(first, second)
-        ):
+        if not (first.rotary and second.rotary and first.workpiece_side == second.workpiece_side):
+            continue
+        apart = np.cross(np.asarray(second.point) - np.asarray(first.point), first.direction)
+        if np.linalg.norm(np.cross(first.direction, second.direction)) < SAME and np.linalg.norm(apart) < SAME_MM:
             text = f"{first.name} and {second.name} turn about the same line, with no axis between them"
             yield "NCF321", text, "see `direction` and `point` of both", True
-
-
-def _dependent(axes: Sequence[Axis]) -> list[Axis]:
-    """Two that are parallel, else all."""
-    for k, first in enumerate(axes):
-        for second in axes[k + 1 :]:
-            if np.linalg.norm(np.cross(first.direction, second.direction)) < PLANE:
-                return [first, second]
-    return list(axes)
-
-
-def _one_line(first: Axis, second: Axis) -> bool:
-    direction = np.asarray(first.direction)
-    apart = np.cross(np.asarray(second.point) - np.asarray(first.point), direction)
-    return bool(np.linalg.norm(np.cross(direction, second.direction)) < SAME and np.linalg.norm(apart) < SAME_MM)
 
 
 def _travels(machine: Machine) -> Iterator[Fault]:
@@ -288,12 +241,8 @@ def _settings(machine: Machine) -> Iterator[Fault]:
                 yield "NCF322", text, "it is in mm and degrees: 0.001 is a micrometre", True
     for name, place in ("workpiece_offset", machine.workpiece_offset), ("tool.point", machine.tool.point):
         if np.abs(place).max() > MOST_TRAVEL:
-            yield (
-                "NCF322",
-                f"{name}: {np.abs(place).max():g} mm is further than any machine reaches",
-                "it is in mm",
-                True,
-            )
+            text = f"{name}: {np.abs(place).max():g} mm is further than any machine reaches"
+            yield "NCF322", text, "it is in mm", True
 
 
 # -- positions of tables and curves ------------------------------------------------------------------------------------
@@ -302,7 +251,7 @@ def _settings(machine: Machine) -> Iterator[Fault]:
 def _positions(machine: Machine) -> Iterator[Fault]:
     """Tables and knots in a unit other than that of the axis, or where it never is."""
     for effect in machine.effects:
-        axis = _axis(machine, effect.input or effect.joint)
+        axis = machine.axis(effect.input or effect.joint)
         positions = np.array(sorted({*getattr(effect.basis, "positions", ()), *getattr(effect.basis, "knots", ())}))
         if axis is None or effect.joint == SPINDLE or len(positions) < 3:
             continue
