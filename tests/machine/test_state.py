@@ -78,6 +78,15 @@ def test_a_factor_multiplies_by_the_other_axis_s_u() -> None:
     assert value(Effect("EAX", (2.0,), times="Z"), q) == pytest.approx(60.0), "a constant times an axis"
 
 
+def test_a_factor_multiplies_a_constant_too() -> None:
+    by_axis, by_input = Effect("EXX", (0.01,), times="Y"), Effect("EYX", (0.01,), times="temp_a", times_center=20.0)
+    machine, state = MACHINE.replace(effects=(by_axis, by_input)), State(inputs={"temp_a": 25.0})
+    q = at(Y=30.0)
+    moved = machine.actual_tip(q, state) - machine.tip(q)
+    np.testing.assert_allclose(moved, machine.error(q, state)[..., :3], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.abs(moved), [0.3, 0.05, 0.0], rtol=0, atol=1e-9)
+
+
 def test_state_inputs_and_the_tool_length_as_one() -> None:
     growth = Effect("EZS", (0.001,), Polynomial((1,)), center=20.0, input="temp_spindle")
     q = at(X=np.zeros(3))

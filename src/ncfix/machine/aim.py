@@ -16,7 +16,7 @@ from ncfix import fast
 from ncfix.machine.loops import room
 from ncfix.machine.route import Route, SplitRoute, Turns
 from ncfix.machine.se3 import Array
-from ncfix.machine.state import Poses, behind_each_other
+from ncfix.machine.state import Poses, behind_each_other, some
 from ncfix.machine.steps import SMALL, dot, has_arrived, volume
 
 Mask = NDArray[np.bool_]
@@ -87,11 +87,12 @@ def aimed(
             break
         everyone = active.size == len(usable)
         rows: slice | NDArray[np.intp] = slice(None) if everyone else active
-        here = replace(poses, positions=q) if everyone else taken(poses, q, active)
+        here = replace(poses, positions=q)
+        here = here if everyone else here.part(active)
         tip, angle = tips(here, turns if everyone else (turns[0][:, active], turns[1][:, active]))
         gap = tip - goal[:, rows]
         for i, axis in enumerate(axes):
-            step = dot([part if everyone else _rows(part, active) for part in back[i]], gap)
+            step = dot([part if everyone else some(part, active) for part in back[i]], gap)
             q[axis, rows] -= step if number < WHOLE_STEPS else step / 2
         size = np.sqrt(dot(gap, gap))
         if number == 0:
@@ -140,20 +141,6 @@ def _compiled(poses: Poses, perfect: Route, approach: SplitRoute, target: Array 
     limits, columns = np.array([CLOSE, FLAT, WHOLE_STEPS]), np.array(approach.axes, dtype=np.int64)
     kernels.aim(*routes, given, columns, goal, limits, room(given, *routes), out)
     return Aim(out[:3], out[5] > 0, out[3]), out[4]
-
-
-def taken(poses: Poses, q: Array, rows: NDArray[np.intp]) -> Poses:
-    """Some of the poses, with positions from q (n_axes, n)."""
-    return Poses(
-        q[:, rows],
-        _rows(poses.tool_length, rows),
-        _rows(poses.direction, rows),
-        {name: values[rows] for name, values in poses.inputs.items()},
-    )
-
-
-def _rows(values: Array, rows: NDArray[np.intp]) -> Array:
-    return values if values.shape[-1] == 1 else values[..., rows]
 
 
 RouteTips = Callable[[Route | None, Poses, Turns | None], Array]

@@ -146,30 +146,25 @@ class Topology:
 def parse_topology(text: str) -> tuple[Topology | None, list[str]]:
     """The topology, or what is wrong with the string. Blanks between the letters may be left out."""
     letters = text.split() if " " in text.strip() else list(text.strip())
-    wrong = list(_topology_faults(letters))
-    if wrong:
-        return None, wrong
-    foundation = letters.index("F")
-    workpiece, tool = tuple(letters[1:foundation]), tuple(letters[foundation + 1 : -1])
-    spindle = tool[-1:] == ("S",)
-    return Topology(workpiece, tool[:-1] if spindle else tool, spindle), []
-
-
-def _topology_faults(letters: list[str]) -> list[str]:
-    wrong = []
+    joints, wrong = letters[1:-1], []
     if letters[:1] != ["w"]:
         wrong.append("it must start with w, the workpiece")
     if letters[-1:] != ["t"]:
         wrong.append("it must end with t, the tool")
     if letters.count("F") != 1:
         wrong.append(f"the foundation F must be named once, not {letters.count('F')} times")
-    joints = letters[1:-1]
     if "S" in joints[:-1]:
         wrong.append("the spindle S can only stand last, before t")
     strange = [each for each in joints if not (len(each) == 1 and "A" <= each <= "Z")]
     wrong += [f"{each!r} is not an axis letter" for each in strange]
     twice = sorted({each for each in joints if joints.count(each) > 1 and each != "F"})
-    return wrong + [f"axis {each} is named twice" for each in twice]
+    wrong += [f"axis {each} is named twice" for each in twice]
+    if wrong:
+        return None, wrong
+    foundation = joints.index("F")
+    workpiece, tool = tuple(joints[:foundation]), tuple(joints[foundation + 1 :])
+    spindle = tool[-1:] == ("S",)
+    return Topology(workpiece, tool[:-1] if spindle else tool, spindle), []
 
 
 COMPONENTS = "XYZABC"
@@ -284,16 +279,51 @@ def component_title(name: str, axis: Axis | None = None) -> str:
 
     Without the axis it goes by the letter: X Y Z U V W are linear, others rotary, and A B C turn about X Y Z.
     """
+    component, zero, joint = _parts(name)
+    about, rotary = TURNS_ABOUT.get(component), axis.rotary if axis else joint not in "XYZUVW"
+    if joint == SPINDLE:
+        if about:
+            return f"{'tilt' if zero else 'tilt motion'} of the spindle about {about}"
+        return f"{'place' if zero else 'motion'} of the spindle in {component}"
+    if zero:
+        return _location_title(component, joint, rotary)
+    if component == joint:
+        return f"{'angular ' if rotary else ''}positioning of {joint}"
+    if about:
+        return f"tilt of {joint} about {about}" if rotary or about != joint else f"roll of {joint}"
+    if not rotary:
+        return f"straightness of {joint} in {component}"
+    if axis is None:
+        sense = "axial " if component == TURNS_ABOUT.get(joint) else "radial "
+    else:  # along the axis line or across it; neither for a skewed axis
+        pairs = zip(axis.error_axes[LINEAR.index(component)], axis.direction, strict=True)
+        along = abs(sum(a * b for a, b in pairs))
+        sense = "axial " if along > 1 - SKEWED else "radial " if along < SKEWED else ""
+    return f"{sense}motion of {joint} in {component}"
+
+
+def _parts(name: str) -> tuple[str, str, str]:
+    """Component, 0 of a location error, and joint."""
     match = NAME.fullmatch(name)
     if match is None:
         raise ValueError(f"{name!r} is not the name of an ISO 230-1 component")
     component, zero, joint = match.groups()
-    if joint == SPINDLE:
-        return _spindle(component, bool(zero))
-    turns = axis.rotary if axis else joint not in "XYZUVW"
-    if zero:
-        return _location(component, joint, turns)
-    return _rotary_motion(component, joint, axis) if turns else _linear_motion(component, joint)
+    return component, zero, joint
+
+
+def _location_title(component: str, joint: str, rotary: bool) -> str:
+    about = TURNS_ABOUT.get(component)
+    if component == joint:
+        return f"zero offset of {joint}"
+    if about:
+        if not rotary and about == joint:
+            return f"roll of {joint} as a whole; {IDLE}"
+        return f"{'tilt of the axis line' if rotary else 'direction'} of {joint}, turned about {about}"
+    if not rotary:
+        return f"offset of the line of {joint} in {component}; {IDLE}"
+    if component == TURNS_ABOUT.get(joint):
+        return f"offset of {joint} along its axis line, {component}; {IDLE}"
+    return f"offset of the axis line of {joint} in {component}"
 
 
 def component_names(joints: Iterable[str] = "XYZABC" + SPINDLE) -> tuple[str, ...]:
@@ -318,61 +348,9 @@ def squareness_meaning(name: str) -> str:
     return f"+{min(axis, other)} to +{max(axis, other)} is 90 deg {sign} {name}"
 
 
-def _linear_motion(component: str, joint: str) -> str:
-    if component == joint:
-        return f"positioning of {joint}"
-    if component in LINEAR:
-        return f"straightness of {joint} in {component}"
-    if TURNS_ABOUT[component] == joint:
-        return f"roll of {joint}"
-    return f"tilt of {joint} about {TURNS_ABOUT[component]}"
-
-
-def _rotary_motion(component: str, joint: str, axis: Axis | None) -> str:
-    if component == joint:
-        return f"angular positioning of {joint}"
-    if component in LINEAR:
-        return f"{_sense(component, joint, axis)}motion of {joint} in {component}"
-    return f"tilt of {joint} about {TURNS_ABOUT[component]}"
-
-
-def _sense(component: str, joint: str, axis: Axis | None) -> str:
-    """Whether a direction is that of the axis line or across it; neither for a skewed axis."""
-    if axis is None:
-        return "axial " if component == TURNS_ABOUT.get(joint) else "radial "
-    pairs = zip(axis.error_axes[LINEAR.index(component)], axis.direction, strict=True)
-    along = abs(sum(a * b for a, b in pairs))
-    return "axial " if along > 1 - SKEWED else "radial " if along < SKEWED else ""
-
-
-def _location(component: str, joint: str, rotary: bool) -> str:
-    if component == joint:
-        return f"zero offset of {joint}"
-    if component in LINEAR:
-        if not rotary:
-            return f"offset of the line of {joint} in {component}; {IDLE}"
-        if component == TURNS_ABOUT.get(joint):
-            return f"offset of {joint} along its axis line, {component}; {IDLE}"
-        return f"offset of the axis line of {joint} in {component}"
-    if not rotary and TURNS_ABOUT[component] == joint:
-        return f"roll of {joint} as a whole; {IDLE}"
-    what = "tilt of the axis line" if rotary else "direction"
-    return f"{what} of {joint}, turned about {TURNS_ABOUT[component]}"
-
-
-def _spindle(component: str, location: bool) -> str:
-    what = "place" if location else "motion"
-    if component in LINEAR:
-        return f"{what} of the spindle in {component}"
-    return f"{'tilt' if location else 'tilt motion'} of the spindle about {TURNS_ABOUT[component]}"
-
-
 def instruments_for(name: str) -> str:
     """The kinds of measurement that see a component, docs/formats.md."""
-    match = NAME.fullmatch(name)
-    if match is None:
-        raise ValueError(f"{name!r} is not the name of an ISO 230-1 component")
-    component, zero, joint = match.groups()
+    component, zero, joint = _parts(name)
     if joint == SPINDLE:
         return "tcp tcp6 probe points" if component in LINEAR else "tcp6 points; others with two tool lengths"
     return "tcp tcp6 probe points length" + ("" if zero else " axis")

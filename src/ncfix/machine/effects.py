@@ -19,8 +19,7 @@ import numpy as np
 
 from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title
 from ncfix.machine.basis import SMOOTH, Backlash, Basis, Periodic, Polynomial
-from ncfix.machine.error_model import signals_of
-from ncfix.machine.linear import dependence_of
+from ncfix.machine.error_model import dependence_of, signals_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.piecewise import PIECEWISE
 from ncfix.machine.se3 import Array

@@ -7,10 +7,10 @@ reference point.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ncfix.machine.axes import BASE_AXES, SPINDLE, Axis, Effect, Tool, Vector
 from ncfix.machine.basis import Basis
 from ncfix.machine.se3 import Array
-from ncfix.machine.state import Poses, Signal, axis_signal, inputs_of
+from ncfix.machine.state import Poses, Signal, inputs_of, signal_called
 
 
 class Sort(Enum):
@@ -39,35 +39,59 @@ class Slot:
 
 
 @dataclass(frozen=True, slots=True)
-class EffectGroup:
-    """Effects evaluated together: `gains[s, 6, k] @ basis(u)` is added to slot `slots[s]`, times the factor's u.
+class Dependence:
+    """How an error depends on the state, whichever component it is: functions of one signal, perhaps times another.
 
-    A gain takes a coefficient's function to the small motion [x y z a b c] along and about the base axes (the axis's
-    own zero position frame, if its error frame moves with it).
+    direction_axis  whose direction of motion the functions need; -1: none
     """
 
     basis: Basis
     signal: Signal | None
     factor: Signal | None
     direction_axis: int
-    slots: tuple[Slot, ...]
-    gains: Array
 
-    def add_to(self, slots: dict[Slot, Array], poses: Poses) -> None:
-        """Evaluate at n poses and add to the six components (6, n), mm and rad, of each slot."""
-        values = self.basis.combine(self.gains.reshape(-1, self.gains.shape[-1]), *self.arguments(poses))
-        if self.factor is not None:
-            values = values * self.factor.u(poses, (-np.inf, np.inf))
-        for slot, value in zip(self.slots, values.reshape(len(self.slots), 6, -1), strict=True):
-            slots[slot] = slots[slot] + value if slot in slots else value
+    @property
+    def signals(self) -> frozenset[Signal]:
+        """Those that it needs."""
+        return frozenset(each for each in (self.signal, self.factor) if each is not None)
+
+    @property
+    def inputs(self) -> frozenset[str]:
+        """The state inputs that must be given."""
+        return inputs_of(self.signals)
+
+    def changes_with(self, axes: Sequence[int]) -> bool:
+        """Whether the functions change with one of the axes."""
+        return any(signal.axis in axes for signal in self.signals)
 
     def arguments(self, poses: Poses) -> tuple[Array, Array]:
         """u and the direction of motion (-1, 0, 1), as the basis sees them: (n,), or (1,) where neither varies."""
-        if self.signal is None:
-            return np.zeros(1), np.zeros(1)
-        u = self.signal.u(poses, self.basis.domain)
-        way = poses.direction[self.direction_axis] if self.basis.needs_direction else 0.0
-        return u, np.broadcast_to(way, u.shape)
+        u = np.zeros(1) if self.signal is None else self.signal.u(poses, self.basis.domain)
+        way = poses.direction[self.direction_axis] if self.direction_axis >= 0 else np.zeros(1)
+        shape = np.broadcast_shapes(u.shape, way.shape)
+        return np.broadcast_to(u, shape), np.broadcast_to(way, shape)
+
+    def times_factor(self, values: Array, poses: Poses) -> Array:
+        """Values (..., n) or (..., 1) at these poses, times the factor's u if there is one."""
+        return values if self.factor is None else values * self.factor.u(poses, (-np.inf, np.inf))
+
+    def rows(self, poses: Poses) -> Array:
+        """The functions at these poses, times the factor: shape (k, n)."""
+        u, way = self.arguments(poses)
+        shape = (poses.positions.shape[1],)
+        return self.times_factor(self.basis.rows(np.broadcast_to(u, shape), np.broadcast_to(way, shape)), poses)
+
+
+@dataclass(frozen=True, slots=True)
+class EffectGroup(Dependence):
+    """Effects evaluated together: `gains[s, 6, k] @ basis(u)` is added to slot `slots[s]`, times the factor's u.
+
+    A gain takes a coefficient's function to the small motion [x y z a b c] along and about the base axes (the axis's
+    own zero position frame, if its error frame moves with it).
+    """
+
+    slots: tuple[Slot, ...]
+    gains: Array
 
 
 @dataclass(frozen=True)
@@ -79,8 +103,7 @@ class ErrorModel:
     @cached_property
     def signals(self) -> frozenset[Signal]:
         """Every signal that matters."""
-        found = [signal for group in self.groups for signal in (group.signal, group.factor)]
-        return frozenset(signal for signal in found if signal is not None)
+        return frozenset().union(*(group.signals for group in self.groups))
 
     @property
     def inputs(self) -> frozenset[str]:
@@ -91,7 +114,10 @@ class ErrorModel:
         """The small motions at each slot, (6, n) or (6, 1): mm along, rad about."""
         slots: dict[Slot, Array] = {}
         for group in self.groups:
-            group.add_to(slots, poses)
+            sums = group.basis.combine(group.gains.reshape(-1, group.gains.shape[-1]), *group.arguments(poses))
+            values = group.times_factor(sums, poses).reshape(len(group.slots), 6, -1)
+            for slot, value in zip(group.slots, values, strict=True):
+                slots[slot] = slots[slot] + value if slot in slots else value
         return slots
 
     def rotates(self, slot: Slot) -> bool:
@@ -101,27 +127,24 @@ class ErrorModel:
 
 def compile_effects(axes: tuple[Axis, ...], tool: Tool, effects: Iterable[Effect]) -> ErrorModel:
     """Sort the effects that are not zero into groups."""
-    together: dict[tuple[object, ...], list[Effect]] = {}
+    together: dict[tuple[object, ...], list[tuple[Effect, Dependence]]] = {}
     for effect in effects:
         if effect.active:
-            key = (*signals_of(axes, effect), direction_axis(axes, effect), effect.basis.family)
-            together.setdefault(key, []).append(effect)
-    return ErrorModel(tuple(_group(axes, tool, members) for members in together.values()))
-
-
-def _group(axes: tuple[Axis, ...], tool: Tool, members: list[Effect]) -> EffectGroup:
-    basis = members[0].basis
-    for effect in members[1:]:
-        basis = basis.merged(effect.basis)
-    slots = tuple(dict.fromkeys(slot_of(axes, tool, effect) for effect in members))
-    gains = np.zeros((len(slots), 6, basis.size))
-    places = {label: index for index, label in enumerate(basis.labels)}
-    for effect in members:
-        columns = [places[label] for label in effect.basis.labels]
-        unit = unit_motion(axes, effect)
-        gains[slots.index(slot_of(axes, tool, effect))][:, columns] += np.outer(unit, effect.coefficients)
-    signal, factor = signals_of(axes, members[0])
-    return EffectGroup(basis, signal, factor, direction_axis(axes, members[0]), slots, gains)
+            on = dependence_of(axes, effect)
+            together.setdefault((on.signal, on.factor, on.direction_axis, on.basis.family), []).append((effect, on))
+    groups = []
+    for members in together.values():
+        on = members[0][1]
+        basis = reduce(lambda basis, member: basis.merged(member[1].basis), members[1:], on.basis)
+        slots = tuple(dict.fromkeys(slot_of(axes, tool, effect) for effect, _ in members))
+        gains = np.zeros((len(slots), 6, basis.size))
+        places = {label: index for index, label in enumerate(basis.labels)}
+        for effect, _ in members:
+            columns = [places[label] for label in effect.basis.labels]
+            unit = unit_motion(axes, effect)
+            gains[slots.index(slot_of(axes, tool, effect))][:, columns] += np.outer(unit, effect.coefficients)
+        groups.append(EffectGroup(basis, on.signal, on.factor, on.direction_axis, slots, gains))
+    return ErrorModel(tuple(groups))
 
 
 def joint_index(axes: tuple[Axis, ...], effect: Effect) -> int:
@@ -150,29 +173,29 @@ def unit_motion(axes: tuple[Axis, ...], effect: Effect) -> Array:
     return unit
 
 
+def dependence_of(axes: tuple[Axis, ...], effect: Effect) -> Dependence:
+    """How an effect depends on the state."""
+    return Dependence(effect.basis, *signals_of(axes, effect), direction_axis(axes, effect))
+
+
 def signals_of(axes: tuple[Axis, ...], effect: Effect) -> tuple[Signal | None, Signal | None]:
     """The signal that the effect's basis sees, and the one that multiplies it."""
     signal = factor = None
     if effect.signal is not None:
         lag = effect.time_constant_s or 0.0
-        plain = _plain(axes, effect.signal)
+        plain = signal_called(axes, effect.signal)
         low, high = effect.range or (plain.low, plain.high)
         low, high = max(low, plain.low), min(high, plain.high)
         signal = replace(plain, low=low, high=high, center=effect.center, scale=effect.scale, constant_s=lag)
     if effect.times is not None:
         center = effect.center if effect.times_center is None else effect.times_center
         scale = effect.scale if effect.times_scale is None else effect.times_scale
-        factor = replace(_plain(axes, effect.times), center=center, scale=scale)
+        factor = replace(signal_called(axes, effect.times), center=center, scale=scale)
     return signal, factor
 
 
-def _plain(axes: tuple[Axis, ...], name: str) -> Signal:
-    names = [axis.name for axis in axes]
-    return axis_signal(axes, names.index(name)) if name in names else Signal(name)
-
-
 def direction_axis(axes: tuple[Axis, ...], effect: Effect) -> int:
-    """The axis whose direction of motion counts: that of the input if it is an axis, else the effect's own."""
+    """The axis whose direction of motion counts: that of the input if it is one, else the effect's own; -1: none."""
     names = [axis.name for axis in axes]
     if not effect.basis.needs_direction:
         return -1
@@ -187,10 +210,12 @@ def feature_lengths(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Arra
     """See `Machine.feature_lengths`."""
     lengths = np.full(len(axes), np.inf)
     for effect, index, signal, is_factor in _dependencies(axes, effects):
-        span = _span(axes[index], signal) / abs(signal.scale)
+        travel = 360.0 if axes[index].rotary else UNKNOWN_RANGE
+        if np.isfinite(signal.low) and np.isfinite(signal.high):
+            travel = signal.high - signal.low
+        span = travel / abs(signal.scale)
         feature = span / 4 if is_factor else effect.basis.feature(span)
-        length = feature * abs(signal.scale) * signal.unit
-        lengths[index] = min(lengths[index], length)
+        lengths[index] = min(lengths[index], feature * abs(signal.scale) * signal.unit)
     return lengths
 
 
@@ -244,13 +269,6 @@ def _dependencies(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Iterat
             for signal, is_factor in zip(signals_of(axes, effect), (False, True), strict=True):
                 if signal is not None and signal.axis is not None:
                     yield effect, signal.axis, signal, is_factor
-
-
-def _span(axis: Axis, signal: Signal) -> float:
-    """The range in the unit of the machine file."""
-    if np.isfinite(signal.low) and np.isfinite(signal.high):
-        return signal.high - signal.low
-    return 360.0 if axis.rotary else UNKNOWN_RANGE
 
 
 MORE = 1.1

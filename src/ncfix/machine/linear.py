@@ -16,11 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, Tool, Triad
-from ncfix.machine.basis import Basis
 from ncfix.machine.chain import advance, columns, cross
-from ncfix.machine.error_model import Slot, Sort, direction_axis, joint_index, signals_of, slot_of, unit_motion
+from ncfix.machine.error_model import Dependence, Slot, Sort, dependence_of, joint_index, slot_of, unit_motion
 from ncfix.machine.se3 import Array
-from ncfix.machine.state import Poses, Signal, inputs_of
+from ncfix.machine.state import Poses, Signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,42 +118,11 @@ def _joined(bundle: Array, weight: Array, own: Array, own_weight: Array) -> tupl
     return np.concatenate(both, axis=1), np.concatenate([weight, own_weight])
 
 
-@dataclass(frozen=True, slots=True)
-class Dependence:
-    """How an error goes with the state, whichever component it is: functions of one signal, perhaps times another.
-
-    direction_axis  whose direction of motion the functions need; -1: none
-    """
-
-    basis: Basis
-    signal: Signal | None
-    factor: Signal | None
-    direction_axis: int
-
-    @property
-    def signals(self) -> frozenset[Signal]:
-        """Those that it needs."""
-        return frozenset(each for each in (self.signal, self.factor) if each is not None)
-
-    @property
-    def inputs(self) -> frozenset[str]:
-        """The state inputs that must be given."""
-        return inputs_of(self.signals)
-
-    def rows(self, poses: Poses) -> Array:
-        """The functions at these poses, times the factor: shape (k, n)."""
-        n = poses.positions.shape[1]
-        u = np.zeros(n) if self.signal is None else np.broadcast_to(self.signal.u(poses, self.basis.domain), (n,))
-        way = poses.direction[self.direction_axis] if self.direction_axis >= 0 else 0.0
-        found = self.basis.rows(u, np.broadcast_to(way, (n,)))
-        return found if self.factor is None else found * self.factor.u(poses, (-np.inf, np.inf))
-
-
 @dataclass(frozen=True)
 class Dependences:
-    """The courses of many effects: each of them once, and the number of every effect's own."""
+    """How many effects depend on the state: each way once, and the number of every effect's own."""
 
-    courses: tuple[Dependence, ...]
+    ways: tuple[Dependence, ...]
     own: tuple[int, ...]
 
     @staticmethod
@@ -162,31 +130,20 @@ class Dependences:
         """Those of these effects."""
         numbers: dict[object, int] = {}
         own: list[int] = []
-        courses: list[Dependence] = []
-        for effect in effects:
-            key = _dependence_key(effect)
+        ways: list[Dependence] = []
+        for e in effects:
+            signal = e.joint, e.input, e.range, e.center, e.scale, e.time_constant_s
+            key = e.basis, *signal, e.times, e.times_center, e.times_scale  # cheaper to compare than to make one
             if key not in numbers:
-                numbers[key] = len(courses)
-                courses.append(dependence_of(axes, effect))
+                numbers[key] = len(ways)
+                ways.append(dependence_of(axes, e))
             own.append(numbers[key])
-        return Dependences(tuple(courses), tuple(own))
+        return Dependences(tuple(ways), tuple(own))
 
     @property
     def signals(self) -> frozenset[Signal]:
         """All that they need."""
-        return frozenset().union(*(each.signals for each in self.courses))
-
-
-def dependence_of(axes: tuple[Axis, ...], effect: Effect) -> Dependence:
-    """How an effect goes with the state."""
-    return Dependence(effect.basis, *signals_of(axes, effect), direction_axis(axes, effect))
-
-
-def _dependence_key(effect: Effect) -> tuple[object, ...]:
-    """What the course depends on; cheaper to compare than a course is to make."""
-    e = effect
-    where = e.joint, e.input, e.range, e.center, e.scale, e.time_constant_s
-    return e.basis, *where, e.times, e.times_center, e.times_scale
+        return frozenset().union(*(each.signals for each in self.ways))
 
 
 def joint_errors(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], poses: Poses) -> Array:
@@ -203,7 +160,7 @@ def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], shared
     n = poses.positions.shape[1]
     by_joint = joint_jacobian(axes, tool, poses)
     responses: dict[object, Array] = {}
-    curves = [course.rows(poses) for course in shared.courses]
+    curves = [way.rows(poses) for way in shared.ways]
     ends = np.cumsum([0, *(len(curves[k]) for k in shared.own)]).tolist()
     found = np.empty((6, ends[-1], n))
     for effect, own, start, end in zip(effects, shared.own, ends[:-1], ends[1:], strict=True):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ncfix.machine import error_model, linear, se3
-from ncfix.machine.aim import Aim, aimed, aimed_ahead, gaps, taken
+from ncfix.machine.aim import Aim, aimed, aimed_ahead, gaps
 from ncfix.machine.axes import ORIGIN, Axis, Effect, Tool, Vector, degrees
 from ncfix.machine.chain import JointChain, build_chain, carried_frames, carried_tips
 from ncfix.machine.error_model import Bow, ErrorModel, bow_of, compile_effects, direction_axis
@@ -249,7 +249,7 @@ class Machine:
         found, rows = aimed_ahead(poses, perfect, approach, target)
         if rows.size:
             goal = None if target is None else target[:, rows]
-            found.put(rows, self._aim_at_length(taken(poses, poses.positions, rows), axes, goal))
+            found.put(rows, self._aim_at_length(poses.part(rows), axes, goal))
         return found
 
     def _aim_at_length(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
@@ -282,11 +282,14 @@ class Machine:
 
     def follows(self, q: ArrayLike, axes: tuple[int, ...]) -> Array:
         """How the tip of a perfect machine follows linear axes, shape (..., 3, axes) mm per mm, workpiece frame."""
-        shape, poses = flatten(q, State(), self.axes, frozenset())
-        out = np.empty((3, len(axes), poses.positions.shape[1]))
-        for part, chunk in poses.chunks():
-            out[:, :, part] = self._perfect_route.follows(chunk, axes)
-        return poses_first(out, shape)
+        route = self._perfect_route
+
+        def ways(chunk: Poses, _: slice) -> Array:
+            n = chunk.positions.shape[1]
+            found = [[np.broadcast_to(along, n) for along in way] for way in route.ways(axes, route.turns(chunk))]
+            return np.array(found).reshape(len(axes), 3, n).swapaxes(0, 1)
+
+        return self._evaluated(q, State(), None, ways, 3, len(axes))
 
     def placed(self, q: ArrayLike, axes: tuple[int, ...], target: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
         """Where X, Y and Z (columns `axes`) of a perfect machine have to be for the tip to be at `target` (n, 3) mm.
@@ -296,29 +299,30 @@ class Machine:
         Shape (n, 3). Only with `linear_ways` that span space.
         """
         assert self.linear_ways is not None
-        _, poses = flatten(q, State(tool_length), self.axes, frozenset())
         goal = np.ascontiguousarray(np.asarray(target, dtype=np.float64).T)
         back: Array = np.linalg.inv(self.linear_ways).astype(np.float64)
-        out = np.empty_like(goal)
-        for part, chunk in poses.chunks():
-            out[:, part] = self._perfect_route.placed(chunk, axes, back, goal[:, part])
-        return np.ascontiguousarray(out.T)
+
+        def places(chunk: Poses, part: slice) -> Array:
+            return self._perfect_route.placed(chunk, axes, back, goal[:, part])
+
+        return self._evaluated(q, State(tool_length), None, places, 3)
 
     def axis_jacobian(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
         """The derivative of the nominal tip pose by the axis positions, shape (..., 6, n_axes); see `Jacobians`."""
-        shape, poses = flatten(q, State(tool_length), self.axes, frozenset())
-        out = np.empty((poses.positions.shape[1], 6, len(self.axes)))
-        for part, chunk in poses.chunks():
-            out[part] = np.moveaxis(linear.axis_jacobian(self.axes, self.tool, chunk), -1, 0)
-        return out.reshape(*shape, 6, len(self.axes))
+
+        def by_axes(chunk: Poses, _: slice) -> Array:
+            return linear.axis_jacobian(self.axes, self.tool, chunk)
+
+        return self._evaluated(q, State(tool_length), None, by_axes, 6, len(self.axes))
 
     def jacobians(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Jacobians:
         """Derivatives of the nominal tip pose by axis positions and by joint errors; see `Jacobians`."""
-        shape, poses = flatten(q, State(tool_length), self.axes, frozenset())
-        out = np.empty((poses.positions.shape[1], 6, len(self.axes) + 1, 6))
-        for part, chunk in poses.chunks():
-            out[part] = np.moveaxis(linear.joint_jacobian(self.axes, self.tool, chunk), -1, 0)
-        return Jacobians(self.axis_jacobian(q, tool_length), out.reshape(*shape, *out.shape[1:]))
+
+        def by_joints(chunk: Poses, _: slice) -> Array:
+            return linear.joint_jacobian(self.axes, self.tool, chunk)
+
+        joints = self._evaluated(q, State(tool_length), None, by_joints, 6, len(self.axes) + 1, 6)
+        return Jacobians(self.axis_jacobian(q, tool_length), joints)
 
     def joint_errors(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
         """The error twist of each joint to first order, shape (..., n_joints, 6): [ex ey ez ea eb ec], mm and rad.
@@ -359,11 +363,7 @@ class Machine:
 
     def _tip(self, q: ArrayLike, state: State, model: ErrorModel | None) -> Array:
         route = self._perfect_route if model is None else self._route
-
-        def tips(part: Poses) -> Array:
-            return self._tips_along(route, part, model)[:, None]
-
-        return self._evaluated(tips, q, state, model, 1)[..., 0]
+        return self._evaluated(q, state, model, lambda chunk, _: self._tips_along(route, chunk, model), 3)
 
     def _tips_along(
         self, route: Route | None, part: Poses, model: ErrorModel | None, turns: Turns | None = None
@@ -382,22 +382,24 @@ class Machine:
         return carried_tips(self._chain.at(part, model), self.tool, part.tool_length, self.workpiece_offset)
 
     def _pose(self, q: ArrayLike, state: State, model: ErrorModel | None) -> Array:
-        def frames(part: Poses) -> Array:
-            return carried_frames(self._chain.at(part, model), self.tool, part.tool_length, self.workpiece_offset)
+        def frames(chunk: Poses, _: slice) -> Array:
+            return carried_frames(self._chain.at(chunk, model), self.tool, chunk.tool_length, self.workpiece_offset)
 
-        rows = self._evaluated(frames, q, state, model, 4)
+        rows = self._evaluated(q, state, model, frames, 3, 4)
         bottom = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*rows.shape[:-2], 1, 4))
         return np.concatenate([rows, bottom], axis=-2)
 
     def _evaluated(
-        self, function: Callable[[Poses], Array], q: ArrayLike, state: State, model: ErrorModel | None, width: int
+        self,
+        q: ArrayLike,
+        state: State,
+        model: ErrorModel | None,
+        function: Callable[[Poses, slice], Array],
+        *shape: int,
     ) -> Array:
-        """A function of poses that gives columns (3, width, n), over all poses: shape (..., 3, width)."""
-        shape, poses = self._poses(q, state, model)
-        out = np.empty((3, width, poses.positions.shape[1]))
-        for part, chunk in poses.chunks():
-            out[:, :, part] = function(chunk)
-        return poses_first(out, shape)
+        """A function of poses, and of which these are, that gives columns (*shape, n), over all: (..., *shape)."""
+        leading, poses = self._poses(q, state, model)
+        return poses_first(poses.evaluated(function, *shape), leading)
 
 
 def dumps(machine: Machine) -> str:

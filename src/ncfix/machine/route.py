@@ -56,7 +56,7 @@ class Terms:
 
     def see(self, axes: Sequence[int]) -> bool:
         """Whether any of these functions changes with one of the axes."""
-        return any(changes_with(group, axes) for group, _ in self.groups)
+        return any(group.changes_with(axes) for group, _ in self.groups)
 
     def given(self, poses: Poses) -> list[Array]:
         """The functions that bases work out, (n,) or (1,) each, in order."""
@@ -64,15 +64,8 @@ class Terms:
         for group, gains in self.groups:
             u, way = group.arguments(poses)
             values = group.basis.rows(u, way) if gains is None else group.basis.combine(gains, u, way)
-            if group.factor is not None:
-                values = values * group.factor.u(poses, (-np.inf, np.inf))
-            found += list(values)
+            found += list(group.times_factor(values, poses))
         return found
-
-
-def changes_with(group: EffectGroup, axes: Sequence[int]) -> bool:
-    """Whether the functions of a group change with one of the axes."""
-    return any(signal is not None and signal.axis in axes for signal in (group.signal, group.factor))
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,39 +90,33 @@ def terms_of(
         if not gains.any():
             continue
         signal, basis = group.signal, group.basis
-        if isinstance(basis, ConstantBasis):
+        if group.factor is not None:
+            parts.append(_given(group, gains, given))
+        elif isinstance(basis, ConstantBasis):
             parts.append(_Part(POWERS, 0, ANY, (0,), gains))
-        elif signal is not None and isinstance(basis, Polynomial) and _is_power(group, signal):
+        elif signal is None or signal.axis is None or signal.constant_s:
+            parts.append(_given(group, gains, given))
+        elif type(basis) is Polynomial and not signal.endless:
             numbers = signal.unit, signal.low, signal.high, signal.center, signal.scale
-            parts.append(_sorted(_Part(POWERS, signal.axis or 0, numbers, basis.degree, gains), 1))
-        elif signal is not None and isinstance(basis, Fourier) and _is_wave(axes, group, signal):
-            parts.append(_sorted(_Part(WAVES, _row(axes, signal, held), ANY, basis.order, gains), 2))
+            parts.append(_sorted(_Part(POWERS, signal.axis, numbers, basis.degree, gains), 1))
+        elif type(basis) is Fourier and (signal.center, signal.scale) == (0.0, 1.0) and axes[signal.axis].rotary:
+            parts.append(_sorted(_Part(WAVES, _wave_row(len(axes), signal, held), ANY, basis.order, gains), 2))
         else:
             parts.append(_given(group, gains, given))
-    return _functions(parts), Terms(tuple(given), tuple(held))
-
-
-def _is_power(group: EffectGroup, signal: Signal) -> bool:
-    """Powers of an axis position that does not turn back."""
-    plain = signal.axis is not None and not signal.endless and not signal.constant_s
-    return type(group.basis) is Polynomial and plain and group.factor is None
-
-
-def _is_wave(axes: tuple[Axis, ...], group: EffectGroup, signal: Signal) -> bool:
-    """Harmonics of the angle of a rotary axis."""
-    plain = (signal.center, signal.scale, signal.constant_s) == (0.0, 1.0, 0.0) and group.factor is None
-    return type(group.basis) is Fourier and plain and signal.axis is not None and axes[signal.axis].rotary
-
-
-def _row(axes: tuple[Axis, ...], signal: Signal, held: list[ClampedAngle]) -> int:
-    """The row of the sine that a wave is made of: its axis's, or one held at the ends of a range."""
-    assert signal.axis is not None
-    if not np.isfinite([signal.low, signal.high]).any():
-        return signal.axis
-    hold = signal.axis, signal.low * signal.unit, signal.high * signal.unit
-    if hold not in held:
-        held.append(hold)
-    return len(axes) + held.index(hold)
+    first = np.cumsum([0, *(len(part.orders) for part in parts)])
+    gains = np.concatenate([part.gains for part in parts], axis=1) if parts else np.zeros((0, 0))
+    to, function = np.nonzero(gains)
+    functions = Functions(
+        np.array([part.family for part in parts], dtype=np.int64),
+        np.array([part.axis for part in parts], dtype=np.int64),
+        np.array([part.signal for part in parts], dtype=np.float64).ravel(),
+        first.astype(np.int64),
+        np.array([order for part in parts for order in part.orders], dtype=np.int64),
+        to.astype(np.int64),
+        function.astype(np.int64),
+        gains[to, function],
+    )
+    return functions, Terms(tuple(given), tuple(held))
 
 
 def _gains(group: EffectGroup, places: Sequence[SmallMotionPlace]) -> Array:
@@ -140,9 +127,8 @@ def _gains(group: EffectGroup, places: Sequence[SmallMotionPlace]) -> Array:
             if slot in group.slots:
                 way, turn = np.split(group.gains[group.slots.index(slot)], 2)
                 arm = np.subtract(slot.reference, place.slots[0].reference)
-                total += np.concatenate(
-                    [place.turn @ each for each in (way, turn, np.cross(arm, turn, axisb=0, axisc=0))]
-                )
+                parts = way, turn, np.cross(arm, turn, axisb=0, axisc=0)
+                total += np.concatenate([place.turn @ each for each in parts])
     return gains.reshape(-1, gains.shape[-1])
 
 
@@ -151,7 +137,18 @@ def _sorted(part: _Part, width: int) -> _Part:
     order = np.argsort(part.orders, kind="stable")
     take = (width * order[:, None] + np.arange(width)).ravel()
     orders = tuple(part.orders[i] for i in order.tolist() for _ in range(width))
-    return _Part(part.family, part.axis, part.signal, orders, part.gains[:, take])
+    return replace(part, orders=orders, gains=part.gains[:, take])
+
+
+def _wave_row(rows: int, signal: Signal, held: list[ClampedAngle]) -> int:
+    """The row of the sine that a wave is made of: its axis's, or one held at the ends of a range."""
+    assert signal.axis is not None
+    if not np.isfinite([signal.low, signal.high]).any():
+        return signal.axis
+    hold = signal.axis, signal.low * signal.unit, signal.high * signal.unit
+    if hold not in held:
+        held.append(hold)
+    return rows + held.index(hold)
 
 
 def _given(group: EffectGroup, gains: Array, given: list[tuple[EffectGroup, Array | None]]) -> _Part:
@@ -162,23 +159,6 @@ def _given(group: EffectGroup, gains: Array, given: list[tuple[EffectGroup, Arra
     rows = np.flatnonzero(gains.any(axis=1))
     given.append((group, np.ascontiguousarray(gains[rows])))
     return _Part(GIVEN, 0, ANY, (0,) * len(rows), (np.arange(len(gains))[:, None] == rows).astype(np.float64))
-
-
-def _functions(parts: list[_Part]) -> Functions:
-    """All groups as arrays."""
-    first = np.cumsum([0, *(len(part.orders) for part in parts)])
-    gains = np.concatenate([part.gains for part in parts], axis=1) if parts else np.zeros((0, 0))
-    to, function = np.nonzero(gains)
-    return Functions(
-        np.array([part.family for part in parts], dtype=np.int64),
-        np.array([part.axis for part in parts], dtype=np.int64),
-        np.array([part.signal for part in parts], dtype=np.float64).ravel(),
-        first.astype(np.int64),
-        np.array([order for part in parts for order in part.orders], dtype=np.int64),
-        to.astype(np.int64),
-        function.astype(np.int64),
-        gains[to, function],
-    )
 
 
 Turns = tuple[Array, Array]
@@ -221,15 +201,11 @@ class Route:
         found[0], found[1], found[2], largest = steps.carried(legs, values, point, poses.positions, *turns, largest)
         return found, largest
 
-    def follows(self, poses: Poses, axes: Sequence[int]) -> Array:
-        """How the tip follows linear axes, (3, axes, n) mm per mm; small motions are left out."""
-        out = np.empty((3, len(axes), poses.positions.shape[1]))
-        for place, way in enumerate(self.ways(axes, self.turns(poses))):
-            out[0, place], out[1, place], out[2, place] = way
-        return out
-
     def ways(self, axes: Sequence[int], turns: Turns) -> list[tuple[Number, Number, Number]]:
-        """The same, a column for each axis and direction; one number where it is alike at all poses."""
+        """How the tip follows linear axes, mm per mm: a column for each axis and direction; small motions are left out.
+
+        One number where it is alike at all poses.
+        """
         return [steps.follows(self.plain[0], axis, *turns) for axis in axes]
 
     def placed(self, poses: Poses, axes: Sequence[int], back: Array, target: Array) -> Array:
@@ -343,9 +319,14 @@ def _path(
             return None
         axis = joints[index].axis
         links += [link.undone() for link in reversed(own)] if axis is not None and axis.workpiece_side else own
-    links.append(Link(rigid=se3.shift(-np.asarray(offset))))
-    found, ahead = _constants_ahead(links)
-    return np.array([ahead[:3, :3] @ tool.point + ahead[:3, 3], ahead[:3, :3] @ np.negative(tool.direction)]), found
+    found, ahead = [], se3.shift(-np.asarray(offset))
+    for link in reversed(links):  # motions that are the same at all poses are done before all others instead
+        if link.rigid is not None:
+            ahead = ahead @ link.rigid
+        else:
+            found.append(link.behind(ahead))
+    start = ahead[:3, :3] @ tool.point + ahead[:3, 3], ahead[:3, :3] @ np.negative(tool.direction)
+    return np.array(start), found[::-1]
 
 
 def _written_out(
@@ -354,7 +335,18 @@ def _written_out(
     """Steps as numbers; the ranges at whose ends harmonics are held are added to `held`."""
     places = [SmallMotionPlace(link.slots, link.seen_from[:3, :3]) for link in links if link.slots]
     functions, terms = terms_of(axes, groups, places, held)
-    legs = _steps(start, links)
+    small = np.cumsum([bool(link.slots) for link in links]) - 1
+    legs = Steps(
+        start.ravel(),
+        np.array([link.kind for link in links], dtype=np.int64),
+        np.array([link.axis for link in links], dtype=np.int64),
+        np.array([link.direction for link in links]).ravel(),
+        np.array([link.point for link in links]).ravel(),
+        np.array([link.center for link in links]).ravel(),
+        np.where([bool(link.slots) for link in links], small, -1).astype(np.int64),
+        np.array([link.rotates for link in links], dtype=np.int64),
+        np.array([len(link.slots) > 1 for link in links], dtype=np.int64),
+    )
     listed = Steps(*(part.tolist() for part in legs)), Functions(*(part.tolist() for part in functions))
     return Route(listed, packed(legs, functions), terms, tuple(i for i, axis in enumerate(axes) if axis.rotary))
 
@@ -390,7 +382,7 @@ class Link:
         if not self.slots:
             return self.axis in axes
         own = [group for group in groups if any(slot in group.slots for slot in self.slots)]
-        return self.axis in axes or any(changes_with(group, axes) for group in own)
+        return self.axis in axes or any(group.changes_with(axes) for group in own)
 
     def behind(self, motion: Array) -> Link:
         """The step as it is done when `motion` has been done before it, and no longer after it."""
@@ -410,12 +402,15 @@ def _nominal(index: int, joint: JointModel) -> list[Link]:
 def _forth(index: int, joint: JointModel, groups: tuple[EffectGroup, ...]) -> list[Link] | None:
     """The same with its errors; None where it cannot be written as steps."""
     placed = (*joint.location, *joint.carried)
-    if any(slot in group.slots and _varies(group) for group in groups for slot in placed):
+    if any(slot in group.slots and group.signals for group in groups for slot in placed):
         return None
     moving = _error_motion(index, joint)
     if moving is None:
         return None
-    small = {slot: _constant(slot, groups) for slot in placed}
+    small = {slot: np.zeros((6, 1)) for slot in placed}
+    for group in groups:
+        for slot in small.keys() & group.slots:
+            small[slot] += group.gains[group.slots.index(slot)] @ group.basis.rows(np.zeros(1), np.zeros(1))
     line, zero = joint.axis_line(small)
     carried = joint.together(joint.carried, small, None)
     links = list(moving)
@@ -446,47 +441,8 @@ def _error_motion(index: int, joint: JointModel) -> list[Link] | None:
     return [*moved, small]
 
 
-def _varies(group: EffectGroup) -> bool:
-    return group.signal is not None or group.factor is not None
-
-
-def _constant(slot: Slot, groups: tuple[EffectGroup, ...]) -> Array:
-    """A small motion that is the same at all poses, (6, 1)."""
-    total = np.zeros((6, 1))
-    for group in groups:
-        if slot in group.slots:
-            total += group.gains[group.slots.index(slot)] @ group.basis.rows(np.zeros(1), np.zeros(1))
-    return total
-
-
 def _rigid(small: SmallMotion) -> Array:
     """A small motion of one pose as a matrix."""
     way, turn = (np.zeros(3) if part is None else part.ravel() for part in (small.translation, small.rotation))
     motion: Array = se3.shift(way) @ se3.turn(turn, small.center.ravel())
     return motion
-
-
-def _constants_ahead(links: list[Link]) -> tuple[list[Link], Array]:
-    """The steps without those that are the same at all poses, and the motion (4, 4) to be done before them instead."""
-    found, ahead = [], np.eye(4)
-    for link in reversed(links):
-        if link.rigid is not None:
-            ahead = ahead @ link.rigid
-        else:
-            found.append(link.behind(ahead))
-    return found[::-1], ahead
-
-
-def _steps(start: Array, links: list[Link]) -> Steps:
-    small = np.cumsum([bool(link.slots) for link in links]) - 1
-    return Steps(
-        start.ravel(),
-        np.array([link.kind for link in links], dtype=np.int64),
-        np.array([link.axis for link in links], dtype=np.int64),
-        np.array([link.direction for link in links]).ravel(),
-        np.array([link.point for link in links]).ravel(),
-        np.array([link.center for link in links]).ravel(),
-        np.where([bool(link.slots) for link in links], small, -1).astype(np.int64),
-        np.array([link.rotates for link in links], dtype=np.int64),
-        np.array([len(link.slots) > 1 for link in links], dtype=np.int64),
-    )

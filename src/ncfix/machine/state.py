@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ncfix import fast
 from ncfix.diagnostics import UsageError
@@ -55,14 +55,18 @@ class Poses:
             part = slice(start, start + size)
             yield part, self.part(part)
 
-    def part(self, part: slice) -> Poses:
+    def evaluated(self, function: Callable[[Poses, slice], Array], *shape: int) -> Array:
+        """A function of poses and which of these they are, that gives (*shape, n), over all of them, run by run."""
+        out = np.empty((*shape, self.positions.shape[1]))
+        for part, chunk in self.chunks():
+            out[..., part] = function(chunk, part)
+        return out
+
+    def part(self, part: slice | NDArray[np.intp]) -> Poses:
         """Some of the poses."""
-        return Poses(
-            self.positions[:, part],
-            _part(self.tool_length, part),
-            _part(self.direction, part),
-            {name: values[part] for name, values in self.inputs.items()},
-        )
+        inputs = {name: values[part] for name, values in self.inputs.items()}
+        length, direction = some(self.tool_length, part), some(self.direction, part)
+        return Poses(self.positions[:, part], length, direction, inputs)
 
 
 def behind_each_other(kinds: Sequence[Poses]) -> Poses:
@@ -126,7 +130,8 @@ def _directions(values: Array, shape: tuple[int, ...], n_axes: int) -> Array:
     return np.broadcast_to(values, (*shape, n_axes)).reshape(-1, n_axes).T
 
 
-def _part(values: Array, part: slice) -> Array:
+def some(values: Array, part: slice | NDArray[np.intp]) -> Array:
+    """What is known of some poses, (..., n); of one value for all that."""
     return values if values.shape[-1] == 1 else values[..., part]
 
 
@@ -196,11 +201,13 @@ def inputs_of(signals: Iterable[Signal]) -> frozenset[str]:
     return frozenset(name for signal in signals for name in signal.inputs)
 
 
-def axis_signal(axes: tuple[Axis, ...], index: int) -> Signal:
-    """The position of an axis."""
-    axis = axes[index]
-    low, high = (limit / axis.unit for limit in axis.range)
-    return Signal(axis.name, index, axis.unit, low, high, axis.endless)
+def signal_called(axes: tuple[Axis, ...], name: str) -> Signal:
+    """The position of the axis with this letter, or a state input."""
+    for index, axis in enumerate(axes):
+        if axis.name == name:
+            low, high = (limit / axis.unit for limit in axis.range)
+            return Signal(name, index, axis.unit, low, high, axis.endless)
+    return Signal(name)
 
 
 def turned_back(angle: Array, low: float, high: float, turn: float = 360.0) -> Array:

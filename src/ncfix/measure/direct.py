@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
-from ncfix.machine.error_model import unit_motion
-from ncfix.machine.linear import dependence_of
+from ncfix.machine.error_model import dependence_of, unit_motion
 from ncfix.machine.state import State, flatten, with_lags
 from ncfix.measure.checks import component_of
 from ncfix.measure.measurement import Array, Index, Measurement, groups
