@@ -105,40 +105,34 @@ def aimed(
     return Aim(q[list(axes)], arrived, off), largest
 
 
-def aimed_ahead(
-    poses: Poses, perfect: Route, approach: SplitRoute, target: Array | None
-) -> tuple[Aim, NDArray[np.intp]]:
+def aimed_ahead(poses: Poses, perfect: Route, split: SplitRoute, target: Array | None) -> tuple[Aim, NDArray[np.intp]]:
     """Move three linear axes until the tip is at `target` (3, n); None: where a perfect machine has it.
 
     What they do not change is undone once, ahead of all passes; so only the rest is gone through in each.
 
     Also the poses that it is not for: they need more passes, or small motions are large.
     """
-    many = fast.engaged() and poses.positions.shape[1] > 1
-    aim, largest = (_compiled if many else _by_columns)(poses, perfect, approach, target)
+    within, turns = split.within, split.within.turns(poses)
+    if fast.engaged() and poses.positions.shape[1] > 1:
+        aim, largest = _compiled(poses, perfect, split, turns, target)
+    else:
+        goal = perfect.tips(poses, turns)[0] if target is None else target
+        goal, angle = split.behind.carried(poses, turns, goal)
+        aim, largest = aimed(poses, split.axes, turns, within.tips, within.ways(split.axes, turns), goal, WHOLE_STEPS)
+        largest = np.maximum(largest, angle)
     return aim, np.flatnonzero(~aim.arrived | (largest >= SMALL))
 
 
-def _by_columns(poses: Poses, perfect: Route, approach: SplitRoute, target: Array | None) -> tuple[Aim, Array]:
-    """The same; also the largest squared angle of a small motion (n,)."""
-    within, behind, turns = approach.within, approach.behind, approach.within.turns(poses)
-    goal = perfect.tips(poses, turns)[0] if target is None else target
-    goal, angle = behind.carried(poses, turns, goal)
-    ways = within.ways(approach.axes, turns)
-    aim, largest = aimed(poses, approach.axes, turns, within.tips, ways, goal, WHOLE_STEPS)
-    return aim, np.maximum(largest, angle)
-
-
-def _compiled(poses: Poses, perfect: Route, approach: SplitRoute, target: Array | None) -> tuple[Aim, Array]:
-    """The same, compiled."""
+def _compiled(poses: Poses, perfect: Route, split: SplitRoute, turns: Turns, target: Array | None) -> tuple[Aim, Array]:
+    """By compiled loops; also the largest squared angle of a small motion (n,)."""
     from ncfix.machine import kernels
 
-    within, behind, turns = approach.within, approach.behind, approach.within.turns(poses)
+    within, behind = split.within, split.behind
     routes = perfect.compiled, within.compiled, behind.compiled
     given = within.columns(poses, turns, behind.terms.given(poses) + within.terms.given(poses))
     out = np.empty((6, poses.positions.shape[1]))
     goal = np.empty((3, 0)) if target is None else np.ascontiguousarray(target)
-    limits, columns = np.array([CLOSE, FLAT, WHOLE_STEPS]), np.array(approach.axes, dtype=np.int64)
+    limits, columns = np.array([CLOSE, FLAT, WHOLE_STEPS]), np.array(split.axes, dtype=np.int64)
     kernels.aim(*routes, given, columns, goal, limits, room(given, *routes), out)
     return Aim(out[:3], out[5] > 0, out[3]), out[4]
 

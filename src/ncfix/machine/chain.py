@@ -121,49 +121,33 @@ class SmallMotion:
 
     def forth(self, moved: Array, weight: Weight = 1.0) -> Array:
         """Carry with it."""
-        if self._varies_like(moved):
-            from ncfix.machine import kernels
-
-            out = np.empty_like(moved)
-            kernels.forth(*self._rows, moved, _weights(moved, weight), out)
-            return out
+        if (found := self._compiled(moved, weight, forwards=True)) is not None:
+            return found
         if self.rotation is not None:
             moved = _turned(self.rotation, self.center, moved, weight)
         return moved if self.translation is None else moved + self.translation * weight
 
     def back(self, moved: Array, weight: Weight = 1.0) -> Array:
         """Undo it."""
-        if self._varies_like(moved):
-            from ncfix.machine import kernels
-
-            out = np.empty_like(moved)
-            kernels.back(*self._rows, moved, _weights(moved, weight), out)
-            return out
+        if (found := self._compiled(moved, weight, forwards=False)) is not None:
+            return found
         if self.translation is not None:
             moved = moved - self.translation * weight
-        if self.rotation is not None:
-            moved = _turned(-self.rotation, self.center, moved, weight)
-        return moved
+        return moved if self.rotation is None else _turned(-self.rotation, self.center, moved, weight)
 
-    def _varies_like(self, moved: Array) -> bool:
-        """Whether rotation and translation differ from pose to pose, as the compiled kernels have it."""
-        if self.rotation is None or self.translation is None or not _is_many(moved):
-            return False
-        same = self.rotation.shape == self.translation.shape == (3, 1, moved.shape[2])
-        return same and bool(np.abs(self.rotation).max() < SMALL)
+    def _compiled(self, moved: Array, weight: Weight, forwards: bool) -> Array | None:
+        """The same by compiled kernels; None unless rotation and translation differ from pose to pose."""
+        rotation, translation = self.rotation, self.translation
+        if rotation is None or translation is None or not _is_many(moved):
+            return None
+        if not rotation.shape == translation.shape == (3, 1, moved.shape[2]) or not np.abs(rotation).max() < SMALL:
+            return None
+        from ncfix.machine import kernels
 
-    @property
-    def _rows(self) -> tuple[Array, Array, Array]:
-        """Rotation, translation and center, (3, n) each, contiguous."""
-        assert self.rotation is not None
-        assert self.translation is not None
-        center = np.broadcast_to(self.center, self.rotation.shape)
-        rotation, translation, center = map(_first_row, (self.rotation, self.translation, center))
-        return rotation, translation, center
-
-
-def _first_row(vectors: Array) -> Array:
-    return np.ascontiguousarray(vectors[:, 0])
+        center, out = np.broadcast_to(self.center, rotation.shape), np.empty_like(moved)
+        rows = (np.ascontiguousarray(each[:, 0]) for each in (rotation, translation, center))
+        (kernels.forth if forwards else kernels.back)(*rows, moved, _weights(moved, weight), out)
+        return out
 
 
 def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array:
@@ -172,9 +156,8 @@ def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array
         from ncfix.machine import kernels
 
         first, second = (factor.item() for factor in se3.rotation_factors((vector * vector).sum(0)))
-        weights = _weights(moved, weight)
         out = np.empty_like(moved)
-        kernels.turned(vector.ravel(), first, second, center.ravel(), moved, weights, out)
+        kernels.turned(vector.ravel(), first, second, center.ravel(), moved, _weights(moved, weight), out)
         return out
     return moved + rotated_by(vector, moved - center * weight)
 
@@ -245,48 +228,35 @@ class JointModel:
         """The small motion that slots make together at positions (n,); None: with the axis at zero."""
         if not slots:
             return None
-        terms = [(self._turned(small[slot], position), self._carried_along(slot, position)) for slot in slots]
+        terms = []
+        for slot in slots:
+            own, point = small[slot], columns(slot.reference)
+            if self.axis is not None and position is not None:
+                own = turned_with(self.axis, position, own)
+                point = point if lies_on_axis(self.axis, point) else advance(self.axis, position, point)
+            terms.append((own, point))
         return composed(terms, any(slot in self.rotating for slot in slots))
 
-    def _carried_along(self, slot: Slot, position: Array | None) -> Array:
-        """The reference point, where the joint's nominal motion has carried it."""
-        point = columns(slot.reference)
-        if self.axis is None or position is None or lies_on_axis(self.axis, point):
-            return point
-        return advance(self.axis, position, point)
-
-    def _turned(self, small: Array, position: Array | None) -> Array:
-        """A small motion in base axes, where the error frame turns with the joint."""
-        if self.axis is None or position is None or not (self.axis.moving_frame and self.axis.rotary):
-            return small
-        pair = np.stack([small[:3], small[3:]], axis=1)
-        turned = advance(self.axis, position, pair, weight=0.0)
-        return np.concatenate([turned[:, 0], turned[:, 1]])
-
     def axis_line(self, small: Mapping[Slot, Array]) -> tuple[SmallMotion | None, Array | None]:
-        """The motion of the axis line, and the zero offset: the component along or about the axis itself."""
+        """The motion of the axis line, and the zero offset (n,) or (1,): what is along or about the axis itself."""
         if not self.location or self.axis is None:
             return None, None
-        along, terms = self._along, []
+        along = slice(3, 6) if self.axis.rotary else slice(0, 3)
+        terms, offset = [], np.zeros(1)
         for slot in self.location:
-            across = small[slot].copy()
-            across[along] -= np.multiply.outer(self.axis.direction, dot(self.axis.direction, small[slot][along]))
+            own, across = dot(self.axis.direction, small[slot][along]), small[slot].copy()
+            across[along] -= np.multiply.outer(self.axis.direction, own)
             terms.append((across, columns(slot.reference)))
-        return composed(terms, any(slot in self.rotating for slot in self.location)), self.zero_offset(small)
+            offset = offset + self.axis.zero_sense * own
+        return composed(terms, any(slot in self.rotating for slot in self.location)), offset
 
-    @property
-    def _along(self) -> slice:
-        """The components of a small motion of which one is along or about the axis."""
-        return slice(3, 6) if self.axis is not None and self.axis.rotary else slice(0, 3)
 
-    def zero_offset(self, small: Mapping[Slot, Array]) -> Array | None:
-        """What location errors along or about the axis add to its position, (n,) or (1,); None without any."""
-        if not self.location or self.axis is None:
-            return None
-        offset = np.zeros(1)
-        for slot in self.location:
-            offset = offset + self.axis.zero_sense * dot(self.axis.direction, small[slot][self._along])
-        return offset
+def turned_with(axis: Axis, position: Array, small: Array) -> Array:
+    """A small motion (6, n) in base axes, where the error frame turns with the axis at positions (n,)."""
+    if not (axis.moving_frame and axis.rotary):
+        return small
+    turned = advance(axis, position, np.stack([small[:3], small[3:]], axis=1), weight=0.0)
+    return np.concatenate([turned[:, 0], turned[:, 1]])
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, Tool, Triad
-from ncfix.machine.chain import advance, columns, cross
+from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, Tool
+from ncfix.machine.chain import advance, columns, cross, turned_with
 from ncfix.machine.error_model import Dependence, Slot, Sort, dependence_of, joint_index, slot_of, unit_motion
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
@@ -74,11 +74,14 @@ def _in_workpiece_frame(
     All of them are carried together, one growing bundle of columns: each joint adds its own where it stands.
     """
     tip = np.moveaxis(tool.tip(poses.tool_length), -1, 0)[:, None, :]
-    bundle, weight = _joined(tip, np.ones((1, 1)), *_spindle_vectors(tool, with_errors))
+    size = 4 if with_errors else 2
+    own_weight = np.eye(size)[:, -1:]  # of directions, and a point
+    spindle = columns(*BASE_AXES, tool.point) if with_errors else columns(ORIGIN, ORIGIN)
+    bundle, weight = _joined(tip, np.ones((1, 1)), spindle, own_weight)
     order = [len(axes)]
     for index in reversed(range(len(axes))):
         axis, position = axes[index], poses.positions[index]
-        own, own_weight = _error_vectors(axis, position) if with_errors else _line_vectors(axis)
+        own = _error_vectors(axis, position) if with_errors else columns(axis.direction, axis.point)
         if axis.workpiece_side:
             bundle, weight = _joined(bundle, weight, own, own_weight)
             bundle = advance(axis, -position, bundle, weight)
@@ -87,29 +90,16 @@ def _in_workpiece_frame(
             bundle, weight = _joined(bundle, weight, own, own_weight)
         order.append(index)
     bundle = np.broadcast_to(bundle, (3, bundle.shape[1], poses.positions.shape[1]))
-    size = 4 if with_errors else 2
     starts = {joint: 1 + size * place for place, joint in enumerate(order)}
     return bundle[:, 0], [bundle[:, starts[joint] : starts[joint] + size] for joint in range(len(order))]
 
 
-def _line_vectors(axis: Axis) -> tuple[Array, Array]:
-    """Direction and point of an axis line: where its motion leaves them."""
-    return columns(axis.direction, axis.point), np.array([[0.0], [1.0]])
-
-
-def _error_vectors(axis: Axis, position: Array) -> tuple[Array, Array]:
-    """Error axes and reference point of a joint, in the frame of its body's zero position."""
-    triad = columns(*axis.error_axes)
+def _error_vectors(axis: Axis, position: Array) -> Array:
+    """Error axes and reference point of a joint, in the frame of its body's zero position, (3, 4, n or 1)."""
+    triad, reference = columns(*axis.error_axes), advance(axis, position, columns(axis.reference))
     if axis.moving_frame:
         triad = advance(axis, position, triad, weight=0.0)
-    reference = advance(axis, position, columns(axis.reference))
-    return _joined(triad, np.zeros((3, 1)), reference, np.ones((1, 1)))
-
-
-def _spindle_vectors(tool: Tool, with_errors: bool) -> tuple[Array, Array]:
-    if not with_errors:
-        return columns(ORIGIN, ORIGIN), np.zeros((2, 1))
-    return columns(*BASE_AXES, tool.point), np.array([[0.0], [0.0], [0.0], [1.0]])
+    return _joined(triad, np.zeros((3, 1)), reference, np.ones((1, 1)))[0]
 
 
 def _joined(bundle: Array, weight: Array, own: Array, own_weight: Array) -> tuple[Array, Array]:
@@ -176,20 +166,21 @@ def unit_twist(axes: tuple[Axis, ...], tool: Tool, effect: Effect, poses: Poses)
     """What an effect of 1 mm or 1 rad does to its joint, at its reference point in its error axes: (6, n) or (6, 1)."""
     slot, motion = slot_of(axes, tool, effect), unit_motion(axes, effect)
     if slot.joint == len(axes):
-        return _seen(_twist(motion, columns(slot.reference)), columns(tool.point), BASE_AXES, None, None)
-    axis, position = axes[slot.joint], poses.positions[slot.joint]
-    reference = advance(axis, position, columns(axis.reference))
-    moving = position if axis.moving_frame else None
-    return _seen(_joint_twist(axis, position, slot, motion), reference, axis.error_axes, axis, moving)
+        triad, (velocity, turned) = BASE_AXES, _at(columns(tool.point), _twist(motion, columns(slot.reference)))
+    else:
+        axis, position = axes[slot.joint], poses.positions[slot.joint]
+        triad, reference = axis.error_axes, advance(axis, position, columns(axis.reference))
+        velocity, turned = _at(reference, _joint_twist(axis, position, slot, motion))
+        if axis.moving_frame:
+            velocity, turned = (advance(axis, -position, part, weight=0.0) for part in (velocity, turned))
+    rows: Array = np.asarray(triad)
+    return np.concatenate([rows @ velocity[:, 0], rows @ turned[:, 0]])
 
 
 def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Array:
     """The twist about the base origin, (6, 1, n) or (6, 1, 1)."""
     if slot.sort is Sort.MOTION:
-        turned = motion
-        if axis.moving_frame:
-            pair = columns(tuple(motion[:3]), tuple(motion[3:]))
-            turned = np.concatenate(list(np.moveaxis(advance(axis, position, pair, weight=0.0), 1, 0)))
+        turned = turned_with(axis, position, motion[:, None])
         return _twist(turned, advance(axis, position, columns(slot.reference)))
     fixed = _twist(motion, columns(slot.reference))
     if slot.sort is Sort.CARRIED:
@@ -201,7 +192,11 @@ def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Arra
     across[along] -= share * direction
     line = _twist(across, columns(slot.reference))
     own = axis.zero_sense * share * np.concatenate(axis.screw)[:, None, None]
-    return line - _carried(axis, position, line) + own
+    velocity, turned = (advance(axis, position, part, weight=0.0) for part in (line[:3], line[3:]))
+    origin = advance(axis, position, columns(ORIGIN))
+    velocity, turned, origin = np.broadcast_arrays(velocity, turned, origin)
+    carried = np.concatenate([velocity + cross(origin, turned), turned])  # the adjoint of the nominal motion
+    return line - carried + own
 
 
 def _twist(motion: Array, reference: Array) -> Array:
@@ -211,19 +206,7 @@ def _twist(motion: Array, reference: Array) -> Array:
     return np.concatenate([velocity, np.broadcast_to(turned, velocity.shape)])
 
 
-def _carried(axis: Axis, position: Array, twist: Array) -> Array:
-    """A twist carried along by the nominal motion of the axis: the adjoint of M applied to it."""
-    velocity, turned = (advance(axis, position, part, weight=0.0) for part in (twist[:3], twist[3:]))
-    origin = advance(axis, position, columns(ORIGIN))
-    velocity, turned, origin = np.broadcast_arrays(velocity, turned, origin)
-    return np.concatenate([velocity + cross(origin, turned), turned])
-
-
-def _seen(twist: Array, point: Array, triad: Triad, axis: Axis | None, moving: Array | None) -> Array:
-    """The twist at a point, in a triad that may turn with its axis."""
+def _at(point: Array, twist: Array) -> tuple[Array, Array]:
+    """The velocity of a point (3, 1, n) under a twist (6, 1, n), and the rotation."""
     velocity = twist[:3] + cross(twist[3:], np.broadcast_to(point, np.broadcast_shapes(twist[3:].shape, point.shape)))
-    turned = np.broadcast_to(twist[3:], velocity.shape)
-    if axis is not None and moving is not None:
-        velocity, turned = (advance(axis, -moving, part, weight=0.0) for part in (velocity, turned))
-    rows = np.asarray(triad)
-    return np.concatenate([rows @ velocity[:, 0], rows @ turned[:, 0]])
+    return velocity, np.broadcast_to(twist[3:], velocity.shape)

@@ -117,7 +117,7 @@ class Machine:
         return route
 
     @cached_property
-    def _approach(self) -> SplitRoute | None:
+    def _split_route(self) -> SplitRoute | None:
         return split_route_of(self.axes, self.tool, self._chain.joints, self._model, self.workpiece_offset)
 
     @cached_property
@@ -243,10 +243,10 @@ class Machine:
         return Aim(found.place.T, found.arrived, found.off)
 
     def _aim(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
-        approach, perfect = self._approach, self._perfect_route
-        if approach is None or approach.axes != axes:
+        split = self._split_route
+        if split is None or split.axes != axes:
             return self._aim_at_length(poses, axes, target)
-        found, rows = aimed_ahead(poses, perfect, approach, target)
+        found, rows = aimed_ahead(poses, self._perfect_route, split, target)
         if rows.size:
             goal = None if target is None else target[:, rows]
             found.put(rows, self._aim_at_length(poses.part(rows), axes, goal))
