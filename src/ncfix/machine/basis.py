@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ncfix.machine.se3 import Array
 
@@ -163,7 +164,7 @@ class Polynomial(Basis):
         return powers(u, self.degree)
 
     def slopes(self, u: Array, direction: Array) -> Array:
-        return _columns(self.degree, u) * powers(u, tuple(max(power - 1, 0) for power in self.degree))
+        return columns_like(self.degree, u) * powers(u, tuple(max(power - 1, 0) for power in self.degree))
 
     def feature(self, span: float) -> float:
         return span / (4 * max(self.degree)) if max(self.degree) else np.inf
@@ -206,7 +207,7 @@ class Backlash(Polynomial):
         return 0.5 * direction * powers(u, self.degree)
 
     def slopes(self, u: Array, direction: Array) -> Array:
-        return 0.5 * direction * _columns(self.degree, u) * powers(u, tuple(max(p - 1, 0) for p in self.degree))
+        return 0.5 * direction * columns_like(self.degree, u) * powers(u, tuple(max(p - 1, 0) for p in self.degree))
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,7 +233,7 @@ class Fourier(Basis):
 
     def slopes(self, u: Array, direction: Array) -> Array:
         waves = _waves(u, self.order, self.turn)
-        rate = 2 * np.pi / self.turn * _columns(self.order, u)
+        rate = 2 * np.pi / self.turn * columns_like(self.order, u)
         slopes = np.empty_like(waves)
         slopes[0::2], slopes[1::2] = -rate * waves[1::2], rate * waves[0::2]
         return slopes
@@ -278,7 +279,7 @@ class Periodic(Fourier):
 def powers(u: Array, degree: tuple[int, ...]) -> Array:
     """Powers of u by repeated multiplication, shape (...) -> (k, ...)."""
     u = np.asarray(u, dtype=np.float64)
-    ladder = np.empty((max(degree) + 1, *u.shape))
+    ladder = np.empty((max(degree, default=0) + 1, *u.shape))
     ladder[0] = 1.0
     for power in range(1, len(ladder)):
         ladder[power] = ladder[power - 1] * u
@@ -302,12 +303,13 @@ def distinct(name: str, values: tuple[int, ...], lowest: int) -> list[tuple[str,
     return []
 
 
-def _columns(values: tuple[int, ...], u: Array) -> Array:
+def columns_like(values: ArrayLike, u: ArrayLike) -> Array:
+    """Values (k,) in the shape (k, 1, ...), that goes with u (...)."""
     return np.asarray(values, dtype=np.float64).reshape(-1, *np.ones(np.ndim(u), dtype=int))
 
 
 def _waves(u: Array, order: tuple[int, ...], period: float) -> Array:
-    phase = (2 * np.pi / period) * np.asarray(u, dtype=np.float64) * _columns(order, u)
+    phase = (2 * np.pi / period) * np.asarray(u, dtype=np.float64) * columns_like(order, u)
     waves = np.empty((2 * len(order), *np.shape(u)))
     waves[0::2], waves[1::2] = np.cos(phase), np.sin(phase)
     return waves

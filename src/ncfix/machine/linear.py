@@ -173,8 +173,8 @@ def unit_twist(axes: tuple[Axis, ...], tool: Tool, effect: Effect, poses: Poses)
         velocity, turned = _at(reference, _joint_twist(axis, position, slot, motion))
         if axis.moving_frame:
             velocity, turned = (advance(axis, -position, part, weight=0.0) for part in (velocity, turned))
-    rows: Array = np.asarray(triad)
-    return np.concatenate([rows @ velocity[:, 0], rows @ turned[:, 0]])
+    found: Array = np.concatenate([np.asarray(triad) @ part[:, 0] for part in (velocity, turned)])
+    return found
 
 
 def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Array:
@@ -196,7 +196,8 @@ def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Arra
     origin = advance(axis, position, columns(ORIGIN))
     velocity, turned, origin = np.broadcast_arrays(velocity, turned, origin)
     carried = np.concatenate([velocity + cross(origin, turned), turned])  # the adjoint of the nominal motion
-    return line - carried + own
+    found: Array = line - carried + own
+    return found
 
 
 def _twist(motion: Array, reference: Array) -> Array:

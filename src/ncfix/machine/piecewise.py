@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.machine.basis import Basis, distinct, key, powers
+from ncfix.machine.basis import Basis, columns_like, distinct, key, powers
 from ncfix.machine.se3 import Array
 
 
@@ -229,7 +229,7 @@ def ascending(name: str, values: tuple[float, ...], strictly: bool = True) -> li
 
 def _at(index: Any, values: Array, size: int) -> Array:
     """Rows that are zero but for `values` in row `index`."""
-    rows: Array = np.where(np.arange(size).reshape(-1, *np.ones(np.ndim(index), dtype=int)) == index, values, 0.0)
+    rows: Array = np.where(columns_like(range(size), index) == index, values, 0.0)
     return rows
 
 
@@ -277,19 +277,19 @@ class Truncated(Basis):
 
     def rows(self, u: Array, direction: Array) -> Array:
         u = np.asarray(u, dtype=np.float64)
-        found = np.concatenate([_powers(u, self.powers), self._above(u) ** self.degree])
+        found = np.concatenate([powers(u, self.powers), self._above(u) ** self.degree])
         if not self.detrended:
             return found
         trend = self._trend()
-        return found - _column(trend[:, 0], u) - _column(trend[:, 1], u) * u
+        return found - columns_like(trend[:, 0], u) - columns_like(trend[:, 1], u) * u
 
     def slopes(self, u: Array, direction: Array) -> Array:
         u = np.asarray(u, dtype=np.float64)
-        own = _column(np.array(self.powers), u) * _powers(u, tuple(max(power - 1, 0) for power in self.powers))
+        own = columns_like(self.powers, u) * powers(u, tuple(max(power - 1, 0) for power in self.powers))
         above = self._above(u)
         pieces = self.degree * above ** (self.degree - 1) * (above > 0)
         found = np.concatenate([own, pieces])
-        return found - _column(self._trend()[:, 1], u) if self.detrended else found
+        return found - columns_like(self._trend()[:, 1], u) if self.detrended else found
 
     def without_knots(self, keep: NDArray[np.bool_]) -> Self:
         """The basis with some of its functions only."""
@@ -302,7 +302,7 @@ class Truncated(Basis):
 
     def _above(self, u: Array) -> Array:
         """How far u is above each knot, (k, ...); zero below it."""
-        above: Array = np.maximum(u - _column(np.array(self.knots), u), 0.0)
+        above: Array = np.maximum(u - columns_like(self.knots, u), 0.0)
         return above
 
     def _trend(self) -> Array:
@@ -321,14 +321,6 @@ def _moments(power: int, low: float, high: float, knot: float) -> tuple[float, f
         return float((high - knot) ** (n + 1) - (low - knot) ** (n + 1)) / (n + 1)
 
     return integral(power), integral(power + 1) + knot * integral(power)
-
-
-def _powers(u: Array, degree: tuple[int, ...]) -> Array:
-    return powers(u, degree) if degree else np.zeros((0, *u.shape))
-
-
-def _column(values: Array, u: Array) -> Array:
-    return np.asarray(values, dtype=np.float64).reshape(-1, *np.ones(np.ndim(u), dtype=int))
 
 
 PIECEWISE: tuple[type[Basis], ...] = (PiecewiseLinear, Spline, PiecewiseConstant, Truncated)
