@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.finish import finished
-from ncfix.control.following import Follower
-from ncfix.control.moves import Kind, Moves, Trace
-from ncfix.text.dialect import Dialect
-from ncfix.text.language import BulkLayout, Run
+from ncfix.control.moves import Kind, Moves
+from ncfix.text.language import BulkLayout
 from ncfix.text.layout import CENTRE_LETTERS, Layout
 from ncfix.text.shapes import Scan, scan
 from ncfix.text.tree import Flow, Literal, Program, Template
@@ -28,7 +23,6 @@ from ncfix_fanuc.macro.rules import RULES
 from ncfix_iso.rs274.language import RS274, writable
 
 if TYPE_CHECKING:
-    from ncfix.control.flatten import FlatLine
     from ncfix.text.language import Language
 
 
@@ -46,34 +40,6 @@ def runs_straight_on(template: Template) -> bool:
 def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """The shapes of blocks, in which numbers with and without a decimal point differ."""
     return scan(source, blocks, pointless=True)
-
-
-def following(program: Program, run: Run) -> MacroInterpreter:
-    """The control's walk through a program, before its first step."""
-    control = MacroControl(run, program.dialect)
-    return MacroInterpreter(control, program, run)
-
-
-def follower(dialect: Dialect, run: Run) -> Follower:
-    """See `Language`.
-
-    That the text has no subprogram of a number that was found in a file is certain only at its end.
-    """
-    return Follower(MacroControl(run, dialect), run, partial(MacroInterpreter, in_parts=True))
-
-
-def follow(program: Program, run: Run) -> Trace:
-    """The motions of a program of this family; raises what `trace` does."""
-    walk = following(program, run)
-    walk.run()
-    return finished(walk.control, program, walk.control.moves())
-
-
-def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
-    """The blocks of a program of this family as they are executed."""
-    from ncfix_iso.rs274.flatten import unrolled
-
-    return unrolled(following(program, run), steps, limit)
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
@@ -103,14 +69,13 @@ FANUC: Language = replace(
     RS274,
     scan=scanned,
     parse=parse_block,
-    follow=follow,
+    control=MacroControl,
+    interpreter=MacroInterpreter,
     layout=layout,
     alike=False,
     render=render,
     bulk=in_bulk,
     one_by_one=one_by_one,
-    unroll=unroll,
-    follower=follower,
     straight=runs_straight_on,
     semantics=frozenset(RULES),
 )

@@ -17,6 +17,7 @@ from ncfix_heidenhain.klartext.contours import written_out
 from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
+from ncfix_heidenhain.klartext.layout import uses_comma
 from ncfix_heidenhain.klartext.number_text import Style
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
 from ncfix_heidenhain.klartext.plans import Plan
@@ -128,11 +129,9 @@ class KlartextFlattener(Flattener):
         return self.short(found) if digits == OTHERS else self.style.number(found, digits)
 
 
-def unrolled(
-    interpreter: KlartextInterpreter, steps: Mapping[str, float], limit: int, comma: bool
-) -> Sequence[FlatLine]:
+def unrolled(interpreter: KlartextInterpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """Follow a program and write down its blocks; raises SourceError NCF237 and NCF238."""
-    flattener = KlartextFlattener(interpreter.control, steps, limit, Style(comma))
+    flattener = KlartextFlattener(interpreter.control, steps, limit, Style(uses_comma(interpreter.main.program.source)))
     interpreter.watcher = flattener
     interpreter.run()
     program = interpreter.main.program

@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
-from ncfix.control.finish import finished
-from ncfix.control.following import Follower
-from ncfix.control.moves import Trace
-from ncfix.text.dialect import Dialect
-from ncfix.text.language import BulkLayout, Language, Run
+from ncfix.text.language import BulkLayout, Language
 from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
 from ncfix.text.reach import tape_end
 from ncfix.text.shapes import scan, split_blocks
@@ -25,24 +20,6 @@ from ncfix_iso.rs274.interpreter import RS274Interpreter
 
 if TYPE_CHECKING:
     from ncfix.control.flatten import FlatLine
-
-
-def following(program: Program, run: Run) -> RS274Interpreter:
-    """The control's walk through a program, before its first step."""
-    control = Control(run, program.dialect)
-    return RS274Interpreter(control, program, run)
-
-
-def follower(dialect: Dialect, run: Run) -> Follower:
-    """See `Language`."""
-    return Follower(Control(run, dialect), run, partial(RS274Interpreter, in_parts=True))
-
-
-def follow(program: Program, run: Run) -> Trace:
-    """The motions of a program of this family; raises what `trace` does."""
-    walk = following(program, run)
-    walk.run()
-    return finished(walk.control, program, walk.control.moves())
 
 
 def writable(program: Program, block: int) -> Layout | None:
@@ -69,11 +46,11 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     return replace(found, further=not (layout.after or layout.prefix), arc=arc_layout(program, block, layout))
 
 
-def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
-    """The blocks of a program of this family as they are executed."""
+def unroll(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
+    """See `Language`."""
     from ncfix_iso.rs274.flatten import unrolled
 
-    return unrolled(following(program, run), steps, limit)
+    return unrolled(interpreter, steps, limit)
 
 
 RS274 = Language(
@@ -81,7 +58,8 @@ RS274 = Language(
     end=tape_end,
     scan=scan,
     parse=parse_block,
-    follow=follow,
+    control=Control,
+    interpreter=RS274Interpreter,
     layout=writable,
     alike=True,
     render=render,
@@ -89,6 +67,5 @@ RS274 = Language(
     unroll=unroll,
     arc_pieces=True,
     bulk=in_bulk,
-    follower=follower,
     semantics=frozenset(RULES),
 )

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.finish import finished
 from ncfix.control.flatten import FlatLine
-from ncfix.control.following import Follower
-from ncfix.control.moves import Moves, Trace
+from ncfix.control.moves import Moves
 from ncfix.text import reach
-from ncfix.text.dialect import Dialect
-from ncfix.text.language import ArcLayout, BulkLayout, Language, Run
+from ncfix.text.language import ArcLayout, BulkLayout, Language
 from ncfix.text.layout import arc_layout, bulk_layout
 from ncfix.text.reach import whole_text
 from ncfix.text.shapes import split_blocks
@@ -36,12 +32,6 @@ from ncfix_siemens.sinumerik.state import Sinumerik
 SPATIAL = frozenset("XYZ")
 
 
-def following(program: Program, run: Run) -> SinumerikInterpreter:
-    """The control's walk through a program, before its first step."""
-    control = Sinumerik(run, program.dialect)
-    return SinumerikInterpreter(control, program, run)
-
-
 def runs_straight_on(template: Template) -> bool:
     """Whether a block of this shape has nothing to do with others elsewhere in the text.
 
@@ -50,24 +40,11 @@ def runs_straight_on(template: Template) -> bool:
     return reach.runs_straight_on(template) and len(polar_words(template)) != 1
 
 
-def follower(dialect: Dialect, run: Run) -> Follower:
+def unroll(interpreter: SinumerikInterpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """See `Language`."""
-    return Follower(Sinumerik(run, dialect), run, partial(SinumerikInterpreter, in_parts=True))
-
-
-def follow(program: Program, run: Run) -> Trace:
-    """The motions of a program of this family; raises what `trace` does."""
-    walk = following(program, run)
-    walk.run()
-    return finished(walk.control, program, walk.moves())
-
-
-def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
-    """The blocks of a program of this family as they are executed."""
-    walk = following(program, run)
-    walk.watcher = SinumerikFlattener(walk.control, steps, limit)
-    walk.run()
-    return walk.watcher.lines
+    interpreter.watcher = SinumerikFlattener(interpreter.control, steps, limit)
+    interpreter.run()
+    return interpreter.watcher.lines
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
@@ -116,7 +93,8 @@ SINUMERIK = Language(
     end=whole_text,
     scan=scan,
     parse=parse_block,
-    follow=follow,
+    control=Sinumerik,
+    interpreter=SinumerikInterpreter,
     layout=layout_of,
     render=render,
     arc_pieces=True,
@@ -124,6 +102,5 @@ SINUMERIK = Language(
     bulk=in_bulk,
     one_by_one=one_by_one,
     renumber=renumbered,
-    follower=follower,
     straight=runs_straight_on,
 )

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -189,7 +190,7 @@ class Task:
         object.__setattr__(self, "dialect", numbered)
 
     def follower(self) -> Follower:
-        """What follows the program; raises `NotInPartsError` if its language is followed as a whole."""
+        """What follows the program."""
         axes, rotary = self.machine.axis_names, rotary_names(self.machine)
         kinematics = kinematics_of(self.machine)
         return follower_of(self.dialect, Run(self.setup, axes, rotary, self.resolve, kinematics=kinematics))
@@ -204,12 +205,9 @@ class Task:
 
 
 def follower_of(dialect: Dialect, run: Run) -> Follower:
-    """What follows a program part by part; raises `NotInPartsError` if its language is followed as a whole."""
-    make = language_of(dialect).follower
-    if make is None:
-        raise NotInPartsError(f"{dialect.title} is followed as a whole")
-    found: Follower = make(dialect, run)
-    return found
+    """What follows a program part by part."""
+    language = language_of(dialect)
+    return Follower(language.control(run, dialect), run, partial(language.interpreter, in_parts=True))
 
 
 COARSE = 10

@@ -7,15 +7,15 @@ them only. In the flat program each execution is a block of its own. It is writt
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ncfix.control.faults import Fault
 from ncfix.control.moves import Kind, Kinematics, Moves, Rule
-from ncfix.control.trace import trace
+from ncfix.control.trace import interpreter_of, trace
 from ncfix.diagnostics import RefusedError, SourceError
 from ncfix.text.language import Resolve, Run, language_of
 from ncfix.text.reader import read
@@ -41,25 +41,6 @@ class FlatLine(NamedTuple):
 
     text: str
     line: int
-
-
-class Unroll(Protocol):
-    """Follows a program as the control would and writes down every block as it is executed.
-
-    steps  axis letter -> least increment of its axis, mm or degree
-    limit  lines that may be written
-
-    Raises SourceError NCF237 where what is executed depends on the machine at run time, NCF238 beyond the limit.
-    """
-
-    def __call__(
-        self,
-        program: Program,
-        run: Run,
-        steps: Mapping[str, float],
-        limit: int,
-    ) -> Sequence[FlatLine]:
-        """The lines of the flat program."""
 
 
 class Change(NamedTuple):
@@ -187,16 +168,17 @@ def flatten(
     kinematics: Kinematics | None = None,
     limit: int = LINES,
 ) -> Flat:
-    """Write a program out flat; arguments as of `trace` and `Unroll`.
+    """Write a program out flat; arguments as of `trace` and `Flattener`.
 
-    Raises RefusedError NCF237 and NCF238 where `Unroll` does, NCF239 if the language cannot, or if the flat program
-    would not make the same motions.
+    Raises RefusedError NCF237 where what is executed depends on the machine at run time, NCF238 beyond the limit,
+    NCF239 if the language cannot, or if the flat program would not make the same motions.
     """
     unroll = language_of(program.dialect).unroll
     if unroll is None:
         raise RefusedError.of(NOT_FLAT, f"programs in {program.dialect.title} cannot be written out flat")
     try:
-        found = unroll(program, Run(setup, axes, rotary, resolve, kinematics=kinematics), steps, limit)
+        walk = interpreter_of(program, Run(setup, axes, rotary, resolve, kinematics=kinematics))
+        found = unroll(walk, steps, limit)
     except SourceError as error:
         if error.messages[0].code in (RUNTIME, TOO_LONG):
             raise RefusedError.collected(error.messages) from None

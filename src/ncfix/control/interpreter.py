@@ -98,6 +98,11 @@ class Interpreter(ABC, Generic[U]):
     def note_stretch(self, unit: U, block: int, done: int) -> None:
         """Blocks from `block` on have been taken at once."""
 
+    def moves(self) -> Moves:
+        """The motions of the program, when it has been followed."""
+        moves: Moves = self.control.moves()
+        return moves
+
     # -- what a language says of parts --------------------------------------------------------------------------------
 
     @property

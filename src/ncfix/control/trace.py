@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
+from ncfix.control.finish import finished
+from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Kinematics, Trace
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import UsageError
@@ -35,4 +38,12 @@ def trace(
     strangers = [axis for axis in axes if axis not in AXIS_LETTERS]
     if strangers:
         raise UsageError.of(NO_LETTER, f"the axis {strangers[0]} has no letter that a program can move")
-    return language_of(program.dialect).follow(program, Run(setup, axes, rotary, resolve, kinematics))
+    interpreter = interpreter_of(program, Run(setup, axes, rotary, resolve, kinematics))
+    interpreter.run()
+    return finished(interpreter.control, program, interpreter.moves())
+
+
+def interpreter_of(program: Program, run: Run) -> Interpreter[Any]:
+    """The control's walk through a program, before its first step."""
+    language = language_of(program.dialect)
+    return language.interpreter(language.control(run, program.dialect), program, run)

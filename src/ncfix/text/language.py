@@ -6,7 +6,7 @@ what a block means and how a corrected motion is put into words is a family's ow
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pkgutil import resolve_name
@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ncfix.control.flatten import Unroll
-    from ncfix.control.following import Follower
-    from ncfix.control.moves import Kinematics, Moves, Trace
+    from ncfix.control.control import Control
+    from ncfix.control.flatten import FlatLine
+    from ncfix.control.interpreter import Interpreter
+    from ncfix.control.moves import Kinematics, Moves
     from ncfix.control.setup import Setup
     from ncfix.text.build import Parsed
     from ncfix.text.dialect import Dialect
@@ -117,7 +118,8 @@ class Language:
     scan      (source, blocks) -> shapes and numbers of the blocks, without understanding them
     parse     (dialect, text) -> one block by its grammar; raises `BlockError`
     lenient   a block that cannot be read, and that the control may never get to, is no error until it does
-    follow    the program's motions; raises what `trace` does
+    control   what the control keeps while it follows a program of a dialect
+    interpreter  (control, program, run) -> the walk through a program; `in_parts`: this is the first of its parts
     layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
     alike     those of all blocks of a shape are the same
     render    (program, block, layout, target) -> its edits, and the lines that come after it
@@ -127,8 +129,8 @@ class Language:
     one_by_one  (program, moves, pieces, first piece of each motion) -> (n,) motions that `render` has to write one by
               one for what else there is about them; None: none
     renumber  a text with its blocks numbered anew; None where blocks need no numbers
-    unroll    the blocks of a program as they are executed, for `flatten`; None if the language cannot
-    follower  as `follow`, but for a program that comes in parts, of a dialect
+    unroll    (interpreter, least increments, limit) -> the blocks of a program as they are executed, see `flatten`;
+              None if the language cannot write them
     straight  a program with blocks of this shape may come in parts: they have nothing to do with others elsewhere
     semantics  the rule sets that the family has, by the names that `Dialect.semantics` may give
     """
@@ -137,7 +139,8 @@ class Language:
     end: Callable[[bytes, NDArray[np.int64]], int]
     scan: Callable[[bytes, NDArray[np.int64]], Scan]
     parse: Callable[[Dialect, str], Parsed]
-    follow: Callable[[Program, Run], Trace]
+    control: Callable[[Run, Dialect], Control]
+    interpreter: Callable[..., Interpreter[Any]]
     layout: Callable[[Program, int], BlockLayout | None]
     render: Callable[[Program, int, Any, Target], Rendered]
     alike: bool = False
@@ -146,8 +149,7 @@ class Language:
     bulk: Callable[[Program, int], BulkLayout | None] | None = None
     one_by_one: Callable[[Program, Moves, Pieces, NDArray[np.int64]], NDArray[np.bool_]] | None = None
     renumber: Callable[[bytes], bytes] | None = None
-    unroll: Unroll | None = None
-    follower: Callable[[Dialect, Run], Follower] | None = None
+    unroll: Callable[[Any, Mapping[str, float], int], Sequence[FlatLine]] | None = None
     straight: Callable[[Template], bool] = runs_straight_on
     semantics: frozenset[str] = frozenset({"iso"})
 
