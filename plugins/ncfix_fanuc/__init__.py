@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from ncfix.hookspecs import Register, hookimpl
@@ -76,10 +77,7 @@ HAAS = replace(
         rb"(?im)^[^(;\n]*(?<![A-Z])G[ \t]*(?:(?:187|150)(?!\d)|154[ \t]*P|47[ \t]*[PE]|103[ \t]*P)",
         rb"(?im)^[^(;\n]*(?<![A-Z])M[ \t]*97[ \t]*P",
     ),
-    understands=(
-        *FANUC.understands,
-        "G154 P and G110 ... G129, M97, TCP (G234), the dynamic work offset (G254 G255)",
-    ),
+    understands=(*FANUC.understands, "G154 P and G110 ... G129, M97, TCP (G234), the dynamic work offset (G254 G255)"),
     semantics="haas",
 )
 
@@ -104,27 +102,6 @@ def register_dialects(register: Register[Dialect]) -> None:
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the controls `fanuc` and `fanuc-rotary`, grids in space, and `fanuc-pitch`, stored pitch errors."""
-    register(grid, name="fanuc")
-    register(grid_with_angles, name="fanuc-rotary")
-    register(pitch_errors, name="fanuc-pitch")
-
-
-def grid() -> Control:
-    """The grid, imported when tables are asked for."""
-    from ncfix_fanuc.control import Fanuc
-
-    return Fanuc()
-
-
-def grid_with_angles() -> Control:
-    """The grid with angles."""
-    from ncfix_fanuc.rotary import FanucRotary
-
-    return FanucRotary()
-
-
-def pitch_errors() -> Control:
-    """Stored pitch errors."""
-    from ncfix_fanuc.pitch import FanucPitch
-
-    return FanucPitch()
+    register(lambda: import_module("ncfix_fanuc.control").Fanuc(), name="fanuc")
+    register(lambda: import_module("ncfix_fanuc.rotary").FanucRotary(), name="fanuc-rotary")
+    register(lambda: import_module("ncfix_fanuc.pitch").FanucPitch(), name="fanuc-pitch")

@@ -61,8 +61,7 @@ BACKLASH_ASSUMPTION = Assumption(
     "and as written: the play must have gone, not doubled.",
 )
 HOMING = SettingForm(
-    "axes of X, Y and Z, like XY",
-    lambda text: set(text.upper()) <= set(LINEAR) and len(set(text.upper())) == len(text),
+    "axes of X, Y and Z, like XY", lambda text: set(text.upper()) <= set(LINEAR) and len(set(text.upper())) == len(text)
 )
 BACKLASH_OPTIONS: Mapping[str, Option] = {
     "play": Option(

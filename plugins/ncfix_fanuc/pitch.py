@@ -80,10 +80,7 @@ class FanucPitch(Control):
             "Punch the parameters of the control and compare the form.",
         ),
     )
-    options: ClassVar[Mapping[str, Option]] = {
-        "sign": sign_option("PITCH-1"),
-        **UNITS,
-    }
+    options: ClassVar[Mapping[str, Option]] = {"sign": sign_option("PITCH-1"), **UNITS}
     steps = (
         "Settle PITCH-1 on the machine.",
         "Save parameters and pitch data; set parameter 3605#0 to 0 (one table for both ways).",

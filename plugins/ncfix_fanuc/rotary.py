@@ -173,9 +173,7 @@ class FanucRotary(Control):
         **PLACING_OPTIONS,
         **BACKLASH_OPTIONS,
         "rotary_points": Option(
-            "72",
-            "most points along a rotary axis; how many the control takes is not public",
-            whole(2, MOST_ROTARY),
+            "72", "most points along a rotary axis; how many the control takes is not public", whole(2, MOST_ROTARY)
         ),
     }
     steps = (
@@ -365,10 +363,7 @@ class LatticeFilling:
         volume.anchors = self._anchors(inputs)
         mesh = search(volume, share * AIM * self.request.target, [most] * len(inputs), most ** len(inputs))
         lengths, angles = mesh.grid.values[..., :3], mesh.grid.values[..., 3:] / reach
-        grids = (
-            replace(mesh.grid, outputs=LINEAR, values=lengths),
-            replace(mesh.grid, outputs=ANGLES, values=angles),
-        )
+        grids = (replace(mesh.grid, outputs=LINEAR, values=lengths), replace(mesh.grid, outputs=ANGLES, values=angles))
         return Lattice.of(grids, self.sign, self.units, volume.anchors, table.centre), mesh
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from ncfix.hookspecs import Register, hookimpl
@@ -67,32 +68,11 @@ def register_dialects(register: Register[Dialect]) -> None:
 @hookimpl
 def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
     """Bring what the messages about Klartext programs mean."""
-    register(message_codes, name="klartext")
-
-
-def message_codes() -> Mapping[str, Code]:
-    """The codes, imported when they are asked for."""
-    from ncfix_heidenhain.klartext.message_codes import KLARTEXT_CODES
-
-    return KLARTEXT_CODES
+    register(lambda: import_module("ncfix_heidenhain.klartext.message_codes").KLARTEXT_CODES, name="klartext")
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the controls `heidenhain`, axis tables, and `heidenhain-kinematics`, KinematicsComp."""
-    register(axis_tables, name="heidenhain")
-    register(whole_chain, name="heidenhain-kinematics")
-
-
-def axis_tables() -> Control:
-    """The control with axis tables, imported when tables are asked for."""
-    from ncfix_heidenhain.control import Heidenhain
-
-    return Heidenhain()
-
-
-def whole_chain() -> Control:
-    """The control with KinematicsComp."""
-    from ncfix_heidenhain.kinematics import KinematicsComp
-
-    return KinematicsComp()
+    register(lambda: import_module("ncfix_heidenhain.control").Heidenhain(), name="heidenhain")
+    register(lambda: import_module("ncfix_heidenhain.kinematics").KinematicsComp(), name="heidenhain-kinematics")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from ncfix.hookspecs import Register, hookimpl
@@ -15,11 +16,4 @@ if TYPE_CHECKING:
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `isg`: VOLCOMP configuration and grid."""
-    register(control, name="isg")
-
-
-def control() -> Control:
-    """The control, imported when tables are asked for."""
-    from ncfix_isg.control import Isg
-
-    return Isg()
+    register(lambda: import_module("ncfix_isg.control").Isg(), name="isg")

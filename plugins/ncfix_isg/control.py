@@ -123,9 +123,7 @@ class Isg(Control):
         "axes": Option("", "logical axis numbers, e.g. X:1,Y:2,Z:3,B:4,C:5"),
         "filter_steps": Option("20", "over how many cycles the control spreads a change", whole(0, MOST_NODES)),
         "fit": Option(
-            "nodes",
-            "nodes: exact at the nodes; area: least squares over what is around them",
-            one_of("nodes", "area"),
+            "nodes", "nodes: exact at the nodes; area: least squares over what is around them", one_of("nodes", "area")
         ),
         "grids": Option(
             "auto",

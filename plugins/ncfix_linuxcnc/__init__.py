@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from ncfix.hookspecs import Register, hookimpl
@@ -50,11 +51,4 @@ def register_dialects(register: Register[Dialect]) -> None:
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `linuxcnc`: `.comp` files."""
-    register(control, name="linuxcnc")
-
-
-def control() -> Control:
-    """The control, imported when tables are asked for."""
-    from ncfix_linuxcnc.control import LinuxCnc
-
-    return LinuxCnc()
+    register(lambda: import_module("ncfix_linuxcnc.control").LinuxCnc(), name="linuxcnc")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from ncfix.hookspecs import Register, hookimpl
@@ -69,24 +70,10 @@ def register_dialects(register: Register[Dialect]) -> None:
 @hookimpl
 def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
     """Bring what the messages about SINUMERIK programs mean."""
-    register(message_codes, name="sinumerik")
-
-
-def message_codes() -> Mapping[str, Code]:
-    """The codes, imported when they are asked for."""
-    from ncfix_siemens.sinumerik.message_codes import SINUMERIK_CODES
-
-    return SINUMERIK_CODES
+    register(lambda: import_module("ncfix_siemens.sinumerik.message_codes").SINUMERIK_CODES, name="sinumerik")
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `siemens`: CEC and EEC tables."""
-    register(control, name="siemens")
-
-
-def control() -> Control:
-    """The control, imported when tables are asked for."""
-    from ncfix_siemens.control import Siemens
-
-    return Siemens()
+    register(lambda: import_module("ncfix_siemens.control").Siemens(), name="siemens")

@@ -179,19 +179,14 @@ class Assigned:
     fields: dict[str, ArrayAssignment] = field(default_factory=dict)
     values: dict[int, ArrayAssignment] = field(default_factory=dict)
 
-    def put_field(self, name: str, assignment: ArrayAssignment) -> None:
-        """Take a field; the last of several counts."""
-        self._look_for_another(self.fields.get(name), assignment)
-        self.fields[name] = assignment
-
-    def put_value(self, number: int, assignment: ArrayAssignment) -> None:
-        """Take a value; the last of several counts."""
-        self._look_for_another(self.values.get(number), assignment)
-        self.values[number] = assignment
-
-    def _look_for_another(self, other: ArrayAssignment | None, assignment: ArrayAssignment) -> None:
-        if other is not None:
+    def put(self, which: int | str, assignment: ArrayAssignment) -> None:
+        """Take a value by its number, or a field by its name; the last of several counts."""
+        if which in self.values or which in self.fields:
             self.remarks.doubt(assignment.line, "is assigned twice: the control keeps the last", "a slip?")
+        if isinstance(which, int):
+            self.values[which] = assignment
+        else:
+            self.fields[which] = assignment
 
     def lacks(self, needed: Iterable[str]) -> bool:
         """Whether fields are missing, which is refused."""

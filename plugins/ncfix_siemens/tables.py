@@ -118,36 +118,26 @@ def _assigned(table: CecTable, style: CecStyle) -> Iterator[str]:
 def read_cec(lines: Iterable[FileRow], remarks: Remarks) -> list[CecTable]:
     """The tables of a file, by index, with remarks; a table that is not complete is left out."""
     found: dict[int, Assigned] = {}
-    for each in assignments(lines, remarks):
-        _sort_cec(each, found, remarks)
+    for assignment in assignments(lines, remarks):
+        name = assignment.name.upper()
+        field = name.removeprefix(f"{CEC_VALUE}_")
+        wanted = 2 if name == CEC_VALUE else 1
+        if field in LINKS:
+            remarks.doubt(assignment.line, f"${assignment.name}: axes of other control units are not followed")
+        elif name != CEC_VALUE and field not in CEC_FIELDS:
+            remarks.refuse(assignment.line, f"${assignment.name} is not a variable of these tables")
+        elif len(assignment.indices) != wanted or not all(each.strip().isdecimal() for each in assignment.indices):
+            text = f"${assignment.name} takes {wanted} whole number{'s' * (wanted > 1)} in its brackets"
+            remarks.refuse(assignment.line, text)
+        else:
+            index, *number = (int(text) for text in assignment.indices)
+            place, names = f"$AN_CEC[{index},{{}}]", f"$AN_CEC_{{}}[{index}]"
+            table = found.setdefault(index, Assigned(f"table {index + 1}", place, names, remarks))
+            table.put(number[0] if number else field, assignment)
     tables = [_cec_table(index, found[index], remarks) for index in sorted(found)]
     good = [table for table in tables if table is not None]
     _look_at_products(good, found, remarks)
     return good
-
-
-def _sort_cec(assignment: ArrayAssignment, tables: dict[int, Assigned], remarks: Remarks) -> None:
-    name = assignment.name.upper()
-    field = name.removeprefix(f"{CEC_VALUE}_")
-    if field in LINKS:
-        remarks.doubt(assignment.line, f"${assignment.name}: axes of other control units are not followed")
-        return
-    wanted = 2 if name == CEC_VALUE else 1
-    if name != CEC_VALUE and field not in CEC_FIELDS:
-        remarks.refuse(assignment.line, f"${assignment.name} is not a variable of these tables")
-        return
-    if len(assignment.indices) != wanted or not all(index.strip().isdecimal() for index in assignment.indices):
-        remarks.refuse(
-            assignment.line, f"${assignment.name} takes {wanted} whole number{'s' * (wanted > 1)} in its brackets"
-        )
-        return
-    index, *number = (int(text) for text in assignment.indices)
-    place, names = f"$AN_CEC[{index},{{}}]", f"$AN_CEC_{{}}[{index}]"
-    table = tables.setdefault(index, Assigned(f"table {index + 1}", place, names, remarks))
-    if number:
-        table.put_value(number[0], assignment)
-    else:
-        table.put_field(field, assignment)
 
 
 def _cec_table(index: int, table: Assigned, remarks: Remarks) -> CecTable | None:
@@ -226,30 +216,23 @@ def eec_text(table: CecTable, heads: Iterable[str]) -> bytes:
 def read_eec(lines: Iterable[FileRow], remarks: Remarks) -> list[CecTable]:
     """The tables of a file, with remarks; one that is not complete is left out."""
     found: dict[tuple[int, str], Assigned] = {}
-    for each in assignments(lines, remarks):
-        _sort_eec(each, found, remarks)
+    for assignment in assignments(lines, remarks):
+        name = assignment.name.upper()
+        field = name.removeprefix(f"{EEC_VALUE}_")
+        *numbers, axis = assignment.indices
+        wanted = 2 if name == EEC_VALUE else 1
+        if name != EEC_VALUE and field not in EEC_FIELDS:
+            remarks.refuse(assignment.line, f"${assignment.name} is not a variable of these tables")
+        elif len(numbers) != wanted or not all(each.strip().isdecimal() for each in numbers):
+            inside = "encoder, number and axis" if wanted == 2 else "encoder and axis"
+            remarks.refuse(assignment.line, f"${assignment.name} takes {inside} in its brackets")
+        else:
+            encoder, axis = int(numbers[0]), axis.strip().upper()
+            place, names = f"$AA_ENC_COMP[{encoder},{{}},{axis}]", f"$AA_ENC_COMP_{{}}[{encoder},{axis}]"
+            table = found.setdefault((encoder, axis), Assigned(axis, place, names, remarks))
+            table.put(int(numbers[1]) if wanted == 2 else field, assignment)
     tables = [_eec_table(*key, found[key], remarks) for key in sorted(found)]
     return [table for table in tables if table is not None]
-
-
-def _sort_eec(assignment: ArrayAssignment, tables: dict[tuple[int, str], Assigned], remarks: Remarks) -> None:
-    name = assignment.name.upper()
-    field = name.removeprefix(f"{EEC_VALUE}_")
-    wanted = 3 if name == EEC_VALUE else 2
-    if name != EEC_VALUE and field not in EEC_FIELDS:
-        remarks.refuse(assignment.line, f"${assignment.name} is not a variable of these tables")
-        return
-    if len(assignment.indices) != wanted or not all(index.strip().isdecimal() for index in assignment.indices[:-1]):
-        inside = "encoder, number and axis" if wanted == 3 else "encoder and axis"
-        remarks.refuse(assignment.line, f"${assignment.name} takes {inside} in its brackets")
-        return
-    encoder, axis = int(assignment.indices[0]), assignment.indices[-1].strip().upper()
-    place, names = f"$AA_ENC_COMP[{encoder},{{}},{axis}]", f"$AA_ENC_COMP_{{}}[{encoder},{axis}]"
-    table = tables.setdefault((encoder, axis), Assigned(axis, place, names, remarks))
-    if wanted == 3:
-        table.put_value(int(assignment.indices[1]), assignment)
-    else:
-        table.put_field(field, assignment)
 
 
 def _eec_table(encoder: int, axis: str, table: Assigned, remarks: Remarks) -> CecTable | None:

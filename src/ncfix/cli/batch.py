@@ -160,11 +160,13 @@ def _let_stay() -> None:
 
 def _written(fixed: FixedText, target: OutputTarget, options: FixOptions) -> FixOutcome:
     entry: dict[str, Any] = fixed.report.as_dict()
-    messages = [*fixed.report.warnings, *_refusals(target.source, entry["refused"])]
-    console.tell_some(messages, partial(_with_lines, source=target.source))
+    path = shown(target.source)
+    refusals = (Message(each["code"], each["reason"], Place(path, each["line"])) for each in entry["refused"])
+    console.tell_some([*fixed.report.warnings, *refusals], partial(_with_lines, source=target.source))
     refused = bool(entry["refused"]) and not options.allow_refused
     if not refused:
-        _write(fixed, target)
+        if fixed.changed or not target.in_place:
+            target.write(fixed.text, files.mode_of(target.source))
         entry["output"] = target.path
     for line in _summary(entry, refused):
         console.say(line)
@@ -173,30 +175,15 @@ def _written(fixed: FixedText, target: OutputTarget, options: FixOptions) -> Fix
     return FixOutcome(ExitCode.REFUSED if refused else ExitCode.DONE, entry)
 
 
-def _write(fixed: FixedText, target: OutputTarget) -> None:
-    if target.in_place and not fixed.changed:
-        return
-    target.write(fixed.text, files.mode_of(target.source))
-
-
-def _refusals(source: str, refused: Sequence[dict[str, Any]]) -> list[Message]:
-    return [Message(each["code"], each["reason"], Place(shown(source), each["line"])) for each in refused]
-
-
 def _with_lines(messages: Sequence[Message], source: str) -> list[Message]:
     """Messages, those on lines of a program file with these lines."""
-    path = shown(source)
-    wanted = {each.place.line for each in messages if each.place and _is_bare(each.place, path)}
+    bare = [(each, each.place if each.place and _is_bare(each.place, shown(source)) else None) for each in messages]
+    wanted = {place.line for _, place in bare if place}
     if not wanted or not os.path.isfile(source):
         return list(messages)
     with open(source, encoding="latin-1") as text:
         lines = {n: line.rstrip("\n") for n, line in enumerate(islice(text, max(wanted)), start=1) if n in wanted}
-    return [
-        replace(each, place=replace(each.place, text=lines.get(each.place.line, "")))
-        if each.place and _is_bare(each.place, path)
-        else each
-        for each in messages
-    ]
+    return [replace(each, place=replace(at, text=lines.get(at.line, ""))) if at else each for each, at in bare]
 
 
 def _is_bare(place: Place, path: str) -> bool:
@@ -259,9 +246,14 @@ class Batch:
         kept = {target: done[target.name] for target in self.targets if self._holds(target, done.get(target.name))}
         fresh = self._fresh([target for target in self.targets if target not in kept], jobs, make)
         for target in self.targets:
-            outcome = _kept(target, kept[target]) if target in kept else next(fresh)
-            if journal is not None and target not in kept and outcome.entry["output"] is not None:
-                journal.add(self._record(target, outcome))
+            if target in kept:
+                console.say(f"{visible(shown(target.source))} -> {visible(target.path)}: done before")
+                yield FixOutcome(ExitCode.DONE, {**kept[target].entry, "resumed": True}, kept[target].called)
+                continue
+            outcome = next(fresh)
+            if journal is not None and outcome.entry["output"] is not None:
+                digest = digest_of(target.path) or ""
+                journal.add(JournalRecord(target.name, self.job.key(target), digest, outcome.called, outcome.entry))
             yield outcome
         if journal is not None:
             journal.finish()
@@ -280,15 +272,6 @@ class Batch:
         if record is None:
             return False
         return record.holds(self.job.key(target), target.path, subprograms(self.job.setup, target.source))
-
-    def _record(self, target: OutputTarget, outcome: FixOutcome) -> JournalRecord:
-        digest = digest_of(target.path) or ""
-        return JournalRecord(target.name, self.job.key(target), digest, outcome.called, outcome.entry)
-
-
-def _kept(target: OutputTarget, record: JournalRecord) -> FixOutcome:
-    console.say(f"{visible(shown(target.source))} -> {visible(target.path)}: done before")
-    return FixOutcome(ExitCode.DONE, {**record.entry, "resumed": True}, record.called)
 
 
 def _lost(target: OutputTarget) -> tuple[FixOutcome, list[str]]:

@@ -53,10 +53,7 @@ CODES = {
         "`--in-place` puts the result where the program is, `-o` somewhere else.",
         "Leave one of them out.",
     ),
-    "NCF012": Code(
-        "interrupted",
-        "The command was stopped with Ctrl-C. Outputs that were not complete are not there.",
-    ),
+    "NCF012": Code("interrupted", "The command was stopped with Ctrl-C. Outputs that were not complete are not there."),
     "NCF013": Code(
         "written to a pipe, and would have to be different",
         "A long program that goes to a pipe is written while it is read. Further down something was found that changes "

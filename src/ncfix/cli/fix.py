@@ -25,7 +25,7 @@ from ncfix.host import processors
 from ncfix.plugins import registry
 
 if TYPE_CHECKING:
-    from ncfix.cli.batch import FixJob
+    pass
 
 AUTO = 0
 """`--jobs auto` as a number: as many as pay."""
@@ -151,30 +151,24 @@ def fix(
     was written.
     """
     from ncfix.batch.work import executor_of
-    from ncfix.cli.batch import Batch
+    from ncfix.cli.batch import Batch, FixJob
 
     outputs = Outputs(output, in_place, force, resume)
     wanted = targets(programs, outputs, (machine_path, *given.files), folders=True)
     for target in wanted:
         check_streams(JSON if as_json else None, program=target)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
-    job = _job(machine_path, dialect, given, {**choices, "force": force})
-    outcomes = list(
-        Batch(job, wanted, outputs.folder(programs), resume).run(processes_for(jobs, wanted), executor_of(executor))
-    )
+    from ncfix.compensate import FixOptions
+
+    if choices.pop("thesis"):
+        choices["strategy"] = "thesis"
+    machine = sound(load_machine(machine_path), machine_path, force)
+    job = FixJob(machine, given.load(), dialect, FixOptions(**choices, force=force))
+    batch = Batch(job, wanted, outputs.folder(programs), resume)
+    outcomes = list(batch.run(processes_for(jobs, wanted), executor_of(executor)))
     if len(outcomes) > 1:
         written = sum(outcome.entry["output"] is not None for outcome in outcomes)
         console.say(f"{len(outcomes)} programs: {written} written, {len(outcomes) - written} not")
     if as_json:
         console.put_json(files=[outcome.entry for outcome in outcomes])
     return max(outcome.code for outcome in outcomes)
-
-
-def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: dict[str, Any]) -> FixJob:
-    from ncfix.cli.batch import FixJob
-    from ncfix.compensate import FixOptions
-
-    if choices.pop("thesis"):
-        choices["strategy"] = "thesis"
-    machine = sound(load_machine(machine_path), machine_path, choices["force"])
-    return FixJob(machine, setup.load(), dialect, FixOptions(**choices))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import get_completion_class
@@ -14,7 +14,7 @@ from click.shell_completion import get_completion_class
 from ncfix.cli import console
 from ncfix.cli.options import DIALECT, OneOf, json_option
 from ncfix.diagnostics import Code, ExitCode, UsageError
-from ncfix.plugins import Plugin, called, load_plugins, registry
+from ncfix.plugins import called, load_plugins, registry
 
 if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect
@@ -42,33 +42,23 @@ FLOORS = (
 @json_option
 def dialects(name: str | None, as_json: bool) -> None:
     """List the dialects for `--dialect`, with the file suffixes that suggest them; or all about the one called NAME."""
-    found = registry("dialects") if name is None else {name: _known_dialect(name)}
+    if name is None:
+        found: dict[str, Dialect] = registry("dialects")
+    else:
+        from ncfix.text.dialects import get
+
+        found = {name: get(name)}
     if as_json:
-        console.put_json(dialects=[_dialect_entry(it) for it in found.values()])
+        fields = ("name", "title", "suffixes", *(field for field, _ in PARTS))
+        console.put_json(dialects=[{field: getattr(it, field) for field in fields} for it in found.values()])
     elif name is not None:
-        _describe(found[name])
+        lines = [f"{found[name].name}: {found[name].title}"]
+        for field, heading in PARTS:
+            lines += ["", heading, *(f"  {sentence}" for sentence in getattr(found[name], field))]
+        console.put("".join(f"{line}\n" for line in lines))
     else:
         rows = [(name, it.title, " ".join(it.suffixes)) for name, it in found.items()]
         console.table(("name", "title", "suffixes"), rows)
-
-
-def _known_dialect(name: str) -> Dialect:
-    from ncfix.text.dialects import get
-
-    return get(name)
-
-
-def _dialect_entry(dialect: Dialect) -> dict[str, Any]:
-    lists = {field: getattr(dialect, field) for field, _ in PARTS}
-    return {"name": dialect.name, "title": dialect.title, "suffixes": dialect.suffixes, **lists}
-
-
-def _describe(dialect: Dialect) -> None:
-    """What a dialect makes of the blocks of a program."""
-    lines = [f"{dialect.name}: {dialect.title}"]
-    for field, heading in PARTS:
-        lines += ["", heading, *(f"  {sentence}" for sentence in getattr(dialect, field))]
-    console.put("".join(f"{line}\n" for line in lines))
 
 
 def all_codes() -> dict[str, Code]:
@@ -91,31 +81,20 @@ def explain(code: str | None, as_json: bool) -> None:
     codes = all_codes()
     if code is not None:
         code = f"NCF{code}" if code.isdecimal() else code.upper()
-        codes = {code: _known_code(code, codes)}
+        if code not in codes:
+            close = get_close_matches(code, codes, 1)
+            hint = f"did you mean {close[0]}? " if close else ""
+            text = f"there is no message code {code!r}"
+            raise UsageError.of("NCF009", text, hint=f"{hint}`ncfix explain` lists all")
+        codes = {code: codes[code]}
     if as_json:
-        console.put_json(codes=[{"code": key, **_code_as_dict(it)} for key, it in codes.items()])
+        entries = [{"code": key, "title": it.title, "text": it.text, "hint": it.hint} for key, it in codes.items()]
+        console.put_json(codes=entries)
     elif code is None:
         console.table(("code", "title"), [(key, it.title) for key, it in codes.items()])
     else:
-        console.put("".join(_code_page(key, it) for key, it in codes.items()))
-
-
-def _known_code(code: str, codes: dict[str, Code]) -> Code:
-    if code not in codes:
-        close = get_close_matches(code, codes, 1)
-        hint = f"did you mean {close[0]}? " if close else ""
-        text = f"there is no message code {code!r}"
-        raise UsageError.of("NCF009", text, hint=f"{hint}`ncfix explain` lists all")
-    return codes[code]
-
-
-def _code_as_dict(code: Code) -> dict[str, str]:
-    return {"title": code.title, "text": code.text, "hint": code.hint}
-
-
-def _code_page(key: str, code: Code) -> str:
-    hint = f"\nhint: {code.hint}\n" if code.hint else ""
-    return f"{key}: {code.title}\n\n{code.text}\n{hint}"
+        for key, it in codes.items():
+            console.put(f"{key}: {it.title}\n\n{it.text}\n" + (f"\nhint: {it.hint}\n" if it.hint else ""))
 
 
 @click.command()
@@ -124,27 +103,21 @@ def plugins(as_json: bool) -> int:
     """List the plugins and what each adds; exit code 1 if one was left out."""
     found = load_plugins()
     if as_json:
-        entries = [_plugin_as_dict(plugin) for plugin in found.loaded]
+        entries = [
+            {
+                **{field: getattr(plugin, field) for field in ("name", "module", "distribution", "version", "hooks")},
+                "things": {kind: list(things) for kind, things in plugin.things.items()},
+            }
+            for plugin in found.loaded
+        ]
         console.put_json(plugins=entries, left_out=[problem.as_dict() for problem in found.problems])
     else:
-        console.table(("name", "from", "adds"), [_plugin_row(plugin) for plugin in found.loaded])
+        rows = []
+        for each in found.loaded:
+            adds = "; ".join(f"{kind}: {', '.join(things)}" for kind, things in each.things.items() if things)
+            rows.append((each.name, f"{each.distribution} {each.version}".strip(), adds))
+        console.table(("name", "from", "adds"), rows)
     return ExitCode.FINDINGS if found.problems else ExitCode.DONE
-
-
-def _plugin_row(plugin: Plugin) -> tuple[str, str, str]:
-    adds = "; ".join(f"{kind}: {', '.join(things)}" for kind, things in plugin.things.items() if things)
-    return plugin.name, f"{plugin.distribution} {plugin.version}".strip(), adds
-
-
-def _plugin_as_dict(plugin: Plugin) -> dict[str, object]:
-    return {
-        "name": plugin.name,
-        "module": plugin.module,
-        "distribution": plugin.distribution,
-        "version": plugin.version,
-        "hooks": plugin.hooks,
-        "things": {kind: list(things) for kind, things in plugin.things.items()},
-    }
 
 
 @click.command()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -131,25 +130,25 @@ def _as_dict(calibration: Calibration, over: Prediction) -> dict[str, Any]:
 
     from ncfix.measure.residuals import residuals, rms_by_set
 
-    residual = residuals(calibration.problem, calibration.estimate)
+    problem, estimate = calibration.problem, calibration.estimate
+    residual = residuals(problem, estimate)
     tests = {"ball_bar": _ball_bars(calibration), "positioning": _positioning(calibration)}
-    sigma, covariance = calibration.sigma, calibration.covariance
+    values, sigma = estimate.coefficients.tolist(), calibration.sigma.tolist()
+    unknowns = [label for each in problem.observations for label in each.unknowns.labels]
     return {
         "parameters": [
             {"name": label, "value": value, "sigma": deviation, "held": math.isnan(deviation)}
-            for label, value, deviation in zip(
-                calibration.labels, calibration.estimate.coefficients.tolist(), sigma.tolist(), strict=True
-            )
+            for label, value, deviation in zip(calibration.labels, values, sigma, strict=True)
         ],
-        "covariance": covariance,
-        "set_up": _set_up(calibration),
+        "covariance": calibration.covariance,
+        "set_up": dict(zip(unknowns, estimate.unknowns.tolist(), strict=False)),
         "chi_square": calibration.chi_square,
         "freedom": calibration.freedom,
-        "condition": calibration.estimate.solution.condition,
+        "condition": estimate.solution.condition,
         "rms_um": {
             "before": calibration.before_um,
             "after": calibration.after_um,
-            "sets": rms_by_set(calibration.problem, residual),
+            "sets": rms_by_set(problem, residual),
         },
         "prediction": asdict(over),
         "largest_cook": float(residual.cook.max(initial=0.0)),
@@ -176,25 +175,19 @@ def _positioning(calibration: Calibration) -> list[dict[str, Any]]:
     return [asdict(each) for seen in calibration.problem.observations for each in figures(seen.measurement)]
 
 
-def _set_up(calibration: Calibration) -> dict[str, float]:
-    labels = [label for each in calibration.problem.observations for label in each.unknowns.labels]
-    return dict(zip(labels, calibration.estimate.unknowns.tolist(), strict=False))
-
-
 def _print(calibration: Calibration, over: Prediction) -> None:
     console.table(("coefficient", "value", "sigma", "unit"), list(_rows(calibration)))
     for bar in _ball_bars(calibration):
         _say_bar(bar)
     for row in _positioning(calibration):
-        _say_positioning(row)
+        unit = "urad" if row["component"][1] in "ABC" else "um"
+        known = [f"{name} {row[name]:.1f}" for name in ("A", "R", "E", "M", "B") if row[name] == row[name]]
+        console.say(f"{row['component']} set {row['name']}, ISO 230-2: {', '.join(known)} {unit}")
     held = "; what is held counts as known" if any(map(math.isnan, calibration.sigma.tolist())) else ""
     figures = f"{over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms"
     console.say(f"sigma of the tip error over the travels: {figures}{held}")
-    lengths = not math.isnan(calibration.before_um)
-    rms = (
-        f"rms {calibration.before_um:.2f} um before, {calibration.after_um:.2f} um after" if lengths else "only angles"
-    )
-    console.say(f"{rms}; {_noise(calibration)}")
+    rms = f"rms {calibration.before_um:.2f} um before, {calibration.after_um:.2f} um after"
+    console.say(f"{'only angles' if math.isnan(calibration.before_um) else rms}; {_noise(calibration)}")
 
 
 def _rows(calibration: Calibration) -> Iterator[tuple[str, str, str, str]]:
@@ -219,20 +212,12 @@ def _noise(calibration: Calibration) -> str:
 
 def _say_bar(bar: dict[str, Any]) -> None:
     centre = ", ".join(f"{value:.1f}" for value in bar["centre"])
-    text = (
-        f"ball-bar set {bar['name']}: size {bar['size']:+.1f} um, form {bar['form']:.1f} um, centre off by {centre} um"
-    )
-    circle = bar["circle"]
-    if circle:
+    text = f"ball-bar set {bar['name']}: size {bar['size']:+.1f} um, form {bar['form']:.1f} um"
+    text += f", centre off by {centre} um"
+    if circle := bar["circle"]:
         names = {"G(b)": "Gb", "H": "H", "D": "D", "Fmax": "F_max", "Fmin": "F_min"}
         text += "; ISO 230-4: " + ", ".join(f"{name} {circle[key]:.1f}" for name, key in names.items())
     console.say(text)
-
-
-def _say_positioning(row: dict[str, Any]) -> None:
-    unit = "urad" if row["component"][1] in "ABC" else "um"
-    known = [f"{name} {row[name]:.1f}" for name in ("A", "R", "E", "M", "B") if row[name] == row[name]]
-    console.say(f"{row['component']} set {row['name']}, ISO 230-2: {', '.join(known)} {unit}")
 
 
 @click.command()
@@ -413,7 +398,10 @@ def diagnose(
 
     each_once(measured)
     inputs = (*measured, machine_path)
-    machine_target, next_target, page_target = (_target(path, force, inputs) for path in (output, next_path, report))
+    machine_target, next_target, page_target = (
+        targets([STREAM], Outputs(path, force=force), inputs)[0] if path is not None else None
+        for path in (output, next_path, report)
+    )
     check_streams("what was found", machine=machine_target, poses=next_target, report=page_target)
     form = form_of(report) if report is not None else None
     machine = load_machine(machine_path)
@@ -436,13 +424,10 @@ def diagnose(
         console.put_json(**as_dict(diagnosis, written))
     else:
         console.put(text(diagnosis))
-        _say_written(diagnosis, output, written)
+        if output and written is None:
+            wrong = "; constants that are wrong are for `ncfix calibrate`" if diagnosis.moved else ""
+            console.say(f"no machine file was written: there is nothing to add to the model{wrong}")
     return ExitCode.FINDINGS if check and diagnosis.verdict != NOTHING else ExitCode.DONE
-
-
-def _target(path: str | None, force: bool, inputs: Sequence[str]) -> OutputTarget | None:
-    """Where an output goes that was asked for; none of the inputs."""
-    return targets([STREAM], Outputs(path, force=force), inputs)[0] if path is not None else None
 
 
 def _write_next(diagnosis: Diagnosis, target: OutputTarget) -> None:
@@ -455,9 +440,3 @@ def _write_next(diagnosis: Diagnosis, target: OutputTarget) -> None:
     plan = diagnosis.proposal.plan
     table = target.path.endswith(".csv")
     target.write((dumps(plan, ("dx", "dy", "dz")) if table else skeleton(plan, diagnosis.data.machine)).encode())
-
-
-def _say_written(diagnosis: Diagnosis, output: str | None, written: str | None) -> None:
-    if output and written is None:
-        wrong = "; constants that are wrong are for `ncfix calibrate`" if diagnosis.moved else ""
-        console.say(f"no machine file was written: there is nothing to add to the model{wrong}")

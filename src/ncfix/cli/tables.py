@@ -36,16 +36,12 @@ from ncfix.diagnostics import ConfigError, ExitCode, Message, Place, RefusedErro
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ncfix.compensate.driver import Fixed
     from ncfix.compensate.following import Followed
     from ncfix.machine import Machine
     from ncfix.tables.compensation import Tables
     from ncfix.tables.control import Control, Written
     from ncfix.tables.export import Exported
-    from ncfix.tables.forms import Linted
     from ncfix.text.tree import Program
 
 SAME = 0.5
@@ -56,12 +52,7 @@ MANY = 4
 
 
 def along(
-    following: Following,
-    control: Control,
-    tables: Tables,
-    settings: Mapping[str, str],
-    path: str,
-    tool_length: float,
+    following: Following, control: Control, tables: Tables, settings: Mapping[str, str], path: str, tool_length: float
 ) -> dict[str, Any]:
     """What a control with these tables leaves along a program: `{path, error_before_um, error_after_um, remarks}`.
 
@@ -71,6 +62,8 @@ def along(
     Raises `RefusedError` for a program that would be corrected twice: NCF493 if it carries a stamp of ncfix, NCF438 if
     its numbers show it.
     """
+    import numpy as np
+
     from ncfix.compensate.figures.simulation import Along, seems_corrected, tip_errors, tip_with
     from ncfix.compensate.plan.intent import Intent
     from ncfix.machine import State
@@ -88,17 +81,13 @@ def along(
         made = tip_with(lambda q, way, length: tables.for_tool(length).at(names, q, way))
         after = figures(Along.of(tip_errors(intent, lines, made=made)))
     fixed_length = not (control.any_tool or control.rewrites) and machine.depends_on_tool_length
-    remarks = list(_other_tools(moves.tool_length, tool_length)) if fixed_length else []
-    return {"path": shown(path), "error_before_um": before, "error_after_um": after, "remarks": remarks}
-
-
-def _other_tools(used: NDArray[np.float64], length: float) -> Iterator[str]:
-    import numpy as np
-
-    others = sorted({float(round(each, 3)) for each in used[np.isfinite(used)] if abs(each - length) > SAME})
+    used = moves.tool_length[np.isfinite(moves.tool_length)].tolist() if fixed_length else []
+    others = sorted({round(each, 3) for each in used if abs(each - tool_length) > SAME})
+    remarks = []
     if others:
         listed = ", ".join(f"{each:g}" for each in others[:MANY]) + (" ..." if len(others) > MANY else "")
-        yield f"The tables hold for a tool of {length:g} mm; this program also runs with {listed} mm."
+        remarks = [f"The tables hold for a tool of {tool_length:g} mm; this program also runs with {listed} mm."]
+    return {"path": shown(path), "error_before_um": before, "error_after_um": after, "remarks": remarks}
 
 
 def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
@@ -386,10 +375,13 @@ def lint(paths: tuple[str, ...], control: str, as_json: bool) -> int:
     for folder, content in _gathered(paths):
         for name, looked in sorted(lint_files(content, control).items()):
             path = os.path.join(folder, name)
-            messages = [_placed(message, folder, content) for message in looked.messages]
+            messages = _below(folder, looked.messages, content)
             console.tell_some(messages)
-            worst = max(worst, _code(looked))
-            entries.append(_entry(path, looked, messages))
+            code = ExitCode.FINDINGS if messages else ExitCode.DONE
+            worst = max(worst, code if looked.owner else ExitCode.UNREADABLE)
+            found = [message.as_dict() for message in messages]
+            whose = {"form": looked.owner or None, "title": looked.title or None}
+            entries.append({"path": shown(path), **whose, "findings": found})
             if not as_json:
                 said = console.counted(len(messages), "finding") if messages else "nothing found"
                 console.say(f"{shown(path)}: {looked.title or 'of no known form'}: {said}")
@@ -408,21 +400,3 @@ def _gathered(paths: Sequence[str]) -> Iterator[tuple[str, dict[str, bytes]]]:
             folder, name = os.path.split(path)
             found.setdefault(folder, {})[name] = files.read_bytes(path)
     yield from ((folder, content) for folder, content in found.items() if content)
-
-
-def _placed(message: Message, folder: str, names: dict[str, bytes]) -> Message:
-    """With the folder before the name of its file."""
-    if message.place is None or message.place.path not in names:
-        return message
-    return replace(message, place=replace(message.place, path=os.path.join(folder, message.place.path)))
-
-
-def _code(looked: Linted) -> int:
-    if not looked.owner:
-        return ExitCode.UNREADABLE
-    return ExitCode.FINDINGS if looked.messages else ExitCode.DONE
-
-
-def _entry(path: str, looked: Linted, messages: Sequence[Message]) -> dict[str, Any]:
-    found = [message.as_dict() for message in messages]
-    return {"path": shown(path), "form": looked.owner or None, "title": looked.title or None, "findings": found}

@@ -78,13 +78,17 @@ def digest(content: bytes) -> str:
 
 def read_manifest(data: bytes, path: str) -> Manifest:
     """Read the side file; raises `ConfigError` NCF486."""
+
+    def texts(record: Mapping[str, Any]) -> dict[str, str]:
+        return {str(name): str(value) for name, value in record.items()}
+
     try:
         found = json.loads(data)
         if found["ncfix-tables"] != SCHEMA:
             raise ValueError(f"schema {found['ncfix-tables']!r}, not {SCHEMA}")
         ranges = {str(axis): (float(low), float(high)) for axis, (low, high) in found["ranges"].items()}
-        texts = (str(found["control"]), str(found["machine"]), str(found["hash"]))
-        return Manifest(*texts, ranges, float(found["tool_length"]), _texts(found["settings"]), _texts(found["files"]))
+        whose = (str(found["control"]), str(found["machine"]), str(found["hash"]))
+        return Manifest(*whose, ranges, float(found["tool_length"]), texts(found["settings"]), texts(found["files"]))
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         text = f"is not the side file of exported tables: {error}"
         raise ConfigError.of("NCF486", text, Place(path), "export again") from error
@@ -99,10 +103,6 @@ def remarks_of(data: bytes) -> tuple[tuple[str, ...], Least | None]:
         return texts, Least(float(least["max"]) / 1e3, str(least["why"])) if least else None
     except (KeyError, TypeError, ValueError):
         return texts, None
-
-
-def _texts(record: Mapping[str, Any]) -> dict[str, str]:
-    return {str(name): str(value) for name, value in record.items()}
 
 
 def check_origin(manifest: Manifest, control: str, machine: Machine | None, path: str) -> None:
@@ -136,12 +136,8 @@ class Exported:
 
     def limits(self) -> dict[str, Any]:
         """How much of what the control can hold is used."""
-        grids = self.tables.grids
-        return {
-            "tables": len(grids),
-            "points": self.tables.points,
-            "largest": max((g.points for g in grids), default=0),
-        }
+        sizes = [grid.points for grid in self.tables.grids]
+        return {"tables": len(sizes), "points": self.tables.points, "largest": max(sizes, default=0)}
 
 
 def export(control: Control, request: Request, poses: int = POSES) -> Exported:
@@ -150,35 +146,33 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     Raises `RefusedError`: NCF484 for what the format cannot hold, NCF489 for corrections beyond what the machine
     allows, NCF490 for tables that leave more than there was before.
     """
-    _check_finite(request.machine)
+    if any(not np.isfinite(effect.coefficients).all() for effect in request.machine.effects):
+        raise RefusedError.of("NCF489", "an error of the machine is not a number", hint="calibrate it again")
     written = called("controls", control.name, control.write, request, gives=Written)
     tables = _read_again(control, written)
     messages = linted(control, written.files)
     left = residual(request.machine, tables, request.space, request.tool_length, poses)
     _check_size(request.machine, left, request.target)
     written = replace(written, notes=(*written.notes, *_remarks(control, request, tables, left, written)))
-    made = _manifest(control, request, written.files)
+    ranges = {
+        axis.name: (round(float(low) / axis.unit, 9), round(float(high) / axis.unit, 9))
+        for axis, (low, high) in zip(request.machine.axes, request.space, strict=True)
+    }
+    hashes = {name: digest(content) for name, content in written.files.items()}
+    of_machine = request.machine.name, request.machine.hash, ranges
+    made = Manifest(control.name, *of_machine, request.tool_length, dict(request.settings), hashes)
     sheet = as_markdown(control, request, tables, left, written)
     said = {"ncfix": __version__, **control.described(), "residual_um": left.figures(), "notes": written.notes}
     if written.least:
         said["least_um"] = {"max": 1e3 * written.least.value, "why": written.least.why}
-    more = {
-        SIDE_FILE: made.as_bytes(**said),
-        f"{SHEET}.md": sheet.encode(),
-        f"{SHEET}.html": as_html(sheet).encode(),
-    }
+    more = {SIDE_FILE: made.as_bytes(**said), f"{SHEET}.md": sheet.encode(), f"{SHEET}.html": as_html(sheet).encode()}
     reaches = control.reached(request.machine, tables)
     files = {**written.files, **more}
     return Exported(written.files, files, tables, left, written.notes, messages, written.least, reaches)
 
 
 def emulate(
-    control: Control,
-    files: Files,
-    machine: Machine,
-    folder: str,
-    any_machine: bool = False,
-    poses: int = POSES,
+    control: Control, files: Files, machine: Machine, folder: str, any_machine: bool = False, poses: int = POSES
 ) -> Exported:
     """Run files as the control would; they are those of a folder, side file included.
 
@@ -197,7 +191,11 @@ def emulate(
     if not tables.axes <= set(machine.axis_names):
         odd = ", ".join(sorted(tables.axes - set(machine.axis_names)))
         raise RefusedError.of("NCF487", f"the tables are for axes that the machine does not have: {odd}", Place(folder))
-    space = ranges_of(machine, _internal(machine, made.ranges))
+    units = {axis.name: axis.unit for axis in machine.axes}
+    ranges = {
+        name: (low * units[name], high * units[name]) for name, (low, high) in made.ranges.items() if name in units
+    }
+    space = ranges_of(machine, ranges)
     left = residual(machine, tables, space, made.tool_length, poses)
     messages = (*made.changed(native, folder), *linted(control, native))
     same = made.hash == machine.hash and not made.changed(native, folder)
@@ -234,23 +232,18 @@ def _remarks(control: Control, request: Request, tables: Tables, left: Residual,
     before, after = (float(np.sqrt(np.mean(each**2))) for each in (left.before, left.after))
     if after > WORTH * before and before > request.target:
         yield "These tables take off next to nothing: the format does not reach the errors of this machine."
-    for covered in _covered(request):
-        yield f"They cover {covered}: beyond that {control.properties.extrapolation}, and more is left."
-    for name, covered in _wrong_turn(request, tables):
-        text = f"{name} turns without end and these tables do not repeat: they hold while the control counts it from "
-        text += f"{covered}; elsewhere {control.properties.extrapolation}"
-        yield f"{text}. --range {name}=LOW,HIGH makes them for other counts."
-    if not control.any_tool and not request.tool_length and request.machine.depends_on_tool_length:
-        yield "They are for a tool of no length: --tool-length was not given, and the error depends on it."
-
-
-def _covered(request: Request) -> Iterator[str]:
-    """Of axes whose travel is not covered as a whole, which part is."""
     machine = request.machine
     for axis, (low, high), travel in zip(machine.axes, request.space.tolist(), machine.ranges.tolist(), strict=True):
         if np.isfinite(travel).all() and (low > travel[0] + CLOSE or high < travel[1] - CLOSE):
             sizes = [f"{value / axis.unit:g}" for value in (low, high, *travel)]
-            yield f"{axis.name} from {sizes[0]} to {sizes[1]}, of a travel from {sizes[2]} to {sizes[3]}"
+            covered = f"{axis.name} from {sizes[0]} to {sizes[1]}, of a travel from {sizes[2]} to {sizes[3]}"
+            yield f"They cover {covered}: beyond that {control.properties.extrapolation}, and more is left."
+    for name, covered in _wrong_turn(request, tables):
+        text = f"{name} turns without end and these tables do not repeat: they hold while the control counts it from "
+        text += f"{covered}; elsewhere {control.properties.extrapolation}"
+        yield f"{text}. --range {name}=LOW,HIGH makes them for other counts."
+    if not control.any_tool and not request.tool_length and machine.depends_on_tool_length:
+        yield "They are for a tool of no length: --tool-length was not given, and the error depends on it."
 
 
 def _wrong_turn(request: Request, tables: Tables) -> Iterator[tuple[str, str]]:
@@ -269,46 +262,16 @@ def _wrong_turn(request: Request, tables: Tables) -> Iterator[tuple[str, str]]:
                 yield axis.name, f"{low:g} to {high:g} degree"
 
 
-def _internal(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    units = {axis.name: axis.unit for axis in machine.axes}
-    return {
-        name: (low * units.get(name, 1.0), high * units.get(name, 1.0))
-        for name, (low, high) in ranges.items()
-        if name in units
-    }
-
-
-def _manifest(control: Control, request: Request, files: Files) -> Manifest:
-    machine = request.machine
-    ranges = {
-        axis.name: (round(float(low) / axis.unit, 9), round(float(high) / axis.unit, 9))
-        for axis, (low, high) in zip(machine.axes, request.space, strict=True)
-    }
-    hashes = {name: digest(content) for name, content in files.items()}
-    return Manifest(
-        control.name, machine.name, machine.hash, ranges, request.tool_length, dict(request.settings), hashes
-    )
-
-
-def _check_finite(machine: Machine) -> None:
-    if any(not np.isfinite(effect.coefficients).all() for effect in machine.effects):
-        raise RefusedError.of("NCF489", "an error of the machine is not a number", hint="calibrate it again")
-
-
 def _check_size(machine: Machine, left: Residual, target: float) -> None:
     allowed: Array = np.where(machine.rotary, machine.max_correction[1], machine.max_correction[0])
     for name, value, limit, rotary in zip(left.names, left.largest, allowed, machine.rotary, strict=True):
         if value > limit:
-            shown = (
-                f"{np.degrees(value):.4f} of {np.degrees(limit):.4f} degree" if rotary else f"{value:.3f} of {limit} mm"
-            )
+            angles = f"{np.degrees(value):.4f} of {np.degrees(limit):.4f} degree"
+            shown = angles if rotary else f"{value:.3f} of {limit} mm"
             text = f"the correction of {name} is larger than this machine allows: {shown}"
             raise RefusedError.of("NCF489", text, hint="max_correction in the machine file, if that is right")
     if np.mean(left.after**2) > np.mean(left.before**2) + (target / 10) ** 2:
         sizes = [f"{1e3 * float(np.sqrt(np.mean(each**2))):.3g}" for each in (left.after, left.before)]
-        text = (
-            f"these tables would leave more error than there is without them: {sizes[0]} um rms instead of {sizes[1]}"
-        )
-        raise RefusedError.of(
-            "NCF490", text, hint="the format does not reach these errors: correct programs, ncfix fix"
-        )
+        text = "these tables would leave more error than there is without them: "
+        hint = "the format does not reach these errors: correct programs, ncfix fix"
+        raise RefusedError.of("NCF490", f"{text}{sizes[0]} um rms instead of {sizes[1]}", hint=hint)

@@ -386,16 +386,14 @@ def lint_files(files: Files, control: str = "") -> Mapping[str, Linted]:
         return _shared(chosen, tables, linted(chosen, tables) if made is not None else _look(chosen, tables))
     found: dict[str, Linted] = {}
     known = controls()
-    owners = {name: _owner(known.values(), name, content) for name, content in tables.items()}
-    for chosen in known.values():
-        own = {name: tables[name] for name, owner in owners.items() if owner is chosen}
-        if own:
+    owners: dict[str, dict[str, bytes]] = {}
+    for name, content in tables.items():
+        whose = (who for who, it in known.items() if called("controls", it.name, it.knows, name, content, gives=bool))
+        owners.setdefault(next(whose, ""), {})[name] = content
+    for who, chosen in known.items():
+        if own := owners.get(who):
             found |= _shared(chosen, own, _look(chosen, own))
     return {name: found[name] if name in found else _of_form(name, tables[name]) for name in tables}
-
-
-def _owner(known: Iterable[Control], name: str, content: bytes) -> Control | None:
-    return next((each for each in known if called("controls", each.name, each.knows, name, content, gives=bool)), None)
 
 
 def _look(control: Control, files: Files) -> tuple[Message, ...]:
@@ -417,11 +415,7 @@ def _of_form(name: str, content: bytes) -> Linted:
     """A file that no control of a plugin knows: of a form that is known, or of none."""
     document = recognised(name, content)
     if document is None:
-        return Linted("", "", (unknown(name),))
+        hint = "ncfix lint --control NAME says whose it is; ncfix plugins lists the controls"
+        remark = Message("NCF509", "is no table of a form that ncfix or a plugin knows", Place(name), hint)
+        return Linted("", "", (remark,))
     return Linted(document.form, BY_NAME[document.form].title, ())
-
-
-def unknown(name: str) -> Message:
-    """The remark on a file that is of no form that is known: NCF509."""
-    hint = "ncfix lint --control NAME says whose it is; ncfix plugins lists the controls"
-    return Message("NCF509", "is no table of a form that ncfix or a plugin knows", Place(name), hint)

@@ -11,7 +11,6 @@ from ncfix import __version__
 from ncfix.tables.compensation import Tables
 from ncfix.tables.control import Control, Request, Written
 from ncfix.tables.correction import Residual, corners, residual
-from ncfix.tables.grid import Array
 
 CLASSES = {
     "L-POS": "how far each linear axis goes, along itself.",
@@ -49,14 +48,16 @@ def as_markdown(control: Control, request: Request, tables: Tables, left: Residu
 def _lines(control: Control, request: Request, tables: Tables, left: Residual, written: Written) -> Iterator[str]:
     machine, figures = request.machine, left.figures()
     before, after = figures["before"], figures["after"]
+    pose = " ".join(f"{name}{value:g}" for name, value in after["at"].items())
     yield f"# {control.title}: compensation tables for {machine.name}"
     yield ""
     yield f"- Machine file: {machine.hash}; the tables hold for these errors only. Made by ncfix {__version__}."
     yield f"- Tip error: max {before['max']:.2f} um, rms {before['rms']:.2f} um without the tables;"
-    yield f"  max {after['max']:.2f} um, rms {after['rms']:.2f} um with them, most at {_pose(after['at'])}."
+    yield f"  max {after['max']:.2f} um, rms {after['rms']:.2f} um with them, most at {pose}."
     reached = control.reached(machine, tables)
     yield f"- Class (ISO/TR 16907): {reached}. Tables: {len(tables.grids)}, points: {tables.points}."
-    yield from (f"- {name}: {meaning}" for name, meaning in CLASSES.items() if name in _words(reached))
+    words = reached.replace(",", " ").split()
+    yield from (f"- {name}: {meaning}" for name, meaning in CLASSES.items() if name in words)
     if control.any_tool:
         yield f"- They hold for tools of any length; the figures are those of {request.tool_length:g} mm."
     else:
@@ -65,11 +66,18 @@ def _lines(control: Control, request: Request, tables: Tables, left: Residual, w
     if not control.rewrites:
         yield "- Programs that ncfix fix has corrected must not run with them: they would be corrected twice."
     yield "- Not checked: collisions, and whether the control has the options that the tables need."
-    yield from _list("Largest corrections", _corrections(left))
-    yield from _list("Range covered; beyond it: " + control.properties.extrapolation, _ranges(request))
+    largest = list(zip(left.names, left.largest, left.rotary, strict=True))
+    yield from _list("Largest corrections", (f"{name}: {_moved(value, rotary)}" for name, value, rotary in largest))
+    ranges = (
+        f"{axis.name}: {low / axis.unit:g} to {high / axis.unit:g} {'degree' if axis.rotary else 'mm'}"
+        for axis, (low, high) in zip(machine.axes, request.space, strict=True)
+    )
+    yield from _list("Range covered; beyond it: " + control.properties.extrapolation, ranges)
     yield from _list("Settings", (f"{name} = {value}" for name, value in request.settings.items() if value))
     if not control.rewrites:
-        yield from _list("Before you begin", (*BEFORE, *_jump(left)))
+        moved = ", ".join(f"{name} {_moved(JUMP * value, rotary)}" for name, value, rotary in largest if value)
+        jump = f"No axis may move by more than this when the tables come on: {moved}."
+        yield from _list("Before you begin", (*BEFORE, jump) if moved else BEFORE)
     yield from _list("What to do, in this order", control.steps, numbered=True)
     if not control.rewrites:
         title = "What the control must add then (mean of both ways); see that nothing is in the way of the axes"
@@ -88,14 +96,6 @@ def _list(title: str, items: Iterable[str], numbered: bool = False) -> Iterator[
         yield from (f"{number}. {item}" if numbered else f"- {item}" for number, item in enumerate(found, 1))
 
 
-def _pose(at: dict[str, float]) -> str:
-    return " ".join(f"{name}{value:g}" for name, value in at.items())
-
-
-def _words(reaches: str) -> list[str]:
-    return reaches.replace(",", " ").split()
-
-
 def _length_note(request: Request, tables: Tables) -> str:
     if request.machine.depends_on_tool_length:
         other = residual(request.machine, tables, request.space, request.tool_length + LONGER).figures()["after"]
@@ -104,32 +104,17 @@ def _length_note(request: Request, tables: Tables) -> str:
     return "; the error of this machine does not depend on that length"
 
 
-def _corrections(left: Residual) -> Iterator[str]:
-    for name, value, rotary in zip(left.names, left.largest, left.rotary, strict=True):
-        yield f"{name}: {_moved(value, rotary)}"
-
-
-def _jump(left: Residual) -> Iterator[str]:
-    parts = [
-        f"{name} {_moved(JUMP * value, rotary)}"
-        for name, value, rotary in zip(left.names, left.largest, left.rotary, strict=True)
-        if value
-    ]
-    if parts:
-        yield f"No axis may move by more than this when the tables come on: {', '.join(parts)}."
-
-
 def _checks(request: Request, tables: Tables) -> Iterator[str]:
     """Corrections in the middle of the travel, and where each axis is corrected most half-way from there to corners."""
-    names = request.machine.axis_names
+    names, units = request.machine.axis_names, np.array([axis.unit for axis in request.machine.axes])
     space = request.space.mean(axis=1)[:, None] + (request.space - request.space.mean(axis=1)[:, None]) / 2
     q = np.concatenate([space.mean(axis=1)[None], corners(space)])
-    q = np.unique(np.round(q / _units(request), 3), axis=0) * _units(request)
+    q = np.unique(np.round(q / units, 3), axis=0) * units
     found = tables.for_tool(request.tool_length).at(names, q)
     middle = int(np.argmin(np.abs(q - space.mean(axis=1)).sum(axis=1)))
     rows = [middle, *np.argmax(np.abs(found), axis=0)[np.abs(found).max(axis=0) > 0].tolist()]
     for row in dict.fromkeys(rows):
-        pose = " ".join(f"{name}{value:g}" for name, value in zip(names, q[row] / _units(request), strict=True))
+        pose = " ".join(f"{name}{value:g}" for name, value in zip(names, q[row] / units, strict=True))
         added = ", ".join(
             f"{name} {_moved(value, axis.rotary, '+')}"
             for name, value, axis in zip(names, found[row], request.machine.axes, strict=True)
@@ -137,18 +122,8 @@ def _checks(request: Request, tables: Tables) -> Iterator[str]:
         yield f"{pose}: {added}"
 
 
-def _units(request: Request) -> Array:
-    return np.array([axis.unit for axis in request.machine.axes])
-
-
 def _moved(value: float, rotary: bool, sign: str = "") -> str:
     return f"{np.degrees(value) + 0.0:{sign}.5f} degree" if rotary else f"{1e3 * value + 0.0:{sign}.1f} um"
-
-
-def _ranges(request: Request) -> Iterator[str]:
-    for axis, (low, high) in zip(request.machine.axes, request.space, strict=True):
-        unit = "degree" if axis.rotary else "mm"
-        yield f"{axis.name}: {low / axis.unit:g} to {high / axis.unit:g} {unit}"
 
 
 def as_html(markdown: str) -> str:
