@@ -12,6 +12,7 @@ has measured numbers in it, is only collected.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from operator import itemgetter
 from typing import Any
 
 import sympy as sp
@@ -43,7 +44,8 @@ class Algebra:
         found = set().union(*(generators(expression) for expression in expressions))
         angles = {generator.args[0] for generator in found if isinstance(generator, (sp.sin, sp.cos))}
         self.angles = sorted(angles, key=sp.default_sort_key)
-        self.roots = sorted((g for g in found if _is_root(g)), key=sp.default_sort_key)
+        powers = [g for g in found if g.is_Pow and g.exp == sp.Rational(1, 2)]
+        self.roots = sorted((g for g in powers if g.base.is_Integer), key=sp.default_sort_key)
         trig = {f(angle) for angle in self.angles for f in (sp.sin, sp.cos)}
         self.others = sorted(found - trig - set(self.roots), key=sp.default_sort_key)
         leading = [sp.sin(angle) for angle in self.angles] + self.roots
@@ -97,8 +99,12 @@ class Algebra:
 
     def expression(self, poly: Poly) -> sp.Expr:
         """A short way to write the polynomial."""
-
-        return written(self, poly)
+        if not poly:
+            return sp.Integer(0)
+        collected = _collected(self, poly)
+        if self.measured:
+            return collected.replace(lambda e: bool(e.is_Rational and e.q > SIMPLE), sp.Float)
+        return collected if _plain(self, poly) else min(collected, _shortest(self, poly), key=sp.count_ops)
 
 
 def as_fractions(expression: sp.Expr) -> sp.Expr:
@@ -115,10 +121,6 @@ def generators(expression: sp.Expr) -> set[sp.Expr]:
     if expression.is_Pow and expression.exp.is_Integer and expression.exp > 0:
         return generators(expression.base)
     return {expression}
-
-
-def _is_root(expression: sp.Expr) -> bool:
-    return bool(expression.is_Pow and expression.exp == sp.Rational(1, 2) and expression.base.is_Integer)
 
 
 def _replaced(poly: Poly, index: int, square: Poly) -> Poly:
@@ -147,16 +149,6 @@ LONG = 40
 """With more terms than this the search for something shorter takes long and finds little."""
 
 
-def written(algebra: Algebra, poly: Poly) -> sp.Expr:
-    """The expression."""
-    if not poly:
-        return sp.Integer(0)
-    if _plain(algebra, poly):
-        collected = _collected(algebra, poly)
-        return collected.replace(_is_measured, sp.Float) if algebra.measured else collected
-    return min(_collected(algebra, poly), _shortest(algebra, poly), key=sp.count_ops)
-
-
 def _plain(algebra: Algebra, poly: Poly) -> bool:
     return algebra.measured or len(poly) > LONG
 
@@ -164,7 +156,7 @@ def _plain(algebra: Algebra, poly: Poly) -> bool:
 def _shortest(algebra: Algebra, poly: Poly) -> sp.Expr:
     if _plain(algebra, poly):
         return poly.as_expr()
-    forms = [_merged(algebra, poly), poly, algebra.with_sines(poly)]
+    forms = [_with_pairs_merged(algebra, poly), poly, algebra.with_sines(poly)]
     ways = [way for form in forms if len(form) <= len(poly) for way in (form.as_expr(), sp.Mul(*_factors(form)))]
     return min(ways, key=sp.count_ops)
 
@@ -198,22 +190,14 @@ def _by_dimension(algebra: Algebra, poly: Poly) -> dict[Powers, Poly]:
     return {lengths: poly.new(function) for lengths, function in found.items()}
 
 
-def _merged(algebra: Algebra, poly: Poly) -> Poly:
+def _with_pairs_merged(algebra: Algebra, poly: Poly) -> Poly:
     """Pairs a m - a m cos^2 become a m sin^2."""
     for sine, cosine in algebra.pairs:
-        poly = _squares_merged(poly, sine, cosine)
+        found = dict(poly)
+        for powers in sorted(poly, key=itemgetter(cosine), reverse=True):
+            base = raised(powers, cosine, -2)
+            if powers[cosine] >= 2 and powers in found and found.get(base) == -found[powers]:
+                del found[powers]
+                found[raised(base, sine, 2)] = found.pop(base)
+        poly = poly.new(found)
     return poly
-
-
-def _squares_merged(poly: Poly, sine: int, cosine: int) -> Poly:
-    found = dict(poly)
-    for powers in sorted(poly, key=lambda powers: -powers[cosine]):
-        base = raised(powers, cosine, -2)
-        if powers[cosine] >= 2 and powers in found and found.get(base) == -found[powers]:
-            del found[powers]
-            found[raised(base, sine, 2)] = found.pop(base)
-    return poly.new(found)
-
-
-def _is_measured(expression: sp.Expr) -> bool:
-    return bool(expression.is_Rational and expression.q > SIMPLE)

@@ -12,37 +12,20 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from itertools import combinations_with_replacement
 from math import prod
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 import sympy as sp
 
 from ncfix.diagnostics import ConfigError
 
 TAKEN = (
-    "np",
-    "shape",
-    "map",
-    "v",
-    "locals",
-    "float",
-    "pi",
-    "sin",
-    "cos",
-    "tan",
-    "sqrt",
-    "branch",
-    *"xyzijk",
-    "dx",
-    "dy",
-    "dz",
-    "rx",
-    "ry",
-    "rz",
-)
+    "np", "shape", "map", "v", "locals", "float", "pi", "sin", "cos", "tan", "sqrt", "branch", *"xyzijk",
+    "dx", "dy", "dz", "rx", "ry", "rz",
+)  # fmt: skip
 RESERVED = {*keyword.kwlist, *keyword.softkwlist, *TAKEN}
 GREEK = re.compile(r"(Theta|theta|phi|psi|alpha|beta|gamma|delta)(\w*)")
 LETTER = re.compile(r"([A-Za-z])_?(\w+)")
@@ -125,7 +108,24 @@ UNITS: dict[str, Vector] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Translation:
+class Transformation:
+    """What all steps have in common; their fields are vectors and expressions."""
+
+    @property
+    def expressions(self) -> tuple[Expr, ...]:
+        """Every expression in it."""
+        parts = (getattr(self, each.name) for each in fields(self))
+        return tuple(e for part in parts for e in (part if isinstance(part, tuple) else (part,)))
+
+    def with_values(self, values: dict[Expr, Expr]) -> Self:
+        """The step with some symbols replaced."""
+        parts = {each.name: getattr(self, each.name) for each in fields(self)}
+        vectors = {n: tuple(e.xreplace(values) for e in part) for n, part in parts.items() if isinstance(part, tuple)}
+        return replace(self, **{n: vectors[n] if n in vectors else part.xreplace(values) for n, part in parts.items()})
+
+
+@dataclass(frozen=True, slots=True)
+class Translation(Transformation):
     """A shift along the coordinate axes, mm; each component a polynomial in the Small variables."""
 
     vector: Vector
@@ -135,18 +135,9 @@ class Translation:
         """The shift back."""
         return Translation(negated(self.vector))
 
-    @property
-    def expressions(self) -> tuple[Expr, ...]:
-        """Every expression in it."""
-        return self.vector
-
-    def with_values(self, values: dict[Expr, Expr]) -> Translation:
-        """The step with some symbols replaced."""
-        return Translation(substituted(self.vector, values))
-
 
 @dataclass(frozen=True, slots=True)
-class Rotation:
+class Rotation(Transformation):
     """A right-handed rotation about a unit vector through the origin; the angle, rad, is linear in the errors."""
 
     direction: Vector
@@ -157,18 +148,9 @@ class Rotation:
         """The rotation back."""
         return Rotation(self.direction, -self.angle)
 
-    @property
-    def expressions(self) -> tuple[Expr, ...]:
-        """Every expression in it."""
-        return (*self.direction, self.angle)
-
-    def with_values(self, values: dict[Expr, Expr]) -> Rotation:
-        """The step with some symbols replaced."""
-        return Rotation(substituted(self.direction, values), self.angle.xreplace(values))
-
 
 @dataclass(frozen=True, slots=True)
-class Screw:
+class Screw(Transformation):
     """The exponential of a small twist about the origin: rotation vector, rad, and velocity of the origin, mm."""
 
     rotation: Vector
@@ -179,15 +161,6 @@ class Screw:
         """The screw back."""
         return Screw(negated(self.rotation), negated(self.velocity))
 
-    @property
-    def expressions(self) -> tuple[Expr, ...]:
-        """Every expression in it."""
-        return (*self.rotation, *self.velocity)
-
-    def with_values(self, values: dict[Expr, Expr]) -> Screw:
-        """The step with some symbols replaced."""
-        return Screw(substituted(self.rotation, values), substituted(self.velocity, values))
-
 
 Step = Translation | Rotation | Screw
 
@@ -195,12 +168,6 @@ Step = Translation | Rotation | Screw
 def inverse(steps: Sequence[Step]) -> tuple[Step, ...]:
     """The steps that undo these."""
     return tuple(step.inverse for step in reversed(steps))
-
-
-def substituted(vector: Vector, values: dict[Expr, Expr]) -> Vector:
-    """The vector with some symbols replaced."""
-    x, y, z = (part.xreplace(values) for part in vector)
-    return x, y, z
 
 
 def negated(vector: Vector) -> Vector:
@@ -237,13 +204,9 @@ def skew(vector: Vector) -> sp.Matrix:
 
 def rodrigues(direction: Vector, angle: Expr) -> sp.Matrix:
     """The rotation matrix (3, 3) of a unit vector and an angle; sums of angles are written out."""
-    cosine, sine = _written_out(sp.cos(angle)), _written_out(sp.sin(angle))
+    cosine, sine = (sp.expand_trig(f(angle)) if f(angle).free_symbols else f(angle) for f in (sp.cos, sp.sin))
     turning, u = skew(direction), sp.Matrix(direction)
     return cosine * sp.eye(3) + sine * turning + (1 - cosine) * (u * u.T)
-
-
-def _written_out(expression: Expr) -> Expr:
-    return sp.expand_trig(expression) if expression.free_symbols else expression
 
 
 def homogeneous(rotation: sp.Matrix, translation: Sequence[Expr], corner: int = 1) -> sp.Matrix:
@@ -302,10 +265,7 @@ class Chain:
 
     def variable(self, name: str) -> Variable:
         """The variable of that name; KeyError if there is none."""
-        for variable in self.variables:
-            if variable.name == name:
-                return variable
-        raise KeyError(name)
+        return {variable.name: variable for variable in self.variables}[name]
 
     def without(self, names: Iterable[str]) -> Chain:
         """The same chain with some errors set to zero."""

@@ -11,14 +11,13 @@ import operator
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import sympy as sp
 
 from ncfix.diagnostics import ConfigError, NcfixError, Place
 from ncfix.inputs import MOST_SAID, taken
 from ncfix.machine.fields import Report, TomlTable, did_you_mean
-from ncfix.machine.symbolic.chain import UNITS, Chain, Expr, Rotation, Size, Step, Translation, Variable, Vector
+from ncfix.machine.symbolic.chain import UNITS, Chain, Expr, Rotation, Size, Step, Translation, Variable
 from ncfix.toml_text import decoded, key_lines, parsed
 
 SCHEMA = 1
@@ -61,22 +60,23 @@ def _chain(root: TomlTable) -> Chain:
     if version not in (None, SCHEMA):
         root.note("NCF317", "ncfix-chain", f"schema version {version}, this ncfix reads {SCHEMA}")
     name = root.text("name") or "chain"
-    variables = _variables(root)
+    tables = root.table("variable", required=True)
+    found = [_variable(tables, name) for name in tables.values] if tables else []
+    variables = tuple(variable for variable in found if variable)
     senses = {axis: -1 if axis in _texts(root, "left_handed") else 1 for axis in UNITS}
     formulas = _Formulas({variable.name: variable.sign * variable.symbol for variable in variables})
-    found = [_step(root, index, text, formulas, senses) for index, text in enumerate(_texts(root, "chain", True))]
-    steps = [step for step in found if step is not None]
-    axis = _tool_axis(root)
-    root.close()
-    _check_steps(root, variables, steps)
-    return Chain(name, variables, tuple(steps), axis)
-
-
-def _tool_axis(root: TomlTable) -> Vector:
+    steps = []
+    for index, text in enumerate(_texts(root, "chain", True)):
+        try:
+            steps.append(formulas.step(text, senses))
+        except _FormulaError as error:
+            root.report.note("NCF391", ("chain", index), f"{text!r}: {error}", error.hint)
     x, y, z = (sp.Rational(str(part)) for part in root.numbers("tool_axis", count=3) or (0, 0, 1))
     if abs(x * x + y * y + z * z - 1) > UNIT_TO:
         root.note("NCF313", "tool_axis", "is not a unit vector")
-    return x, y, z
+    root.close()
+    _check_steps(root, variables, steps)
+    return Chain(name, variables, tuple(steps), (x, y, z))
 
 
 def _texts(root: TomlTable, key: str, required: bool = False) -> list[str]:
@@ -87,12 +87,6 @@ def _texts(root: TomlTable, key: str, required: bool = False) -> list[str]:
         root.note("NCF304", key, "expected a list of texts")
         return []
     return values
-
-
-def _variables(root: TomlTable) -> tuple[Variable, ...]:
-    tables = root.table("variable", required=True)
-    found = [_variable(tables, name) for name in tables.values] if tables else []
-    return tuple(variable for variable in found if variable)
 
 
 def _variable(tables: TomlTable, name: str) -> Variable | None:
@@ -112,14 +106,6 @@ def _variable(tables: TomlTable, name: str) -> Variable | None:
         return Variable(name, kind, definition, axis, angle, arguments, number, sign or 1)
     except NcfixError as error:
         tables.note("NCF391", name, error.messages[0].text, error.messages[0].hint)
-        return None
-
-
-def _step(root: TomlTable, index: int, text: str, formulas: _Formulas, senses: Mapping[str, int]) -> Step | None:
-    try:
-        return formulas.step(text, senses)
-    except _FormulaError as error:
-        root.report.note("NCF391", ("chain", index), f"{text!r}: {error}", error.hint)
         return None
 
 
@@ -150,7 +136,10 @@ class _Formulas:
 
     def step(self, text: str, senses: Mapping[str, int]) -> Step:
         """An elementary transformation."""
-        call = _parsed(text)
+        try:
+            call = ast.parse(text.strip(), mode="eval").body
+        except (SyntaxError, ValueError, RecursionError) as error:
+            raise _FormulaError("cannot be read") from error
         if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.func.id not in STEPS:
             raise _FormulaError("a transformation is T(x, y, z), Rx(angle), Ry(angle) or Rz(angle)")
         values = [self._value(argument) for argument in call.args]
@@ -166,7 +155,9 @@ class _Formulas:
         if isinstance(node, ast.Constant) and type(node.value) in (int, float):
             return sp.Rational(str(node.value))
         if isinstance(node, ast.Name):
-            return self._named(node.id)
+            if node.id not in self._names:
+                raise _FormulaError(f"no variable {node.id!r}", did_you_mean(node.id, self._names))
+            return self._names[node.id]
         if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
             return OPERATORS[type(node.op)](self._value(node.operand))
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
@@ -177,15 +168,3 @@ class _Formulas:
                 return function(self._value(node.args[0]))
         text = f"{ast.unparse(node)!r} cannot be part of a formula"
         raise _FormulaError(text, "numbers, names, + - * / **, sin, cos, tan, sqrt")
-
-    def _named(self, name: str) -> Expr:
-        if name not in self._names:
-            raise _FormulaError(f"no variable {name!r}", did_you_mean(name, self._names))
-        return self._names[name]
-
-
-def _parsed(text: str) -> Any:
-    try:
-        return ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError) as error:
-        raise _FormulaError("cannot be read") from error

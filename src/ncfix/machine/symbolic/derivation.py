@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import product
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
@@ -52,30 +53,24 @@ class Expansion:
     def step(self, step: Step) -> list[Matrices]:
         """A step as the product of power series whose coefficients are sympy matrices."""
         if isinstance(step, Translation):
-            return [self._translation(step)]
+            parts = [polynomial_part(component, self.smalls, self.order) for component in step.vector]
+            found = {}
+            for monomial in dict.fromkeys(key for part in parts for key in part):
+                vector = [part.get(monomial, sp.Integer(0)) for part in parts]
+                found[monomial] = homogeneous(sp.zeros(3) if monomial else sp.eye(3), vector, int(not monomial))
+            return [found]
         if isinstance(step, Screw):
-            return self._exponential(self._twist(step))
+            twist: Matrices = {}
+            for row, unit in enumerate(UNITS.values()):
+                for i, factor in linear_part(step.rotation[row], self.smalls)[1].items():
+                    twist[(i,)] = twist.get((i,), sp.zeros(4)) + factor * homogeneous(skew(unit), ZERO, 0)
+                for i, factor in linear_part(step.velocity[row], self.smalls)[1].items():
+                    twist[(i,)] = twist.get((i,), sp.zeros(4)) + factor * homogeneous(sp.zeros(3), unit, 0)
+            return self._exponential(twist)
         large, factors = linear_part(step.angle, self.smalls)
         nominal: Matrices = {(): homogeneous(rodrigues(step.direction, large), ZERO)}
         turning = homogeneous(skew(step.direction), ZERO, 0)
         return [nominal, *self._exponential({(i,): factor * turning for i, factor in factors.items()})]
-
-    def _translation(self, step: Translation) -> Matrices:
-        parts = [polynomial_part(component, self.smalls, self.order) for component in step.vector]
-        found = {}
-        for monomial in dict.fromkeys(key for part in parts for key in part):
-            vector = [part.get(monomial, sp.Integer(0)) for part in parts]
-            found[monomial] = homogeneous(sp.zeros(3) if monomial else sp.eye(3), vector, int(not monomial))
-        return found
-
-    def _twist(self, step: Screw) -> Matrices:
-        twist: Matrices = {}
-        for row, unit in enumerate(UNITS.values()):
-            for i, factor in linear_part(step.rotation[row], self.smalls)[1].items():
-                twist[(i,)] = twist.get((i,), sp.zeros(4)) + factor * homogeneous(skew(unit), ZERO, 0)
-            for i, factor in linear_part(step.velocity[row], self.smalls)[1].items():
-                twist[(i,)] = twist.get((i,), sp.zeros(4)) + factor * homogeneous(sp.zeros(3), unit, 0)
-        return twist
 
     def _exponential(self, twist: Matrices) -> list[Matrices]:
         """1 + t + t^2/2 + ... of a twist that is linear in the Small variables."""
@@ -84,40 +79,22 @@ class Expansion:
         total: Matrices = {(): sp.eye(4)}
         power: Matrices = {(): sp.eye(4)}
         for degree in range(1, 2 if self.linear_trig else self.order + 1):
-            power = _multiplied(power, twist)
+            last, power = power, {}
+            for (p, left), (q, right) in product(last.items(), twist.items()):
+                key = tuple(sorted(p + q))
+                power[key] = power.get(key, sp.zeros(4)) + left * right
             for monomial, matrix in power.items():
                 total[monomial] = total.get(monomial, sp.zeros(4)) + matrix / sp.factorial(degree)
         return [total]
 
 
-def _multiplied(a: Matrices, b: Matrices) -> Matrices:
-    found: Matrices = {}
-    for p, left in a.items():
-        for q, right in b.items():
-            key = tuple(sorted(p + q))
-            found[key] = found.get(key, sp.zeros(4)) + left * right
-    return found
-
-
 def multiply(algebra: Algebra, a: Series, b: Series, order: int) -> Series:
     """The product of two series, truncated."""
     found: Series = {}
-    for p, left in a.items():
-        for q, right in b.items():
-            if len(p) + len(q) <= order:
-                key = tuple(sorted(p + q))
-                product = algebra.product(left, right)
-                found[key] = found[key] + product if key in found else product
-    return found
-
-
-def add_series(a: Series, b: Series, factor: sp.Rational) -> Series:
-    """a + factor * b."""
-    found = dict(a)
-    for key, matrix in b.items():
-        ring = matrix.domain.ring
-        scaled = matrix.applyfunc(lambda poly, ring=ring: poly * ring.domain_new(factor))
-        found[key] = found[key] + scaled if key in found else scaled
+    for (p, left), (q, right) in product(a.items(), b.items()):
+        if len(p) + len(q) <= order:
+            key, matrix = tuple(sorted(p + q)), algebra.product(left, right)
+            found[key] = found[key] + matrix if key in found else matrix
     return found
 
 
@@ -137,7 +114,10 @@ def logarithm(algebra: Algebra, series: Series, order: int) -> Series:
     power: Series | None = None
     for degree in range(1, order + 1):
         power = x if power is None else multiply(algebra, power, x, order)
-        total = add_series(total, power, sp.Rational((-1) ** (degree + 1), degree))
+        factor = algebra.ring.domain_new(sp.Rational((-1) ** (degree + 1), degree))
+        for key, matrix in power.items():
+            scaled = matrix.applyfunc(lambda poly, factor=factor: poly * factor)
+            total[key] = total[key] + scaled if key in total else scaled
     return total
 
 
@@ -181,23 +161,6 @@ class Derivation:
         return tuple(variable.name for i, variable in enumerate(self.chain.smalls) if i not in used)
 
 
-def derive_chain(chain: Chain, order: int = 1, linear_trig: bool = False) -> Derivation:
-    """Derive the formulas of a chain; raises `UsageError` NCF392 if the order is not 1, 2, ...
-
-    linear_trig  replace sin t by t and cos t by 1 for errors, as Freeman and Ford do: wrong from second order on
-    """
-    if order < 1:
-        raise UsageError.of("NCF392", f"the order is {order}", hint="1 is first order, 2 second order")
-    smalls = tuple(variable.symbol for variable in chain.smalls)
-    expansion = Expansion(smalls, order, linear_trig)
-    factors = [factor for step in chain.steps for factor in expansion.step(step)]
-    entries = [entry for factor in factors for matrix in factor.values() for entry in matrix]
-    algebra = Algebra(sp.expand(entry) for entry in (*entries, *chain.tool_axis))
-    series = [{key: algebra.matrix(matrix) for key, matrix in factor.items()} for factor in factors]
-    pose = compose(algebra, series, order)
-    return Derivation(chain, order, _nominal(algebra, pose[()], chain), _terms(algebra, pose, order))
-
-
 def _nominal(algebra: Algebra, pose: DomainMatrix, chain: Chain) -> dict[str, sp.Expr]:
     axis = algebra.matrix(sp.Matrix([*chain.tool_axis, 0]))
     direction = algebra.product(pose, axis)
@@ -235,15 +198,23 @@ def derive(
     include      which errors: names or patterns such as "E?C"; for a machine also the groups "motions", "locations",
                  "spindle" and "machine" (what its file has). None: all motions and locations; all errors of a chain
     lettered     of a machine: fixed angles of axes become variables instead of exact constants
-    linear_trig  sin t = t and cos t = 1 for errors, as Freeman and Ford have it: not true from second order on
+    linear_trig  sin t = t and cos t = 1 for errors, as Freeman and Ford have it: wrong from second order on
 
     Raises `UsageError` NCF392 (order) and NCF393 (an error that is not there).
     """
     if isinstance(source, Machine):
-        source = from_machine(source, DEFAULT if include is None else include, lettered)
-    elif include is not None:
-        source = _only(source, [include] if isinstance(include, str) else list(include))
-    return derive_chain(source, order, linear_trig)
+        chain = from_machine(source, DEFAULT if include is None else include, lettered)
+    else:
+        chain = source if include is None else _only(source, [include] if isinstance(include, str) else list(include))
+    if order < 1:
+        raise UsageError.of("NCF392", f"the order is {order}", hint="1 is first order, 2 second order")
+    expansion = Expansion(tuple(variable.symbol for variable in chain.smalls), order, linear_trig)
+    factors = [factor for step in chain.steps for factor in expansion.step(step)]
+    entries = [entry for factor in factors for matrix in factor.values() for entry in matrix]
+    algebra = Algebra(sp.expand(entry) for entry in (*entries, *chain.tool_axis))
+    series = [{key: algebra.matrix(matrix) for key, matrix in factor.items()} for factor in factors]
+    pose = compose(algebra, series, order)
+    return Derivation(chain, order, _nominal(algebra, pose[()], chain), _terms(algebra, pose, order))
 
 
 def _only(chain: Chain, patterns: list[str]) -> Chain:

@@ -17,8 +17,8 @@ from math import atan2, pi
 
 import sympy as sp
 
-from ncfix.diagnostics import NcfixError, UsageError
-from ncfix.machine.axes import COMPONENTS, SPINDLE, Axis, Effect, component_title
+from ncfix.diagnostics import UsageError
+from ncfix.machine.axes import COMPONENTS, SPINDLE, Axis, Effect, component_names, component_title
 from ncfix.machine.axes import Vector as Numbers
 from ncfix.machine.chain import columns, lies_on_axis
 from ncfix.machine.machine import Machine
@@ -92,11 +92,10 @@ class Constants:
         where = f"angle from {'xyz'[near]} towards {'xyz'[far]} of {definition}"
         exact = None if self.lettered else _degrees(size)
         angle = self._variable(f"phi{suffix}", size, where, rotary=True) if exact is None else exact
-        parts = {near: (sp.cos(angle), values[near]), far: (sp.sin(angle), values[far])}
-        total = ZERO
-        for k, (size_k, value) in parts.items():
-            total = added(total, scaled(size_k if value > 0 else -size_k, UNITS["xyz"[k]]))
-        return total
+        found = list(ZERO)
+        for k, size_k in ((near, sp.cos(angle)), (far, sp.sin(angle))):
+            found[k] = size_k if values[k] > 0 else -size_k
+        return found[0], found[1], found[2]
 
     def _variable(self, name: str, value: float, definition: str, rotary: bool = False) -> Expr:
         self.variables[name] = Variable(name, definition=definition, value=float(value), rotary=rotary)
@@ -141,20 +140,18 @@ class ErrorSymbol:
 
 def chosen(machine: Machine, include: str | Iterable[str] = DEFAULT) -> list[ErrorSymbol]:
     """The errors that `include` names: groups, names, patterns such as "E?C"; raises `UsageError` NCF393."""
-    everything = list(_names(machine))
+    everything = component_names((*machine.axis_names, SPINDLE))
     wanted: set[str] = set()
     for item in [include] if isinstance(include, str) else include:
         found = _group(machine, item) if item in GROUPS else {n for n in everything if fnmatchcase(n, item)}
         if not found and item != "machine":
-            raise _nothing(item, everything)
+            close = get_close_matches(item, (*GROUPS, *everything), 1)
+            hint = (
+                f"{f'did you mean {close[0]}? ' if close else ''}{', '.join(GROUPS)}, a name or a pattern such as E?C"
+            )
+            raise UsageError.of("NCF393", f"{item!r} names no error of this machine", hint=hint)
         wanted |= found
     return [_symbol(machine, name) for name in everything if name in wanted]
-
-
-def _names(machine: Machine) -> Iterable[str]:
-    for joint in (*machine.axis_names, SPINDLE):
-        yield from (f"E{component}{joint}" for component in COMPONENTS)
-        yield from (f"E{component}0{joint}" for component in COMPONENTS)
 
 
 def _group(machine: Machine, group: str) -> set[str]:
@@ -166,41 +163,24 @@ def _group(machine: Machine, group: str) -> set[str]:
     return {f"E{component}{zero}{axis}" for axis in machine.axis_names for component in COMPONENTS}
 
 
-def _nothing(item: str, names: Sequence[str]) -> NcfixError:
-    close = get_close_matches(item, (*GROUPS, *names), 1)
-    hint = f"did you mean {close[0]}? " if close else ""
-    text = f"{item!r} names no error of this machine"
-    return UsageError.of("NCF393", text, hint=f"{hint}{', '.join(GROUPS)}, a name or a pattern such as E?C")
-
-
 def _symbol(machine: Machine, name: str) -> ErrorSymbol:
     same = [effect for effect in machine.effects if effect.name == name and effect.active] or [Effect(name, (0.0,))]
     effect = same[0]
-    if len({(_reference(it), it.carried) for it in same}) > 1:
+    references = [each.reference if effect.rotational else None for each in same]  # only a rotation needs one
+    if len({*zip(references, (each.carried for each in same), strict=True)}) > 1:
         text = f"the effects {name} of this machine differ in reference or carried: one symbol cannot stand for them"
         raise UsageError.of("NCF393", text, hint="leave it out, or give them one reference point")
-    axes = {axis.name: axis for axis in machine.axes}
-    title = component_title(name, axes.get(effect.joint))
+    own = () if effect.location or effect.joint == SPINDLE else (effect.joint,)
+    signals = (signal for each in same for signal in (each.signal, each.times) if signal is not None)
+    title, arguments = component_title(name, machine.axis(effect.joint)), tuple(dict.fromkeys((*own, *signals)))
     return ErrorSymbol(
-        variable=Variable(name, Size.SMALL, title, rotary=effect.rotational, arguments=_arguments(same)),
+        variable=Variable(name, Size.SMALL, title, rotary=effect.rotational, arguments=arguments),
         joint=effect.joint,
         component=effect.component,
         location=effect.location,
-        reference=_reference(effect),
+        reference=references[0],
         carried=effect.carried or (effect.location and effect.joint == SPINDLE),
     )
-
-
-def _reference(effect: Effect) -> Numbers | None:
-    """Only a rotation needs one."""
-    return effect.reference if effect.rotational else None
-
-
-def _arguments(same: Sequence[Effect]) -> tuple[str, ...]:
-    effect = same[0]
-    own = () if effect.location or effect.joint == SPINDLE else (effect.joint,)
-    signals = (signal for it in same for signal in (it.signal, it.times) if signal is not None)
-    return tuple(dict.fromkeys((*own, *signals)))
 
 
 Carry = Callable[[Numbers, Vector], Vector]
@@ -226,30 +206,21 @@ def from_machine(machine: Machine, include: str | Iterable[str] = DEFAULT, lette
         body = _AxisSteps(axis, constants).steps(own)
         steps += inverse(body) if axis.workpiece_side else body
     tool_axis = constants.direction(machine.tool.direction, "T", "the tool's direction")
-    steps += _spindle(machine, [error for error in errors if error.joint == SPINDLE], constants)
-    steps.append(Translation(added(_gauge(machine, constants), scaled(-LENGTH.symbol, tool_axis))))
-    axes = [Variable(a.name, definition=_title(a), axis=True, rotary=a.rotary) for a in machine.axes]
-    variables = (*axes, LENGTH, *constants.variables.values(), *(error.variable for error in errors))
-    return Chain(machine.name, variables, tuple(_telling(steps)), tool_axis)
+    gauge = constants.point(machine.tool.point, "T", "the gauge line")
+    spindle, references = [e for e in errors if e.joint == SPINDLE], _References(machine.tool.point, gauge, constants)
+    for location in (True, False):
+        steps += _small_motion((e for e in spindle if e.location == location), BASE, BASE, references)
+    steps.append(Translation(added(gauge, scaled(-LENGTH.symbol, tool_axis))))
+    variables = [*(_position(axis) for axis in machine.axes), LENGTH, *constants.variables.values()]
+    variables += [error.variable for error in errors]
+    moving = tuple(step for step in steps if not (isinstance(step, Translation) and step.vector == ZERO))
+    return Chain(machine.name, tuple(variables), moving, tool_axis)
 
 
-def _title(axis: Axis) -> str:
-    return f"position of the {'rotary' if axis.rotary else 'linear'} axis {axis.name}, {'rad' if axis.rotary else 'mm'}"
-
-
-def _telling(steps: Iterable[Step]) -> list[Step]:
-    """Without the translations by nothing."""
-    return [step for step in steps if not (isinstance(step, Translation) and step.vector == ZERO)]
-
-
-def _gauge(machine: Machine, constants: Constants) -> Vector:
-    return constants.point(machine.tool.point, "T", "the gauge line")
-
-
-def _spindle(machine: Machine, errors: Sequence[ErrorSymbol], constants: Constants) -> list[Step]:
-    references = _References(machine.tool.point, _gauge(machine, constants), constants)
-    kinds = ([e for e in errors if e.location], [e for e in errors if not e.location])
-    return [step for own in kinds for step in _small_motion(own, BASE, BASE, references)]
+def _position(axis: Axis) -> Variable:
+    kind, unit = ("rotary", "rad") if axis.rotary else ("linear", "mm")
+    title = f"position of the {kind} axis {axis.name}, {unit}"
+    return Variable(axis.name, definition=title, axis=True, rotary=axis.rotary)
 
 
 class _References:
@@ -299,12 +270,18 @@ class _AxisSteps:
         self.position = sp.Symbol(axis.name, real=True)
         self.direction = constants.direction(axis.direction, axis.name, f"the {axis.name} axis")
         self.point = constants.point(axis.point, axis.name, f"the {axis.name} axis") if axis.rotary else ZERO
-        self.triad = tuple(_triad_row(constants, row, f"{axis.name}{k}") for k, row in enumerate(axis.error_axes, 1))
+        self.triad = tuple(
+            constants.direction(row, f"{axis.name}{k}", f"row {k} of the error axes of {axis.name}")
+            for k, row in enumerate(axis.error_axes, 1)
+        )
         self.fixed = _References(axis.reference, self.point, constants)
 
     def steps(self, errors: Sequence[ErrorSymbol]) -> tuple[Step, ...]:
         """Lc L E M(q + offset) inverse(L)."""
-        turned = self._turned_triad()
+        turned: Vectors = self.triad
+        if self.axis.moving_frame and self.axis.rotary:
+            rotation = rodrigues(self.direction, self.position)
+            turned = tuple(_times(rotation, row) for row in self.triad)
         moving = _References(self.axis.reference, self.point, self.constants, self._carried)
         motion = _small_motion((e for e in errors if not e.location), turned, turned, moving)
         line = self._line([e for e in errors if e.location and not e.carried])
@@ -329,12 +306,6 @@ class _AxisSteps:
         shifts, turns = (self.triad, across) if self.axis.rotary else (across, self.triad)
         return _small_motion(errors, shifts, turns, self.fixed)
 
-    def _turned_triad(self) -> Vectors:
-        if not (self.axis.moving_frame and self.axis.rotary):
-            return self.triad
-        rotation = rodrigues(self.direction, self.position)
-        return tuple(_times(rotation, row) for row in self.triad)
-
     def _carried(self, numbers: Numbers, symbols: Vector) -> Vector:
         if not self.axis.rotary:
             return added(symbols, scaled(self.position, self.direction))
@@ -342,10 +313,6 @@ class _AxisSteps:
             return symbols
         arm = added(symbols, negated(self.point))
         return added(self.point, _times(rodrigues(self.direction, self.position), arm))
-
-
-def _triad_row(constants: Constants, row: Numbers, suffix: str) -> Vector:
-    return constants.direction(row, suffix, f"row {suffix[-1]} of the error axes of {suffix[:-1]}")
 
 
 def _times(matrix: sp.Matrix, vector: Vector) -> Vector:

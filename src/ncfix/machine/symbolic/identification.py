@@ -11,7 +11,7 @@ of the tool tip, nominal part included.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import combinations, product
@@ -36,8 +36,8 @@ class PolynomialColumns:
         self._algebra = algebra
         self._columns = columns
         self._rows = list(dict.fromkeys(row for column in columns for row in column))
-        point = _GenericPoint(algebra)
-        values = [[point.value(column.get(row)) for column in columns] for row in self._rows]
+        value = _at_generic_point(algebra)
+        values = [[value(column.get(row)) for column in columns] for row in self._rows]
         self.numbers: Array = np.array(values, dtype=np.float64).reshape(len(self._rows), len(columns))
         self.pivots = independent_columns(self.numbers)
 
@@ -60,26 +60,21 @@ class PolynomialColumns:
         return found
 
     def _factors(self, index: int) -> dict[int, sp.Expr]:
-        """The column as a combination of pivot columns."""
+        """The column as a combination of pivot columns, by Cramer's rule."""
+        algebra = self._algebra
         factors = np.linalg.lstsq(self.numbers[:, self.pivots], self.numbers[:, index], rcond=None)[0]
         used = [pivot for pivot, factor in zip(self.pivots, factors, strict=True) if abs(factor) > NEGLIGIBLE]
         rows = independent_columns(self.numbers[:, used].T)
         square = [[self._entry(row, pivot) for pivot in used] for row in rows]
-        right = [self._entry(row, index) for row in rows]
-        whole = _determinant(self._algebra, square)
-        return {pivot: self._ratio(_replaced(square, k, right), whole) for k, pivot in enumerate(used)}
-
-    def _ratio(self, square: list[list[Poly]], whole: Poly) -> sp.Expr:
-        """Cramer's rule."""
-        above, below = _determinant(self._algebra, square).cancel(whole)
-        return self._algebra.expression(above) / self._algebra.expression(below)
+        whole, found = _determinant(algebra, square), {}
+        for k, pivot in enumerate(used):
+            replaced = [[*row[:k], self._entry(r, index), *row[k + 1 :]] for r, row in zip(rows, square, strict=True)]
+            above, below = _determinant(algebra, replaced).cancel(whole)
+            found[pivot] = algebra.expression(above) / algebra.expression(below)
+        return found
 
     def _entry(self, row: int, column: int) -> Poly:
         return self._columns[column].get(self._rows[row], self._algebra.ring.zero)
-
-
-def _replaced(square: list[list[Poly]], column: int, right: list[Poly]) -> list[list[Poly]]:
-    return [[*row[:column], side, *row[column + 1 :]] for row, side in zip(square, right, strict=True)]
 
 
 def _determinant(algebra: Algebra, square: list[list[Poly]]) -> Poly:
@@ -99,18 +94,18 @@ def _determinant(algebra: Algebra, square: list[list[Poly]]) -> Poly:
     return minor(tuple(range(len(square))))
 
 
-class _GenericPoint:
-    """Numbers for the ring's generators as no coincidence would give them."""
+def _at_generic_point(algebra: Algebra) -> Callable[[Poly | None], float]:
+    """The values of polynomials where the ring's generators are numbers as no coincidence would give them."""
+    symbols = sorted(set().union(*(g.free_symbols for g in algebra.ring.symbols)), key=sp.default_sort_key)
+    numbers = np.random.default_rng(2003).uniform(0.4, 1.4, len(symbols))
+    point = {symbol: sp.Float(number) for symbol, number in zip(symbols, numbers, strict=True)}
+    values = np.array([float(g.subs(point)) for g in algebra.ring.symbols])
 
-    def __init__(self, algebra: Algebra) -> None:
-        symbols = sorted(set().union(*(g.free_symbols for g in algebra.ring.symbols)), key=sp.default_sort_key)
-        numbers = np.random.default_rng(2003).uniform(0.4, 1.4, len(symbols))
-        point = {symbol: sp.Float(number) for symbol, number in zip(symbols, numbers, strict=True)}
-        self._values = np.array([float(g.subs(point)) for g in algebra.ring.symbols])
-
-    def value(self, poly: Poly | None) -> float:
+    def value(poly: Poly | None) -> float:
         terms = poly.items() if poly else ()
-        return float(sum(float(factor) * np.prod(self._values ** np.array(powers)) for powers, factor in terms))
+        return float(sum(float(factor) * np.prod(values ** np.array(powers)) for powers, factor in terms))
+
+    return value
 
 
 def independent_columns(matrix: Array) -> list[int]:
@@ -237,17 +232,13 @@ class Equation:
     @property
     def measurement(self) -> str:
         """What is measured, in degrees: `X(90, 0) - X(270, 180)`."""
-        letter, operator = self.coordinate.upper(), "-" if self.sign < 0 else "+"
-        return f"{letter}{_pose(self.first)} {operator} {letter}{_pose(self.second)}"
+        first, second = (f"{self.coordinate.upper()}({', '.join(map(str, p))})" for p in (self.first, self.second))
+        return f"{first} {'-' if self.sign < 0 else '+'} {second}"
 
     @property
     def terms(self) -> int:
         """How long it is."""
         return sum(len(poly) for poly in self.coefficients.values()) + len(self.constant)
-
-
-def _pose(pose: Pose) -> str:
-    return f"({', '.join(map(str, pose))})"
 
 
 def equations(
@@ -267,10 +258,11 @@ def equations(
     readings = [_reading(derivation, dict(zip(axes, pose, strict=True)), set(zero)) for pose in poses]
     algebra = Algebra(sp.expand(e) for reading in readings for linear in reading for e in linear.values())
     polys = [[{key: algebra.poly(e) for key, e in linear.items()} for linear in reading] for reading in readings]
-    found = []
+    found, none = [], algebra.ring.zero
     for sign, (first, second), k in product(signs, combinations(range(len(poses)), 2), range(len(POSITION))):
-        total = _combined(algebra, polys[first][k], polys[second][k], sign)
-        constant = total.pop(sp.S.One, algebra.ring.zero)
+        a, b = polys[first][k], polys[second][k]
+        total = {key: poly for key in {**a, **b} if (poly := a.get(key, none) + sign * b.get(key, none))}
+        constant = total.pop(sp.S.One, none)
         found.append(Equation(algebra, POSITION[k], poses[first], poses[second], sign, total, constant))
     return tuple(found)
 
@@ -287,14 +279,6 @@ def _reading(derivation: Derivation, pose: Mapping[sp.Expr, int], zero: set[str]
                 linear[derivation.monomial(key).subs(values)] = coefficient.subs(values)
         found.append(linear)
     return found
-
-
-def _combined(
-    algebra: Algebra, first: Mapping[sp.Expr, Poly], second: Mapping[sp.Expr, Poly], sign: int
-) -> dict[sp.Expr, Poly]:
-    zero = algebra.ring.zero
-    total = {key: first.get(key, zero) + sign * second.get(key, zero) for key in {**first, **second}}
-    return {key: poly for key, poly in total.items() if poly}
 
 
 Choose = Callable[[Sequence[Equation]], Equation]
@@ -386,18 +370,16 @@ def report(tests: Iterable[Identification]) -> str:
 
 def measuring(derivation: Derivation, vary: Iterable[str] = ()) -> str:
     """Rank and inseparable combinations, without and with lengths varied (`vary`), then a protocol of differences."""
-    return "".join(_parts(derivation, list(vary)))
-
-
-def _parts(derivation: Derivation, vary: list[str]) -> Iterator[str]:
     chain = derivation.chain
     axes = [axis.name for axis in chain.axes]
-    yield f"{chain.name}: what the position of the tool tip tells\n"
-    yield f"\nwith {', '.join(axes)} varied: {identifiable(derivation).to_text()}"
+    parts = [
+        f"{chain.name}: what the position of the tool tip tells\n",
+        f"\nwith {', '.join(axes)} varied: {identifiable(derivation).to_text()}",
+    ]
     for name in vary:
         if any(dimension.name == name for dimension in chain.dimensions):
-            yield f"\nwith {name} varied, too: {identifiable(derivation, [*axes, name]).to_text()}"
-    rotary = [axis.name for axis in chain.axes if axis.rotary]
-    if rotary:
-        yield f"\nDifferences of readings at ({', '.join(rotary)}), degrees, everything else standing still\n"
-        yield report(protocol(equations(derivation, signs=(-1,))))
+            parts.append(f"\nwith {name} varied, too: {identifiable(derivation, [*axes, name]).to_text()}")
+    if rotary := [axis.name for axis in chain.axes if axis.rotary]:
+        parts.append(f"\nDifferences of readings at ({', '.join(rotary)}), degrees, everything else standing still\n")
+        parts.append(report(protocol(equations(derivation, signs=(-1,)))))
+    return "".join(parts)

@@ -20,24 +20,26 @@ MEANINGS = (
 
 
 def to_text(derivation: Derivation) -> str:
-    """The whole derivation."""
-    return "\n".join(_text_lines(derivation)) + "\n"
-
-
-def _text_lines(derivation: Derivation) -> Iterator[str]:
-    chain = derivation.chain
-    yield f"{chain.name}: errors to {ordinal(derivation.order)} order"
-    yield from ("", "Variables")
-    yield from variable_table(chain.variables)
-    yield from ("", "Nominal", f"  {MEANINGS[0]}")
-    yield from (f"  {name} = {derivation.nominal[name]}" for name in (*POSITION, *DIRECTION))
-    yield from ("", "Inverse nominal", "  axis positions, rad and mm")
-    yield from (f"  {line}" for line in inverse_nominal(derivation).lines())
-    yield from ("", "Error", f"  {MEANINGS[1]}")
+    """Plain text: variables, nominal formulas and their inverse, and the errors, one summand on each line."""
+    lines = [f"{derivation.chain.name}: errors to {ordinal(derivation.order)} order", "", "Variables"]
+    lines += variable_table(derivation.chain.variables)
+    lines += ["", "Nominal", f"  {MEANINGS[0]}"]
+    lines += [f"  {name} = {derivation.nominal[name]}" for name in (*POSITION, *DIRECTION)]
+    lines += ["", "Inverse nominal", "  axis positions, rad and mm"]
+    lines += [f"  {line}" for line in inverse_nominal(derivation).lines()]
+    lines += ["", "Error", f"  {MEANINGS[1]}"]
     for component in COMPONENTS:
-        yield from _text_component(derivation, component)
+        terms = derivation.terms[component]
+        lines.append(f"  {component} =" if terms else f"  {component} = 0")
+        for key, coefficient in terms.items():
+            sign, size = signed(coefficient)
+            shown = f"({size})" if size.is_Add else f"{size}"
+            errors = str(derivation.monomial(key))
+            product = errors if size == 1 else f"{size}*{errors}" if size.is_Number else f"{errors}*{shown}"
+            lines.append(f"    {sign} {product}")
     if derivation.without_effect:
-        yield from ("", f"Without effect: {' '.join(derivation.without_effect)}")
+        lines += ["", f"Without effect: {' '.join(derivation.without_effect)}"]
+    return "\n".join(lines) + "\n"
 
 
 def ordinal(order: int) -> str:
@@ -53,46 +55,32 @@ def variable_table(variables: Iterable[Variable]) -> Iterator[str]:
         yield f"  {f'{variable.symbol}{value}':<24} {variable.size.value:<6} {variable.definition}{sign}".rstrip()
 
 
-def _text_component(derivation: Derivation, component: str) -> Iterator[str]:
-    terms = derivation.terms[component]
-    yield f"  {component} = 0" if not terms else f"  {component} ="
-    for key, coefficient in terms.items():
-        sign, size = signed(coefficient)
-        yield f"    {sign} {_text_product(str(derivation.monomial(key)), size)}"
-
-
 def signed(coefficient: sp.Expr) -> tuple[str, sp.Expr]:
     """The sign of a summand, and the rest."""
     negative = coefficient.as_coeff_Mul()[0].is_negative
     return ("-", -coefficient) if negative else ("+", coefficient)
 
 
-def _text_product(errors: str, size: sp.Expr) -> str:
-    if size == 1:
-        return errors
-    if size.is_Number:
-        return f"{size}*{errors}"
-    return f"{errors}*({size})" if size.is_Add else f"{errors}*{size}"
-
-
 NAMES = {"dx": r"\delta_x", "dy": r"\delta_y", "dz": r"\delta_z", "rx": r"\rho_x", "ry": r"\rho_y", "rz": r"\rho_z"}
 
 
 def to_latex(derivation: Derivation) -> str:
-    """Nominal formulas and error formulas."""
-    names = symbol_names(derivation)
-    nominal = [f"{name} &= {_latex(derivation.nominal[name], names)}" for name in (*POSITION, *DIRECTION)]
-    blocks = [_aligned(nominal), *(_aligned(list(_latex_component(derivation, name, names))) for name in COMPONENTS)]
-    return "\n".join(blocks)
-
-
-def symbol_names(derivation: Derivation) -> dict[sp.Expr, str]:
-    """How each variable is written."""
-    return {variable.symbol: _latex_name(variable) for variable in derivation.chain.variables}
-
-
-def _latex_name(variable: Variable) -> str:
-    return f"{variable.latex}({', '.join(variable.arguments)})" if variable.arguments else variable.latex
+    """LaTeX: aligned equations for a document that loads amsmath; nominal formulas and error formulas."""
+    names = {}
+    for variable in derivation.chain.variables:
+        arguments = f"({', '.join(variable.arguments)})" if variable.arguments else ""
+        names[variable.symbol] = variable.latex + arguments
+    blocks = [[f"{name} &= {_latex(derivation.nominal[name], names)}" for name in (*POSITION, *DIRECTION)]]
+    for component in COMPONENTS:
+        lines = [] if derivation.terms[component] else [f"{NAMES[component]} &= 0"]
+        for number, (key, coefficient) in enumerate(derivation.terms[component].items()):
+            sign, size = signed(coefficient)
+            shown = "" if sign == "+" and number == 0 else sign
+            head = "&\\quad" if number else f"{NAMES[component]} &="
+            lines.append(f"{head} {shown} {_latex_product(_latex(derivation.monomial(key), names), size, names)}")
+        blocks.append(lines)
+    bodies = (" \\\\\n".join(f"  {line}" for line in lines) for lines in blocks)
+    return "\n".join(f"\\begin{{align*}}\n{body}\n\\end{{align*}}\n" for body in bodies)
 
 
 def _latex(expression: sp.Expr, names: dict[sp.Expr, str]) -> str:
@@ -103,17 +91,6 @@ def _latex(expression: sp.Expr, names: dict[sp.Expr, str]) -> str:
     return text
 
 
-def _latex_component(derivation: Derivation, component: str, names: dict[sp.Expr, str]) -> Iterator[str]:
-    terms = derivation.terms[component]
-    if not terms:
-        yield f"{NAMES[component]} &= 0"
-    for number, (key, coefficient) in enumerate(terms.items()):
-        sign, size = signed(coefficient)
-        shown = "" if sign == "+" and number == 0 else sign
-        head = "&\\quad" if number else f"{NAMES[component]} &="
-        yield f"{head} {shown} {_latex_product(_latex(derivation.monomial(key), names), size, names)}"
-
-
 def _latex_product(errors: str, size: sp.Expr, names: dict[sp.Expr, str]) -> str:
     if size == 1:
         return errors
@@ -121,11 +98,6 @@ def _latex_product(errors: str, size: sp.Expr, names: dict[sp.Expr, str]) -> str
     if size.is_Number:
         return rf"{text}\,{errors}"
     return rf"{errors}\,\left({text}\right)" if size.is_Add else rf"{errors}\,{text}"
-
-
-def _aligned(lines: list[str]) -> str:
-    body = " \\\\\n".join(f"  {line}" for line in lines)
-    return f"\\begin{{align*}}\n{body}\n\\end{{align*}}\n"
 
 
 WIDTH = 116
