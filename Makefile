@@ -1,7 +1,8 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint format accuracy bench same-bytes tables study hidden metamorphic refusals inserted-blocks ci clean
+.PHONY: demo test lint format accuracy bench same-bytes tables study hidden metamorphic refusals inserted-blocks \
+	goldens goldens-update ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -49,6 +50,15 @@ refusals:        ## what becomes of the motion blocks of the corpus, all folders
 
 inserted-blocks: ## how many blocks a correction puts into the programs of the corpus, by language (minutes); TOLERANCE=1.9 MOST=20000
 	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/inserted_blocks.py $(if $(TOLERANCE),--tolerance-um $(TOLERANCE)) $(if $(MOST),--most $(MOST))
+
+GOLDENS = PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) -m goldens $(ONLY) \
+	$(if $(JOBS),--jobs $(JOBS)) $(if $(AGAINST),--against $(AGAINST)) $(if $(SHOW),--show $(SHOW))
+
+goldens:         ## compare what comes out with docs/changes-of-output.md; ONLY="klartext measure" AGAINST=COMMIT JOBS=2 SHOW=CASE
+	$(GOLDENS)
+
+goldens-update:  ## take what comes out now as right; ONLY="klartext"
+	$(GOLDENS) --update
 
 ci:              ## what the server runs
 	.ci/run
