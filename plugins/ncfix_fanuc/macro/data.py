@@ -9,8 +9,8 @@ from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z
 from ncfix.control.motion import Motion
 from ncfix.control.moves import Kind
 from ncfix.control.places import mask_of
-from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.settings import AFTER_UNFOLLOWED
 from ncfix_iso.rs274.systems import (
     SYSTEM_NAMES,

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from ncfix.control.faults import Fault
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Flow, Jump, Let, OpenCall, Operation, Return
 from ncfix.control.parts import NotInPartsError
+from ncfix.control.values import Unknown
 from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
 from ncfix.text.tree import Flow as FlowItem
 from ncfix_fanuc.macro import builder
-from ncfix_fanuc.macro.arithmetic import number
+from ncfix_fanuc.macro.expressions import number
 from ncfix_iso.rs274.control import Control
 from ncfix_iso.rs274.parameters import Store
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit, has_words
@@ -44,7 +45,7 @@ LENGTHS = frozenset("ABCIJKQRUVWXYZ")
 
 def local_variables(arguments: Iterable[tuple[str, float, bool]]) -> Store:
     """The local variables that arguments (address, value, known only at run time) set, in the order written."""
-    store = Store()
+    store: Store = {}
     count, last = 1, 0
     for address, value, runtime in arguments:
         if address not in ONCE:
@@ -57,7 +58,7 @@ def local_variables(arguments: Iterable[tuple[str, float, bool]]) -> Store:
             number = 3 * count + position
             if count > SETS:
                 raise Fault("NCF221", f"I, J and K may stand {SETS} times in a macro call")
-        store.assign(number, value, runtime)
+        store[number] = Unknown(f"#{number}", value) if runtime else value
     return store
 
 

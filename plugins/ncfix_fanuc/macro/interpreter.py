@@ -11,19 +11,20 @@ from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z
 from ncfix.control.faults import Fault
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.places import mask_of
+from ncfix.control.values import Unknown, nominal
 from ncfix.text.language import Run
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import dynamic, polar, scaling, system, vectors
-from ncfix_fanuc.macro.arithmetic import variable_number
 from ncfix_fanuc.macro.control import MacroControl
 from ncfix_fanuc.macro.corners import CORNER
+from ncfix_fanuc.macro.expressions import is_vacant, variable_number
 from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
 from ncfix_fanuc.macro.lengths import LENGTH_IN_STEPS, lone_number
 from ncfix_fanuc.macro.points import G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.rules import MACRO
 from ncfix_fanuc.macro.variables import POSITION_READ, is_system
-from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.control import Block
+from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, RS274Interpreter
 from ncfix_iso.rs274.order import MACHINE
 from ncfix_iso.rs274.parameters import Store
@@ -166,8 +167,8 @@ class MacroInterpreter(RS274Interpreter):
         """The plan without the words whose value is a vacant variable: they count as not written."""
         if not plan.computed and not plan.code_words:
             return plan
-        spans = [span for _, function, span in plan.computed if math.isnan(function(self.control))]
-        spans += [word.span for word, function in plan.code_words if math.isnan(function(self.control))]
+        spans = [span for _, function, span in plan.computed if is_vacant(function(self.control))]
+        spans += [word.span for word, function in plan.code_words if is_vacant(function(self.control))]
         if not spans:
             return plan
         key = id(plan), frozenset(spans)
@@ -230,11 +231,11 @@ class MacroInterpreter(RS274Interpreter):
         parameters = self.control.parameters
         for target, function, span in plan.assignments:
             self.span = span
-            parameters.touched = False
-            number = variable_number(target(self.control)) if callable(target) else int(target)
+            which = target(self.control) if callable(target) else float(target)
+            number = variable_number(nominal(which))
             parameters.check_writable(number)
-            value = function(self.control)
-            runtime = parameters.touched
+            value, runtime = self.control.value_of(function)
+            runtime |= isinstance(which, Unknown)
             parameters.assign(number, value, runtime)
             if is_system(number):
                 system.was_set(self.control, number, value, runtime)

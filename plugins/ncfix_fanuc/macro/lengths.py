@@ -13,7 +13,7 @@ from ncfix.text.tree import Comment, Tape, Word
 from ncfix_fanuc.macro.data import CHANGED
 from ncfix_fanuc.macro.vectors import INCLINED
 from ncfix_iso.rs274 import lengths
-from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.groups import LENGTH
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from ncfix.control.motion import Motion
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
-from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.lengths import tool_offset
 from ncfix_iso.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, go_to_reference
 from ncfix_iso.rs274.targets import destination

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ncfix_fanuc.macro import data, dynamic, lengths, mirror, polar, references, scaling, tilt
-from ncfix_fanuc.macro.arithmetic import compiled
 from ncfix_fanuc.macro.cycles import cycle
+from ncfix_fanuc.macro.expressions import compiled
 from ncfix_fanuc.macro.variables import is_lasting, is_system
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.groups import ISO_G, Rules, grouped

@@ -13,13 +13,14 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ncfix.control.faults import Fault
+from ncfix.control.values import Unknown, Value, nominal
 from ncfix_fanuc.macro.data import keep_length
 from ncfix_iso.rs274.systems import activate, before_persistent
 
 if TYPE_CHECKING:
     from ncfix_fanuc.macro.control import MacroControl
 
-Getter = Callable[[], float]
+Getter = Callable[[], Value]
 
 OFFSETS = range(5221, 5327)
 """Work offsets G54 (5221) to G59 (5321), twenty numbers each."""
@@ -61,12 +62,12 @@ def offsets(control: MacroControl) -> dict[int, Getter]:
     return {number: partial(offset, control, number) for number in OFFSETS if (number - OFFSETS.start) % 20 in SPATIAL}
 
 
-def offset(control: MacroControl, number: int) -> float:
+def offset(control: MacroControl, number: int) -> Value:
     """A work offset; it has to be given."""
     before_persistent(control, number)
-    store = control.parameters.numbers
-    control.parameters.touched |= number in store.runtime
-    return store.values.get(number, 0.0) / control.modal.unit
+    found = control.parameters.numbers.get(number, 0.0)
+    value = nominal(found) / control.modal.unit
+    return Unknown(found.why, value) if isinstance(found, Unknown) else value
 
 
 def modes(control: MacroControl) -> dict[int, Getter]:
@@ -96,7 +97,7 @@ def was_set(control: MacroControl, number: int, value: float, runtime: bool) -> 
         raise Fault(ALARM_RAISED, "the program raises an alarm here (#3000)", "the control stops")
     system, place = divmod(number - OFFSETS.start, 20)
     if number in OFFSETS and place in SPATIAL:
-        control.parameters.numbers.assign(number, control.modal.unit * value, runtime)
+        control.parameters.put(control.parameters.numbers, number, control.modal.unit * value, runtime)
         if control.modal.system == 1 + system:
             activate(control, control.modal.system)
     elif number in LENGTHS:

@@ -26,7 +26,7 @@ from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
 from ncfix_fanuc.macro.planes import are_square, by_axes, by_points, euler, in_order
 from ncfix_fanuc.macro.squaring import SQUARED, Squared, turned_square
-from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.settings import unfollowed
 from ncfix_iso.rs274.shifts import rotate_system
 from ncfix_iso.rs274.systems import turned_back

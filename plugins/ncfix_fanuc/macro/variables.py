@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ncfix.control.faults import Fault
-from ncfix_fanuc.macro.arithmetic import VACANT
+from ncfix.control.values import Unknown, Value, nominal
+from ncfix_fanuc.macro.expressions import VACANT
 from ncfix_iso.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, Parameters, Store
 
 LOCAL = range(1, 34)
@@ -48,7 +49,7 @@ class Variables(Parameters):
     unset: Callable[[int], None] = lambda index: None
     inherits: bool = False
 
-    def numbered(self, index: int) -> float:
+    def numbered(self, index: int) -> Value:
         """The value of `#index`, vacant if it has none; raises `Fault`."""
         if index == 0:
             return VACANT
@@ -57,25 +58,22 @@ class Variables(Parameters):
         store = self.store_of(index)
         if index in self.live:
             return self.from_control(index)
-        if index not in store.values and self.is_left_over(index):
+        if index not in store and self.is_left_over(index):
             self.unset(index)
-            self.touched = True
-            return 0.0
-        if index in store.runtime or (is_system(index) and index not in store.values):
-            self.touched = True
-        return store.values.get(index, 0.0 if is_system(index) else VACANT)
+            return Unknown(f"#{index}")
+        return store.get(index, Unknown(f"#{index}") if is_system(index) else VACANT)
 
     def is_left_over(self, index: int) -> bool:
         """Whether a variable that the program has not set may have a value from another program."""
         return is_common(index) or (self.inherits and len(self.scopes) == 1)
 
-    def from_control(self, index: int) -> float:
+    def from_control(self, index: int) -> Value:
         """A value that the control computes; a position is not what it will be when the program is corrected."""
         self.changes += 1
         value = self.live[index]()
         if any(index in positions for positions in POSITIONS):
             self.position(index)
-            self.touched = True
+            return Unknown(f"#{index}", nominal(value))
         return value
 
     def store_of(self, index: Key) -> Store:
@@ -93,9 +91,7 @@ class Variables(Parameters):
 
     def assign(self, key: Key, value: float, runtime: bool = False) -> None:
         """Set a variable."""
-        store = self.store_of(key)
-        self.changes += store.values.get(key) != value
-        store.assign(key, value, runtime)
+        self.put(self.store_of(key), key, value, runtime)
         if isinstance(key, int) and is_system(key):
             setter = self.setters.get(key)
             if setter is not None:

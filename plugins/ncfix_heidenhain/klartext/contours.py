@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 
 from ncfix.control.coordinates import PLANES, X, Y, dot, rotated
+from ncfix.control.values import Unknown, Value, nominal, signed
 from ncfix_heidenhain.klartext.control import FREELY, Control
 from ncfix_heidenhain.klartext.free import Element, Leg, solved
 from ncfix_heidenhain.klartext.step import IN_PLANE, somewhere
@@ -122,12 +123,13 @@ def element_of(control: Control, text: str) -> Element | None:
     arc, rest = found["arc"].upper() == "C", text[found.end() :]
     if SENSE.sub(" ", WORD.sub(" ", REST.sub(" ", rest))).strip():
         return None
-    control.scope.parameters.touched = False
     pairs = [(name.upper(), number(control, value)) for name, value in WORD.findall(REST.sub(" ", rest))]
     signs = {name.upper(): 1 if sign == "+" else -1 for name, sign in SENSE.findall(rest)}
-    values = dict(pairs)
+    if any(isinstance(value, Unknown) for _, value in pairs):
+        return None
+    values = {name: nominal(value) for name, value in pairs}
     fits = values.keys() <= (OF_ARCS if arc else OF_LINES) and len(values) == len(pairs) and (arc or "DR" not in signs)
-    if control.scope.parameters.touched or not fits or ("CCX" in values) != ("CCY" in values):
+    if not fits or ("CCX" in values) != ("CCY" in values):
         return None
     return Element(
         arc,
@@ -145,11 +147,11 @@ def element_of(control: Control, text: str) -> Element | None:
     )
 
 
-def number(control: Control, text: str) -> float:
+def number(control: Control, text: str) -> Value:
     """The value of a number or a Q parameter."""
     bare = "".join(text.split()).lstrip("+-")
     value = control.scope.parameters.get(bare.upper()) if bare[0] in "Qq" else float(bare.replace(",", "."))
-    return -value if text.startswith("-") else value
+    return signed(-1.0 if text.startswith("-") else 1.0, value)
 
 
 def in_radians(values: Mapping[str, float], name: str) -> float | None:

@@ -10,7 +10,7 @@ from ncfix.control import control as base
 from ncfix.control import tcp
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
 from ncfix.control.knowledge import WORK_OFFSET
-from ncfix.control.motion import AT_START, Motion, Unknown, first_reason
+from ncfix.control.motion import AT_START, Motion, UnknownAxes, first_reason
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.places import mask_of
@@ -226,7 +226,7 @@ class Control(base.Control):
         machine = motion.passing is not None and motion.passing.rule is Pass.MACHINE_COORDINATES
         return 0 if self.modal.incremental or machine else own
 
-    def is_led(self, unknown: Unknown) -> bool:
+    def is_led(self, unknown: UnknownAxes) -> bool:
         """What is not known is so because the control itself has led the axes somewhere."""
         return bool(unknown) and LED_BY_CONTROL.issuperset(unknown.values())
 

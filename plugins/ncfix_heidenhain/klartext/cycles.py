@@ -14,6 +14,7 @@ from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion
 from ncfix.control.moves import Kind
 from ncfix.control.places import mask_of
+from ncfix.control.values import numbers
 from ncfix_heidenhain.klartext import trans_cycles
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, Control
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
@@ -178,11 +179,11 @@ def levels(control: Control, height: float) -> tuple[float, float, str]:
         sign = -1.0 if depth < 0 else 1.0
         return height + sign * unit * (abs(gap) + abs(depth)), height, ""
     parameters = control.scope.parameters
-    parameters.touched = False
-    gap, depth, surface, second = (parameters.get(name) for name in ("Q200", "Q201", "Q203", "Q204"))
-    by_diameter = cycle.number == 240 and parameters.get("Q343") != 0.0
-    if parameters.touched or by_diameter:
+    by_diameter = parameters.get("Q343") if cycle.number == 240 else 0.0
+    known = numbers(parameters.get(name) for name in ("Q200", "Q201", "Q203", "Q204"))
+    if known is None or by_diameter != 0.0:
         return height, height, DEPTH_AT_RUN_TIME
+    gap, depth, surface, second = known
     clear = surface + max(gap, second)
     return unit * (surface + depth), unit * clear, ""
 

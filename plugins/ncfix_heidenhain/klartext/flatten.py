@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ncfix.control.flatten import Change, FlatLine, Flattener
+from ncfix.control.values import nominal
 from ncfix.text.number_style import decimals_for
 from ncfix.text.tree import Assignment, Constant, Expression, Literal, Opaque, Span, Text, Word
 from ncfix_heidenhain.klartext.calculate import compiled
@@ -72,10 +73,10 @@ class KlartextFlattener(Flattener):
         parameters = replace(control.scope.parameters, values=dict(control.scope.parameters.values))
         scope = replace(control.scope, parameters=parameters)
         for name, value in plan.assignments:
-            parameters.assign(name, value(scope))
+            parameters.assign(name, *scope.value_of(value))
         places = pattern_of_cycle(int(plan.name.removeprefix("cycl def ")), parameters) or ()
         shared = [name for name, _ in plan.assignments if name in SHARED]
-        set_anew = [f"FN 0: {name} = {self.short(parameters.get(name))}" for name in shared]
+        set_anew = [f"FN 0: {name} = {self.short(nominal(parameters.get(name)))}" for name in shared]
         return [*set_anew, *(f"L {self.place(place)} R0 FMAX M99" for place in places)] if places else []
 
     def point(self, place: complex) -> str:

@@ -11,18 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ncfix.control.coordinates import INDEX
+from ncfix.control.expressions import Evaluate
 from ncfix.control.faults import Fault
 from ncfix.control.flow import Return
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.control.moves import Moves
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.places import mask_of
+from ncfix.control.values import Unknown
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
 from ncfix.text.reach import UNREAD
 from ncfix.text.tree import Command, Opaque, Program, Template
 from ncfix_heidenhain.klartext import cycles, lines, tilting, trans_cycles
-from ncfix_heidenhain.klartext.calculate import Evaluate
 from ncfix_heidenhain.klartext.codes import after_motion, before_motion
 from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.flow import PROGRAM, KlartextFlow
@@ -178,10 +179,10 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     def holds(self, plan: Plan) -> bool:
         """Whether a condition is met; raises `Fault` if that is known only at run time."""
         assert plan.test is not None
-        value, at_runtime = self.control.scope.value_of(plan.test)
-        if at_runtime:
+        value = plan.test(self.control.scope)
+        if isinstance(value, Unknown):
             code = AT_RUN_TIME if self.watcher is None else WRITTEN_AT_RUN_TIME
-            lacking = self.control.scope.parameters.lacking
+            lacking = value.why
             text = f"where the program goes on depends on {lacking}, which is known only at run time"
             raise Fault(code, text, f'variables."{lacking}" in the setup file gives it a value')
         return value != 0.0
@@ -205,8 +206,8 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         """The number or name of a tool; a name for a number that is known only at run time."""
         if plan.tool is None or isinstance(plan.tool, str):
             return plan.tool
-        number, at_runtime = self.control.scope.value_of(plan.tool)
-        return self.control.scope.parameters.lacking if at_runtime else number
+        number = plan.tool(self.control.scope)
+        return number.why if isinstance(number, Unknown) else number
 
     def names(self, plan: Plan, flow: KlartextFlow) -> str:
         """The words of a cycle definition that have no value."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from ncfix.control import tcp
 from ncfix.control.coordinates import LETTERS, Vector, dot
-from ncfix.control.motion import Motion, Unknown
+from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.places import mask_of
@@ -91,7 +91,9 @@ def name_polar(control: Control, step: Step) -> None:
         control.places.settle(mask_of((control.path.plane.first, control.path.plane.second)))
 
 
-def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int, *, follows: bool = False) -> None:
+def run(
+    control: Control, step: Step, target: Vector, unknown: UnknownAxes, axes: int, *, follows: bool = False
+) -> None:
     """A straight motion to a command."""
     turned = [index for index in control.turning if axes >> index & 1]
     positioning = turned and (not axes & IN_SPACE or turns(control, turned, target, unknown))
@@ -109,13 +111,13 @@ def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: in
     keep_tangent(control, *before)
 
 
-def turns(control: Control, indices: Sequence[int], target: Vector, unknown: Unknown) -> bool:
+def turns(control: Control, indices: Sequence[int], target: Vector, unknown: UnknownAxes) -> bool:
     """Whether some of these axes move, or may."""
     lost = control.unknown.keys() | unknown.keys()
     return any(index in lost or abs(target[index] - control.position[index]) > STILL for index in indices)
 
 
-def keep_tangent(control: Control, start: Vector, unknown: Unknown) -> None:
+def keep_tangent(control: Control, start: Vector, unknown: UnknownAxes) -> None:
     """Note in which direction a straight motion went; one without a way leaves the direction as it was."""
     if any(index in unknown or index in control.unknown for index in range(3) if index in control.machine):
         control.path.tangent = None
@@ -141,7 +143,7 @@ def take_short_way(control: Control, step: Step, target: Vector, axes: int) -> s
     return ""
 
 
-def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int) -> None:
+def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: UnknownAxes, axes: int) -> None:
     """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
     linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
     tcp.switch(control, control.offsets.tool, False)
@@ -160,7 +162,7 @@ def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: Unkno
     control.path.tangent = None
 
 
-def own(unknown: Unknown, index: int) -> Unknown:
+def own(unknown: UnknownAxes, index: int) -> UnknownAxes:
     """The entry of one axis."""
     return {index: unknown[index]} if index in unknown else {}
 
@@ -214,7 +216,7 @@ def departure(control: Control, step: Step) -> None:
         return
     tangent, control.path.tangent = control.path.tangent, None
     plane = control.path.plane
-    lost: Unknown = {i: DEPARTED for i in (plane.first, plane.second) if i in control.machine}
+    lost: UnknownAxes = {i: DEPARTED for i in (plane.first, plane.second) if i in control.machine}
     target = control.position[:]
     straight_on = step.name == "dep lt" and "LEN" in step.words.values and not (beside or step.words.runtime)
     if straight_on and tangent is not None:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
+from ncfix.control.values import Value, nominal, numbers, signed
 from ncfix_heidenhain.klartext.calculate import Parameters
 
 ON_CIRCLE, ON_LINES = 220, 221
@@ -40,15 +41,17 @@ Values = Mapping[str, float]
 def pattern_of(text: str, parameters: Parameters) -> tuple[Place, ...] | None:
     """The places of a PATTERN DEF; None if they are known only at run time, or their form is not."""
     code = LEFT_OUT.sub(" ", text)
-    parameters.touched = False
     found: list[Place] = []
+    certain = True
     for kind, inside in KINDS.findall(code):
-        values = {name.upper(): number(sign, value, parameters) for name, sign, value in WORDS.findall(inside)}
+        said = {name.upper(): number(sign, value, parameters) for name, sign, value in WORDS.findall(inside)}
+        certain &= numbers(said.values()) is not None
+        values = {name: nominal(value) for name, value in said.items()}
         if not understood(inside, values) or holes(values) + len(found) > MOST_HOLES:
             return None
         found += FORMS[kind.upper()](values, found)
     rest = KINDS.sub(" ", code).split()
-    return None if parameters.touched or not found or len(rest) > 2 else tuple(found)
+    return None if not certain or not found or len(rest) > 2 else tuple(found)
 
 
 def understood(inside: str, values: Values) -> bool:
@@ -61,10 +64,10 @@ def holes(values: Values) -> float:
     return max(values.get("NUM", 0.0), max(values.get("NUMX", 0.0), 1.0) * max(values.get("NUMY", 0.0), 1.0))
 
 
-def number(sign: str, text: str, parameters: Parameters) -> float:
+def number(sign: str, text: str, parameters: Parameters) -> Value:
     """The value of a number or a Q parameter."""
     value = parameters.get(text.upper()) if text[0] in "Qq" else float(text.replace(",", "."))
-    return -value if sign == "-" else value
+    return signed(-1.0 if sign == "-" else 1.0, value)
 
 
 # -- forms ------------------------------------------------------------------------------------------------------------
@@ -135,9 +138,11 @@ FORMS: Mapping[str, Callable[[Values, list[Place]], Iterator[Place]]] = {
 def pattern_of_cycle(cycle: int, parameters: Parameters) -> tuple[Place, ...] | None:
     """The places of cycle 220 or 221, from the Q parameters; None if they are known only at run time."""
     names = CIRCLE_WORDS if cycle == ON_CIRCLE else LINE_WORDS
-    parameters.touched = False
-    values = {word: parameters.get(name) for word, name in names.items()}
-    if parameters.touched or holes(values) > MOST_HOLES:
+    known = numbers(parameters.get(name) for name in names.values())
+    if known is None:
+        return None
+    values = dict(zip(names, known, strict=True))
+    if holes(values) > MOST_HOLES:
         return None
     if cycle == ON_LINES:
         return tuple(lines(values, []))

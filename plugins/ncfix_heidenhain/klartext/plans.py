@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from ncfix.control.expressions import Evaluate
 from ncfix.text.reach import UNREAD, Deletable, deletable
 from ncfix.text.tree import (
     Assignment,
@@ -19,7 +20,7 @@ from ncfix.text.tree import (
     Text,
     Word,
 )
-from ncfix_heidenhain.klartext.calculate import Evaluate, compiled
+from ncfix_heidenhain.klartext.calculate import compiled
 
 FUNCTIONS = frozenset({"l", "lp", "ln", "c", "cp", "cr", "ct", "ctp", "cc", "rnd", "chf"})
 OPENING = ("tool ", "cycl ", "plane ", "trans ", "appr ", "dep ")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ncfix.control.builder import Arc
 from ncfix.control.coordinates import Vector, X, Y
-from ncfix.control.motion import Motion, Unknown
+from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import Kind
 from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.targets import Words
@@ -40,7 +40,7 @@ def with_increments(control: Control, on: bool) -> None:
     control.modal.incremental = on
 
 
-def somewhere(control: Control, axes: int, target: Vector, unknown: Unknown, reason: str) -> None:
+def somewhere(control: Control, axes: int, target: Vector, unknown: UnknownAxes, reason: str) -> None:
     """A refused curve that ends nobody knows where: the motion before it must still end where it did."""
     normal = control.rotation[0][2], control.rotation[1][2], control.rotation[2][2]
     control.modal.arc_absolute = True

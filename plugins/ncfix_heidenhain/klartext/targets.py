@@ -15,7 +15,7 @@ from ncfix.control import tcp
 from ncfix.control.control import ADRIFT
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
 from ncfix.control.faults import Fault
-from ncfix.control.motion import AT_START, Unknown
+from ncfix.control.motion import AT_START, UnknownAxes
 from ncfix.control.places import mask_of
 from ncfix_heidenhain.klartext.control import SPATIAL, Control
 from ncfix_heidenhain.klartext.plans import MOVING
@@ -77,7 +77,7 @@ class Where:
     """A position along the axes of the frame, and why some of it is not known."""
 
     inner: Vector
-    unknown: Unknown
+    unknown: UnknownAxes
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +102,12 @@ def frame(control: Control) -> tuple[object, ...]:
     return control.rotation, tuple(control.offset), control.modal.unit, control.tcp
 
 
-def inner_unknown(control: Control, unknown: Unknown) -> Unknown:
+def inner_unknown(control: Control, unknown: UnknownAxes) -> UnknownAxes:
     """What is not known along the axes of the frame."""
     return dict(tcp.along_frame(control, unknown))
 
 
-def destination(control: Control, words: Words) -> tuple[Vector, Unknown]:
+def destination(control: Control, words: Words) -> tuple[Vector, UnknownAxes]:
     """The command at which the motion of a block ends, and what is not known of it."""
     return command_of(control, led(control, words), words.axes)
 
@@ -165,7 +165,7 @@ def settle(control: Control, words: Words) -> None:
     control.settle(wanted)
 
 
-def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unknown]:
+def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, UnknownAxes]:
     """A position as a command; axes without a word stay exactly where they are."""
     target = control.outer(where.inner)
     turned = control.is_rotated and axes & 7
@@ -182,7 +182,7 @@ def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unkno
     return target, found
 
 
-def in_machine(control: Control, words: Words) -> tuple[Vector, Unknown]:
+def in_machine(control: Control, words: Words) -> tuple[Vector, UnknownAxes]:
     """The command of words in machine coordinates (M91); increments count from the last such position, if any."""
     target, unknown = control.position[:], dict(control.unknown)
     for address, value in words.values.items():

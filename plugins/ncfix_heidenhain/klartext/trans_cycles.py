@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from ncfix.control.coordinates import DEGREE, INDEX
+from ncfix.control.values import Unknown
 from ncfix_heidenhain.klartext.control import PRESET, Control
 from ncfix_heidenhain.klartext.targets import Words
 from ncfix_heidenhain.klartext.tilting import cycle_19
@@ -88,11 +89,9 @@ def tilt(control: Control, words: Words, text: str) -> None:
 
 def preset(control: Control, words: Words, text: str) -> None:
     """Cycle 247: the preset of the row Q339."""
-    parameters = control.scope.parameters
-    parameters.touched = False
-    number = parameters.get("Q339")
+    number = control.scope.parameters.get("Q339")
     control.suspended.pop(PRESET, None)
-    if parameters.touched:
+    if isinstance(number, Unknown):
         control.suspended[PRESET] = NO_PRESET
         return
     control.load_preset(f"PRESET{number:g}")

@@ -10,8 +10,8 @@ from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion
 from ncfix.control.moves import Kind
-from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.feeds import check_feed
 from ncfix_iso.rs274.targets import destination
 

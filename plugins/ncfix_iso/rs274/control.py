@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from ncfix.control import control as shared
 from ncfix.control import rollover
 from ncfix.control.coordinates import INCH, LETTERS, zeros
+from ncfix.control.expressions import Evaluate
 from ncfix.control.modal import Saved
+from ncfix.control.values import Unknown, Value, nominal
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
-from ncfix_iso.rs274.expressions import Evaluate
 from ncfix_iso.rs274.groups import RULES, Rules
 from ncfix_iso.rs274.parameters import Parameters, Store
 
@@ -123,9 +124,8 @@ class Control(shared.Control):
 
     def value_of(self, function: Evaluate) -> tuple[float, bool]:
         """The value of an expression, and whether it is known only at run time; raises `Fault`."""
-        self.parameters.touched = False
         value = function(self)
-        return value, self.parameters.touched
+        return nominal(value), isinstance(value, Unknown)
 
     def deciding(self, function: Evaluate) -> float:
         """A value that decides where to go on; where it is known only at run time nothing after it is certain."""
@@ -134,9 +134,8 @@ class Control(shared.Control):
             self.refusal = self.refusal or RUNTIME_BRANCH
         return value
 
-    def coordinate(self, index: int) -> float:
+    def coordinate(self, index: int) -> Value:
         """Where an axis stands in program units, X not as a diameter; marked where it is known only at run time."""
         self.settle((index,))
-        if index in self.unknown or index in self.shaky:
-            self.parameters.touched = True
-        return self.program_position()[index] / self.unit_of(index)
+        value = self.program_position()[index] / self.unit_of(index)
+        return Unknown(LETTERS[index], value) if index in self.unknown or index in self.shaky else value

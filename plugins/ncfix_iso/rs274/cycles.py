@@ -11,11 +11,11 @@ import math
 from ncfix.control import tcp
 from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot
 from ncfix.control.faults import Fault
-from ncfix.control.motion import Motion, Unknown
+from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import FeedMode, Kind
 from ncfix.control.places import mask_of
-from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.systems import check_system
 from ncfix_iso.rs274.targets import by_radius_and_angle, unknown_after, unnamed
 
@@ -142,7 +142,7 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
         control.unknown = tcp.lost_of_axes(control, {**unknown, across: height})
 
 
-def hole_unknown(control: Control, block: Block) -> Unknown:
+def hole_unknown(control: Control, block: Block) -> UnknownAxes:
     """Which axes are not known at the bottom of a hole."""
     modal = control.modal
     unknown = dict(unknown_after(control, block, modal.incremental, tcp.lost_in_frame(control)))

@@ -1,95 +1,110 @@
-"""Expressions of a block made into functions, once per shape; a function reads its numbers from a `Scope`."""
+"""The expressions of RS274NGC, as LinuxCNC computes them.
+
+Source: LinuxCNC documentation, "G-code overview", "Binary operators" and "Functions"; angles are degrees. Since
+version 2.9.1 numbers are equal that differ by less than 1e-6, and `le` and `ge` hold for equal ones. Before, `eq` and
+`ne` had 0.0001, and `le` and `ge` were exact. `lt` and `gt` are exact in all (LinuxCNC, pull request 2525).
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Protocol
 
-from ncfix.control.arithmetic import ARITHMETIC
+from ncfix.control.expressions import ARITHMETIC, FUNCTIONS, SUMS, Evaluate, Expressions, power, remainder
 from ncfix.control.faults import Fault
-from ncfix.control.scope import BlockNumbers, literal
-from ncfix.text.tree import Binary, Constant, Exists, Expression, Literal, NamedParameter, Parameter, Unary
-from ncfix_iso.rs274.arithmetic import BINARY, UNARY, in_doubt, whole
+from ncfix.control.values import Unknown, Value, nominal
+from ncfix.text.tree import NamedParameter, Parameter
+
+EQUAL = 1e-6
+"""Two numbers are equal that differ by less."""
+
+FORMERLY_EQUAL = 1e-4
+"""The same for `eq` and `ne` before 2.9.1."""
 
 
-class Values(Protocol):
-    """The parameters as expressions see them.
-
-    touched  a value known only at run time has been read
-    """
-
-    touched: bool
-
-    def numbered(self, index: int) -> float:
-        """The value of `#index`; raises `Fault`."""
-
-    def named(self, name: str) -> float:
-        """The value of `#<name>`; raises `Fault`."""
-
-    def exists(self, key: int | str) -> bool:
-        """Whether the parameter has been defined."""
+def modulo(left: float, right: float) -> float:
+    """`left MOD right`, never negative."""
+    rest = remainder(left, right)
+    return rest + abs(right) if rest < 0.0 else rest
 
 
-class Scope(BlockNumbers, Protocol):
-    """What an expression may refer to."""
-
-    @property
-    def parameters(self) -> Values:
-        """The parameters."""
-
-
-Evaluate = Callable[[Scope], float]
-
-
-def compiled(expression: Expression) -> Evaluate:
-    """The function that computes an expression; it raises `Fault` where the control would stop."""
-    match expression:
-        case Literal(slot):
-            return literal(slot)
-        case Constant(value):
-            return lambda scope: value
-        case Parameter(index):
-            number = compiled(index)
-            return lambda scope: scope.parameters.numbered(whole(number(scope), "the number of a parameter"))
-        case NamedParameter(name):
-            return lambda scope: scope.parameters.named(name)
-        case Exists(parameter):
-            return existence(parameter)
-        case Unary(operator, operand):
-            return unary(operator, compiled(operand))
-        case Binary(operator, left, right):
-            return binary(operator, compiled(left), compiled(right))
-        case _:
-            raise AssertionError(f"the grammars of this family have no {type(expression).__name__}")
+def whole(value: float, what: str) -> int:
+    """A number that must be a whole one, as an index or a label; LinuxCNC allows 0.0001 off."""
+    nearest = math.floor(value)
+    if value - nearest > 0.9999:
+        return nearest + 1
+    if value - nearest > 0.0001:
+        raise Fault(ARITHMETIC, f"{what} is {value:g}, and must be a whole number")
+    return nearest
 
 
-def unary(operator: str, operand: Evaluate) -> Evaluate:
-    """A sign or a function of one argument."""
-    function = UNARY[operator]
-    return lambda scope: function(operand(scope))
+def number_of(value: Value) -> int:
+    """The number of a parameter."""
+    return whole(nominal(value), "the number of a parameter")
 
 
-def binary(operator: str, left: Evaluate, right: Evaluate) -> Evaluate:
-    """An operator between two operands; what depends on the version of the control is known at run time only."""
-    function = BINARY[operator]
+OPERATORS: dict[str, Callable[[float, float], float]] = {
+    **SUMS,
+    "mod": modulo,
+    "**": power,
+    "and": lambda a, b: float(a != 0.0 and b != 0.0),
+    "or": lambda a, b: float(a != 0.0 or b != 0.0),
+    "xor": lambda a, b: float((a != 0.0) != (b != 0.0)),
+    "eq": lambda a, b: float(abs(a - b) < EQUAL),
+    "ne": lambda a, b: float(abs(a - b) >= EQUAL),
+    "lt": lambda a, b: float(a < b),
+    "gt": lambda a, b: float(a > b),
+    "le": lambda a, b: float(a <= b or abs(a - b) < EQUAL),
+    "ge": lambda a, b: float(a >= b or abs(a - b) < EQUAL),
+    "atan": lambda y, x: math.degrees(math.atan2(y, x)),
+}
 
-    def evaluate(scope: Scope) -> float:
-        a, b = left(scope), right(scope)
-        if in_doubt(operator, a, b):
-            scope.parameters.touched = True
-        value = function(a, b)
-        if not math.isfinite(value):
-            raise Fault(ARITHMETIC, f"the result of {operator} is not a finite number")
-        return value
-
-    return evaluate
+FUNCTIONS_OF_PARAMETERS: dict[str, tuple[Callable[..., float], int]] = {
+    **FUNCTIONS,
+    "fix": (lambda a: float(math.floor(a)), 1),
+    "fup": (lambda a: float(math.ceil(a)), 1),
+    "round": (lambda a: float(math.trunc(a + math.copysign(0.5, a))), 1),
+}
 
 
-def existence(parameter: Parameter | NamedParameter) -> Evaluate:
-    """`EXISTS[...]`: 1 or 0."""
-    if isinstance(parameter, NamedParameter):
-        name = parameter.name
-        return lambda scope: float(scope.parameters.exists(name))
-    number = compiled(parameter.index)
-    return lambda scope: float(scope.parameters.exists(whole(number(scope), "the number of a parameter")))
+class ParameterExpressions(Expressions):
+    """RS274NGC: `#1`, `#<name>`, `[...]`; scopes have `parameters`."""
+
+    operators = OPERATORS
+    functions = FUNCTIONS_OF_PARAMETERS
+
+    def in_doubt(self, operator: str, left: float, right: float) -> bool:
+        """Whether a comparison comes out otherwise in older versions of the control."""
+        match operator:
+            case "eq" | "ne":
+                return EQUAL <= abs(left - right) < FORMERLY_EQUAL
+            case "le":
+                return 0.0 < left - right < EQUAL
+            case "ge":
+                return 0.0 < right - left < EQUAL
+        return False
+
+    def numbered(self, index: Evaluate) -> Evaluate:
+        """`#1`, `#[...]`; which one may itself be unknown."""
+
+        def evaluate(scope: object) -> Value:
+            which = index(scope)
+            value: Value = scope.parameters.numbered(number_of(which))  # type: ignore[attr-defined]
+            return Unknown(which.why, nominal(value)) if isinstance(which, Unknown) else value
+
+        return evaluate
+
+    def named(self, name: str) -> Evaluate:
+        """`#<name>`."""
+        return lambda scope: scope.parameters.named(name)
+
+    def existence(self, parameter: Parameter | NamedParameter) -> Evaluate:
+        """`EXISTS[...]`: 1 or 0."""
+        if isinstance(parameter, NamedParameter):
+            name = parameter.name
+            return lambda scope: float(scope.parameters.exists(name))
+        number = self.compiled(parameter.index)
+        return lambda scope: float(scope.parameters.exists(number_of(number(scope))))
+
+
+compiled = ParameterExpressions().compiled

@@ -16,6 +16,7 @@ from ncfix.control.faults import Fault
 from ncfix.control.flatten import RUNTIME, Change, FlatLine, Flattener
 from ncfix.control.places import mask_of
 from ncfix.control.unit import TextUnit
+from ncfix.control.values import nominal
 from ncfix.diagnostics import SourceError
 from ncfix.text.number_style import decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Literal, Opaque, Parameter, Word
@@ -152,10 +153,10 @@ class RS274Flattener(Flattener):
     def value_of(self, number: int) -> str:
         """The value of a parameter as text; raises `Fault` where it depends on the machine at run time."""
         parameters = self.control.parameters
-        if number in parameters.numbers.runtime:
+        if parameters.is_unknown(number):
             what = f"what #{number} is set to"
             raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
-        value = parameters.numbered(number)
+        value = nominal(parameters.numbered(number))
         return "#0" if math.isnan(value) else trimmed(value, VARIABLE_DECIMALS)
 
     def word(self, word: Word) -> Change | None:
@@ -181,7 +182,7 @@ class RS274Flattener(Flattener):
         if isinstance(word.value, Constant):
             dropped = round(10 * word.value.value) in DROPPED_CODES[word.address]
             return self.dropped(word) if dropped else None
-        value = self.control.rules.compiled(word.value, word.address)(self.control)
+        value = nominal(self.control.rules.compiled(word.value, word.address)(self.control))
         return self.dropped(word) if math.isnan(value) else self.replaced(word.value_span, f"{value:g}")
 
     def absent(self) -> list[Change]:

@@ -13,12 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
+from ncfix.control.expressions import Evaluate
 from ncfix.control.faults import Fault
 from ncfix.control.flow import NO_LABEL, NO_SUBPROGRAM, Call, Flow, Jump, Let, OpenCall, Operation
-from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.control import Control
-from ncfix_iso.rs274.expressions import Evaluate
-from ncfix_iso.rs274.parameters import Store
+from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit
 from ncfix_iso.rs274.settings import restore
 
@@ -110,7 +109,7 @@ class OWords(Flow[RS274Unit]):
     def computed_label(self, label: Evaluate) -> str:
         """A label given by an expression; where execution skips it may not have a value, and is none then."""
         try:
-            return str(whole(label(self.control), "a label"))
+            return str(whole(self.control.value_of(label)[0], "a label"))
         except Fault:
             if self.skipping is None:
                 raise
@@ -244,7 +243,7 @@ class OWords(Flow[RS274Unit]):
         begin = self.block if control.rules.strict else 0
         entry = (known.unit, known.block) if known else (file, 0) if file else (self.unit, begin)
         call = OpenCall(label, entry, left, kind, again, leave)
-        control.parameters.scopes.append(Store())
+        control.parameters.scopes.append({})
         control.saved.append(None)
         if known is None:
             self.skip_to(label)

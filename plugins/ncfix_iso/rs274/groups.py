@@ -10,8 +10,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ncfix.control.expressions import Evaluate
 from ncfix.text.tree import Expression
-from ncfix_iso.rs274.expressions import Evaluate, compiled
+from ncfix_iso.rs274.expressions import compiled
 
 NON_MODAL = "non-modal"
 MOTION = "motion"
@@ -130,7 +131,7 @@ class Rules:
     offset_group: int = 14
     system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
     lasting: Callable[[int], bool] = lambda number: False
-    compiled: Callable[[Expression, str], Evaluate] = lambda expression, address: compiled(expression)
+    compiled: Callable[[Expression, str], Evaluate] = compiled
 
 
 LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")

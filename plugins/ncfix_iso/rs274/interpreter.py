@@ -11,12 +11,13 @@ from ncfix.control.faults import Fault
 from ncfix.control.flow import NEVER_ENDS, WAITS, Flow
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.control.places import mask_of
+from ncfix.control.values import Unknown
 from ncfix.text.language import Run
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
-from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.choice import motion_of
 from ncfix_iso.rs274.control import RUNTIME_BRANCH, Block, Control
+from ncfix_iso.rs274.expressions import number_of, whole
 from ncfix_iso.rs274.flow import OWords
 from ncfix_iso.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix_iso.rs274.order import MACHINE, MOTIONS
@@ -200,24 +201,25 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         pending = []
         for target, function, span in plan.assignments:
             self.span = span
-            parameters.touched = False
-            key = whole(target(self.control), "the number of a parameter") if callable(target) else target
+            which = target(self.control) if callable(target) else target
+            key = number_of(which) if callable(target) else target
             parameters.check_writable(key)
-            pending.append((key, function(self.control), parameters.touched))
+            value, runtime = self.control.value_of(function)
+            pending.append((key, value, runtime or isinstance(which, Unknown)))
         for key, value, runtime in pending:
             parameters.assign(key, value, runtime)
 
     def computed_codes(self, plan: Plan) -> Codes:
         """The codes of a block in which some are computed."""
-        parameters = self.control.parameters
-        parameters.touched = False
+        at_runtime = False
         pairs: list[tuple[Word, int]] = []
         for word, function in plan.code_words:
-            tenths = 10 * function(self.control)
+            value, unknown = self.control.value_of(function)
+            tenths, at_runtime = 10 * value, at_runtime or unknown
             if abs(tenths - round(tenths)) > 0.001:
                 raise Fault(BAD_MOTION, f"{word.address}{tenths / 10:g} is not a code", span=word.span)
             pairs.append((word, round(tenths)))
-        if parameters.touched:
+        if at_runtime:
             self.control.refusal = self.control.refusal or "a G or M code is known only at run time"
         return grouped_codes(pairs, plan.letters, self.control.rules)
 

@@ -10,8 +10,8 @@ from ncfix.control import tcp
 from ncfix.control.coordinates import LETTERS, Vector, X, Y, Z, zeros
 from ncfix.control.faults import Fault
 from ncfix.control.places import mask_of
-from ncfix_iso.rs274.arithmetic import whole
 from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.systems import BAD_G10, SYSTEM_NAMES, first_parameter, set_system, stored, words_of
 
 BAD_LENGTH = "NCF224"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ncfix.control import tcp
 from ncfix.control.coordinates import INDEX, N_LETTERS, Vector, rotated
 from ncfix.control.faults import Fault
-from ncfix.control.motion import Motion, Unknown
+from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import FeedMode, Kind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.places import mask_of
@@ -115,15 +115,14 @@ def go_to_reference(control: Control, block: Block, code: int) -> None:
     control.make(Motion(Kind.RAPID, block.axes, target, unknown, modal, passing=passing))
 
 
-def reference_target(control: Control, name: str, axes: int) -> tuple[Vector, Unknown]:
+def reference_target(control: Control, name: str, axes: int) -> tuple[Vector, UnknownAxes]:
     """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
     first = REFERENCES[name]
-    runtime = control.parameters.numbers.runtime
     target, unknown = along(control, stored(control, first), axes), dict(control.unknown)
     for index in control.machine:
         if axes >> index & 1:
             unknown.pop(index, None)
-            given = is_given(control, first, index) and first + index not in runtime
+            given = is_given(control, first, index) and not control.parameters.is_unknown(first + index)
             if not given and not assumed(control, name):
                 unknown[index] = AFTER_REFERENCE
     if control.tcp:
@@ -185,7 +184,7 @@ def probe(control: Control, block: Block, code: int) -> None:
     control.parameters.assign(5070, 1.0, runtime=True)
 
 
-def probe_nominally(control: Control, block: Block, target: Vector, unknown: Unknown, code: int) -> None:
+def probe_nominally(control: Control, block: Block, target: Vector, unknown: UnknownAxes, code: int) -> None:
     """Probing that ends where the setup says; what is computed from it is computed anew at run time."""
     control.knowledge.probing()
     touched = {letter: value for letter, value in (control.setup.probed or {}).items() if letter in block.values}

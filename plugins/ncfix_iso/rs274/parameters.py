@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ncfix.control.faults import Fault
+from ncfix.control.values import Unknown, Value, nominal
 
 N_PARAMETERS = 5603
 """Numbered parameters are 1 up to here."""
@@ -30,24 +31,8 @@ OF_THE_MACHINE = ("_hal[", "_ini[")
 """How the names of the machine's pins begin, and of the entries of its configuration: known at run time only."""
 
 
-@dataclass(slots=True)
-class Store:
-    """The parameters of one scope that have been set, and which of them are known only at run time."""
-
-    values: dict[Key, float] = field(default_factory=dict)
-    runtime: set[Key] = field(default_factory=set)
-
-    def copy(self) -> Store:
-        """The same parameters in a store of its own."""
-        return Store(dict(self.values), set(self.runtime))
-
-    def assign(self, key: Key, value: float, runtime: bool) -> None:
-        """Set a parameter."""
-        self.values[key] = value
-        if runtime:
-            self.runtime.add(key)
-        else:
-            self.runtime.discard(key)
+Store = dict[Key, Value]
+"""The parameters of one scope that have been set."""
 
 
 @dataclass(slots=True)
@@ -60,24 +45,22 @@ class Parameters:
     predefined  named parameters of that kind
     persistent  called with the number before a parameter between 5161 and 5390 is read: it may be lacking
     returned    value of the last `return`, and whether it gave one
-    touched     a value known only at run time has been read since this was last cleared
     inputs      a pin of the machine or an input (M66) has been read: what is computed may depend on it
     changes     how often a parameter has got another value, or one has been read that the control computes
     """
 
-    numbers: Store = field(default_factory=Store)
-    scopes: list[Store] = field(default_factory=lambda: [Store()])
-    live: Mapping[int, Callable[[], float]] = field(default_factory=dict)
-    predefined: Mapping[str, Callable[[], float]] = field(default_factory=dict)
+    numbers: Store = field(default_factory=dict)
+    scopes: list[Store] = field(default_factory=lambda: [{}])
+    live: Mapping[int, Callable[[], Value]] = field(default_factory=dict)
+    predefined: Mapping[str, Callable[[], Value]] = field(default_factory=dict)
     persistent: Callable[[int], None] = lambda index: None
-    returned: tuple[float, bool] = (0.0, False)
-    touched: bool = False
+    returned: tuple[Value, bool] = (0.0, False)
     inputs: bool = False
     changes: int = 0
 
     # -- reading ------------------------------------------------------------------------------------------------------
 
-    def numbered(self, index: int) -> float:
+    def numbered(self, index: int) -> Value:
         """The value of `#index`; raises `Fault`."""
         if not 1 <= index < N_PARAMETERS:
             raise Fault(OUT_OF_RANGE, f"there is no parameter #{index}", f"they are #1 to #{N_PARAMETERS - 1}")
@@ -87,31 +70,27 @@ class Parameters:
         if 5161 <= index <= 5390:
             self.changes += 1
             self.persistent(index)
-        if index in self.numbers.runtime:
-            self.touched = True
-        return self.numbers.values.get(index, 0.0)
+        return self.numbers.get(index, 0.0)
 
-    def named(self, name: str) -> float:
+    def named(self, name: str) -> Value:
         """The value of `#<name>`; raises `Fault`."""
         if name in self.predefined:
             self.changes += 1
             return self.predefined[name]()
         scope = self.scope_of(name)
-        if name not in scope.values and name.startswith(OF_THE_MACHINE):
-            self.touched = self.inputs = True
-            return 0.0
-        if name not in scope.values:
+        if name not in scope and name.startswith(OF_THE_MACHINE):
+            self.inputs = True
+            return Unknown(f"#<{name}>")
+        if name not in scope:
             hint = f'if the control has it: variables."#<{name}>" in the setup file'
             raise Fault(UNDEFINED, f"parameter #<{name}> is used and not defined", hint)
-        if name in scope.runtime:
-            self.touched = True
-        return scope.values[name]
+        return scope[name]
 
     def exists(self, key: Key) -> bool:
         """Whether the parameter has been defined."""
         if isinstance(key, int):
             return 1 <= key < N_PARAMETERS
-        return key in self.predefined or key in self.scope_of(key).values
+        return key in self.predefined or key in self.scope_of(key)
 
     def scope_of(self, name: str) -> Store:
         """Names that begin with `_` are global, others belong to the subprogram."""
@@ -129,15 +108,22 @@ class Parameters:
 
     def assign(self, key: Key, value: float, runtime: bool = False) -> None:
         """Set a parameter, and whether its value is known only at run time."""
-        store = self.numbers if isinstance(key, int) else self.scope_of(key)
-        self.changes += store.values.get(key) != value
-        store.assign(key, value, runtime)
+        self.put(self.numbers if isinstance(key, int) else self.scope_of(key), key, value, runtime)
+
+    def put(self, store: Store, key: Key, value: float, runtime: bool) -> None:
+        """Set a parameter of a scope."""
+        self.changes += key not in store or nominal(store[key]) != value
+        store[key] = Unknown(f"#{key}", value) if runtime else value
+
+    def is_unknown(self, number: int) -> bool:
+        """Whether a numbered parameter is known only at run time."""
+        return isinstance(self.numbers.get(number), Unknown)
 
     # -- subprograms --------------------------------------------------------------------------------------------------
 
     def locals(self) -> list[tuple[float, bool]]:
         """#1 to #30, and whether they are known only at run time."""
-        return [(self.numbers.values.get(index, 0.0), index in self.numbers.runtime) for index in LOCAL]
+        return [(nominal(self.numbers.get(index, 0.0)), self.is_unknown(index)) for index in LOCAL]
 
     def set_locals(self, values: list[tuple[float, bool]]) -> None:
         """Set #1 to #30; those without a value become 0."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import INDEX
+from ncfix.control.expressions import Evaluate
 from ncfix.control.faults import Fault
 from ncfix.control.lane_tables import Lane
 from ncfix.control.modal import NO_MOTION
@@ -33,7 +34,6 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix_iso.rs274 import groups
-from ncfix_iso.rs274.expressions import Evaluate
 from ncfix_iso.rs274.groups import TOOL_CHANGE, Rules
 from ncfix_iso.rs274.order import Step, steps_of
 

@@ -10,13 +10,14 @@ from collections.abc import Callable
 from functools import partial
 
 from ncfix.control.coordinates import LETTERS
+from ncfix.control.values import Value
 from ncfix_iso.rs274.control import Control
 from ncfix_iso.rs274.flow import OWords
 
 VERSION = 2.9
 """The version of LinuxCNC that programs find: that of the interpreter which is followed."""
 
-Getter = Callable[[], float]
+Getter = Callable[[], Value]
 
 
 def install(control: Control, flow: OWords) -> None:

@@ -22,10 +22,11 @@ from ncfix.control.coordinates import (
     transposed,
 )
 from ncfix.control.faults import Fault
-from ncfix.control.motion import Unknown
+from ncfix.control.motion import UnknownAxes
 from ncfix.control.places import mask_of
-from ncfix_iso.rs274.arithmetic import whole
+from ncfix.control.values import nominal
 from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.expressions import whole
 
 SYSTEM_NAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 SHIFT = 5211
@@ -68,9 +69,9 @@ def parameter_key(name: str) -> int | str:
 
 def stored(control: Control, first: int) -> Vector:
     """Nine parameters as a position, mm and rad."""
-    values = control.parameters.numbers.values
+    values = control.parameters.numbers
     scales = (DEGREE if turning else 1.0 for turning in control.rotary)
-    return [values.get(first + index, 0.0) * scale for index, scale in enumerate(scales)]
+    return [nominal(values.get(first + index, 0.0)) * scale for index, scale in enumerate(scales)]
 
 
 def store(control: Control, first: int, index: int, value: float, runtime: bool) -> None:
@@ -81,7 +82,7 @@ def store(control: Control, first: int, index: int, value: float, runtime: bool)
 
 def is_given(control: Control, first: int, index: int) -> bool:
     """Whether a parameter of a coordinate system or reference point has been given by setup or program."""
-    return first + index in control.parameters.numbers.values
+    return first + index in control.parameters.numbers
 
 
 def words_of(block: Block) -> list[int]:
@@ -141,7 +142,7 @@ def activate(control: Control, system: int) -> None:
 
 def turn_of(control: Control, system: int) -> Rotation:
     """The rotation of a coordinate system (G10 R)."""
-    angle = control.parameters.numbers.values.get(first_parameter(system) + 9, 0.0)
+    angle = nominal(control.parameters.numbers.get(first_parameter(system) + 9, 0.0))
     return about(PLANES[170], angle) if angle else IDENTITY
 
 
@@ -149,12 +150,12 @@ def mark_shaky(control: Control) -> None:
     """Note which letters have an offset that is known only at run time."""
     if control.probes_nominally:
         return
-    runtime = control.parameters.numbers.runtime
+    unknown = control.parameters.is_unknown
     first = first_parameter(control.modal.system)
-    marked = {index for index in control.machine if first + index in runtime or SHIFT + index in runtime}
+    marked = {index for index in control.machine if unknown(first + index) or unknown(SHIFT + index)}
     marked |= control.offsets.doubtful & set(control.machine)
     turned = control.offsets.turn is not IDENTITY
-    if turned and (marked & {X, Y} or first + 9 in runtime):
+    if turned and (marked & {X, Y} or unknown(first + 9)):
         marked |= {X, Y} & set(control.machine)
     control.shaky = dict.fromkeys(sorted(marked), RUNTIME_OFFSET)
 
@@ -190,7 +191,7 @@ def check_system(control: Control) -> None:
 
 def before_persistent(control: Control, number: int) -> None:
     """A parameter between 5161 and 5390 is read: if it is one that the setup should give, it has to be there."""
-    if number in control.parameters.numbers.values:
+    if number in control.parameters.numbers:
         return
     system, axis = divmod(number - 5221, 20)
     if 0 <= system < len(SYSTEM_NAMES) and axis < N_LETTERS:
@@ -231,7 +232,7 @@ def set_system(control: Control, block: Block, *, at_position: bool) -> None:
         control.places.shift(mask_of(words_of(block)) | (mask_of((X, Y)) if "R" in block.values else 0))
 
 
-def origin_for_position(control: Control, block: Block, system: int, origin: Vector) -> tuple[Vector, Unknown]:
+def origin_for_position(control: Control, block: Block, system: int, origin: Vector) -> tuple[Vector, UnknownAxes]:
     """The origin with which the control stands at the words of the block in that system, and where it is doubtful."""
     turn = turn_of(control, system)
     involved = {*words_of(block), *((X, Y) if turn is not IDENTITY and block.axes & 3 else ())}

@@ -11,7 +11,8 @@ import math
 from ncfix.control import tcp
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, X, Y, rotated
 from ncfix.control.faults import Fault
-from ncfix.control.motion import Unknown
+from ncfix.control.motion import UnknownAxes
+from ncfix.control.values import nominal
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.systems import check_system
 
@@ -20,13 +21,13 @@ RUNTIME = "where the axis {} stands is known only at run time"
 POLAR = "NCF223"
 
 
-def destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
+def destination(control: Control, block: Block) -> tuple[Vector, UnknownAxes]:
     """The command at which a motion of this block ends."""
     target, unknown = words_destination(control, block)
     return (target, unknown | unnamed(control, block)) if control.unnamed else (target, unknown)
 
 
-def unnamed(control: Control, block: Block) -> Unknown:
+def unnamed(control: Control, block: Block) -> UnknownAxes:
     """Axes of the plane that cannot be known until both are named, after a rotation has gone on or off (G68, G69)."""
     named = {index for index in control.unnamed if block.axes >> index & 1}
     if not named:
@@ -41,7 +42,7 @@ def unnamed(control: Control, block: Block) -> Unknown:
     return dict.fromkeys(sorted(doubtful & {*control.machine}), AFTER_ROTATION)
 
 
-def words_destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
+def words_destination(control: Control, block: Block) -> tuple[Vector, UnknownAxes]:
     """The command to which the words of a block lead."""
     incremental = control.modal.incremental
     if not incremental and not control.offset_checked:
@@ -62,7 +63,7 @@ def words_destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
     return target, unknown_after(control, block, incremental, control.unknown)
 
 
-def unknown_after(control: Control, block: Block, incremental: bool, before: Unknown) -> Unknown:
+def unknown_after(control: Control, block: Block, incremental: bool, before: UnknownAxes) -> UnknownAxes:
     """Which axes are not known where the motion ends, of those that were not `before`."""
     if not (before or control.shaky or block.runtime):
         return before
@@ -79,7 +80,7 @@ def unknown_after(control: Control, block: Block, incremental: bool, before: Unk
     return unknown
 
 
-def rotated_destination(control: Control, block: Block, incremental: bool) -> tuple[Vector, Unknown]:
+def rotated_destination(control: Control, block: Block, incremental: bool) -> tuple[Vector, UnknownAxes]:
     """`destination` in a rotated frame, where one word moves several axes."""
     program = control.program_position()
     for letter, value in block.values.items():
@@ -95,7 +96,7 @@ def rotated_destination(control: Control, block: Block, incremental: bool) -> tu
     return target, rotated_unknown(control, block, incremental)
 
 
-def rotated_unknown(control: Control, block: Block, incremental: bool) -> Unknown:
+def rotated_unknown(control: Control, block: Block, incremental: bool) -> UnknownAxes:
     """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
     own = unknown_after(control, block, incremental, tcp.lost_in_frame(control))
     unknown = tcp.lost_of_axes(control, own) if own else {}
@@ -105,7 +106,9 @@ def rotated_unknown(control: Control, block: Block, incremental: bool) -> Unknow
 
 def cartesian(control: Control, block: Block) -> Block:
     """A block with polar words `@` (radius) and `^` (angle), in X and Y of the program's frame, absolute."""
-    program = [control.coordinate(index) if index in (X, Y) or block.axes >> index & 1 else 0.0 for index in range(9)]
+    program = [
+        nominal(control.coordinate(index)) if index in (X, Y) or block.axes >> index & 1 else 0.0 for index in range(9)
+    ]
     x, y = by_radius_and_angle(control, block, program[X], program[Y])
     others = {letter: value for letter, value in block.values.items() if letter not in "@^"}
     if control.modal.incremental:
@@ -131,7 +134,7 @@ def by_radius_and_angle(control: Control, block: Block, x: float, y: float) -> t
     return radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle))
 
 
-def machine_destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
+def machine_destination(control: Control, block: Block) -> tuple[Vector, UnknownAxes]:
     """The command at which a motion in machine coordinates (G53) ends."""
     target, unknown = control.position[:], dict(control.unknown)
     for letter, value in block.values.items():

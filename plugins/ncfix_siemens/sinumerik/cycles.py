@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 from ncfix.control.coordinates import LETTERS, rotated
 from ncfix.control.moves import CycleCall, Kind
+from ncfix.control.values import Unknown, number
 from ncfix_siemens.sinumerik.destination import End, Leg, Words
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.increments import stand
 from ncfix_siemens.sinumerik.patterns import AFTER_PATTERN, Points, lead_to, points_of
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
-from ncfix_siemens.sinumerik.values import Value, number
 from ncfix_siemens.sinumerik.vocabulary import DRILLING
 
 MADE = "motions that the control makes up ({})"
@@ -65,7 +65,7 @@ class Drilling:
     clear: float | None
     depth: float | None
     fault: str
-    values: tuple[Value, ...]
+    values: tuple[float | str | None, ...]
     sure: bool
     external: str
 
@@ -87,9 +87,14 @@ class Drilling:
         mode = given[GEOMETRY_MODE][1] if len(given) > GEOMETRY_MODE else None
         if step.name == CENTRING and mode:
             fault = BY_DIAMETER.format(name)
-        sure = all(value is not None for part, value in zip(step.written, values, strict=True) if part is not None)
-        values = tuple(value if part is not None else None for part, value in zip(step.written, values, strict=True))
-        return cls(step.name, clear, depth, fault, values, sure, control.external)
+        sure = all(
+            not isinstance(value, Unknown) for part, value in zip(step.written, values, strict=True) if part is not None
+        )
+        said = tuple(
+            None if part is None or isinstance(value, Unknown) else value
+            for part, value in zip(step.written, values, strict=True)
+        )
+        return cls(step.name, clear, depth, fault, said, sure, control.external)
 
     def call(self, control: Sinumerik, block: int, *, modal: bool) -> CycleCall:
         """The call for a hole in a block of the program that is executed."""

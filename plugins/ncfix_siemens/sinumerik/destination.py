@@ -10,7 +10,7 @@ from typing import NamedTuple
 from ncfix.control.builder import Arc
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, rotated
 from ncfix.control.faults import Fault
-from ncfix.control.motion import Unknown
+from ncfix.control.motion import UnknownAxes
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Passing
 from ncfix.control.places import mask_of
@@ -76,8 +76,8 @@ class End:
     """Where a motion ends: the command, which axes are not known there, and which coordinates."""
 
     target: Vector
-    unknown: Unknown
-    lost: Unknown
+    unknown: UnknownAxes
+    lost: UnknownAxes
 
 
 class Leg(NamedTuple):
@@ -116,7 +116,7 @@ def destination(control: Sinumerik, words: Words) -> End:
     return End(command(control, program, moved), control.unknown_for(lost), lost)
 
 
-def place(control: Sinumerik, words: Words, letter: str, program: Vector, lost: Unknown) -> None:
+def place(control: Sinumerik, words: Words, letter: str, program: Vector, lost: UnknownAxes) -> None:
     """Take one axis word."""
     index, value = INDEX[letter], words.values[letter]
     form = words.forms.get(letter, "")
@@ -177,7 +177,7 @@ def command(control: Sinumerik, program: Vector, moved: set[int]) -> Vector:
 # -- polar coordinates ------------------------------------------------------------------------------------------------
 
 
-def polar(control: Sinumerik, words: Words, program: Vector, lost: Unknown) -> set[int]:
+def polar(control: Sinumerik, words: Words, program: Vector, lost: UnknownAxes) -> set[int]:
     """Take AP and RP, about the pole, in the plane; the coordinates that they move."""
     plane, pole = control.modal.plane, control.modes.pole
     angle, radius = (polar_word(control, words, address) for address in ("AP", "RP"))
@@ -287,7 +287,7 @@ def machine_destination(control: Sinumerik, words: Words) -> End:
     return End(target, unknown, lost_in_frame(control, unknown))
 
 
-def place_at_machine(control: Sinumerik, words: Words, letter: str, target: Vector, unknown: Unknown) -> None:
+def place_at_machine(control: Sinumerik, words: Words, letter: str, target: Vector, unknown: UnknownAxes) -> None:
     """Take one axis word in machine coordinates."""
     index, value = INDEX[letter], words.values[letter]
     if counts_on(control, words.forms.get(letter, "")):
@@ -302,7 +302,7 @@ def place_at_machine(control: Sinumerik, words: Words, letter: str, target: Vect
         unknown[index] = RUNTIME
 
 
-def lost_in_frame(control: Sinumerik, unknown: Unknown) -> Unknown:
+def lost_in_frame(control: Sinumerik, unknown: UnknownAxes) -> UnknownAxes:
     """Which coordinates of the program are not known where these axes are not: in a turned frame one hides three."""
     if not control.is_rotated:
         return dict(unknown)

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.faults import Fault
 from ncfix.control.flatten import RUNTIME, Change, Flattener
+from ncfix.control.values import Unknown, number
 from ncfix.text.number_style import decimals_for
 from ncfix.text.tree import (
     Assignment,
@@ -34,7 +35,6 @@ from ncfix_siemens.sinumerik.render import FORM
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
-from ncfix_siemens.sinumerik.values import number
 from ncfix_siemens.sinumerik.variables import Variables, key_of
 from ncfix_siemens.sinumerik.vocabulary import FORMS, HARMLESS
 
@@ -100,9 +100,9 @@ class SinumerikFlattener(Flattener):
         places = [number(part(self.control)) for part in step.index]
         known = tuple(place for place in places if place is not None)
         value = variables.value((step.name, known) if known else step.name)
-        if value is None and not any(has_value(variables, name) for name in names_in(item.value)):
+        if isinstance(value, Unknown) and not any(has_value(variables, name) for name in names_in(item.value)):
             return None
-        if value is None or len(known) < len(places) or step.value is None:
+        if isinstance(value, Unknown) or len(known) < len(places) or step.value is None:
             raise Fault(RUNTIME, f"what {step.name.upper()} is set to is known only at run time")
         return self.replaced(item.span, f"{self.target(step.name, known)}={assigned(value)}")
 
@@ -147,8 +147,9 @@ class SinumerikFlattener(Flattener):
         values = [
             None if part is None else value(scope) for value, part in zip(step.arguments, step.written, strict=True)
         ]
-        if all(value is not None or part is None for value, part in zip(values, step.written, strict=True)):
-            return self.replaced(command.span, f"{command.name.upper()}({','.join(map(argument, values))})")
+        known = [None if isinstance(value, Unknown) else value for value in values]
+        if all(value is not None or part is None for value, part in zip(known, step.written, strict=True)):
+            return self.replaced(command.span, f"{command.name.upper()}({','.join(map(argument, known))})")
         if command.name in HARMLESS:
             return self.dropped(command)
         raise Fault(RUNTIME, f"an argument of {command.name.upper()} is known only at run time")
@@ -178,7 +179,7 @@ def indices(target: Parameter | NamedParameter | Call) -> tuple[Expression | Non
 
 def has_value(variables: Variables, name: str) -> bool:
     """Whether a name in an expression is, or may be, that of a variable whose value is known."""
-    return name == ANY_PARAMETER or variables.value(key_of(name)) is not None
+    return name == ANY_PARAMETER or not isinstance(variables.value(key_of(name)), Unknown)
 
 
 def is_index(value: Expression | None) -> bool:

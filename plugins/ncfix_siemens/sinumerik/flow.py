@@ -6,13 +6,15 @@ import copy
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from ncfix.control.expressions import Evaluate
 from ncfix.control.faults import Fault
 from ncfix.control.flow import NO_LABEL, Flow, Jump, Let, OpenCall, Operation, Repeat
+from ncfix.control.values import Unknown, Value, number
 from ncfix.text.tree import Expression, NamedParameter, Parameter
+from ncfix_siemens.sinumerik.expressions import Key, compiled
 from ncfix_siemens.sinumerik.plans import Branching, Letting
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
-from ncfix_siemens.sinumerik.values import Evaluate, Key, Value, compiled, number
 from ncfix_siemens.sinumerik.variables import Local
 
 
@@ -214,7 +216,7 @@ class SinumerikFlow(Flow[SinumerikUnit]):
         for place, parameter in enumerate(unit.parameters):
             given = place < len(values) and written[place] is not None
             local.kinds[parameter.name] = parameter.kind
-            local.values[parameter.name] = values[place] if given else None if parameter.kind == "axis" else 0.0
+            local.values[parameter.name] = values[place] if given else Unknown() if parameter.kind == "axis" else 0.0
             key = self.key_of(written[place]) if given else None
             if parameter.by_reference and key is not None:
                 results[parameter.name] = key
@@ -223,7 +225,7 @@ class SinumerikFlow(Flow[SinumerikUnit]):
         def leave() -> None:
             control.variables.scopes.pop()
             for name, theirs in results.items():
-                control.variables.assign(theirs, local.values.get(name))
+                control.variables.assign(theirs, local.values.get(name, Unknown()))
             if kept is not None:
                 control.restore(*kept)
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from ncfix.control.coordinates import INCH, INDEX, PLANES, Vector, zeros
 from ncfix.control.places import mask_of
+from ncfix.control.values import Unknown
 from ncfix_siemens.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
 from ncfix_siemens.sinumerik.destination import Words
 from ncfix_siemens.sinumerik.increments import had_from_the_start
@@ -272,7 +273,7 @@ def set_length(control: Sinumerik) -> None:
     control.suspended.pop("length", None)
     if across == 2 or constant == 17.0:
         vector[2] = length
-    elif length and constant is None:
+    elif length and isinstance(constant, Unknown):
         control.suspended["length"] = PLANE_LENGTH
     else:
         vector[across] = length

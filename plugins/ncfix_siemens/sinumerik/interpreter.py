@@ -15,6 +15,7 @@ from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Moves
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.places import mask_of
+from ncfix.control.values import number
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
 from ncfix.text.tree import Program
@@ -251,7 +252,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             if isinstance(value, str) and address == "T":
                 texts[address] = value
                 continue
-            values[address] = None if isinstance(value, str) else value
+            values[address] = number(value)
             if setting.form:
                 forms[address] = setting.form
         self.span = None

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import INDEX, LETTERS
 from ncfix.control.moves import Kind
+from ncfix.control.values import number
 from ncfix_siemens.sinumerik.destination import End, Leg, Words, destination
 from ncfix_siemens.sinumerik.plans import Letting
 from ncfix_siemens.sinumerik.state import Sinumerik
@@ -56,7 +57,7 @@ def follow_polynomial(control: Sinumerik, turn: Turn, step: Letting, letter: str
     value = first(control) if first is not None and letter is not None else None
     letters = LETTERS if letter is None else letter
     axes = [each for each in letters if INDEX[each] in control.machine]
-    ends: dict[str, float | None] = dict.fromkeys(axes, None if isinstance(value, str) else value)
+    ends: dict[str, float | None] = dict.fromkeys(axes, None if value is None else number(value))
     words = Words(turn.words.block, ends, {}, sum(1 << INDEX[each] for each in axes))
     control.go(Leg(Kind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS))
 

@@ -19,6 +19,7 @@ from ncfix.control.coordinates import DEGREE, LETTERS, angles_in_words, product
 from ncfix.control.faults import Fault
 from ncfix.control.pointing import Pointing
 from ncfix.control.pointing_angles import Triple, dot
+from ncfix.control.values import number
 from ncfix_siemens.sinumerik.affine import turned
 from ncfix_siemens.sinumerik.destination import Words
 from ncfix_siemens.sinumerik.directions import NO_LENGTH
@@ -122,7 +123,7 @@ def by_vector(words: Words) -> Triple:
 
 def by_angles(control: Sinumerik, words: Words) -> Triple | None:
     """The direction that A2 B2 C2 say, as a vector; None where nobody says how they are meant."""
-    euler = control.variables.value(MEANT.strip('"').lower())
+    euler = number(control.variables.value(MEANT.strip('"').lower()))
     default = "" if euler is None else "orieuler" if euler else "orirpy"
     meant = control.modes.angles or default
     if meant not in TURNS:

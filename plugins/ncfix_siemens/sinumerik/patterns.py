@@ -11,8 +11,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ncfix.control.values import number
 from ncfix_siemens.sinumerik.destination import End, Words, command
-from ncfix_siemens.sinumerik.values import number
 
 if TYPE_CHECKING:
     from ncfix_siemens.sinumerik.plans import Calling

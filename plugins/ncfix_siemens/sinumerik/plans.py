@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
+from ncfix.control.expressions import Evaluate, left_out
 from ncfix.control.lane_tables import Lane
 from ncfix.text.reach import Deletable, deletable
 from ncfix.text.tree import (
@@ -29,7 +30,7 @@ from ncfix.text.tree import (
 )
 from ncfix_siemens.sinumerik.blocks import STATEMENT
 from ncfix_siemens.sinumerik.build import BRACKET
-from ncfix_siemens.sinumerik.values import Evaluate, compiled, nothing
+from ncfix_siemens.sinumerik.expressions import compiled
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS
 
 DWELL_WORDS = "FS"
@@ -55,7 +56,7 @@ class Setting:
 
     def unsure(self) -> Setting:
         """The word with a value that nobody knows: its block sets a variable of it, before it reads it or after."""
-        return replace(self, value=nothing)
+        return replace(self, value=left_out)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +162,7 @@ def setting(word: Word) -> Setting:
     value = word.value
     if isinstance(value, Call) and value.name in FORMS and not value.indexed:
         inner = value.arguments[0] if value.arguments else None
-        return Setting(word.address, nothing if inner is None else compiled(inner), value.name, word.span)
+        return Setting(word.address, left_out if inner is None else compiled(inner), value.name, word.span)
     return Setting(word.address, compiled(value), "", word.span)
 
 
@@ -219,7 +220,7 @@ def target_of(item: Assignment) -> tuple[str, tuple[Evaluate, ...]]:
 
 def evaluates(arguments: tuple[Expression | None, ...]) -> tuple[Evaluate, ...]:
     """Arguments as functions; those that are left out are known only at run time."""
-    return tuple(nothing if part is None else compiled(part) for part in arguments)
+    return tuple(left_out if part is None else compiled(part) for part in arguments)
 
 
 def calling(item: Command) -> Calling:

@@ -17,18 +17,18 @@ from ncfix.control import rollover, tcp
 from ncfix.control.control import Control
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
 from ncfix.control.modal import Modal
-from ncfix.control.motion import AT_START, Motion, Unknown
+from ncfix.control.motion import AT_START, Motion, UnknownAxes
 from ncfix.control.moves import Kind, Rule
 from ncfix.control.passing import Pass
 from ncfix.control.places import mask_of
 from ncfix.control.setup import Tool
+from ncfix.control.values import Unknown, Value
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_siemens.sinumerik import heading
 from ncfix_siemens.sinumerik.affine import WORLD, shifted
 from ncfix_siemens.sinumerik.increments import Footing, footings, stand
 from ncfix_siemens.sinumerik.modes import Frames, Modes, Named
-from ncfix_siemens.sinumerik.values import Value
 from ncfix_siemens.sinumerik.variables import Variables, key_of
 from ncfix_siemens.sinumerik.vocabulary import TURNING
 
@@ -70,7 +70,7 @@ class Sinumerik(Control):
         super().__init__(run, dialect)
         self.frames = Frames()
         self.modes = Modes()
-        self.lost: Unknown = {}
+        self.lost: UnknownAxes = {}
         self.over: tuple[int, ...] = ()
         self.edge = 0
         self.allowance = 0.0
@@ -165,7 +165,7 @@ class Sinumerik(Control):
             value = self.variables.shared.get(key, 0.0)
             if key in self.variables.shared:
                 self.places.shift(1 << index)
-            if value is None and index in self.machine:
+            if isinstance(value, Unknown) and index in self.machine:
                 self.shaky[index] = RUNTIME_OFFSET
             elif letter in given:
                 self.shaky.pop(index, None)
@@ -235,7 +235,7 @@ class Sinumerik(Control):
         """Coordinates whose start position has been asked for are known."""
         self.lost = {index: why for index, why in self.lost.items() if why is not AT_START or index in self.unknown}
 
-    def unknown_for(self, lost: Unknown) -> Unknown:
+    def unknown_for(self, lost: UnknownAxes) -> UnknownAxes:
         """Which axes are not known where these coordinates of the program's frame are not."""
         if not lost:
             return {}
@@ -272,7 +272,7 @@ class Sinumerik(Control):
         plane = self.modal.plane
         return words.axes | (1 << plane.first | 1 << plane.second if words.values.keys() & {"AP", "RP"} else 0)
 
-    def _lost_at_end(self, motion: Motion) -> Unknown:
+    def _lost_at_end(self, motion: Motion) -> UnknownAxes:
         """As for all controls; the book of turned coordinates is `lost`."""
         return self.lost if self.is_rotated else motion.unknown
 

@@ -7,7 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ncfix.control.coordinates import INDEX
+from ncfix.control.expressions import Evaluate
 from ncfix.control.faults import Fault
+from ncfix.control.values import number
 from ncfix.text.tree import Call, Expression, NamedParameter
 from ncfix_siemens.sinumerik import framing, motion
 from ncfix_siemens.sinumerik.affine import WORLD
@@ -20,7 +22,6 @@ from ncfix_siemens.sinumerik.plans import LISTS, Calling, Plan, evaluates
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.swivel import swivel
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
-from ncfix_siemens.sinumerik.values import Evaluate, number
 from ncfix_siemens.sinumerik.vocabulary import (
     DRILLING,
     ENDED_BY,

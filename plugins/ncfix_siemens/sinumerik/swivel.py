@@ -18,13 +18,13 @@ from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.places import mask_of
 from ncfix.control.tcp import rotary_at_zero
+from ncfix.control.values import number
 from ncfix.text.tree import Text
 from ncfix_siemens.sinumerik.affine import WORLD, Affine, shifted, turned
 from ncfix_siemens.sinumerik.destination import End, Leg, Words
 from ncfix_siemens.sinumerik.orientation import WAY
 from ncfix_siemens.sinumerik.plans import Calling, plain_text
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
-from ncfix_siemens.sinumerik.values import number
 
 ORDER = {1: "X", 2: "Y", 3: "Z"}
 """The axes in the bits of the mode."""

@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from ncfix_siemens.sinumerik.values import Key, Value, number
+from ncfix.control.values import Unknown, Value, number
+from ncfix_siemens.sinumerik.expressions import Key
 
 CONSTANTS: dict[str, Value] = {"true": 1.0, "false": 0.0, "$pi": math.pi}
-INITIAL: dict[str, Value] = {"real": 0.0, "int": 0.0, "bool": 0.0, "string": "", "char": None, "axis": None}
+INITIAL: dict[str, Value] = {"real": 0.0, "int": 0.0, "bool": 0.0, "string": "", "char": Unknown(), "axis": Unknown()}
 WHOLE = frozenset({"int", "char"})
 
 
@@ -51,20 +52,22 @@ class Variables:
         return cls({key_of(name): value for name, value in variables.items()})
 
     def value(self, key: Key) -> Value:
-        """The value of a variable, None if nobody knows it."""
+        """The value of a variable; unknown if nobody has set it."""
         name = name_of(key)
         if name in CONSTANTS:
             return CONSTANTS[name]
         scope = self.scope_of(name)
         if scope is None:
-            return self.shared.get(key)
-        return scope.values.get(key, INITIAL.get(scope.kinds[name]))
+            return self.shared.get(key, Unknown())
+        return scope.values.get(key, INITIAL.get(scope.kinds[name], Unknown()))
 
     def assign(self, key: Key, value: Value) -> None:
         """Set a variable; whole ones round."""
         name = name_of(key)
         scope = self.scope_of(name)
         before = self.value(key)
+        if isinstance(value, Unknown):
+            value = Unknown()
         if scope is None:
             self.shared[key] = value
         else:

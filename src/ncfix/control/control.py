@@ -12,7 +12,7 @@ from ncfix.control import contour, tcp
 from ncfix.control.builder import Builder, Style
 from ncfix.control.coordinates import LETTERS, Vector
 from ncfix.control.flow import Budget
-from ncfix.control.motion import AT_START, Motion, Unknown, blanked, first_reason, leaves_unknown
+from ncfix.control.motion import AT_START, Motion, UnknownAxes, blanked, first_reason, leaves_unknown
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.passing import Pass, Passing, may_pass
 from ncfix.control.places import mask_of
@@ -183,7 +183,7 @@ class Control(Standing):
         self.places.lose(mask_of(lost))
         self.places.begun = True
 
-    def _lost_at_end(self, motion: Motion) -> Unknown:
+    def _lost_at_end(self, motion: Motion) -> UnknownAxes:
         """What is not known at the end of a motion, along the axes of the program's frame."""
         if self.saying is not None and self.saying[0] is motion.unknown:
             return self.saying[1]
@@ -246,7 +246,7 @@ class Control(Standing):
             return motion._replace(passing=Passing(Pass.UNSAID, why))
         return motion._replace(refusal=why)
 
-    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str) -> str:
+    def _verdict(self, kind: Kind, unknown: UnknownAxes, refusal: str) -> str:
         """Why a motion that does not pass is refused; empty if it may be corrected.
 
         A canned cycle begins with a rapid, so it does not matter where from.
@@ -272,7 +272,7 @@ class Control(Standing):
         self.whole = whole
         return style
 
-    def _judged(self, kind: Kind, unknown: Unknown, refusal: str, code: int) -> int:
+    def _judged(self, kind: Kind, unknown: UnknownAxes, refusal: str, code: int) -> int:
         """The style of a motion that does not pass."""
         reason = self._verdict(kind, unknown, refusal)
         return self._style(kind, Rule.REFUSE if reason else Rule.CORRECT, reason, code)

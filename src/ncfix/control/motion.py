@@ -13,7 +13,7 @@ from ncfix.control.passing import Passing
 AT_START = "where the axis {} stands when the program starts is not given"
 """Why a position is not known at first; asked of the setup when it matters."""
 
-Unknown = dict[int, str]
+UnknownAxes = dict[int, str]
 """Letter index -> why the position of the axis is not known, with a `{}` for its letter."""
 
 
@@ -31,7 +31,7 @@ class Motion(NamedTuple):
     kind: Kind
     axes: int
     target: Vector
-    unknown: Unknown
+    unknown: UnknownAxes
     code: int
     refusal: str = ""
     passing: Passing | None = None
@@ -39,20 +39,20 @@ class Motion(NamedTuple):
     settles: int | None = None
 
 
-def blanked(position: Vector, unknown: Unknown) -> Vector:
+def blanked(position: Vector, unknown: UnknownAxes) -> Vector:
     """A position with NaN where it is not known."""
     if not unknown:
         return position
     return [math.nan if index in unknown else value for index, value in enumerate(position)]
 
 
-def first_reason(unknown: Unknown) -> str:
+def first_reason(unknown: UnknownAxes) -> str:
     """The reason for the first axis whose position is not known."""
     index = min(unknown)
     return unknown[index].format(LETTERS[index])
 
 
-def leaves_unknown(rapid: Motion, before: set[str], lost: Unknown) -> bool:
+def leaves_unknown(rapid: Motion, before: set[str], lost: UnknownAxes) -> bool:
     """Whether a rapid says nothing of the axes of the program's frame that are `lost` at its end, and were `before`.
 
     Where they stand, its correction would depend on. It cuts nothing, and the axes that it names can be corrected as

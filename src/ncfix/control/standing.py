@@ -23,7 +23,7 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.knowledge import Knowledge
 from ncfix.control.modal import Modal, Offsets, Tools
-from ncfix.control.motion import AT_START, Unknown
+from ncfix.control.motion import AT_START, UnknownAxes
 from ncfix.control.places import Places
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect
@@ -80,16 +80,16 @@ class Standing(ABC):
         self.tilted = False
         self.switches = set[int]()
         self.tcp = run.setup.tcp
-        self.said: Unknown | None = None
-        self.saying: tuple[Unknown, Unknown] | None = None
-        self.shaky: Unknown = {}
+        self.said: UnknownAxes | None = None
+        self.saying: tuple[UnknownAxes, UnknownAxes] | None = None
+        self.shaky: UnknownAxes = {}
         self.locate: Callable[[], Place] = lambda: Place("")
         self.offset_checked = False
         self._frame = -1
         self.places = Places.at_start(run.setup, run.axes, LETTERS)
         self.rotation: Rotation = IDENTITY
         self.position = zeros()
-        self.unknown: Unknown = {}
+        self.unknown: UnknownAxes = {}
         self._start(run.axes)
 
     def _start(self, axes: tuple[str, ...]) -> None:

@@ -18,7 +18,7 @@ from ncfix.control.pointing import Pointing
 
 if TYPE_CHECKING:
     from ncfix.control.control import Control
-    from ncfix.control.motion import Unknown
+    from ncfix.control.motion import UnknownAxes
 
 PROBE = 128.0
 """mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""
@@ -26,18 +26,18 @@ PROBE = 128.0
 TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
 
 
-def rotary_at_zero(control: Control, position: Vector, unknown: Unknown) -> bool:
+def rotary_at_zero(control: Control, position: Vector, unknown: UnknownAxes) -> bool:
     """Whether all rotary axes of the machine stand at zero."""
     return all(index not in unknown and abs(position[index]) < 1e-12 for index in control.turning)
 
 
-def from_machine(control: Control, target: Vector, unknown: Unknown) -> None:
+def from_machine(control: Control, target: Vector, unknown: UnknownAxes) -> None:
     """Make a position of the axes one of tool-centre-point control, in place."""
     if not converted(control, target, unknown, TcpState(False, 0.0), TcpState(True, control.offsets.tool[Z])):
         unknown |= {index: TURNED for index in (X, Y, Z) if index in control.machine}
 
 
-def converted(control: Control, position: Vector, unknown: Unknown, before: TcpState, after: TcpState) -> bool:
+def converted(control: Control, position: Vector, unknown: UnknownAxes, before: TcpState, after: TcpState) -> bool:
     """Say the same position as another command, in place; False where that is not known."""
     if rotary_at_zero(control, position, unknown):
         position[Z] += before.shift - after.shift
@@ -50,24 +50,24 @@ def converted(control: Control, position: Vector, unknown: Unknown, before: TcpS
     return True
 
 
-def lost_in_frame(control: Control) -> Unknown:
+def lost_in_frame(control: Control) -> UnknownAxes:
     """What is not known along the axes of the program's frame."""
     if control.said is not None and control.unknown:
         return control.said
     return along_frame(control, control.unknown)
 
 
-def along_frame(control: Control, unknown: Unknown) -> Unknown:
+def along_frame(control: Control, unknown: UnknownAxes) -> UnknownAxes:
     """The axes of the program's frame that have a part in one of these of the machine."""
     return mixed_into(unknown, control.inverse) if unknown and control.is_rotated else unknown
 
 
-def lost_of_axes(control: Control, lost: Unknown) -> Unknown:
+def lost_of_axes(control: Control, lost: UnknownAxes) -> UnknownAxes:
     """Which axes of the machine are not known where this is not known along those of the program's frame."""
     return {index: why for index, why in mixed_into(lost, control.rotation).items() if index in control.machine}
 
 
-def mixed_into(unknown: Unknown, rotation: Rotation) -> Unknown:
+def mixed_into(unknown: UnknownAxes, rotation: Rotation) -> UnknownAxes:
     """What is not known of turned axes, each of which is made of those in its row: of one of them it is enough."""
     mixed = {index: why for index, why in unknown.items() if index > Z}
     for index in (X, Y, Z):

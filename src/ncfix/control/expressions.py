@@ -1,0 +1,252 @@
+"""Expressions of a block made into functions, once per shape: one evaluator for all languages.
+
+A function reads the numbers of the block that is executed from a `Scope` and gives a `Value`. What operators and
+functions a language has, and what it counts as a number, is in its own `Expressions`. Angles are degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Protocol
+
+from ncfix.control.faults import Fault
+from ncfix.control.values import Unknown, Value, nominal
+from ncfix.text.tree import (
+    Binary,
+    Call,
+    Constant,
+    Exists,
+    Expression,
+    Literal,
+    NamedParameter,
+    Parameter,
+    Text,
+    Unary,
+)
+
+ARITHMETIC = "NCF210"
+
+
+class Scope(Protocol):
+    """What an expression may refer to; each language adds its variables."""
+
+    @property
+    def numbers(self) -> Sequence[float]:
+        """The numbers of the program that is executed."""
+
+    @property
+    def first(self) -> int:
+        """Where those of the block begin."""
+
+
+Evaluate = Callable[[Any], Value]
+"""Gives the value of an expression in a `Scope` of its language; raises `Fault` where the control would stop."""
+
+
+class Expressions:
+    """How a language computes.
+
+    operators   operator -> function of its two operands
+    functions   name or sign -> function, and how many arguments it takes
+    impossible  what is said of a result that is no finite number; `{}` stands for the operator or function
+
+    Functions raise `Fault`, ValueError or ArithmeticError where there is no result. Where an operand is unknown, there
+    is never a fault: the result is unknown, and nominally 0.
+    """
+
+    operators: ClassVar[Mapping[str, Callable[[float, float], float]]] = {}
+    functions: ClassVar[Mapping[str, tuple[Callable[..., float], int]]] = {}
+    impossible = "the result of {} is not a finite number"
+
+    def compiled(self, expression: Expression, address: str = "") -> Evaluate:
+        """The function that computes an expression, which stands behind `address` if that is given."""
+        match expression:
+            case Literal(slot):
+                return lambda scope: scope.numbers[scope.first + slot]
+            case Constant(value):
+                return lambda scope: value
+            case Text(text):
+                return self.text(text)
+            case Parameter(index):
+                return self.numbered(self.compiled(index))
+            case NamedParameter(name):
+                return self.named(name)
+            case Exists(parameter):
+                return self.existence(parameter)
+            case Unary(operator, operand):
+                return self.function(operator, (self.compiled(operand, address),), address)
+            case Binary(operator, left, right):
+                return self.operator(operator, left, right, address)
+            case Call(name, arguments, indexed):
+                parts = tuple(left_out if part is None else self.compiled(part) for part in arguments)
+                return self.element(name, parts) if indexed else self.function(name, parts, address)
+        raise self.none_such(expression)
+
+    def none_such(self, expression: object) -> AssertionError:
+        """The grammar of the language has no such expression."""
+        return AssertionError(f"{type(self).__name__}: the grammar has no {expression!r}")
+
+    # -- what a language has of its own -------------------------------------------------------------------------------
+
+    def operand(self, value: float) -> float:
+        """What a number counts as in arithmetic."""
+        return value
+
+    def in_doubt(self, operator: str, left: float, right: float) -> bool:
+        """Whether a comparison comes out otherwise on other controls, or by rounding: then it is unknown."""
+        return False
+
+    def text(self, text: str) -> Evaluate:
+        """A text."""
+        return lambda scope: text
+
+    def numbered(self, index: Evaluate) -> Evaluate:
+        """A variable that is called by its number."""
+        raise self.none_such(index)
+
+    def named(self, name: str) -> Evaluate:
+        """A variable that is called by its name."""
+        raise self.none_such(name)
+
+    def element(self, name: str, index: tuple[Evaluate, ...]) -> Evaluate:
+        """An element of an array."""
+        raise self.none_such(name)
+
+    def existence(self, parameter: Parameter | NamedParameter) -> Evaluate:
+        """Whether a variable has been defined."""
+        raise self.none_such(parameter)
+
+    # -- operators and functions --------------------------------------------------------------------------------------
+
+    def function(self, name: str, arguments: tuple[Evaluate, ...], address: str = "") -> Evaluate:
+        """A sign or a function, with functions that give its arguments."""
+        function, count = self.functions[name]
+        if len(arguments) != count:
+            text = f"{name.upper()} takes {count} argument{'s' if count > 1 else ''}"
+
+            def wrong(scope: Scope) -> Value:
+                raise Fault(ARITHMETIC, text)
+
+            return wrong
+        return lambda scope: self.applied(name, function, *[argument(scope) for argument in arguments])
+
+    def operator(self, operator: str, left: Expression, right: Expression, address: str = "") -> Evaluate:
+        """An operator between two operands, or a function of two."""
+        function = self.operators[operator]
+        first, second = self.compiled(left, address), self.compiled(right, address)
+
+        def evaluate(scope: Scope) -> Value:
+            a, b = first(scope), second(scope)
+            value = self.applied(operator, function, a, b)
+            if isinstance(value, float) and self.in_doubt(operator, nominal(a), nominal(b)):
+                return Unknown("", value)
+            return value
+
+        return evaluate
+
+    def applied(self, name: str, function: Callable[..., float], *values: Value) -> Value:
+        """A function of values; a text is no number, and what comes of it is unknown."""
+        unknown = next((value for value in reversed(values) if isinstance(value, Unknown | str)), None)
+        try:
+            result = float(function(*(self.operand(nominal(value)) for value in values)))
+            if not math.isfinite(result):
+                raise ArithmeticError
+        except (Fault, ValueError, ArithmeticError) as error:
+            if unknown is not None:
+                return Unknown(unknown.why if isinstance(unknown, Unknown) else "")
+            if isinstance(error, Fault):
+                raise
+            raise Fault(ARITHMETIC, self.impossible.format(name)) from None
+        if unknown is None:
+            return result
+        return Unknown(unknown.why if isinstance(unknown, Unknown) else "", result)
+
+
+def left_out(scope: Scope) -> Value:
+    """An argument that is left out, or what nobody can know: unknown."""
+    return Unknown()
+
+
+# -- what all controls compute alike ----------------------------------------------------------------------------------
+
+
+def divide(left: float, right: float) -> float:
+    """`left / right`."""
+    if right == 0.0:
+        raise Fault(ARITHMETIC, "division by zero")
+    return left / right
+
+
+def power(left: float, right: float) -> float:
+    """`left ** right`."""
+    if left < 0.0 and not right.is_integer():
+        raise Fault(ARITHMETIC, f"a negative number to the power {right:g}")
+    try:
+        return float(left**right)
+    except (OverflowError, ZeroDivisionError):
+        raise Fault(ARITHMETIC, f"{left:g} ** {right:g} is too large a number") from None
+
+
+def remainder(left: float, right: float) -> float:
+    """`left MOD right`, with the sign of `left`."""
+    if right == 0.0:
+        raise Fault(ARITHMETIC, "MOD by zero")
+    return math.fmod(left, right)
+
+
+def inverse(function: Callable[[float], float], name: str) -> Callable[[float], float]:
+    """Arc sine or arc cosine in degrees."""
+
+    def checked(value: float) -> float:
+        if not -1.0 <= value <= 1.0:
+            raise Fault(ARITHMETIC, f"{name} of {value:g}: the argument must be between -1 and 1")
+        return math.degrees(function(value))
+
+    return checked
+
+
+def logarithm(value: float) -> float:
+    """`LN[value]`."""
+    if value <= 0.0:
+        raise Fault(ARITHMETIC, f"LN of {value:g}: the argument must be positive")
+    return math.log(value)
+
+
+def square_root(value: float) -> float:
+    """`SQRT[value]`."""
+    if value < 0.0:
+        raise Fault(ARITHMETIC, f"SQRT of the negative number {value:g}")
+    return math.sqrt(value)
+
+
+def exponential(value: float) -> float:
+    """`EXP[value]`."""
+    try:
+        return math.exp(value)
+    except OverflowError:
+        raise Fault(ARITHMETIC, f"EXP of {value:g} is too large a number") from None
+
+
+FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
+    "+": (lambda a: a, 1),
+    "-": (lambda a: -a, 1),
+    "abs": (abs, 1),
+    "acos": (inverse(math.acos, "ACOS"), 1),
+    "asin": (inverse(math.asin, "ASIN"), 1),
+    "cos": (lambda a: math.cos(math.radians(a)), 1),
+    "exp": (exponential, 1),
+    "ln": (logarithm, 1),
+    "sin": (lambda a: math.sin(math.radians(a)), 1),
+    "sqrt": (square_root, 1),
+    "tan": (lambda a: math.tan(math.radians(a)), 1),
+}
+"""Signs, and the functions of one argument that most languages have."""
+
+SUMS: dict[str, Callable[[float, float], float]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": divide,
+}
+"""The four rules of arithmetic."""
