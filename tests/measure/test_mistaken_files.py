@@ -87,11 +87,12 @@ MISTAKES: dict[str, dict[str, Callable[[str], tuple[Change, ...]]]] = {
         "two sets of the other sign": lambda t: (two_sets(times(SHIFTS, -1)),),
         "positions exchanged": lambda t: (exchanged("X", "Y"),),
         "nothing measured": lambda t: (filled(SHIFTS, "0.0"),),
+        "a set with columns exchanged": lambda t: (one_set(exchanged("dx", "dy")),),
         "every row a set": lambda t: (each_its_set,),
     },
     "probe": {
-        "a standard too long": lambda t: (same, longer(0, 1 + 120e-6)),
-        "a standard too short": lambda t: (same, longer(1, 1 - 120e-6)),
+        "a standard too long": lambda t: (same, longer(0, 1 + 63e-6)),
+        "a standard too short": lambda t: (same, longer(1, 1 - 63e-6)),
         "a standard in inches": lambda t: (same, longer(0, 1 / 25.4)),
         "columns exchanged": lambda t: (exchanged("mx", "my"),),
         "a sign": lambda t: (times(["mz"], -1),),
@@ -224,7 +225,7 @@ def test_a_stated_distance_is_never_an_outlier() -> None:
     data = simulate(plan(known, "probe", 200), known, Faults(noise_um=1.0), seed=1)
     found: Calibration = calibrate([_with_distances(data, known, 1.0)], perfect(known))
     assert refusals(found, []) == ()
-    wrong = calibrate([_with_distances(data, known, 1 + 150e-6)], perfect(known))
+    wrong = calibrate([_with_distances(data, known, 1 + 63e-6)], perfect(known))
     assert wrong.estimate.weight[wrong.problem.stated].min() == 1
     assert "NCF621" in {each.code for each in refusals(wrong, [])}
 

@@ -93,8 +93,8 @@ CODES = {
     "NCF621": Code(
         "stated lengths that contradict each other",
         "Calibrated distances (`# distance:`) are never outliers: what they say holds. One of these is further from "
-        "what the others and the readings say than its uncertainty and the noise allow. One is wrong, or the model "
-        "lacks an effect. No machine file is written (exit code 4); `--allow-misfit` writes it all the same.",
+        "what the others and the readings say than its uncertainty, the noise and errors of a usual size that the "
+        "model lacks allow. No machine file is written (exit code 4); `--allow-misfit` writes it all the same.",
         "Look at the certificates; leave the wrong one out, or estimate more effects: `--effects`.",
     ),
     "NCF622": Code(

@@ -11,14 +11,18 @@ from collections.abc import Iterator
 import numpy as np
 
 from ncfix.diagnostics import Message
-from ncfix.measure.calibrate import Calibration, Estimate, Problem
-from ncfix.measure.measurement import Measurement
+from ncfix.machine.plausible import functions, much
+from ncfix.measure.calibrate import HOPELESS, Calibration, Estimate, Problem
+from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.residuals import place, residuals
+from ncfix.measure.selection import candidates
 
-FAR = 3.5
+FAR = 4.0
 """Standard deviations that a stated length may be from what all others say."""
-MODEL = 0.25
-"""Of the noise of a reading: what small effects that the model lacks may do to a distance, which many readings tell."""
+LACKING = 0.1
+"""Of what is much: the standard deviation of each error that machines have and the model lacks."""
+TOLD = 1e-6
+"""Of a value: what of it is less than this is told by no other value."""
 MANY, FEW = 0.05, 4
 """Share of the values that may be outliers; so many may be in any file."""
 ALL = 0.5
@@ -61,31 +65,52 @@ def untouched(measurement: Measurement) -> Message | None:
 
 
 def _standards(problem: Problem, estimate: Estimate) -> Iterator[Message]:
-    """Stated lengths that the others and the readings deny, by what is predicted without them."""
+    """NCF621 if the others and the readings deny a stated length, by what is predicted of it without it.
+
+    Real machines have all errors of ISO 230-1, a model some of them. What it lacks bends a distance more than it
+    shows in the readings, since the balls move with it. So the errors that it lacks may be there, too, in the sizes
+    that machines have, and readings that show one tell how much it bends a distance: a Gaussian prior on them.
+    """
     stated = np.flatnonzero(problem.stated)
     if not stated.size:
         return
-    read = ~problem.stated & (estimate.weight > 0)
-    size = estimate.residual / problem.sigma
-    leverage = estimate.solution.leverage
-    free = max(float((1 - leverage)[read].sum()), 1.0)
-    factor = max(1.0, float(np.sqrt((estimate.weight * size**2)[read].sum() / (estimate.share * free))))
-    rest = 1 - leverage[stated]
-    model = MODEL * factor * float(np.median(problem.sigma[read]))
-    known = rest > 1e-6
-    missed = np.where(known, estimate.residual[stated], 0.0) / np.where(known, rest, 1.0)
-    deviation = factor * problem.sigma[stated] / np.sqrt(np.where(known, rest, 1.0))
-    far = np.abs(missed) > FAR * np.hypot(deviation, model)
-    if not far.any():
+    root = np.sqrt(estimate.weight) / problem.sigma
+    residual = estimate.residual * root
+    free = np.concatenate([estimate.solution.orthogonal, estimate.solution.nuisance], axis=1)
+    lacking = LACKING * _lacking(problem, estimate) * root[:, None]
+    inner = np.linalg.inv(np.eye(lacking.shape[1]) + lacking.T @ lacking)
+    sought = np.column_stack([residual, np.eye(len(residual))[:, stated]])
+    solved_free = free - lacking @ (inner @ (lacking.T @ free))
+    solved = sought - lacking @ (inner @ (lacking.T @ sought))
+    solved -= solved_free @ np.linalg.solve(free.T @ solved_free, solved_free.T @ sought)
+    pull, precision = solved[stated, 0], solved[stated, 1:]
+    squares = float(residual @ solved[:, 0] - pull @ np.linalg.pinv(precision, rcond=TOLD) @ pull)
+    freedom = max(int((estimate.weight > 0).sum()) - free.shape[1], 1)
+    factor = max(1.0, float(np.sqrt(max(squares, 0.0) / (estimate.share * freedom))))
+    told = np.maximum(np.diag(precision), TOLD)
+    far = np.where(np.diag(precision) > TOLD, np.abs(pull) / (factor * np.sqrt(told)), 0.0)
+    at = int(np.argmax(far))
+    if far[at] <= FAR:
         return
-    at = int(np.argmax(np.abs(missed) / deviation))
-    found = residuals(problem, estimate)
+    missed = 1e3 * pull[at] / told[at] * problem.sigma[stated[at]]
     text = (
-        f"the stated distances cannot all be true: one is {1e3 * missed[at]:+.1f} um from what the others and the "
-        f"readings say, {abs(missed[at]) / deviation[at]:.0f} times what is stated"
+        f"the stated distances cannot all be true: one is {missed:+.1f} um from what the others and the readings say, "
+        f"{far[at]:.0f} standard deviations of that"
     )
     hint = "which standard is right? Leave the other out, or estimate what the model lacks: --effects"
-    yield Message("NCF621", text, place(problem, found, int(stated[at])), hint)
+    yield Message("NCF621", text, place(problem, residuals(problem, estimate), int(stated[at])), hint)
+
+
+def _lacking(problem: Problem, estimate: Estimate) -> Array:
+    """What errors do that machines have and that are not estimated, each as large as what is much of it: (m, k), mm."""
+    machine, selection = problem.machine, problem.selection
+    there = {(effect.name, effect.basis) for effect in selection.estimated}
+    others = [effect for effect in candidates(machine) if (effect.name, effect.basis) not in there]
+    sizes = [much(machine, each.name) / np.abs(functions(machine, each)).max(axis=1) for each in others]
+    held = np.setdiff1d(np.arange(problem.design.shape[1]), estimate.solution.kept)
+    parts = [np.concatenate([each.design(others) for each in problem.observations]), problem.design[:, held]]
+    errors: Array = np.concatenate(parts, axis=1) * np.concatenate([*sizes, problem.limits[held] / HOPELESS])
+    return errors
 
 
 def _outlying(problem: Problem, estimate: Estimate) -> Iterator[Message]:

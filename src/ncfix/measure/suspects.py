@@ -28,6 +28,8 @@ CHANCE = 1e-3
 """How likely the best of all that are tried may be so good by chance."""
 LIKELY = 0.5
 """The same where the file itself looks like a mistake: positions out of range or like radians, errors like um."""
+NOISE = 0.3
+"""The same where what is left is noise alone."""
 LARGE = 2.5
 """Squares a value, in units of the noise, below which there is nothing to explain."""
 WORTH = 0.95
@@ -88,7 +90,9 @@ def suspected(problem: Problem) -> tuple[Message, ...]:
     best, found = min(tried, key=lambda pair: pair[0])
     ratio = best / (now[0] / max(now[1], 1))
     odd = any(each.code in ODD for data in problem.observations for each in data.measurement.remarks)
-    if ratio > (LIKELY if odd else BETTER) or count * fdtr(now[1], now[1], ratio) > CHANCE:
+    alone = problem.noise_known and best < LARGE
+    enough = LIKELY if odd else NOISE if alone else BETTER
+    if ratio > enough or count * fdtr(now[1], now[1], ratio) > CHANCE:
         return ()
     place = found.measurement.place(0)
     return (
@@ -254,27 +258,39 @@ class _Readings:
 
 
 def _exchanged(data: Sequence[Measurement], problem: Problem) -> Iterator[tuple[float, Suspect, int]]:
-    """The measured columns of a file, or of all, in the order and with the signs that leave least; of how many."""
+    """The measured columns of a set, a file, or all files in the order and with the signs that leave least; of how
+    many. A set that was read with the other sign altogether is one of `_series`.
+    """
     files = [file for file, measurement in enumerate(data) if measurement.kind == "tcp"]
     if not files:
         return
     readings = _Readings.of(data, problem)
     names = readings.seen.observations[files[0]].components
     size = len(names)
-    ways = list(product(permutations(range(size)), product((1, -1), repeat=size)))
-    for together in [[file] for file in files] + ([files] if len(files) > 1 else []):
+    ways = list(product(permutations(range(size)), product((1, -1), repeat=size)))[1:]
+    parts = [("", file, [(file, np.ones(len(data[file]), dtype=bool))]) for file in files]
+    if len(files) > 1:
+        parts.append(("", files[0], [rows for _, _, (rows,) in parts]))
+    for file in files:
+        sets = list(dict.fromkeys(data[file].sets))
+        mine = [(f"in set {name} ", file, [(file, np.array(data[file].sets) == name)]) for name in sets[:MOST_SETS]]
+        parts += mine if len(sets) > 1 else []
+    for where, first, together in parts:
         tried = {}
-        for order, signs in ways[1:]:
+        for order, signs in ways:
+            if where and order == tuple(range(size)) and sum(signs) == -size:
+                continue
             values = readings.seen.values.copy()
-            for file in together:
-                mine = readings.part(file)
-                values[mine] = (values[mine].reshape(-1, size)[:, order] * signs).ravel()
+            for file, rows in together:
+                mine_values = values[readings.part(file)].reshape(-1, size)
+                mine_values[rows] = mine_values[rows][:, order] * signs
+                values[readings.part(file)] = mine_values.ravel()
             tried[order, signs] = readings.left(values)
         least = min(tried.values())
         close = [(way, squares) for way, squares in tried.items() if squares <= ALIKE * least]
         (order, signs), squares = min(close, key=lambda pair: (_changes(*pair[0]), pair[1]))
         look = _look(names, order, signs)
-        yield squares, replace(look, file=together[0], measurement=data[together[0]]), len(ways)
+        yield squares, replace(look, text=where + look.text, file=first, measurement=data[first]), len(tried)
 
 
 def _negated(data: Sequence[Measurement], problem: Problem) -> Iterator[tuple[float, Suspect, int]]:
