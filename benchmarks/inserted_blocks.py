@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ncfix.compensate import FixOptions
-from ncfix.compensate.driver import SelfCheckError, fix_program
+from ncfix.compensate.driver import fix_program
+from ncfix.compensate.solve import SelfCheckError
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load

@@ -13,7 +13,7 @@ from time import process_time
 from typing import Any
 
 from ncfix import fast
-from ncfix.compensate import FixOptions, plain, solve, stream
+from ncfix.compensate import FixOptions, driver, plain, solve
 from ncfix.compensate.following import Task
 from ncfix.control import following, parts
 from ncfix.control.setup import Setup
@@ -31,12 +31,12 @@ STAGES: tuple[tuple[str, Any, str], ...] = (
     ("read the text (twice)", parts.PartReader, "read"),
     ("follow it (twice)", following.Follower, "follow"),
     ("plan: correct ends, judge the path between them, split", plain.Planner, "plan"),
-    ("plan, the long way", stream, "agree"),
-    ("write: which words change, digits", stream, "written"),
+    ("plan, the long way", driver, "agree"),
+    ("write: which words change, digits", driver, "written"),
     ("write, the long way", solve, "emit"),
-    ("write: put the text together", stream, "spliced"),
-    ("figures: tip errors before and after", stream, "figures"),
-    ("figures, the long way", stream, "path_error"),
+    ("write: put the text together", driver, "spliced"),
+    ("figures: tip errors before and after", driver, "figures"),
+    ("figures, the long way", driver, "path_error"),
 )
 
 
@@ -56,7 +56,7 @@ def main() -> None:
 def corrected(source: bytes) -> None:
     """Correct a program, part by part."""
     task = Task(load(MACHINE), SETUP, FixOptions(), None, "part.nc", dialects.get("linuxcnc"))
-    stream.Stream(task, io.BytesIO(source).read, lambda data: None).run()
+    driver.Stream(task, io.BytesIO(source).read, lambda data: None).run()
 
 
 def timed(source: bytes) -> dict[str, float]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from ncfix.compensate.stream import Stream, Streamed
+from ncfix.compensate.driver import Stream, Streamed
 from ncfix.diagnostics import ExitCode
 
 PART = 1000

@@ -10,9 +10,8 @@ import pytest
 
 from ncfix.cli.streams import Outlet
 from ncfix.compensate import FixOptions
-from ncfix.compensate.driver import fix_program
+from ncfix.compensate.driver import Stream, Streamed, fix_program
 from ncfix.compensate.following import Task
-from ncfix.compensate.stream import Stream, Streamed
 from ncfix.compensate.workers import Ground
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup

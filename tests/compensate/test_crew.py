@@ -21,8 +21,9 @@ from ncfix.cli.batch import FixJob
 from ncfix.cli.streams import Outlet, Source
 from ncfix.cli.targets import OutputTarget
 from ncfix.compensate import driver, workers
+from ncfix.compensate.driver import Done, PartCorrector, Stream
 from ncfix.compensate.following import Task
-from ncfix.compensate.stream import Corrector, Done, Stream
+from ncfix.compensate.parts import PartProof
 from ncfix.compensate.workers import GoneError, Post, lines_between
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError, UsageError
@@ -80,8 +81,8 @@ def in_another_process(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, i
 @pytest.mark.parametrize(
     ("owner", "name", "instead"),
     [
-        (Corrector, "_corrected", killed),
-        (Corrector, "_follow_on", killed),
+        (PartCorrector, "_corrected", killed),
+        (PartProof, "pass_over", killed),
         (Connection, "send_bytes", killed_in_a_message),
         (workers, "_work", lambda *_: None),
     ],
@@ -96,7 +97,7 @@ def test_a_process_that_is_gone(
 
 
 def test_what_cannot_be_told(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    in_another_process(monkeypatch, Corrector, "_corrected", lambda *_: Done(b"", lambda: None, 1))  # type: ignore[arg-type]
+    in_another_process(monkeypatch, PartCorrector, "_corrected", lambda *_: Done(b"", lambda: None, 1))  # type: ignore[arg-type]
     with pytest.raises(Exception, match="pickle"):
         streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
 
@@ -146,7 +147,7 @@ def test_where_processes_cannot_be_forked_one_does_it_alone(machine: Machine, mo
 
 
 def test_what_is_said_of_it(machine: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    in_another_process(monkeypatch, Corrector, "_corrected", killed)
+    in_another_process(monkeypatch, PartCorrector, "_corrected", killed)
     monkeypatch.setenv("NCFIX_PART_BYTES", "1000")
     monkeypatch.setenv("NCFIX_NO_FAST", "1")  # to compile takes longer than `SECONDS` on a loaded computer
     source, output = tmp_path / "p.ngc", tmp_path / "out.ngc"

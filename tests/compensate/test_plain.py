@@ -16,10 +16,10 @@ from compensate import streaming
 from compensate import test_stream_others as others
 from compensate.test_stream import OPTIONS, streamed
 from ncfix import fast
-from ncfix.compensate import FixOptions, plain, stream
-from ncfix.compensate.driver import SelfCheckError
+from ncfix.compensate import FixOptions, driver, plain
 from ncfix.compensate.parts import Unit
 from ncfix.compensate.plain import Course, Planner
+from ncfix.compensate.solve import SelfCheckError
 from ncfix.control.moves import Kind
 from ncfix.control.parts import NotInPartsError
 from ncfix.machine import Machine, load
@@ -154,7 +154,7 @@ def test_led_tips(change: str, siemens: bool, machine: Machine, monkeypatch: pyt
     assert sum(plainly) >= 2
     assert ("must not be split" in str(found[1])) == (change == "turning")
     assert (found[1]["inserted_blocks"] > 9) == (change == "long")
-    monkeypatch.setattr(stream.Planner, "of", lambda *given: None)
+    monkeypatch.setattr(driver.Planner, "of", lambda *given: None)
     streaming.assert_alike(found, streaming.streamed(*given, 8000, setup=setup))
 
 
@@ -168,7 +168,7 @@ def assert_as_by_the_long_way(
 ) -> None:
     """The same bytes and words, figures but for their last digit."""
     text, report = found
-    monkeypatch.setattr(stream.Planner, "of", lambda *given: None)
+    monkeypatch.setattr(driver.Planner, "of", lambda *given: None)
     expected, reference = streamed(source, machine, size, options)
     assert text == expected
     for name, value in reference.items():
@@ -215,7 +215,7 @@ def test_a_writer_that_gets_a_character_wrong_is_caught(
         place = list(re.finditer(word, text))[-2].end() - 1
         return text if len(plainly) < 3 else text[:place] + bytes([text[place] ^ 1]) + text[place + 1 :]
 
-    monkeypatch.setattr(stream, "spliced", wrong)
+    monkeypatch.setattr(driver, "spliced", wrong)
     assert fast.engage()
     try:
         with pytest.raises((NotInPartsError, SelfCheckError)):

@@ -13,9 +13,10 @@ import pytest
 
 from compensate.streaming import run
 from ncfix import fast
-from ncfix.compensate import FixOptions, stream
-from ncfix.compensate.driver import SelfCheckError, fix_program
+from ncfix.compensate import FixOptions, driver
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import Task
+from ncfix.compensate.solve import SelfCheckError
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError, SourceError
@@ -170,7 +171,7 @@ def test_a_writer_that_gets_one_digit_wrong_is_caught(
         text = spliced(source, splices)
         return with_a_digit_wrong(text, rng) if parts == broken else text
 
-    monkeypatch.setattr(stream, "spliced", wrong)
+    monkeypatch.setattr(driver, "spliced", wrong)
     try:
         for broken in (1, 2, 3, 1, 2, 3, 1, 2, 3):
             parts = 0
@@ -228,7 +229,7 @@ def test_a_refusal_that_reaches_back_through_refused_motions_is_seen(machine: Ma
 
 
 def test_a_path_that_strays_is_not_written_in_parts(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stream, "strays", lambda errors: errors.after.max > 0)
+    monkeypatch.setattr(driver, "strays", lambda errors: errors.after.max > 0)
     with pytest.raises(NotInPartsError, match="strays"):
         streamed(program(1, 30, 0.0), machine, 300)
 

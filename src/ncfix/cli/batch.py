@@ -34,7 +34,7 @@ from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, 
 
 if TYPE_CHECKING:
     from ncfix.compensate import FixOptions
-    from ncfix.compensate.stream import Stream
+    from ncfix.compensate.driver import Stream
     from ncfix.control.setup import Setup
     from ncfix.machine import Machine
     from ncfix.text.dialect import Dialect
@@ -121,8 +121,8 @@ class FixJob:
     def _outlet(
         self, source: Source, target: OutputTarget, dialect: Dialect, find: Find, jobs: int
     ) -> Iterator[tuple[Stream, Outlet]]:
+        from ncfix.compensate.driver import Stream
         from ncfix.compensate.following import Task
-        from ncfix.compensate.stream import Stream
 
         if source.size is None or source.size >= part_bytes():
             fast.engage(console.forewarn)

@@ -17,7 +17,7 @@ from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
 
 if TYPE_CHECKING:
     from ncfix.compensate.account import FixReport
-    from ncfix.compensate.stream import Stamp
+    from ncfix.compensate.driver import Stamp
     from ncfix.compensate.workers import Ground
 
 

@@ -195,7 +195,7 @@ def joined(before: Mapping[str, Left], later: Mapping[str, Left]) -> dict[str, L
     return in_order({**before, **later, **both})
 
 
-def either(found: Sequence[Mapping[str, Left]]) -> tuple[Left, ...]:
+def either(found: Sequence[Mapping[str, Left]]) -> dict[str, Left]:
     """What is left in any of several ways in which a program may run: the most of each axis."""
     together = dict(found[0])
     for other in found[1:]:
@@ -209,7 +209,7 @@ def either(found: Sequence[Mapping[str, Left]]) -> tuple[Left, ...]:
                 stretches=in_stretches(np.array(lines)),
                 most=max(own.most, left.most),
             )
-    return tuple(in_order(together).values())
+    return in_order(together)
 
 
 def in_order(found: Mapping[str, Left]) -> dict[str, Left]:

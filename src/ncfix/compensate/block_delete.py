@@ -18,13 +18,15 @@ import numpy as np
 from ncfix.compensate import FixOptions
 from ncfix.compensate.account import Reason
 from ncfix.compensate.plan.arrays import Mask
+from ncfix.compensate.plan.deviation import PathError
 from ncfix.compensate.plan.findings import Finding
-from ncfix.compensate.solve import Settled, settle
+from ncfix.compensate.solve import Agreed, Before, SelfCheckError, Settled, differences, settle
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.standing import BLOCK_DELETE, named_switches
-from ncfix.diagnostics import Message, Place, RefusedError, SourceError, UsageError
+from ncfix.diagnostics import Message, NcfixError, Place, RefusedError, SourceError, UsageError
 from ncfix.machine import Machine
+from ncfix.text.reader import read
 from ncfix.text.tree import Program, Skip
 from ncfix.text.writer import Edit, Splices
 from ncfix.writer.second_reading import SecondReading
@@ -34,6 +36,8 @@ TOO_MANY = "NCF452"
 NOT_IN_ALL = "NCF453"
 MOST_SWITCHES = 4
 """Switches of which all positions are followed: sixteen of them."""
+ATTEMPTS = 16
+"""The second attempt knows the frames that moved with the first, each further one a frame that depends on others."""
 GRAIN = 9
 """Decimals of mm and rad to which places are the same."""
 WHY = "where a block with / before it is skipped, this block needs another correction than where that is executed"
@@ -242,10 +246,15 @@ def settle_together(
     machine: Machine,
     options: FixOptions,
     readings: Readings,
+    before: Before | None = None,
+    first: Agreed | None = None,
 ) -> Together:
-    """Settle a program in all positions, so that they agree on the text; `moves` and `readings` of each of them."""
+    """Settle a program in all positions, so that they agree on the text; `moves` and `readings` of each of them.
+
+    before, first  of a program in one position, see `settle`
+    """
     if len(moves) == 1:
-        settled = settle(program, moves[0], machine, options, readings[0])
+        settled = settle(program, moves[0], machine, options, readings[0], before, first)
         return Together((settled,), settled.emission.splices, settled.emission.added_blocks)
     refused, whole, spelled = dict[int, Reason](), _starting_elsewhere(moves), dict[int, Mask]()
     while True:
@@ -364,3 +373,55 @@ def _starts(moves: Moves) -> Mapping[int, bytes]:
     for block, start in zip(moves.block.tolist(), places, strict=True):
         found[block] += start.tobytes()
     return found
+
+
+# -- the proof in all positions ----------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class WholeProof:
+    """The proof of a whole program, in each position of block delete.
+
+    follows   traces a text, in each of them
+    attempts  how many are left
+    """
+
+    program: Program
+    follows: Sequence[Callable[[Program], Trace]]
+    attempts: int = ATTEMPTS
+
+    def taught(self, unit: object, together: Together, text: bytes) -> Readings | None:
+        """See `driver.Proof.taught`. RefusedError NCF453 where no text is right in all of several positions."""
+        if text == self.program.source:
+            return None
+        try:
+            return self._taught(together, text)
+        except SelfCheckError as why:
+            if len(self.follows) == 1:
+                raise
+            raise not_in_all(why, self.program) from why
+
+    def _taught(self, together: Together, text: bytes) -> Readings | None:
+        pairs = list(zip(together.settled, (self._again(text, each) for each in self.follows), strict=True))
+        wrong = [differences(settled, again) for settled, again in pairs]
+        at = next((k for k, each in enumerate(wrong) if each.any()), None)
+        if at is None:
+            return None
+        self.attempts -= 1
+        if not self.attempts:
+            (settled, again), piece = pairs[at], int(np.argmax(wrong[at]))
+            pieces, move = settled.plan.pieces, int(settled.plan.pieces.move[piece])
+            meant = settled.moves.end[move] if pieces.kept[piece] else settled.emission.end[piece]
+            line = self.program.line(int(settled.moves.block[move]))
+            raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {meant}")
+        return [SecondReading.of(again, settled.plan.pieces) for settled, again in pairs]
+
+    def _again(self, text: bytes, follow: Callable[[Program], Trace]) -> Moves:
+        try:
+            return follow(read(text, self.program.path, self.program.dialect)).moves
+        except NcfixError as error:
+            raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
+
+    def astray(self, line: int | None, errors: PathError) -> Exception:
+        """See `driver.Proof.astray`."""
+        return SelfCheckError(f"line {line} would lead {errors.after.max:.3f} mm away from where it should")

@@ -15,15 +15,13 @@ import numpy as np
 from ncfix.compensate import FixOptions
 from ncfix.compensate.account import FixReport
 from ncfix.compensate.block_delete import Position, messages_of, most_moves, positions_of
-from ncfix.compensate.driver import fix_program, place_of
+from ncfix.compensate.driver import PartCorrector, fix_program
 from ncfix.compensate.following import Resolve, Task, follow, placed, suspected
 from ncfix.compensate.parts import Part, Parts, Units
 from ncfix.compensate.plan.findings import Finding, Notes
 from ncfix.compensate.plan.limits import findings
 from ncfix.compensate.plan.path import untouched
-from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.report import Tally
-from ncfix.compensate.stream import Corrector
 from ncfix.compensate.workers import Read, Share
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.setup import Setup
@@ -74,9 +72,14 @@ def check_on(program: Program, machine: Machine, setup: Setup, resolve: Resolve 
         message
         for position in positions
         for finding in travel_findings(placed(machine, setup), position.trace.moves)
-        for message in finding.messages(partial(place_of, program, position.trace.moves))
+        for message in finding.messages(partial(_place, program, position.trace.moves))
     )
     return Checked(len(program), most_moves(positions), together(stamped(program), remarks, tuple(travel)))
+
+
+def _place(program: Program, moves: Moves, row: int) -> Place:
+    """Where the block of a motion stands."""
+    return program.place(int(moves.block[row]))
 
 
 def _followed(program: Program, positions: Sequence[Position]) -> tuple[Message, ...]:
@@ -186,13 +189,10 @@ def survey_on(task: Task, read: Read) -> Checked:
 def _survey_corrected(task: Task, read: Read) -> Checked:
     """On a machine with errors."""
     task.check()
-    corrector, tally = Corrector(task, read), Tally(task.machine.least_increment[0])
+    corrector, tally = PartCorrector(task, read), Tally(task.machine.least_increment[0])
     survey = Survey(corrector.machine)
     corrector.units.look = survey.look
     for _, done in corrector.work(Share()):
         tally.take(done.tally)
-    tally.notes = corrector.units.notes
     suspicion = suspected(tally.numbers, tally.step, task.path, task.options.force)
-    messages = (*suspicion, *corrector.units.follower.messages)
-    report = tally.report(task.path, messages, get_strategy(task.options.strategy).leaves, task.options)
-    return survey.checked(corrector.units, remarks_of(report))
+    return survey.checked(corrector.units, remarks_of(corrector.report(tally, suspicion)))

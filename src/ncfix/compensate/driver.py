@@ -5,50 +5,40 @@
 The text that comes out is read and followed again before anybody gets it: the control must understand exactly what the
 plan meant. If it would not, that is a fault of ncfix, and nothing is written.
 
-A long program is corrected while it is read: part after part, in memory that does not depend on its length. Every part
-goes through the same plan, emitter, checks and proof as a whole program does, and what comes out is the same, byte for
-byte. A part begins with the last motion of the one before it, which is written already: all that one part has to know
-of the earlier ones is what that motion left (`Before`). What cannot be done that way raises `NotInPartsError`, and the
-caller takes the program as a whole. Several processes can work on a program (see `workers`): each corrects parts in
-turn, and follows what it has to of others.
+A whole program is one part (`fix_program`). A long one is corrected while it is read, part after part, in memory that
+does not depend on its length (`Stream`): every part goes through the same plan, emitter, checks and proof, and what
+comes out is the same, byte for byte. A part begins with the last motion of the one before it, which is written already:
+all that one part has to know of the earlier ones is what that motion left (`Before`). What cannot be done that way
+raises `NotInPartsError`, and the caller takes the program as a whole. Several processes can work on a program (see
+`workers`): each corrects parts in turn, and follows what it has to of others.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
 from ncfix.compensate import FixOptions
-from ncfix.compensate.account import (
-    NOTHING_SEEN,
-    Account,
-    FixReport,
-    either,
-    left_where_they_stand,
-    with_what_is_left,
-    without_figure,
-)
+from ncfix.compensate.account import FixReport
 from ncfix.compensate.block_delete import (
-    Position,
     Readings,
     Together,
+    WholeProof,
     assumed_of,
     messages_of,
-    most_moves,
-    not_in_all,
     positions_of,
     settle_together,
     stamped,
-    worst_findings,
 )
 from ncfix.compensate.following import (
+    LOOKED,
     Resolve,
+    Task,
     kinematics_of,
-    numbers_at_the_beginning,
     placed,
     refuse_stamped,
     rotary_names,
@@ -57,96 +47,174 @@ from ncfix.compensate.following import (
     traced,
     with_tool_lengths,
 )
+from ncfix.compensate.parts import PartProof, Unit, Units
+from ncfix.compensate.plain import Course, Planner
+from ncfix.compensate.plain_figures import figures, largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
-from ncfix.compensate.plan.deviation import Figures, PathError, path_error
-from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.plan.written import rounding_along
-from ncfix.compensate.report import largest_correction, refusals
-from ncfix.compensate.solve import Settled, differences, increments
-from ncfix.control.flatten import Flat, flatten
+from ncfix.compensate.plan.deviation import PathError, path_error
+from ncfix.compensate.plan.offset import is_offset
+from ncfix.compensate.report import Tally, in_lines
+from ncfix.compensate.solve import Agreed, Before, Settled, agree, increments
+from ncfix.compensate.workers import Ground, Read, Share, crew
+from ncfix.control.flatten import flatten
 from ncfix.control.moves import Moves, Trace
+from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
-from ncfix.diagnostics import Message, NcfixError, Place
+from ncfix.diagnostics import Message, Place
+from ncfix.files import put_at
 from ncfix.machine import Machine, State
 from ncfix.text import stamp
 from ncfix.text.language import language_of
-from ncfix.text.reader import read
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices, spliced
-from ncfix.writer.second_reading import SecondReading
-
-ATTEMPTS = 16
-"""The second attempt knows the frames that moved with the first, each further one a frame that depends on others."""
-
-Attempt = Callable[[Readings], tuple[Together, bytes]]
-Follow = Callable[[Program], Trace]
-
-
-class SelfCheckError(Exception):
-    """The text that was written does not mean what was planned: a fault of ncfix. Nothing may be written."""
-
-
-@dataclass(frozen=True, slots=True)
-class Proven:
-    """A text that a second reading has confirmed in each position of block delete, and what was settled for each."""
-
-    text: bytes
-    together: Together
-
-
-def proven(program: Program, attempt: Attempt, follows: Sequence[Follow]) -> Proven:
-    """Write, read what was written, and write again with what the reading taught, until both agree.
-
-    attempt  settles and writes, given what a control made of the last attempt in each position of block delete
-    follows  traces a program, in each of them
-
-    Raises `SelfCheckError` if they never agree.
-    """
-    readings: Readings = [None] * len(follows)
-    for _ in range(ATTEMPTS):
-        together, text = attempt(readings)
-        if text == program.source:
-            return Proven(text, together)
-        pairs = [
-            (own, _read_and_followed(program, text, own, follow))
-            for own, follow in zip(together.settled, follows, strict=True)
-        ]
-        wrong = [_wrong(*each) for each in pairs]
-        if not any(each.any() for each in wrong):
-            return Proven(text, together)
-        readings = [SecondReading.of(again, own.plan.pieces) for own, again in pairs]
-    at = next(k for k, each in enumerate(wrong) if each.any())
-    raise SelfCheckError(_what_is_wrong(program, *pairs[at], int(np.argmax(wrong[at]))))
-
-
-def _wrong(settled: Settled, again: Moves) -> Mask:
-    wrong = differences(settled, again)
-    assert wrong is not None, "the numbers of motions have been compared"
-    return wrong
-
-
-def _what_is_wrong(program: Program, settled: Settled, again: Moves, piece: int) -> str:
-    """Where a piece would lead, and was not meant to."""
-    move = int(settled.plan.pieces.move[piece])
-    line = program.line(int(settled.moves.block[move]))
-    meant = settled.moves.end[move] if settled.plan.pieces.kept[piece] else settled.emission.end[piece]
-    return f"line {line} would lead to {again.end[piece]}, not to {meant}"
-
-
-def _read_and_followed(program: Program, text: bytes, settled: Settled, follow: Follow) -> Moves:
-    try:
-        again = follow(read(text, program.path, program.dialect)).moves
-    except NcfixError as error:
-        raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
-    pieces = settled.plan.pieces
-    if len(again) != len(pieces):
-        raise SelfCheckError(f"the corrected program has {len(again)} motions, {len(pieces)} were written")
-    return again
-
+from ncfix.writer.emit import Emission
 
 ASTRAY = 1.0
 """mm; no correction and no remainder of one is so large."""
+
+
+class Proof(Protocol):
+    """Reads a text that was written again, and follows it."""
+
+    def taught(self, unit: Unit, together: Together, text: bytes) -> Readings | None:
+        """What a control makes of the text, if that is not what was meant, for another attempt; None if it is.
+
+        Raises `SelfCheckError` for a text that cannot be read, or that never is right, `NotInPartsError` for one that
+        is not right and part of a program.
+        """
+
+    def astray(self, line: int | None, errors: PathError) -> Exception:
+        """What to raise for a path that is no longer that of the program at all."""
+
+
+# -- one part ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """A part that has been corrected and proved.
+
+    text       what it is now; how many bytes that are, where it has been put into a file
+    tally      what there is to report of it
+    next_line  of the program, with which the next part begins
+    """
+
+    text: bytes | int
+    tally: Tally
+    next_line: int
+
+    def placed(self, file: int, at: int) -> Done:
+        """The same with the text put into a file, from a byte on."""
+        assert isinstance(self.text, bytes)
+        put_at(file, at, self.text)
+        return replace(self, text=len(self.text))
+
+
+def _nobody(left: Before, size: int) -> None:
+    """Takes what a part leaves where nothing comes behind it."""
+
+
+@dataclass(slots=True)
+class Corrector:
+    """Corrects a part of a program, or all of it.
+
+    machine  with the workpiece in its place
+    said     what the stamp says: the position of block delete, and what was taken as zero, see `stamp_of`
+    head     the first part
+    at       where the stamp stands in what is written
+    stamped  the stamp, as far as it was known then; empty if there is none
+    """
+
+    task: Task
+    machine: Machine
+    proof: Proof
+    said: Callable[[], tuple[str, tuple[str, ...]]]
+    head: Program | None = None
+    at: int = 0
+    stamped: bytes = b""
+
+    def stamp(self) -> bytes:
+        """The stamp as it has to be by what is known now."""
+        assert self.head is not None
+        return stamp.insertion(self.head, stamp_of(self.head, self.task.machine, self.task.options, *self.said())).text
+
+    def correct(
+        self,
+        unit: Unit,
+        moves: Sequence[Moves],
+        agreed: Agreed | None = None,
+        before: Before | None = None,
+        leave: Callable[[Before, int], object] = _nobody,
+    ) -> Done:
+        """Settle, write, prove and count a part.
+
+        moves   its motions, in each position of block delete
+        agreed  the plan to begin with, if that has been made already
+        before  what the part before has left
+        leave   is told what this one leaves, and how long its text is, before it is proved
+        """
+        task, part = self.task, unit.together
+        readings: Readings | None = [None] * len(moves)
+        while readings is not None:
+            together = settle_together(part.program, moves, self.machine, task.options, readings, before, agreed)
+            settled = together.settled[0]
+            if before is not None and (settled.unmoored or settled.kept[0] != before.kept):
+                raise NotInPartsError("a refusal reaches back into an earlier part")
+            text = self._text(part.program, together.splices, before is None)
+            if not part.last:
+                leave(Before.of(settled.rounds, np.zeros(len(settled.moves.axes), dtype=np.int8)), len(text))
+            readings = self.proof.taught(unit, together, text)
+        own, tally = None, Tally(self.machine.least_increment[0])
+        if unit.head is not None:
+            own = np.ones(len(settled.moves), dtype=bool)
+            own[:1] = False
+        tally.add(part.program, together, own, self.machine)
+        if task.options.verify:
+            errors = [(each.moves, self._tip_errors(each, own, unit)) for each in together.settled]
+            self.note(tally, part.program, *errors)
+        return Done(text, tally, part.program.first_line + part.program.lines_ended)
+
+    def _text(self, program: Program, splices: Splices, first: bool) -> bytes:
+        """The corrected text of a part; the first one gets a stamp, if it differs."""
+        if not first:
+            stop = int(program.blocks[1, 0]) if len(program) > 1 else len(program.source)
+            return spliced(program.source, splices)[stop:]
+        self.head = program
+        edit = stamp.insertion(program, stamp_of(program, self.task.machine, self.task.options, *self.said()))
+        self.at = edit.start
+        if not len(splices):
+            return program.source
+        self.stamped = edit.text
+        return spliced(program.source, Splices.joined([splices, Splices.of([edit])]))
+
+    def _tip_errors(self, settled: Settled, own: Mask | None, unit: Unit) -> PathError:
+        """Tip errors before and after, with the numbers as the control will understand them; of motions `own` (n,)."""
+        emission, shown = settled.emission, settled.shown(self.task.options.split_rapids)
+        return path_error(
+            self.machine,
+            settled.moves,
+            replace(settled.plan.pieces, end=emission.end, centre=emission.centre),
+            emission.start,
+            state=State() if unit.head is None else State(direction=unit.direction),
+            rows=shown if own is None else own & shown,
+            tilts=False,
+            known=settled.plan.known,
+        )
+
+    def note(self, tally: Tally, program: Program, *errors: tuple[Moves, PathError]) -> None:
+        """Take in the tip errors of a part, in each position of block delete."""
+        lines = tally.figures(program, errors)
+        for line, (_, found) in zip(lines, errors, strict=True):
+            if strays(found):
+                raise self.proof.astray(line, found)
+
+
+def strays(errors: PathError) -> bool:
+    """Whether the corrected path is no longer that of the program at all."""
+    return errors.after.max > max(ASTRAY, 10 * errors.before.max)
+
+
+# -- a whole program --------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,151 +243,28 @@ def fix_program(
     """
     refuse_stamped(program, options)
     if machine.is_perfect:
-        return _untouched(program)
-    program = replace(program, dialect=replace(program.dialect, block_numbers=options.block_numbers))
-    on_machine = placed(machine, setup)
+        return Fixed(program.source, False, FixReport(program.path, len(program), 0, 0, 0, False))
+    task = Task(machine, setup, options, resolve, program.path, program.dialect)
+    program = replace(program, dialect=task.dialect)
 
     def follow(source: Program, own: Setup) -> Trace:
         return traced(source, machine, own, resolve)
 
     positions = positions_of(setup, lambda own: with_tool_lengths(program, follow(program, own), machine, own))
     moves, words = [each.trace.moves for each in positions], (stamped(positions), assumed_of(positions))
-
-    def attempt(readings: Readings) -> tuple[Together, bytes]:
-        together = settle_together(program, moves, on_machine, options, readings)
-        return together, _written(program, together.splices, stamp_of(program, machine, options, *words))
-
-    try:
-        proof = proven(program, attempt, [partial(follow, own=each.setup) for each in positions])
-    except SelfCheckError as why:
-        if len(positions) == 1:
-            raise
-        raise not_in_all(why, program) from why
-    step, every = machine.least_increment[0], proof.together.settled
-    numbers = numbers_at_the_beginning(program, every[0], step)
-    suspicion = suspected(numbers, step, program.path, options.force)
-    errors = [_errors(on_machine, each, options.split_rapids) for each in every] if options.verify else []
-    for settled, error in zip(every, errors, strict=options.verify):
-        _check_sane(program, settled, error)
-    report = _report(program, on_machine, positions, proof.together, errors, options)
-    report = replace(report, warnings=(*suspicion, *report.warnings))
-    changed = proof.text != program.source
-    return Fixed(_numbered(program, proof.text) if changed else proof.text, changed, report)
-
-
-def _numbered(program: Program, text: bytes) -> bytes:
-    """The text with its blocks numbered anew, if that is asked for and the language has block numbers."""
+    proof = WholeProof(program, [partial(follow, own=each.setup) for each in positions])
+    corrector = Corrector(task, placed(machine, setup), proof, lambda: words)
+    done = corrector.correct(Unit.whole(program, moves[0], corrector.machine), moves)
+    tally, text = done.tally, done.text
+    assert isinstance(text, bytes)
+    suspicion = suspected(tally.numbers, tally.step, program.path, options.force)
+    tally.blocks = len(program)
+    report = tally.report(program.path, (*suspicion, *messages_of(positions)), options)
+    report = replace(report, block_delete=tuple(sorted(each.on) for each in positions if each.on is not None))
     renumber = language_of(program.dialect).renumber
-    return text if renumber is None or program.dialect.block_numbers != "renumber" else renumber(text)
-
-
-def _written(program: Program, splices: Splices, words: str) -> bytes:
-    """The corrected text, with a stamp of these words."""
-    if not len(splices):
-        return program.source
-    return spliced(program.source, Splices.joined([splices, Splices.of([stamp.insertion(program, words)])]))
-
-
-def _errors(machine: Machine, settled: Settled, split_rapids: bool) -> PathError:
-    """Tip errors before and after, with the numbers as the control will understand them."""
-    emission = settled.emission
-    pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
-    rows, known = settled.shown(split_rapids), settled.plan.known
-    return path_error(machine, settled.moves, pieces, emission.start, rows=rows, tilts=False, known=known)
-
-
-def strays(errors: PathError) -> bool:
-    """Whether the corrected path is no longer that of the program at all."""
-    return errors.after.max > max(ASTRAY, 10 * errors.before.max)
-
-
-def _check_sane(program: Program, settled: Settled, errors: PathError) -> None:
-    """Raise `SelfCheckError` for a path that strays."""
-    if strays(errors):
-        line = _line_of(program, settled.moves, errors.after)
-        raise SelfCheckError(f"line {line} would lead {errors.after.max:.3f} mm away from where it should")
-
-
-def _figures(figures: Sequence[Figures], seen: bool) -> dict[str, float | int | None]:
-    """The worst of all positions of block delete; `seen`: something was looked at."""
-    if not figures or not seen:
-        return dict(NOTHING_SEEN) if figures else {}
-    most, rms = max(each.max for each in figures), max(each.rms for each in figures)
-    return {"max": round(most * 1e3, 4), "rms": round(rms * 1e3, 4)}
-
-
-def place_of(program: Program, moves: Moves, row: int) -> Place:
-    """Where the block of a motion stands."""
-    return program.place(int(moves.block[row]))
-
-
-def _line_of(program: Program, moves: Moves, figures: Figures) -> int | None:
-    return program.line(int(moves.block[figures.move])) if figures.move >= 0 else None
-
-
-def _untouched(program: Program) -> Fixed:
-    report = FixReport(program.path, len(program), 0, 0, 0, False)
-    return Fixed(program.source, False, report)
-
-
-def _report(
-    program: Program,
-    machine: Machine,
-    positions: Sequence[Position],
-    together: Together,
-    errors: Sequence[PathError],
-    options: FixOptions,
-) -> FixReport:
-    every, steps = together.settled, increments(machine)
-    lacking = [each.lacking(steps) for each in every]
-    left = either([left_where_they_stand(program, each.moves, own) for each, own in zip(every, lacking, strict=True)])
-    account = Account.together([Account.of(each.moves, each.kept, each.reasons) for each in every])
-    no_figure = Counter[str]()
-    for settled, own in zip(every, lacking, strict=True):
-        no_figure |= without_figure(settled.moves, settled.kept, own.axes if own else None)
-    refused = refusals(program, account)
-    findings = dict.fromkeys(
-        message
-        for settled, found in zip(every, worst_findings(every), strict=True)
-        for finding in found
-        for message in finding.messages(partial(place_of, program, settled.moves))
-    )
-    worst = max(range(len(errors)), key=lambda k: errors[k].after.max) if errors else 0
-    seen = any(each.samples for each in errors)
-    where = {"where": _line_of(program, every[worst].moves, errors[worst].after)} if errors else {}
-    report = FixReport(
-        path=program.path,
-        blocks=len(program),
-        moves=most_moves(positions),
-        compensated=len(account.compensated),
-        passed=len(account.passed),
-        changed=bool(len(together.splices)),
-        inserted_blocks=together.added_blocks,
-        max_correction_um=max(largest_correction(each.moves, each) for each in every) * 1e3
-        if account.compensated
-        else None,
-        error_before_um=_figures([each.before for each in errors], seen),
-        error_after_um={**_figures([each.after for each in errors], seen), **where},
-        refused=tuple(refused),
-        warnings=(*messages_of(positions), *(each.message(program.path) for each in left), *findings),
-        strategy=options.strategy,
-        leaves=get_strategy(options.strategy).leaves,
-        left=left,
-        rounding_um=max(_rounding(machine, each) for each in every) * 1e3,
-        block_delete=tuple(sorted(each.on) for each in positions if each.on is not None),
-        passed_by_rule=Counter(account.rules.values()),
-        no_figure=no_figure,
-    )
-    return with_what_is_left(report, options.tolerance_um)
-
-
-def _rounding(machine: Machine, settled: Settled) -> float:
-    """What rounded numbers may do along the path, mm."""
-    return rounding_along(Intent(machine, settled.moves, State()), settled.plan.pieces, settled.plan.corners)
-
-
-FLATTENED = "NCF445"
-ONE_POSITION = "NCF447"
+    if text == program.source or renumber is None or options.block_numbers != "renumber":
+        return Fixed(text, text != program.source, report)
+    return Fixed(renumber(text), True, report)
 
 
 def fix_flat(
@@ -327,49 +272,189 @@ def fix_flat(
 ) -> Fixed:
     """As `fix_program`; where that refuses motions, the program is written out flat and corrected so.
 
-    The flat program is kept only if it helps. The report speaks of the lines of the original. A flat program has the
-    numbers of one position of block delete, so a program that is to be right in several stays as it is.
-    Raises what `fix_program` and `flatten` raise.
+    A program that can be corrected as it is keeps its loops and subprograms, and the flat one is kept only if it helps.
+    The report speaks of the lines of the original. A flat program has the numbers of one position of block delete, so a
+    program that is to be right in several stays as it is. Raises what `fix_program` and `flatten` raise.
     """
     fixed = fix_program(program, machine, setup, options, resolve)
     if not fixed.report.refused:
         return fixed
     if len(fixed.report.block_delete) > 1:
         text = "not written out flat: its numbers would be those of one position of block delete"
-        note = Message(ONE_POSITION, text, Place(program.path), "--block-skip on or off says which one")
+        note = Message("NCF447", text, Place(program.path), "--block-skip on or off says which one")
         return replace(fixed, report=replace(fixed.report, warnings=(note, *fixed.report.warnings)))
-    steps = steps_of(machine)
-    flat = flatten(program, setup, machine.axis_names, rotary_names(machine), steps, resolve, kinematics_of(machine))
+    steps = np.where(machine.rotary, np.degrees(machine.least_increment[1]), machine.least_increment[0]).tolist()
+    names, rotary, by_name = (
+        machine.axis_names,
+        rotary_names(machine),
+        dict(zip(machine.axis_names, steps, strict=True)),
+    )
+    flat = flatten(program, setup, names, rotary, by_name, resolve, kinematics_of(machine))
     again = fix_program(flat.program, machine, setup, options, resolve)
     if {each.line for each in fixed.report.refused} <= {flat.lines[each.line - 1] for each in again.report.refused}:
         return fixed
-    return replace(again, changed=True, report=in_lines(again, flat, program))
+    return replace(again, changed=True, report=in_lines(again.report, flat, program))
 
 
-def in_lines(fixed: Fixed, flat: Flat, program: Program) -> FixReport:
-    """The report of a flat program with the lines of the original."""
-    refused = tuple(replace(each, line=flat.lines[each.line - 1]) for each in fixed.report.refused)
-    text = f"the program is written out flat: {len(program)} lines become {len(flat.lines)}"
-    note = Message(FLATTENED, text, Place(program.path), "blocks executed several times are corrected one by one")
-    after = dict(fixed.report.error_after_um)
-    if after.get("where"):
-        after["where"] = flat.lines[int(after["where"] or 1) - 1]
-    warnings = (note, *(placed_in_original(each, flat) for each in fixed.report.warnings))
-    return replace(fixed.report, refused=refused, error_after_um=after, warnings=warnings)
+# -- part after part --------------------------------------------------------------------------------------------------
 
 
-def placed_in_original(message: Message, flat: Flat) -> Message:
-    """A message with the line of the original."""
-    place = message.place
-    if place is None or not 1 <= place.line <= len(flat.lines):
-        return message
-    return replace(message, place=replace(place, line=flat.lines[place.line - 1]))
+class PartCorrector(Corrector):
+    """Goes through a program and corrects its parts, or some of them. `work` is called once."""
+
+    def __init__(self, task: Task, read: Read) -> None:
+        self.units = units = Units.of(task, read)
+        self.parts_proof = PartProof(task, units.reader)
+        super().__init__(task, units.placed, self.parts_proof, lambda: ("", units.assumed))
+        self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect)
+
+    def work(self, share: Share) -> Iterator[tuple[int, Done]]:
+        """The number of each part of the share, and what it has become; the others are followed, or passed over.
+
+        Raises what reading, following and correcting do, and at last UsageError for what the setup does not give.
+        """
+        foreign, self.units.share = False, share
+        for number, unit in enumerate(self.units):
+            if not share.has(number):
+                self.parts_proof.pass_over(unit, foreign)
+                foreign = True
+                continue
+            yield number, self._corrected(unit, number, share, foreign)
+            foreign = False
+
+    def _corrected(self, unit: Unit, number: int, share: Share, foreign: bool) -> Done:
+        """Correct a part, hand on what the next one has to know, and prove it; `foreign`: the one before was not."""
+        if unit.head is not None and is_offset(unit.head.moves).any():
+            raise NotInPartsError("the control offsets a contour from one part into the next")
+        course = None if self.planner is None else self.planner.plan(unit)
+        agreed = None if course is not None else self._agreed(unit)
+        before = share.before(number)
+        if before is not None and foreign:
+            self.parts_proof.follower.stand(before.position)
+        if course is not None and before is not None and not before.kept:
+            plain = written(self.language, course, before.position, increments(self.machine))
+            if plain is not None:
+                return self._plainly(course, plain, number, share)
+        agreed, moves = agreed or self._agreed(unit), unit.together.moves
+        if before is not None:
+            before, (first, *_) = replace(before, direction=unit.direction), before.rounds
+            if first.kept.any() or (moves.wordless[0] & (first.shift != 0)).any():
+                agreed = None  # the motion before was left as it was, or an axis goes on standing off its place
+        return self.correct(unit, [moves], agreed, before, partial(share.leave, number))
+
+    def _plainly(self, course: Course, plain: Emission, number: int, share: Share) -> Done:
+        """Finish a part of plain motions."""
+        part, moves = course.part, course.part.moves
+        text = spliced(part.program.source, plain.splices)
+        if not part.last:
+            shift = course.real.start[-1] - moves.start[-1]
+            left = Before.steady(shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy())
+            share.leave(number, left, len(text))
+        settled = course.settled(plain)
+        self.parts_proof.check(part, settled, text, plain.splices)
+        tally = Tally(self.machine.least_increment[0])
+        tally.add_plain(part.program, settled, largest_shift(course, plain), course.intent)
+        if self.task.options.verify:
+            self.note(tally, part.program, (moves, figures(course, plain, self.task.options.split_rapids)))
+        return Done(text, tally, part.program.first_line + part.program.lines_ended)
+
+    def _agreed(self, unit: Unit) -> Agreed:
+        """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
+        part = unit.together
+        nowhere = np.zeros(len(part.moves.axes))
+        guess = None if unit.head is None else Before.steady(nowhere, unit.direction, nowhere)
+        return agree(part.moves, self.machine, self.task.dialect, self.task.options, guess)
+
+    def report(self, tally: Tally, suspicion: tuple[Message, ...]) -> FixReport:
+        """The report of all parts."""
+        tally.notes = self.units.notes
+        return tally.report(self.task.path, (*suspicion, *self.units.follower.messages), self.task.options)
 
 
-def steps_of(machine: Machine) -> dict[str, float]:
-    """The least increment of each axis, mm or degree."""
-    linear, rotary = machine.least_increment
-    return {
-        name: float(np.degrees(rotary)) if turning else linear
-        for name, turning in zip(machine.axis_names, machine.rotary.tolist(), strict=True)
-    }
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """Where the stamp stands in what was written, what it is now, and what it has to be (empty: there is none)."""
+
+    at: int
+    written: bytes
+    wanted: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Streamed:
+    """What was done, and the stamp, which may say more at the end than could be known at the beginning."""
+
+    report: FixReport
+    stamp: Stamp
+
+
+@dataclass(slots=True)
+class Stream:
+    """One program on its way. `run` is called once.
+
+    read   gives the next so many bytes of the text; none at its end
+    write  takes the corrected text, part by part; or how much of it stands where it belongs already (`Ground.out`)
+    jobs   processes that work on it
+    ground  the files, which all of them have; without it there is one process
+    suspicion  what makes one think that the program was corrected before; None: not judged yet
+    """
+
+    task: Task
+    read: Read
+    write: Callable[[bytes | int], object]
+    jobs: int = 1
+    ground: Ground | None = None
+    tally: Tally = field(init=False)
+    suspicion: tuple[Message, ...] | None = None
+    corrector: PartCorrector | None = None
+
+    def __post_init__(self) -> None:
+        self.tally = Tally(self.task.machine.least_increment[0])
+
+    @property
+    def stamped(self) -> bytes:
+        """The stamp as it was written; empty as long as there is none."""
+        return b"" if self.corrector is None else self.corrector.stamped
+
+    def run(self) -> Streamed:
+        """Correct the program; raises what `fix_program` raises, and `NotInPartsError`."""
+        task = self.task
+        task.check()
+        task.follower()
+        with crew(self.jobs, partial(PartCorrector, task), self.ground) as others:
+            own = self.corrector = PartCorrector(task, others.spread(self.read))
+            for number, done in own.work(others.share):
+                others.put(number, done)
+                self._take(others.ready())
+            self._take(others.rest(own.units.count))
+        self._pass_on(own.units.rest, own.units.read)
+        self.tally.blocks += own.units.blocks
+        report = own.report(self.tally, self._judged())
+        return Streamed(report, Stamp(own.at, own.stamped, own.stamp() if self.tally.changed else b""))
+
+    def _take(self, parts: Iterator[Done]) -> None:
+        """Write parts, and report them."""
+        for done in parts:
+            self.tally.take(done.tally)
+            if done.next_line > LOOKED:
+                self._judged()
+            if self.task.options.allow_refused or not self.tally.refused:
+                self.write(done.text)
+
+    def _judged(self) -> tuple[Message, ...]:
+        """Judge the program by its beginning, once; raises RefusedError NCF438 (see `suspected`)."""
+        if self.suspicion is None:
+            force = self.task.options.force
+            self.suspicion = suspected(self.tally.numbers, self.tally.step, self.task.path, force)
+        return self.suspicion
+
+    def _pass_on(self, text: bytes, read: Read) -> None:
+        """What comes after the end of the program goes out as it came in."""
+        while text:
+            if stamp.SIGN.search(text.decode("latin-1")) and not self.task.options.force:
+                raise NotInPartsError("there is a stamp after the end of the program")
+            ended = text.endswith(b"\n")
+            self.tally.blocks += text.count(b"\n")
+            self.write(text)
+            text = read(self.task.size)
+            self.tally.blocks += not text and not ended

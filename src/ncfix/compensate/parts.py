@@ -11,20 +11,26 @@ from functools import cached_property
 
 import numpy as np
 
+from ncfix import fast
 from ncfix.compensate import FixOptions
+from ncfix.compensate.block_delete import Readings, Together
 from ncfix.compensate.following import Task, placed, refuse_stamped, with_tool_lengths
-from ncfix.compensate.plan.arrays import Index
+from ncfix.compensate.plan.arrays import Index, Mask
+from ncfix.compensate.plan.deviation import PathError
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs, matters
+from ncfix.compensate.solve import SelfCheckError, Settled, differences
 from ncfix.compensate.workers import Passage, Read, Share
 from ncfix.control.following import Follower
 from ncfix.control.moves import Kind, Moves, Rule, Trace
 from ncfix.control.parts import NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
 from ncfix.control.setup import Setup
-from ncfix.diagnostics import Message, UsageError
+from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
+from ncfix.text.writer import Splices, left_alone
 
+FRAMES = "the program takes frames or values from where the machine stands"
 MOST_PENDING = 64
 """Parts that may be put together before one of them ends where it may."""
 
@@ -210,6 +216,11 @@ class Unit:
     direction: Signs
     machine: Machine
 
+    @classmethod
+    def whole(cls, program: Program, moves: Moves, machine: Machine) -> Unit:
+        """A program that is one part."""
+        return cls(Part(program, moves, True), None, np.zeros(len(machine.axes), dtype=np.int8), machine)
+
     @cached_property
     def together(self) -> Part:
         """The part behind that motion."""
@@ -321,3 +332,53 @@ class Units(Parts):
             assert arrival is not None
             direction = arrival[-2] if len(arrival) > 1 else direction
         return head, direction
+
+
+class PartProof:
+    """The proof of the parts of a program, one after the other: goes along what has been written so far."""
+
+    def __init__(self, task: Task, reader: PartReader) -> None:
+        self.again, self.follower = PartReader(task.path, task.dialect, task.head), task.follower()
+        self.again.templates, self.again.index = reader.templates, reader.index
+
+    def pass_over(self, unit: Unit, foreign: bool) -> None:
+        """Go past a part of another process, as programmed; `foreign`: so was the one before."""
+        part = unit.part
+        if unit.head is not None and not foreign:
+            self.follower.stand(unit.head.moves.end[-1])
+        if part.passage is not None:
+            self.again.first_line += part.passage.lines
+            self.follower.resume(part.passage.remains)
+        self.again.first_line += part.program.lines_ended
+        self.follower.follow(part.program, part.last)
+
+    def taught(self, unit: Unit, together: Together, text: bytes) -> Readings | None:
+        """See `driver.Proof.taught`."""
+        (settled,), head = together.settled, unit.head
+        if head is None:
+            self.check(unit.part, settled, text, None)
+        else:
+            own = settled.plan.pieces.move > 0
+            self.check(unit.part, settled, text, together.splices.moved(-len(head.program.source)), own)
+        return None
+
+    def check(self, part: Part, settled: Settled, text: bytes, edits: Splices | None, own: Mask | None = None) -> None:
+        """Raise what `taught` does; `edits` make the text of that of the part, if known; `own` (m,): pieces in it."""
+        if edits is not None and fast.engaged() and not left_alone(part.program.source, edits, text):
+            raise SelfCheckError("more of the text has changed than was written anew")
+        try:
+            program = self.again.read(text)
+            again = self.follower.follow(program, part.last)
+        except NcfixError as error:
+            raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
+        self.again.first_line += program.lines_ended
+        try:
+            right = not differences(settled, again, own).any()
+        except SelfCheckError:
+            right = False
+        if not right:
+            raise NotInPartsError(FRAMES)
+
+    def astray(self, line: int | None, errors: PathError) -> Exception:
+        """See `driver.Proof.astray`."""
+        return NotInPartsError("the path of a part strays")

@@ -113,6 +113,10 @@ CODE_OF_RULE = "NCF432"
 CODE_OF_TEXT = "NCF433"
 
 
+class SelfCheckError(Exception):
+    """The text that was written does not mean what was planned: a fault of ncfix. Nothing may be written."""
+
+
 @dataclass(frozen=True, slots=True)
 class Settled:
     """A plan that can be written, and its text.
@@ -359,15 +363,17 @@ TURN = 1.0
 """rad; a corrected arc turns by what it did but for little, or else by a full turn more or less."""
 
 
-def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask | None:
-    """Pieces that the control would understand otherwise than they were meant; None if their number differs.
+def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask:
+    """Pieces that the control would understand otherwise than they were meant.
 
     own  (m,) pieces that stand in the text that was read; all if not given
+
+    Raises `SelfCheckError` if their number differs.
     """
     emission, pieces = settled.emission, settled.plan.pieces
     rows = np.arange(len(pieces)) if own is None else np.flatnonzero(own)
     if len(again) != len(rows):
-        return None
+        raise SelfCheckError(f"the corrected program has {len(again)} motions, {len(rows)} were written")
     meant = emission.end if own is None else picked(emission.end, rows)
     differs: Mask = differ(again.end, meant) | _strayed(settled, again, rows)
     if not pieces.arc.any():

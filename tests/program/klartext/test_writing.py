@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ncfix.compensate import FixOptions
-from ncfix.compensate.driver import SelfCheckError, fix_program
+from ncfix.compensate.driver import fix_program
+from ncfix.compensate.solve import SelfCheckError
 from ncfix.machine import loads
 from ncfix.text.reader import read
 from ncfix.text.writer import apply

@@ -91,6 +91,10 @@ ONCE = frozenset({"NCF409"})
 """Findings that hold for the whole program, and are told of its first motion only."""
 
 
+NoteKey = tuple[int, str, str, str]
+"""A position of block delete, a code, its text and hint."""
+
+
 @dataclass(slots=True)
 class Found:
     """Messages of one kind, the first few, and how many there are."""
@@ -101,26 +105,26 @@ class Found:
 
 @dataclass(slots=True)
 class Notes:
-    """Findings so far, by code, text and hint."""
+    """Findings so far, by position of block delete, code, text and hint."""
 
-    found: dict[tuple[str, str, str], Found] = field(default_factory=dict)
+    found: dict[NoteKey, Found] = field(default_factory=dict)
 
-    def add(self, finding: Finding, program: Program, moves: Moves, own: Mask | None = None) -> None:
-        """Take in a finding of a part; of motions `own` (n,) if given."""
+    def add(self, finding: Finding, program: Program, moves: Moves, own: Mask | None = None, position: int = 0) -> None:
+        """Take in a finding of a part, in a position of block delete; of motions `own` (n,) if given."""
         rows = np.arange(len(finding)) if own is None else np.flatnonzero(own[finding.moves])
         shown = []
         for k in rows[:MOST].tolist():
             place = program.place(int(moves.block[finding.moves[k]]))
             shown.append(Message(finding.code, finding.sentence(k), place, finding.hint))
-        self._take((finding.code, finding.text, finding.hint), Found(shown, len(rows)))
+        self._take((position, finding.code, finding.text, finding.hint), Found(shown, len(rows)))
 
     def take(self, other: Notes) -> None:
         """Take in the findings of what comes behind."""
         for key, found in other.found.items():
             self._take(key, found)
 
-    def _take(self, key: tuple[str, str, str], found: Found) -> None:
-        if key[0] in ONCE and key in self.found:
+    def _take(self, key: NoteKey, found: Found) -> None:
+        if key[1] in ONCE and key in self.found:
             return
         note = self.found.setdefault(key, Found())
         note.shown += found.shown[: max(MOST - note.count, 0)]
@@ -129,10 +133,8 @@ class Notes:
     def messages(self) -> tuple[Message, ...]:
         """What was found, in the order of one plan."""
         messages: list[Message] = []
-        for code, note in sorted(
-            ((key[0], note) for key, note in self.found.items()), key=lambda each: ORDER.index(each[0])
-        ):
+        for (_, code, *_), note in sorted(self.found.items(), key=lambda each: (each[0][0], ORDER.index(each[0][1]))):
             messages += note.shown
             if note.count > MOST:
                 messages.append(Message(code, f"and {note.count - MOST} more motions like these"))
-        return tuple(messages)
+        return tuple(dict.fromkeys(messages))
