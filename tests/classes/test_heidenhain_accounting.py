@@ -10,8 +10,8 @@ from pathlib import Path
 
 from classes.accounting import Account
 from ncfix.compensate import FixOptions
-from ncfix.compensate.account import FixReport
 from ncfix.compensate.driver import fix_flat, fix_program
+from ncfix.compensate.report import FixReport
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ncfix.compensate.account import FixReport, with_what_is_left
+from ncfix.compensate.report import FixReport
 
 
 def report(left: float | None) -> FixReport:
@@ -14,16 +14,16 @@ def report(left: float | None) -> FixReport:
 
 @pytest.mark.parametrize("left", [None, 0.0, 1.0, 1.5])
 def test_nothing_is_said_within_tolerance_and_rounding(left: float | None) -> None:
-    assert with_what_is_left(report(left), 1.0).warnings == ()
+    assert report(left).with_what_is_left(1.0).warnings == ()
 
 
 def test_the_worst_place_is_named_beyond_it() -> None:
-    (warning,) = with_what_is_left(report(5.346), 1.0).warnings
+    (warning,) = report(5.346).with_what_is_left(1.0).warnings
     assert warning.code == "NCF416"
     assert warning.text == (
         "5.35 um are left here at the tool tip, more than the tolerance of 1 um and the 0.50 um of the control's digits"
     )
     assert warning.place is not None
     assert (warning.place.path, warning.place.line) == ("part.nc", 7)
-    assert with_what_is_left(report(5.346), 4.0).warnings
-    assert with_what_is_left(report(5.346), 4.9).warnings == ()
+    assert report(5.346).with_what_is_left(4.0).warnings
+    assert report(5.346).with_what_is_left(4.9).warnings == ()

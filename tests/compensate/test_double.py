@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from compensate.streaming import run
-from ncfix.compensate import FixOptions, driver, following
+from ncfix.compensate import FixOptions, driver, report
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import Task
 from ncfix.control.setup import Setup
@@ -91,7 +91,7 @@ def test_the_beginning_of_a_long_program_is_judged(machine: Machine, monkeypatch
     """As a whole and in parts: what comes behind those lines makes no difference."""
     once, _ = corrected(pocket(2, seed=1), machine)
     again = unstamped(once)
-    monkeypatch.setattr(following, "LOOKED", 10)
+    monkeypatch.setattr(report, "LOOKED", 10)
     monkeypatch.setattr(driver, "LOOKED", 10)
     _, codes = corrected(again, machine)
     assert "NCF438" not in codes

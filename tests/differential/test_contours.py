@@ -12,8 +12,8 @@ from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from differential.canon import Canon, Controls
 from differential.contours import contour, judged
 from ncfix.compensate import FixOptions
-from ncfix.compensate.account import FixReport
 from ncfix.compensate.driver import fix_program
+from ncfix.compensate.report import FixReport
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Periodic, Polynomial

@@ -16,8 +16,8 @@ from ncfix.cli.targets import STREAM, OutputTarget, shown, stdin
 from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
 
 if TYPE_CHECKING:
-    from ncfix.compensate.account import FixReport
     from ncfix.compensate.driver import Stamp
+    from ncfix.compensate.report import FixReport
     from ncfix.compensate.workers import Ground
 
 

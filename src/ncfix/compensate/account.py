@@ -217,14 +217,6 @@ def in_order(found: Mapping[str, Left]) -> dict[str, Left]:
     return dict(sorted(found.items(), key=lambda item: (item[1].first, item[0])))
 
 
-SEEN_UM = 0.001
-"""By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""
-
-
-NOTHING_SEEN: Mapping[str, None] = {"max": None, "rms": None}
-"""The figures where nothing was looked at."""
-
-
 @dataclass(frozen=True, slots=True)
 class Reason:
     """Why a block is refused: a code that `ncfix explain` knows, a sentence, and the block that causes it (or -1)."""
@@ -232,19 +224,6 @@ class Reason:
     code: str
     text: str
     cause: int = -1
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """A motion block that was left as it was although it is not right, and why."""
-
-    line: int
-    code: str
-    reason: str
-
-    def as_dict(self) -> dict[str, object]:
-        """Plain data, for `--json`."""
-        return {"line": self.line, "code": self.code, "reason": self.reason}
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,77 +275,3 @@ class Account:
     def reasons(self) -> Counter[str]:
         """How often each reason of refusal occurs, in blocks."""
         return Counter(reason.text for reason in self.refused.values())
-
-
-@dataclass(frozen=True, slots=True)
-class FixReport:
-    """What was done to one program, as figures.
-
-    error_before, error_after  tip error along the path: {"max", "rms"} in um, and "where" (line) after
-            None where nothing was looked at
-    max_correction_um  None where nothing was corrected
-    rounding_um  what the control's digits may add to the path that was planned
-    left    axes that had to stay where they stand, since the program has not said where that is
-    block_delete  the positions of block delete for which it is right: the switches that are on in each
-    passed_by_rule  blocks that were passed, by rule
-    no_figure  motions at feed and holes of which the figures say nothing, by reason
-    """
-
-    path: str
-    blocks: int
-    moves: int
-    compensated: int
-    passed: int
-    changed: bool
-    inserted_blocks: int = 0
-    max_correction_um: float | None = None
-    error_before_um: Mapping[str, float | int | None] = field(default_factory=dict)
-    error_after_um: Mapping[str, float | int | None] = field(default_factory=dict)
-    refused: tuple[Refusal, ...] = ()
-    warnings: tuple[Message, ...] = ()
-    strategy: str = ""
-    leaves: str = ""
-    left: tuple[Left, ...] = ()
-    rounding_um: float = 0.0
-    block_delete: tuple[list[int], ...] = ()
-    passed_by_rule: Mapping[str, int] = field(default_factory=dict)
-    no_figure: Mapping[str, int] = field(default_factory=dict)
-
-    def as_dict(self) -> dict[str, object]:
-        """The per-file object of `fix --json`."""
-        return {
-            "path": self.path,
-            "output": None,
-            "changed": self.changed,
-            "blocks": self.blocks,
-            "moves": self.moves,
-            "compensated": self.compensated,
-            "passed": self.passed,
-            "passed_by_rule": dict(sorted(self.passed_by_rule.items())),
-            "inserted_blocks": self.inserted_blocks,
-            "max_correction_um": self.max_correction_um,
-            "error_before_um": dict(self.error_before_um),
-            "error_after_um": dict(self.error_after_um),
-            "rounding_um": round(self.rounding_um, 4),
-            "no_figure": dict(sorted(self.no_figure.items())),
-            "strategy": self.strategy,
-            "leaves": self.leaves,
-            "block_delete": list(self.block_delete),
-            "left_where_it_stands": [left.as_dict() for left in self.left],
-            "refused": [refusal.as_dict() for refusal in self.refused],
-            "warnings": [warning.as_dict() for warning in self.warnings],
-        }
-
-
-def with_what_is_left(report: FixReport, tolerance_um: float) -> FixReport:
-    """The report with a warning (NCF416) if more is left at the tool tip than tolerance and rounding allow."""
-    left, line = report.error_after_um.get("max"), report.error_after_um.get("where")
-    if left is None or left <= tolerance_um + report.rounding_um + SEEN_UM:
-        return report
-    text = (
-        f"{left:.2f} um are left here at the tool tip, more than the tolerance of {tolerance_um:g} um "
-        f"and the {report.rounding_um:.2f} um of the control's digits"
-    )
-    hint = "the reason is a motion near it that is not corrected, or that the control works out by itself"
-    warning = Message("NCF416", text, Place(report.path, int(line or 0)), hint)
-    return replace(report, warnings=(*report.warnings, warning))

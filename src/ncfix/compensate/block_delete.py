@@ -79,8 +79,9 @@ def positions_of(setup: Setup, follow: Follow) -> tuple[Position, ...]:
     words; UsageError with what all positions lack; RefusedError NCF452 for more switches than can be looked at.
     """
     if setup.block_skip is not None:
-        trace = follow(setup)
-        return (Position(_stated(setup, trace.switches), setup, trace),)
+        trace, stated = follow(setup), setup.block_skip
+        on = trace.switches & stated if isinstance(stated, frozenset) else trace.switches if stated else frozenset()
+        return (Position(on if trace.switches else None, setup, trace),)
     found, lacking = {frozenset[int](): _tried(setup, follow)}, list[Message]()
     switches = _asked(found.values())
     while len(found) < 2 ** len(switches):
@@ -88,7 +89,9 @@ def positions_of(setup: Setup, follow: Follow) -> tuple[Position, ...]:
             text = f"the program has {len(switches)} switches of block delete ({named_switches(switches)})"
             hint = f"--block-skip on, off, or the numbers of those that are on: up to {MOST_SWITCHES} are all looked at"
             raise RefusedError.of(TOO_MANY, f"{text}: too many to prove each position of them", None, hint)
-        for on in _subsets(switches):
+        for on in (
+            frozenset(each) for many in range(len(switches) + 1) for each in combinations(sorted(switches), many)
+        ):
             if on not in found:
                 found[on] = _tried(replace(setup, block_skip=on), follow)
         switches |= _asked(found.values())
@@ -106,14 +109,6 @@ def positions_of(setup: Setup, follow: Follow) -> tuple[Position, ...]:
     )
 
 
-def _stated(setup: Setup, switches: frozenset[int]) -> frozenset[int] | None:
-    """The switches of a program that are on in the stated position; None if it asks none."""
-    if not switches:
-        return None
-    stated = setup.block_skip
-    return switches & stated if isinstance(stated, frozenset) else switches if stated else frozenset()
-
-
 def _tried(setup: Setup, follow: Follow) -> Trace | UsageError:
     """The program in a position, or what it lacks there."""
     try:
@@ -123,23 +118,16 @@ def _tried(setup: Setup, follow: Follow) -> Trace | UsageError:
     except SourceError as error:
         if not setup.block_skip:
             raise
-        raise SourceError.collected(_with_position(each, setup) for each in error.messages) from None
-
-
-def _with_position(message: Message, setup: Setup) -> Message:
-    """What stops the control, with the switches that are on."""
-    assert isinstance(setup.block_skip, frozenset)
-    text = f"where blocks with {named_switches(setup.block_skip)} are skipped: {message.text}"
-    return replace(message, text=text, hint="--block-skip off: they never are, and only this is looked at")
+        assert isinstance(setup.block_skip, frozenset)
+        words = f"where blocks with {named_switches(setup.block_skip)} are skipped"
+        hint = "--block-skip off: they never are, and only this is looked at"
+        raise SourceError.collected(
+            replace(each, text=f"{words}: {each.text}", hint=hint) for each in error.messages
+        ) from None
 
 
 def _asked(found: Iterable[Trace | UsageError]) -> frozenset[int]:
     return frozenset[int]().union(*(each.switches for each in found if isinstance(each, Trace)))
-
-
-def _subsets(switches: frozenset[int]) -> list[frozenset[int]]:
-    ordered = sorted(switches)
-    return [frozenset(each) for many in range(len(ordered) + 1) for each in combinations(ordered, many)]
 
 
 def in_pairs(first: Sequence[Position], second: Sequence[Position]) -> Iterator[tuple[Position, Position]]:
@@ -163,18 +151,11 @@ def messages_of(positions: Sequence[Position]) -> tuple[Message, ...]:
         return tuple(told)
     places = [each.place for each in told if each.code == BLOCK_DELETE]
     rest = dict.fromkeys(each for each in told if each.code != BLOCK_DELETE)
-    return (_all_proven(positions, min(filter(None, places), key=lambda place: place.line, default=None)), *rest)
-
-
-def _all_proven(positions: Sequence[Position], place: Place | None) -> Message:
-    (switches, *_) = (each.trace.switches for each in positions)
-    many = "both" if len(positions) == 2 else f"all {len(positions)}"
-    text = f"blocks with {_written(switches)} may be executed or skipped: {many} positions of block delete are held to"
-    return Message(BLOCK_DELETE, text, place, "--block-skip on or off looks at one position only")
-
-
-def _written(switches: frozenset[int]) -> str:
-    return "/" if len(switches) == 1 else named_switches(switches)
+    first = min(filter(None, places), key=lambda place: place.line, default=None)
+    (switches, *_), many = (each.trace.switches for each in positions), len(positions)
+    words = "/" if len(switches) == 1 else named_switches(switches), "both" if many == 2 else f"all {many}"
+    text = "blocks with {} may be executed or skipped: {} positions of block delete are held to".format(*words)
+    return (Message(BLOCK_DELETE, text, first, "--block-skip on or off looks at one position only"), *rest)
 
 
 def most_moves(positions: Sequence[Position]) -> int:
@@ -264,8 +245,7 @@ def settle_together(
             if twin is not None:
                 found.append(found[twin])
                 continue
-            held = _spelled(_held_whole(own, whole), spelled)
-            found.append(settle(program, held, machine, options, readings[k], refused=refused))
+            found.append(settle(program, _held(own, whole, spelled), machine, options, readings[k], refused=refused))
         more = {block: why for each in found for block, why in each.reasons.items()}
         if more.keys() > refused.keys():
             refused = more
@@ -280,17 +260,16 @@ def settle_together(
             spelled[block] = _named(found, block)
             whole.add(block)
             differing.remove(block)
-        refused |= {block: Reason(DIFFERS, WHY, _deletable_before(program, block)) for block in differing}
+        deletable = np.array([any(isinstance(item, Skip) for item in each.items) for each in program.templates])
+        for block in differing:  # because of the nearest block with a `/` before it, or of that block itself
+            causes = np.flatnonzero(deletable[program.template[: block + 1]])
+            refused[block] = Reason(DIFFERS, WHY, int(causes[-1]) if causes.size else -1)
 
 
-def _held_whole(moves: Moves, whole: set[int]) -> Moves:
-    """The motions, those of blocks `whole` not to be split."""
-    bound = moves.compensated | np.isin(moves.block, list(whole))
-    return replace(moves, compensated=bound) if whole else moves
-
-
-def _spelled(moves: Moves, spelled: Mapping[int, Mask]) -> Moves:
-    """The motions, those of some blocks with words for all axes that need one in any position."""
+def _held(moves: Moves, whole: set[int], spelled: Mapping[int, Mask]) -> Moves:
+    """The motions, those of blocks `whole` not to be split, and of `spelled` with words for the axes that need one."""
+    if whole:
+        moves = replace(moves, compensated=moves.compensated | np.isin(moves.block, list(whole)))
     if not spelled:
         return moves
     named = np.zeros(moves.end.shape, dtype=np.bool_)
@@ -327,13 +306,6 @@ def _differing(moves: Sequence[Moves], edits: Sequence[Mapping[int, Edits]]) -> 
             if wanted.setdefault(block, done.get(block, ())) != done.get(block, ()):
                 differing.add(block)
     return differing
-
-
-def _deletable_before(program: Program, block: int) -> int:
-    """The nearest block with a `/` before a block, or that block itself; -1 if there is none."""
-    shapes = np.array([any(isinstance(item, Skip) for item in each.items) for each in program.templates])
-    found = np.flatnonzero(shapes[program.template[: block + 1]])
-    return int(found[-1]) if found.size else -1
 
 
 def _merged(found: Sequence[Settled], edits: Sequence[Mapping[int, Edits]]) -> Together:

@@ -23,7 +23,6 @@ from typing import Protocol
 import numpy as np
 
 from ncfix.compensate import FixOptions
-from ncfix.compensate.account import FixReport
 from ncfix.compensate.block_delete import (
     Readings,
     Together,
@@ -53,7 +52,7 @@ from ncfix.compensate.plain_figures import figures, largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import PathError, path_error
 from ncfix.compensate.plan.offset import is_offset
-from ncfix.compensate.report import Tally, in_lines
+from ncfix.compensate.report import FixReport, Tally, in_lines
 from ncfix.compensate.solve import Agreed, Before, Settled, agree, increments
 from ncfix.compensate.workers import Ground, Read, Share, crew
 from ncfix.control.flatten import flatten

@@ -16,7 +16,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,8 +113,24 @@ def with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup
     tool with a length below zero, which is a distance of another kind.
     """
     moves = followed.moves
+
+    def told(code: str, first: Mapping[int, int], text: str, hint: str) -> list[Message]:
+        return [
+            Message(
+                code,
+                text.format(tool=tool, length=moves.tool_length[row]),
+                program.place(int(moves.block[row])),
+                hint.format(tool=tool),
+            )
+            for tool, row in first.items()
+        ]
+
     if machine.depends_on_tool_length:
-        _require_lengths(program, moves)
+        below = _first_motions(moves, (moves.tool_length < 0) & (moves.rule == Rule.CORRECT))
+        if below:
+            text = "the length offset of tool {tool} is {length:g} mm: that does not say how long the tool is"
+            hint = "give its length from the gauge line to the tip, and the work offset lower by the difference"
+            raise UsageError.collected(told("NCF446", below, text, hint))
     unknown = np.isnan(moves.tool_length)
     if not unknown.any():
         return followed
@@ -125,8 +140,13 @@ def with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup
         return known
     first = _first_motions(moves, unknown)
     if not setup.assume_zero:
-        raise UsageError.collected(_tool_needed(program, moves, tool, row) for tool, row in first.items())
-    notes = [_tool_assumed(program, moves, tool, row) for tool, row in first.items()]
+        text = "the length of tool {tool} is needed and not given: the errors of this machine depend on it"
+        hint = (
+            "--tool {tool}=LENGTH, or `{tool} = {{ length = ... }}` under [tools] in the setup file, or --assume-zero"
+        )
+        raise UsageError.collected(told("NCF431", first, text, hint))
+    text = "the length of tool {tool} is not given and was taken as zero"
+    notes = told("NCF437", first, text, "--tool {tool}=LENGTH")
     assumed = (*followed.assumed, *(f"length of tool {tool}" for tool in first))
     return replace(known, messages=(*followed.messages, *notes), assumed=assumed)
 
@@ -137,30 +157,6 @@ def _first_motions(moves: Moves, chosen: NDArray[np.bool_]) -> dict[int, int]:
         return {}
     tools, rows = np.unique(np.where(chosen, moves.tool, -1), return_index=True)
     return {int(tools[each]): int(rows[each]) for each in np.argsort(rows) if tools[each] >= 0}
-
-
-def _require_lengths(program: Program, moves: Moves) -> None:
-    """Raises UsageError NCF446: a length offset below zero does not say how long the tool is."""
-    below = _first_motions(moves, (moves.tool_length < 0) & (moves.rule == Rule.CORRECT))
-    if below:
-        raise UsageError.collected(_no_length(program, moves, tool, row) for tool, row in below.items())
-
-
-def _no_length(program: Program, moves: Moves, tool: int, row: int) -> Message:
-    text = f"the length offset of tool {tool} is {moves.tool_length[row]:g} mm: that does not say how long the tool is"
-    hint = "give its length from the gauge line to the tip, and the work offset lower by the difference"
-    return Message("NCF446", text, program.place(int(moves.block[row])), hint)
-
-
-def _tool_needed(program: Program, moves: Moves, tool: int, row: int) -> Message:
-    text = f"the length of tool {tool} is needed and not given: the errors of this machine depend on it"
-    hint = f"--tool {tool}=LENGTH, or `{tool} = {{ length = ... }}` under [tools] in the setup file, or --assume-zero"
-    return Message("NCF431", text, program.place(int(moves.block[row])), hint)
-
-
-def _tool_assumed(program: Program, moves: Moves, tool: int, row: int) -> Message:
-    text = f"the length of tool {tool} is not given and was taken as zero"
-    return Message("NCF437", text, program.place(int(moves.block[row])), f"--tool {tool}=LENGTH")
 
 
 PART_BYTES = 3 << 20
@@ -224,44 +220,20 @@ MOVED = 0.75
 """Steps by which a number has to be corrected to say anything."""
 
 
-class Changed(Protocol):
-    """Motions (n), which of them are left as they are, and how the commands at their ends change, (n, n_axes)."""
-
-    @property
-    def moves(self) -> Moves:
-        """As programmed."""
-
-    @property
-    def kept(self) -> Mask:
-        """Those that are left, (n,)."""
-
-    @property
-    def shift(self) -> Array:
-        """What is added, (n, n_axes) mm and rad."""
-
-
 Numbers = Mapping[int, tuple[Array, Array]]
 """Of each linear axis, by its column: the different commands (k,), and what is added to them (k,), mm."""
 
 
-def numbers_of(settled: Changed, step: float, among: Mask | bool = True) -> Numbers:
-    """The commands that change their axis and are corrected, of motions `among` (n,) which they shall be.
+def numbers_of(moves: Moves, change: Array, among: Mask, step: float) -> Numbers:
+    """The commands that change their axis and are corrected, of motions `among` (n,).
 
-    step  of the control's digits, mm
+    change  (n, n_axes) what is added to the commands at their ends, mm and rad
+    step    of the control's digits, mm
     """
-    moves, change = settled.moves, settled.shift
     new = np.abs(moves.end - moves.start) > step / 2
-    told = ~settled.kept & among
-    said = new & told[:, None] & (np.abs(change) > MOVED * step) & ~moves.rotary
+    said = new & among[:, None] & (np.abs(change) > MOVED * step) & ~moves.rotary
     rows = ((axis, np.flatnonzero(each)) for axis, each in enumerate(said.T))
     return {axis: _different(moves.end[row, axis], change[row, axis], step) for axis, row in rows if len(row)}
-
-
-def numbers_at_the_beginning(program: Program, settled: Changed, step: float, own: Mask | bool = True) -> Numbers:
-    """The numbers in the first lines of a program, of which this is a part; `own` (n,) motions of the part."""
-    if program.first_line > LOOKED:
-        return {}
-    return numbers_of(settled, step, own & (program.lines(settled.moves.block) <= LOOKED))
 
 
 def numbers_together(one: Numbers, other: Numbers, step: float) -> Numbers:

@@ -1,29 +1,25 @@
-"""The report of a correction that was made part by part: the same as of one that was made at once."""
+"""The report of a correction: what is said of a program is put together from its parts, of which there may be one."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.account import (
-    NOTHING_SEEN,
     Account,
-    FixReport,
     Left,
-    Refusal,
     either,
     joined,
     left_where_they_stand,
-    with_what_is_left,
     without_figure,
 )
 from ncfix.compensate.block_delete import Together, worst_findings
-from ncfix.compensate.following import Numbers, numbers_at_the_beginning, numbers_together
+from ncfix.compensate.following import LOOKED, Numbers, numbers_of, numbers_together
 from ncfix.compensate.plan.arrays import Mask, lengths
 from ncfix.compensate.plan.deviation import PathError
 from ncfix.compensate.plan.findings import Notes
@@ -36,6 +32,99 @@ from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
+
+SEEN_UM = 0.001
+"""By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""
+
+
+NOTHING_SEEN: Mapping[str, None] = {"max": None, "rms": None}
+"""The figures where nothing was looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A motion block that was left as it was although it is not right, and why."""
+
+    line: int
+    code: str
+    reason: str
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain data, for `--json`."""
+        return {"line": self.line, "code": self.code, "reason": self.reason}
+
+
+@dataclass(frozen=True, slots=True)
+class FixReport:
+    """What was done to one program, as figures.
+
+    error_before, error_after  tip error along the path: {"max", "rms"} in um, and "where" (line) after
+            None where nothing was looked at
+    max_correction_um  None where nothing was corrected
+    rounding_um  what the control's digits may add to the path that was planned
+    left    axes that had to stay where they stand, since the program has not said where that is
+    block_delete  the positions of block delete for which it is right: the switches that are on in each
+    passed_by_rule  blocks that were passed, by rule
+    no_figure  motions at feed and holes of which the figures say nothing, by reason
+    """
+
+    path: str
+    blocks: int
+    moves: int
+    compensated: int
+    passed: int
+    changed: bool
+    inserted_blocks: int = 0
+    max_correction_um: float | None = None
+    error_before_um: Mapping[str, float | int | None] = field(default_factory=dict)
+    error_after_um: Mapping[str, float | int | None] = field(default_factory=dict)
+    refused: tuple[Refusal, ...] = ()
+    warnings: tuple[Message, ...] = ()
+    strategy: str = ""
+    leaves: str = ""
+    left: tuple[Left, ...] = ()
+    rounding_um: float = 0.0
+    block_delete: tuple[list[int], ...] = ()
+    passed_by_rule: Mapping[str, int] = field(default_factory=dict)
+    no_figure: Mapping[str, int] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, object]:
+        """The per-file object of `fix --json`."""
+        return {
+            "path": self.path,
+            "output": None,
+            "changed": self.changed,
+            "blocks": self.blocks,
+            "moves": self.moves,
+            "compensated": self.compensated,
+            "passed": self.passed,
+            "passed_by_rule": dict(sorted(self.passed_by_rule.items())),
+            "inserted_blocks": self.inserted_blocks,
+            "max_correction_um": self.max_correction_um,
+            "error_before_um": dict(self.error_before_um),
+            "error_after_um": dict(self.error_after_um),
+            "rounding_um": round(self.rounding_um, 4),
+            "no_figure": dict(sorted(self.no_figure.items())),
+            "strategy": self.strategy,
+            "leaves": self.leaves,
+            "block_delete": list(self.block_delete),
+            "left_where_it_stands": [left.as_dict() for left in self.left],
+            "refused": [refusal.as_dict() for refusal in self.refused],
+            "warnings": [warning.as_dict() for warning in self.warnings],
+        }
+
+    def with_what_is_left(self, tolerance_um: float) -> FixReport:
+        """The report with a warning (NCF416) if more is left at the tool tip than tolerance and rounding allow."""
+        left, line = self.error_after_um.get("max"), self.error_after_um.get("where")
+        if left is None or left <= tolerance_um + self.rounding_um + SEEN_UM:
+            return self
+        text = (
+            f"{left:.2f} um are left here at the tool tip, more than the tolerance of {tolerance_um:g} um "
+            f"and the {self.rounding_um:.2f} um of the control's digits"
+        )
+        hint = "the reason is a motion near it that is not corrected, or that the control works out by itself"
+        warning = Message("NCF416", text, Place(self.path, int(line or 0)), hint)
+        return replace(self, warnings=(*self.warnings, warning))
 
 
 @dataclass(slots=True)
@@ -58,6 +147,10 @@ class Side:
             return dict(NOTHING_SEEN)
         rms = math.sqrt(self.squares / way) if way else 0.0
         return {"max": round(self.max * 1e3, 4), "rms": round(rms * 1e3, 4)}
+
+
+SUMS = ("blocks", "moves", "compensated", "passed", "unseen", "samples", "inserted", "way", "refused")
+"""What of a tally is added up."""
 
 
 @dataclass(slots=True)
@@ -97,10 +190,8 @@ class Tally:
         lacking = [each.lacking(steps, own) for each in every]
         left = [left_where_they_stand(program, each.moves, lack) for each, lack in zip(every, lacking, strict=True)]
         self.left = joined(self.left, either(left))
-        account, unseen = (
-            Account.together([Account.of(each.moves, each.kept, each.reasons) for each in every]),
-            Counter[str](),
-        )
+        account = Account.together([Account.of(each.moves, each.kept, each.reasons) for each in every])
+        unseen = Counter[str]()
         for k, (settled, lack, found) in enumerate(zip(every, lacking, worst_findings(every), strict=True)):
             moves, plan, intent = settled.moves, settled.plan, Intent(machine, settled.moves, State())
             self.rounding = max(self.rounding, rounding_along(intent, plan.pieces, plan.corners, own))
@@ -117,7 +208,7 @@ class Tally:
         self.changed |= len(together.splices) > 0
         refused = {block: reason for block, reason in account.refused.items() if block not in theirs}
         self.refused += refusals(program, replace(account, refused=refused))
-        self.numbers = numbers_at_the_beginning(program, every[0], self.step, True if own is None else own)
+        self._look_at_numbers(program, every[0], True if own is None else own)
 
     def add_plain(self, program: Program, settled: Settled, largest: float, intent: Intent) -> None:
         """Take in a part of dwells and motions that were corrected, each in a block of its own.
@@ -130,26 +221,27 @@ class Tally:
         self.inserted += settled.emission.added_blocks
         self.largest = max(self.largest, largest)
         self.changed |= len(settled.emission.splices) > 0
-        self.numbers = numbers_at_the_beginning(program, settled, self.step)
+        self._look_at_numbers(program, settled)
         for finding in settled.plan.findings:
             self.found.add(finding, program, settled.moves)
 
+    def _look_at_numbers(self, program: Program, settled: Settled, own: Mask | bool = True) -> None:
+        """Note the numbers in the first lines of a program; `own` (n,) motions of the part."""
+        if program.first_line <= LOOKED:
+            among = ~settled.kept & own & (program.lines(settled.moves.block) <= LOOKED)
+            self.numbers = numbers_of(settled.moves, settled.shift, among, self.step)
+
     def take(self, other: Tally) -> None:
         """Take in what has been done to the part that comes next."""
-        self.blocks += other.blocks
-        self.moves += other.moves
-        self.compensated += other.compensated
-        self.passed += other.passed
-        self.inserted += other.inserted
+        for name in SUMS:
+            total = getattr(self, name)
+            total += getattr(other, name)
+            setattr(self, name, total)
         self.changed |= other.changed
         self.largest = max(self.largest, other.largest)
         self.rounding = max(self.rounding, other.rounding)
-        self.unseen += other.unseen
-        self.samples += other.samples
-        self.way += other.way
         self.before.take(other.before)
         self.after.take(other.after)
-        self.refused += other.refused
         self.notes = other.notes | self.notes
         self.left = joined(self.left, other.left)
         self.found.take(other.found)
@@ -199,7 +291,7 @@ class Tally:
             passed_by_rule=self.passed,
             no_figure=self.unseen,
         )
-        return with_what_is_left(report, options.tolerance_um)
+        return report.with_what_is_left(options.tolerance_um)
 
 
 def refusals(program: Program, account: Account) -> list[Refusal]:

@@ -25,7 +25,6 @@ from ncfix.compensate.account import Lacking, Reason, at_measured_places
 from ncfix.compensate.following import kinematics_of
 from ncfix.compensate.plan.arcs import Closure, across
 from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked
-from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.limits import findings, led_astray
@@ -255,19 +254,36 @@ def agree(
             kept[0] |= head.kept[at]
             shift = head.shift[at]
         kept, unmoored = _with_what_they_need(moves, kept, bound, reasons)
-        planned = _planned(dialect, moves, machine, options, kept, state, shift)
-        if len(moves):
-            trail.append(_last_of(planned, moves))
+        planned = plan(
+            machine,
+            moves,
+            get_strategy(options.strategy),
+            options.tolerance_mm,
+            Closure(dialect.closure_mm, dialect.closure_relative),
+            kept,
+            rounding_mm=rounding(machine),
+            split_rapids=options.split_rapids,
+            state=state,
+            before=shift,
+            arc_pieces=language_of(dialect).arc_pieces,
+        )
+        if len(moves):  # of the last one
+            off = planned.start[-1] - moves.start[-1]
+            trail.append((bool(planned.pieces.kept[-1]), np.where(np.isfinite(off), off, 0.0)))
         planned = replace(planned, pieces=on_digits(Intent(machine, moves, state), planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start, state)
-        stays = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
+        stays = planned.pieces.kept[np.searchsorted(planned.pieces.move, np.arange(len(moves)))] & ~kept
         for finding in against:
             stays[finding.moves] = True
         astray = led_astray(machine, moves, planned.pieces, planned.start, state)
         waiting = head is not None and len(trail) < len(head.kept)
         if not (stays.any() or (~bound[astray]).any() or waiting):
             return Agreed(planned, kept, reasons, unmoored, tuple(trail))
-        _explain_findings(reasons, (*against, *planned.findings), moves, stays)
+        for finding in (*against, *planned.findings):
+            for k, row in enumerate(finding.moves.tolist()):
+                if stays[row]:
+                    _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
+        _explain(reasons, moves.block[stays].tolist(), CODE_OF_RULE, "no correction was found for it")
         kept |= stays
         bound[astray] = True
 
@@ -296,40 +312,6 @@ def increments(machine: Machine) -> Array:
     return np.where(machine.rotary, rotary, linear)
 
 
-def _planned(
-    dialect: Dialect,
-    moves: Moves,
-    machine: Machine,
-    options: FixOptions,
-    kept: Mask,
-    state: State,
-    before: Array | None,
-) -> Plan:
-    return plan(
-        machine,
-        moves,
-        get_strategy(options.strategy),
-        options.tolerance_mm,
-        Closure(dialect.closure_mm, dialect.closure_relative),
-        kept,
-        rounding_mm=rounding(machine),
-        split_rapids=options.split_rapids,
-        state=state,
-        before=before,
-        arc_pieces=language_of(dialect).arc_pieces,
-    )
-
-
-def _last_of(planned: Plan, moves: Moves) -> tuple[bool, Array]:
-    """Whether the last motion is left as it was, and how far off the axes stand at its start, (n_axes,) mm and rad."""
-    shift = planned.start[-1] - moves.start[-1]
-    return bool(planned.pieces.kept[-1]), np.where(np.isfinite(shift), shift, 0.0)
-
-
-def _first_rows(planned: Plan, n: int) -> Index:
-    return np.searchsorted(planned.pieces.move, np.arange(n))
-
-
 def _by_rule(moves: Moves) -> dict[int, Reason]:
     reasons: dict[int, Reason] = {}
     relative = (moves.kind == Kind.CYCLE) & moves.incremental & (moves.rule == Rule.CORRECT)
@@ -343,15 +325,6 @@ def _by_rule(moves: Moves) -> dict[int, Reason]:
 def _explain(reasons: dict[int, Reason], blocks: list[int], code: str, text: str) -> None:
     for block in blocks:
         reasons.setdefault(block, Reason(code, text))
-
-
-def _explain_findings(reasons: dict[int, Reason], found: tuple[Finding, ...], moves: Moves, refused: Mask) -> None:
-    for finding in found:
-        for k, row in enumerate(finding.moves.tolist()):
-            if refused[row]:
-                _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
-    for row in np.flatnonzero(refused):
-        _explain(reasons, [int(moves.block[row])], CODE_OF_RULE, "no correction was found for it")
 
 
 SAME = 1e-6
@@ -385,16 +358,10 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
     off = across(off, again.normal[arcs])  # the height of a centre means nothing
     differs[arcs[differ(off, np.zeros_like(off))]] = True
-    differs[arcs] |= np.abs(again.sweep[arcs] - _sweeps(settled)[rows[arcs]]) > TURN
-    return differs
-
-
-def _sweeps(settled: Settled) -> Array:
-    """(m,) about how far each piece of an arc turns, rad: its share of what its motion does."""
-    pieces = settled.plan.pieces
     before = np.where(np.diff(pieces.move, prepend=-1) == 0, np.append(0.0, pieces.fraction[:-1]), 0.0)
-    sweep: Array = settled.moves.sweep[pieces.move] * (pieces.fraction - before)
-    return sweep
+    sweeps = settled.moves.sweep[pieces.move] * (pieces.fraction - before)  # its share of what its motion does
+    differs[arcs] |= np.abs(again.sweep[arcs] - sweeps[rows[arcs]]) > TURN
+    return differs
 
 
 def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:

@@ -245,17 +245,8 @@ def tip_with(correct: Correct) -> Tip:
     return tip
 
 
-@dataclass(frozen=True, slots=True)
-class _Ends:
-    """What a correction would change at the ends of motions."""
-
-    moves: Moves
-    kept: Mask
-    shift: Array
-
-
 def seems_corrected(machine: Machine, moves: Moves) -> bool:
-    """Whether the numbers of a program look as if it had been corrected for this machine already (`double`)."""
+    """Whether the numbers of a program look as if it had been corrected for this machine already (see `following`)."""
     kept: Mask = (moves.rule != Rule.CORRECT) | ~np.isfinite(moves.end).all(axis=1)
     shift = np.zeros_like(moves.end)
     intent = Intent(machine, moves, State())
@@ -269,4 +260,4 @@ def seems_corrected(machine: Machine, moves: Moves) -> bool:
         commands = commands_from_joints(machine, corrected, moves.tcp[some], moves.tool_length[some])
         shift[some] = commands - moves.end[some]
     step = machine.least_increment[0]
-    return looks_corrected(numbers_of(_Ends(moves, kept, shift), step), step)
+    return looks_corrected(numbers_of(moves, shift, ~kept, step), step)
