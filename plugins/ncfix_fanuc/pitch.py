@@ -221,7 +221,8 @@ def _with_cells(
             "NCF484", f"{axis} needs {last - first + 1} points, and the control has {MOST_POINTS} for an axis"
         )
     places = np.arange(first, last + 1) * interval * described.unit
-    inside = _turned(places, request.space[column]) if turn else np.clip(places, *request.space[column])
+    lowest, highest = request.space[column]
+    inside = lowest + np.mod(places - lowest, 2 * np.pi) if turn else np.clip(places, lowest, highest)
     mean = np.mean([table.at(inside[:, None])[:, 0] for table in tables], axis=0)
     curve: Array = mean - at_zero(tables)
     if turn:
@@ -239,11 +240,6 @@ def _ends(low: float, high: float, interval: float) -> tuple[int, int]:
     """The first and last whole number of intervals from zero that hold a range."""
     first = math.floor(low / interval + 1e-9)
     return first, max(math.ceil(high / interval - 1e-9), first + 1)
-
-
-def _turned(places: Array, space: Array) -> Array:
-    found: Array = space[0] + np.mod(places - space[0], 2 * np.pi)
-    return found
 
 
 def diffused(curve: Array) -> tuple[NDArray[np.int64], int]:

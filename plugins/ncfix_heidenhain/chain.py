@@ -141,18 +141,12 @@ def _acted(points: Array, axis: str, value: Array) -> Array:
 
 def kinematics_text(rows: Sequence[ChainRow]) -> bytes:
     """The table as a file."""
-    table = tuple((str(n), "", row.key, row.axis, _coord(row), _error(row)) for n, row in enumerate(rows))
-    return TextTable("", tuple(TableColumn(*each) for each in COLUMNS), table, padded=False).text()
-
-
-def _coord(row: ChainRow) -> str:
-    return "" if row.coord is None else f"{round(row.coord, 9) + 0.0:.9g}"
-
-
-def _error(row: ChainRow) -> str:
-    if row.error is None:
-        return ""
-    return "..".join(row.error) if isinstance(row.error, tuple) else f"{row.error:.7f}"
+    table = []
+    for n, row in enumerate(rows):
+        coord = "" if row.coord is None else f"{round(row.coord, 9) + 0.0:.9g}"
+        error = "" if row.error is None else row.error if isinstance(row.error, tuple) else (f"{row.error:.7f}",)
+        table.append((str(n), "", row.key, row.axis, coord, "..".join(error)))
+    return TextTable("", tuple(TableColumn(*each) for each in COLUMNS), tuple(table), padded=False).text()
 
 
 def over_limits(rows: Sequence[ChainRow]) -> Iterator[str]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.axis_tables import AxisTables, additive
-from ncfix.tables.compensation import Compensation, Term
+from ncfix.tables.compensation import Compensation, Term, own_terms
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_sums
@@ -25,6 +25,7 @@ MOST = 256
 """Entries of a file of the older controls; of the newer ones no number is public."""
 TABLES = re.compile(rb"\s*BEGIN[ \t]+\S+\.(?:COM|CMA)\b", re.IGNORECASE)
 SIGN = "sign.txt"
+"""Keeps the sign that was settled for the machine beside the files."""
 SIGNS = ("error", "correction")
 LARGEST = 9.9999
 """mm, degree: what the columns of the peer's files hold."""
@@ -123,9 +124,12 @@ class Heidenhain(Control):
         files = {}
         for line in kept:
             com = _as_file(line, sense, axes if old else None, both)
-            _check_size(com, tables[line.input])
-            text = old_text if old else nck_text
-            files[tables[line.input]] = text(tables[line.input], com, 4)
+            largest = max(float(np.abs(values).max()) for values in com.columns.values())
+            if largest > LARGEST:
+                text = f"{tables[line.input]} would have to hold {largest:.3f}, and its columns end at {LARGEST}"
+                raise RefusedError.of("NCF484", text, hint="is the error in mm?")
+            as_text = old_text if old else nck_text
+            files[tables[line.input]] = as_text(tables[line.input], com, 4)
         files[CONFIG] = cma_text(axes, tables)
         files[SIGN] = f"{settings['sign']}\n".encode()
         least = least_of_sums(machine, request.space, request.tool_length)
@@ -157,28 +161,19 @@ class Heidenhain(Control):
     def _read(self, files: Files) -> tuple[list[Term], list[Remarks]]:
         axes, tables, config = read_cma(files)
         remarks, terms = [config], []
-        sense = read_sign(files, config)
+        sign = files.get(SIGN, b"").decode("latin-1").strip()
+        if sign not in SIGNS:
+            config.refuse(0, f"{SIGN} says {sign!r}", "error or correction; HEID-1 says how to find out")
+        sense = sign_of(sign)
         for axis, name in tables.items():
             com, found = read_com(name, files[name])
             remarks.append(found)
             if com is not None:
                 terms += list(_terms(axis, com, axes, sense, found))
-        _check_entered(files, tables, config)
+        for name in files:
+            if name.upper().endswith(".COM") and name not in tables.values():
+                config.doubt(0, f"{name} is not entered in the active line: the control does not use it")
         return terms, remarks
-
-
-def read_sign(files: Files, remarks: Remarks) -> float:
-    """What turns a value into a correction: the sign that was settled for the machine is kept beside the files."""
-    found = files.get(SIGN, b"").decode("latin-1").strip()
-    if found not in ("error", "correction"):
-        remarks.refuse(0, f"{SIGN} says {found!r}", "error or correction; HEID-1 says how to find out")
-    return 1.0 if found == "correction" else -1.0
-
-
-def _check_entered(files: Files, tables: Mapping[str, str], config: Remarks) -> None:
-    for name in files:
-        if name.upper().endswith(".COM") and name not in tables.values():
-            config.doubt(0, f"{name} is not entered in the active line: the control does not use it")
 
 
 def _terms(axis: str, com: ComTable, axes: tuple[str, ...], sense: float, remarks: Remarks) -> Iterator[Term]:
@@ -188,15 +183,13 @@ def _terms(axis: str, com: ComTable, axes: tuple[str, ...], sense: float, remark
         if output is None:
             continue
         scale = sense * unit_of(output)
-        grid = Grid((axis,), (nodes,), (output,), scale * values[:, None])
         if output == axis and com.backlash is not None:
             if values.any() and not com.backlash.any():
                 text = f"BACKLASH is zero in all rows: {axis} would not be corrected while it travels towards minus"
                 remarks.doubt(0, text, "the values of its own column, if there is no play (HEID-3)")
-            back = Grid((axis,), (nodes,), (output,), scale * com.backlash[:, None])
-            yield from (Term((grid,), (axis, 1)), Term((back,), (axis, -1)))
+            yield from own_terms(axis, nodes, scale * values, scale * com.backlash)
         else:
-            yield Term((grid,))
+            yield Term((Grid((axis,), (nodes,), (output,), scale * values[:, None]),))
     if com.backlash is not None and com.backlash.any() and axis not in {_letter(n, axes, None) for n in com.columns}:
         remarks.doubt(0, f"BACKLASH without a column of {axis} itself is not used")
 
@@ -234,13 +227,6 @@ def _as_file(line: AxisTables, sense: float, numbered: tuple[str, ...] | None, b
     if numbered and not both:
         own = columns[str(numbered.index(line.input) + 1)]
     return ComTable(line.nodes / unit, columns, own if both or numbered else None)
-
-
-def _check_size(com: ComTable, name: str) -> None:
-    largest = max(float(np.abs(values).max()) for values in com.columns.values())
-    if largest > LARGEST:
-        text = f"{name} would have to hold {largest:.3f}, and its columns end at {LARGEST}"
-        raise RefusedError.of("NCF484", text, hint="is the error in mm?")
 
 
 def sign_of(text: str) -> float:

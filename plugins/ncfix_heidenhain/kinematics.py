@@ -11,7 +11,7 @@ import numpy as np
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.machine import Machine
 from ncfix.tables.axis_tables import reversal_note
-from ncfix.tables.compensation import Compensation, Tables, Term
+from ncfix.tables.compensation import Compensation, Tables, Term, own_terms
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import DEGREE, Remarks, check_all, in_order, messages_of, unit_of
@@ -229,11 +229,9 @@ def _grids(
 
 def _own(axis: str, nodes: Array, values: Array, com: ComTable, factor: float) -> tuple[Term, ...]:
     """The table of an axis over itself: BACKLASH in its place while it travels towards minus."""
-    ahead = Grid((axis,), (nodes,), (axis,), values[:, None])
     if com.backlash is None or np.array_equal(values, factor * com.backlash):
-        return (Term((ahead,)),)
-    back = Grid((axis,), (nodes,), (axis,), factor * com.backlash[:, None])
-    return (Term((ahead,), (axis, 1)), Term((back,), (axis, -1)))
+        return (Term((Grid((axis,), (nodes,), (axis,), values[:, None]),)),)
+    return own_terms(axis, nodes, values, factor * com.backlash)
 
 
 def _check_names(chain: tuple[ChainRow, ...], components: Mapping[tuple[str, str], Grid], remarks: Remarks) -> None:

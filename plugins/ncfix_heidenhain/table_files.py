@@ -167,31 +167,20 @@ def read_cma(files: Files) -> tuple[tuple[str, ...], dict[str, str], Remarks]:
     table = read_table(remarks, files[names[0]])
     if table is None:
         return (), {}, remarks
-    axes = _cma_axes(table, remarks)
-    return axes, _active_files(table, axes, files, remarks), remarks
-
-
-def _cma_axes(table: TextTable, remarks: Remarks) -> tuple[str, ...]:
-    """The axes that have a column, each of which should be there once."""
     axes = tuple(column.name for column in table.columns if column.name not in ("NR", ACTIVE))
     for axis in axes:
         if len(axis) != 1 or axis not in ORDER or axes.count(axis) > 1:
             remarks.refuse(0, f"the column {axis} is no axis, or is there twice")
-    return axes
-
-
-def _active_files(table: TextTable, axes: Sequence[str], files: Files, remarks: Remarks) -> dict[str, str]:
-    """Axis -> its file, of those that the active line names and that are there."""
     marked = [row for row, cell in enumerate(table.cells(ACTIVE)) if cell == "*"]
     if len(marked) != 1:
         remarks.refuse(0, f"{len(marked)} lines are marked with *", "exactly one line is active")
-        return {}
+        return axes, {}, remarks
     row = marked[0]
     named = {axis: name for axis in axes if (name := table.cells(axis)[row])}
     for axis, name in named.items():
         if name not in files:
             remarks.refuse(table.lines[row], f"the file {name} of axis {axis} is missing")
-    return {axis: name for axis, name in named.items() if name in files}
+    return axes, {axis: name for axis, name in named.items() if name in files}, remarks
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +229,9 @@ def read_com(path: str, content: bytes) -> tuple[ComTable | None, Remarks]:
     if table is None:
         return None, remarks
     names = [column.name for column in table.columns]
-    _check_numbers(remarks, table)
+    numbered = enumerate(zip(table.lines, table.cells("NR"), strict=True))
+    for expected, line, cell in [(n, line, cell) for n, (line, cell) in numbered if cell != str(n)][:1]:
+        remarks.refuse(line, f"row {cell or 'without a number'} where {expected} should be")
     nodes = _positions(remarks, table, path)
     held = [name for name in names if name not in ("NR", POSITION, BACKLASH)]
     for name in held:
@@ -250,24 +241,13 @@ def read_com(path: str, content: bytes) -> tuple[ComTable | None, Remarks]:
             remarks.refuse(0, f"the column {name} is there twice")
     if not held:
         remarks.refuse(0, "no column of values")
-    columns = {_short(name): _com_values(remarks, table, name) for name in held}
+    short = {name: match[1] if (match := FUNCTION.fullmatch(name)) else name for name in held}
+    columns = {short[name]: _com_values(remarks, table, name) for name in held}
     backlash = _com_values(remarks, table, BACKLASH) if BACKLASH in names else None
     if remarks.wrong:
         return None, remarks
     _look(remarks, table, nodes, columns)
     return ComTable(nodes, columns, backlash), remarks
-
-
-def _short(name: str) -> str:
-    match = FUNCTION.fullmatch(name)
-    return match[1] if match else name
-
-
-def _check_numbers(remarks: Remarks, table: TextTable) -> None:
-    for expected, (line, cell) in enumerate(zip(table.lines, table.cells("NR"), strict=True)):
-        if cell != str(expected):
-            remarks.refuse(line, f"row {cell or 'without a number'} where {expected} should be")
-            return
 
 
 def _positions(remarks: Remarks, table: TextTable, path: str) -> Array:

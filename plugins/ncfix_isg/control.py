@@ -178,7 +178,10 @@ class Isg(Control):
         files = {CONFIG: config_text(numbers, settings["folder"], names, filter_steps, negate)}
         for name, owners, grid in zip(names, made.owners, made.grids, strict=True):
             files[name] = grid_text(_times(grid, dict.fromkeys(negate, -1.0)), owners)
-        play = _play(request, settings)
+        play: tuple[Reversal, ...] = ()
+        if settings["play"] == "yes":
+            space, length = request.space, request.tool_length
+            play = reversals(request.machine, space, length, request.target, MOST_SCREW_POINTS)
         for each in play:
             files[SCREW_FILE.format(each.axis)] = list_text(each, numbers[each.axis])
         return Written(files, tuple(_notes(made, request, play)))
@@ -254,12 +257,6 @@ def _numbers(request: Request, given: str) -> dict[str, int]:
     if odd or sorted(pair[0] for pair in pairs) != sorted(names):
         raise wrong_setting({"axes": given}, "axes", "LETTER:NUMBER for each axis, separated by commas")
     return {name: int(number) for name, number in sorted(pairs, key=lambda pair: LETTERS.index(pair[0]))}
-
-
-def _play(request: Request, settings: Mapping[str, str]) -> tuple[Reversal, ...]:
-    if settings["play"] == "no":
-        return ()
-    return reversals(request.machine, request.space, request.tool_length, request.target, MOST_SCREW_POINTS)
 
 
 def _notes(made: GridSet, request: Request, play: tuple[Reversal, ...]) -> Iterator[str]:

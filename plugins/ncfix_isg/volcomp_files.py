@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from ncfix.tables.axis_tables import Reversal
-from ncfix.tables.compensation import Term
+from ncfix.tables.compensation import Term, own_terms
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid, full_grid
 from ncfix.tables.table_files import Remarks, as_number, unit_of
@@ -338,7 +338,9 @@ def _grids(
         )
         remarks.refuse(0, f"{text} (error 70471)", "GRID needs every combination of the positions once")
         return []
-    _look_at_values(remarks, lines, values)
+    for row in np.flatnonzero(np.abs(values).max(axis=1) > LARGE)[:1]:
+        text = f"an error of {np.abs(values[row]).max():g} mm, which no machine has"
+        remarks.refuse(lines[row], text, "values are in mm, not um")
     ordered = np.zeros((*counts, len(outputs)))
     ordered[at] = values
     _look_for_jumps(remarks, nodes, ordered)
@@ -347,12 +349,6 @@ def _grids(
     axes = tuple(sorted({name[1] for name in outputs}))
     error = np.stack([sum(ordered[..., i] for i, name in enumerate(outputs) if name[1] == axis) for axis in axes], -1)
     return [Grid(tuple(inputs), scaled, axes, -error)]
-
-
-def _look_at_values(remarks: Remarks, lines: Sequence[int], values: Array) -> None:
-    for row in np.flatnonzero(np.abs(values).max(axis=1) > LARGE)[:1]:
-        text = f"an error of {np.abs(values[row]).max():g} mm, which no machine has"
-        remarks.refuse(lines[row], text, "values are in mm, not um")
 
 
 def _look_for_jumps(remarks: Remarks, nodes: Sequence[Array], values: Array) -> None:
@@ -410,9 +406,8 @@ def _terms(remarks: Remarks, numbers: Mapping[str, str] | None) -> Iterator[Term
     if not both and any(point.get("neg", point["pos"]) != point["pos"] for point in points):
         remarks.doubt(0, "values neg that are never used, since kw.ssfk.bilateral is not 1")
     nodes = np.array([point["setpoint"] for point in points], dtype=np.float64) * SCREW_UNIT
-    for key, way in (("pos", 1), ("neg" if both else "pos", -1)):
-        values = np.array([-point[key] for point in points], dtype=np.float64) * SCREW_UNIT
-        yield Term((Grid((axis,), (nodes,), (axis,), values[:, None]),), (axis, way))
+    ahead, back = ([-point[key] for point in points] for key in ("pos", "neg" if both else "pos"))
+    yield from own_terms(axis, nodes, *(np.array(way, dtype=np.float64) * SCREW_UNIT for way in (ahead, back)))
 
 
 def _axis(remarks: Remarks, entries: Entries, numbers: Mapping[str, str] | None) -> str:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ncfix.diagnostics import Message
 from ncfix.tables.axis_tables import positioning
-from ncfix.tables.compensation import Compensation, Term
+from ncfix.tables.compensation import Compensation, Term, own_terms
 from ncfix.tables.control import (
     Assumption,
     Control,
@@ -30,7 +30,7 @@ from ncfix.tables.control import (
     whole,
     wrong_setting,
 )
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Array
 from ncfix.tables.lower_bounds import least_of_own_axis
 from ncfix.tables.table_files import ALONE, DEGREE, ORDER, TURNING, Remarks, check_all, in_order, messages_of, unit_of
 
@@ -68,12 +68,10 @@ class JointTable:
         """The name of its file."""
         return f"joint_{self.number}_{self.axis}.comp"
 
-    def terms(self) -> Iterator[Term]:
+    def terms(self) -> tuple[Term, Term]:
         """The two columns as tables, mm or rad."""
         unit = unit_of(self.axis)
-        for way, values in ((1, self.forward), (-1, self.reverse)):
-            grid = Grid((self.axis,), (self.nodes * unit,), (self.axis,), (values * unit)[:, None])
-            yield Term((grid,), (self.axis, way))
+        return own_terms(self.axis, self.nodes * unit, self.forward * unit, self.reverse * unit)
 
 
 def comp_text(joint: JointTable, kind: int) -> bytes:

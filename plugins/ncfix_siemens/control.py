@@ -89,7 +89,11 @@ class Siemens(Control):
         files = {f"{table.output}_EEC.INI": eec_text(table, _heads(settings)) for table in eec}
         if cec or not eec:
             files[CEC] = cec_text(cec, _heads(settings), _titles(cec, settings), settings.style)
-        return Written(files, tuple(_notes(request, settings, scheme, cec)), _least(request, scheme))
+        rotary = {axis.name for axis in request.machine.axes if axis.rotary}
+        turned = any(term.outputs[0] in rotary for term in scheme.tables.terms)
+        why = "a weighting of the correction that no function of two axes sees has so much of it"
+        least = Least(scheme.bound, why + (", with the rotary axes corrected as here" if turned else ""))
+        return Written(files, tuple(_notes(request, settings, scheme, cec)), least)
 
     def probe(self, request: Request) -> Written:
         """Two small files that settle `value_sign` and `product_terms`, and what to do with them."""
@@ -196,17 +200,6 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[C
         yield "Tables for one way hold the play of the axes: MD32450 $MA_BACKLASH must be what it was when measured."
     if products:
         yield "Products hold in millimetres only: do not switch the control to inches with these tables on."
-
-
-def _least(request: Request, scheme: Scheme) -> Least:
-    at_that = ", with the rotary axes corrected as here" if _turns(request, scheme) else ""
-    why = "a weighting of the correction that no function of two axes sees has so much of it"
-    return Least(scheme.bound, f"{why}{at_that}")
-
-
-def _turns(request: Request, scheme: Scheme) -> bool:
-    rotary = [axis.name for axis in request.machine.axes if axis.rotary]
-    return any(term.outputs[0] in rotary for term in scheme.tables.terms)
 
 
 def _turned(request: Request, scheme: Scheme) -> Iterator[str]:

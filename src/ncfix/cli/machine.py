@@ -7,6 +7,7 @@ symbolically.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,10 +19,12 @@ from ncfix.diagnostics import ExitCode, Message, Place, visible
 from ncfix.plugins import nearest, registry
 
 if TYPE_CHECKING:
-    from ncfix.machine import Axis, Effect, Machine
+    from ncfix.machine import Effect, Machine
     from ncfix.machine.symbolic import Derivation
 
 Row = dict[str, str]
+COLUMNS = ("name", "unit", "title", "basis", "much", "seen by", "needs", "squareness")
+"""Of the table of effects."""
 GENERIC = """
 ncfix = 1
 topology = "w C B F X Y Z t"
@@ -138,56 +141,32 @@ def _effect_as_dict(machine: Machine, effect: Effect) -> dict[str, Any]:
     }
 
 
-def _page(machine: Machine) -> list[str]:
-    return [f"{machine.name}  ({machine.hash})", *_facts(machine), "", *_chain(machine), *_errors(machine)]
+def _page(machine: Machine) -> Iterator[str]:
+    """The facts, the joints as they follow one another, and the errors of each."""
+    from ncfix.machine.effects import depends_on, facts, travel_of, vector
 
-
-def _facts(machine: Machine) -> list[str]:
-    from ncfix.machine.effects import facts
-
-    return [f"{name + ':':<20}{value}" for name, value in facts(machine).items()]
-
-
-def _chain(machine: Machine) -> list[str]:
-    """The joints as they follow one another."""
-    from ncfix.machine.effects import vector
-
-    workpiece = [_axis(axis) for axis in machine.axes if axis.workpiece_side]
-    tool = [_axis(axis) for axis in machine.axes if not axis.workpiece_side]
-    end = f"tool        tip to spindle {vector(machine.tool.direction)}, gauge line at {vector(machine.tool.point)}"
-    return ["workpiece", *workpiece, "foundation", *tool, end]
-
-
-def _axis(axis: Axis) -> str:
-    from ncfix.machine.effects import travel_of, vector
-
-    along = f"along {vector(axis.direction)}"
-    where = f"about {vector(axis.direction)} through {vector(axis.point)}" if axis.rotary else along
-    return f"  {axis.name}  {'rotary' if axis.rotary else 'linear'}  {travel_of(axis):<20}  {where}"
-
-
-def _errors(machine: Machine) -> list[str]:
+    yield f"{machine.name}  ({machine.hash})"
+    yield from (f"{name + ':':<20}{value}" for name, value in facts(machine).items())
+    for heading, on_workpiece in (("\nworkpiece", True), ("foundation", False)):
+        yield heading
+        for axis in (each for each in machine.axes if each.workpiece_side == on_workpiece):
+            through = f" through {vector(axis.point)}" if axis.rotary else ""
+            kind, where = ("rotary", "about") if axis.rotary else ("linear", "along")
+            yield f"  {axis.name}  {kind}  {travel_of(axis):<20}  {where} {vector(axis.direction)}{through}"
+    yield f"tool        tip to spindle {vector(machine.tool.direction)}, gauge line at {vector(machine.tool.point)}"
     if not machine.effects:
-        return ["", "no errors: a perfect machine"]
-    lines = []
+        yield "\nno errors: a perfect machine"
     for joint in (*machine.axis_names, "S"):
         found = [effect for effect in machine.effects if effect.joint == joint]
         if found:
-            lines += ["", f"errors of {joint}" if joint != "S" else "errors of the spindle"]
-            lines += [_effect_line(machine, effect) for effect in found]
-    return lines
-
-
-def _effect_line(machine: Machine, effect: Effect) -> str:
-    from ncfix.machine.effects import depends_on
-
-    facts = _effect_as_dict(machine, effect)
-    if facts["range"] is None:
-        size = "size not known from the file"
-    else:
-        low, high = facts["range"]
-        size = f"{low:+.3g} {facts['unit']}" if low == high else f"{low:+.3g} ... {high:+.3g} {facts['unit']}"
-    return f"  {effect.name:<5} {facts['title']:<44} {depends_on(effect):<28} {size}"
+            yield f"\nerrors of {joint}" if joint != "S" else "\nerrors of the spindle"
+        for effect in found:
+            said = _effect_as_dict(machine, effect)
+            size = "size not known from the file"
+            if said["range"] is not None:
+                low, high = said["range"]
+                size = f"{low:+.3g} {said['unit']}" if low == high else f"{low:+.3g} ... {high:+.3g} {said['unit']}"
+            yield f"  {effect.name:<5} {said['title']:<44} {depends_on(effect):<28} {size}"
 
 
 @click.command()
@@ -199,18 +178,17 @@ def effects(path: str | None, bases: bool, as_json: bool) -> None:
 
     Without a machine, those of one with X Y Z and a table with B and C.
     """
-    rows = _basis_rows() if bases else _effect_rows(path)
+    from ncfix.machine import loads
+
+    if bases:
+        rows = _bases()
+    else:
+        machine = load_machine(path) if path else loads(GENERIC)
+        rows = [*_components(machine, with_all=path is None), *_physical(machine), *_nameless(machine)]
     if as_json:
         console.put_json(**{"bases" if bases else "effects": rows})
     elif rows:
         console.table(tuple(rows[0]), [tuple(row.values()) for row in rows])
-
-
-def _effect_rows(path: str | None) -> list[Row]:
-    from ncfix.machine import loads
-
-    machine = load_machine(path) if path else loads(GENERIC)
-    return [*_components(machine, with_all=path is None), *_physical(machine), *_nameless(machine)]
 
 
 def _components(machine: Machine, with_all: bool) -> list[Row]:
@@ -235,7 +213,7 @@ def _components(machine: Machine, with_all: bool) -> list[Row]:
         unit = "rad" if effect.rotational else "mm"
         square = squareness_meaning(name)
         basis, much = usual_basis(name), large_size(name)
-        rows.append(_row(name, title, unit=unit, basis=basis, much=much, seen=seen, squareness=square))
+        rows.append(_row(name, title, unit=unit, basis=basis, much=much, seen_by=seen, squareness=square))
     return rows
 
 
@@ -248,7 +226,9 @@ def _physical(machine: Machine) -> list[Row]:
         unit = " ".join(dict.fromkeys("rad" if each.rotational else "mm" for each in named.effects))
         much = "" if math.isnan(named.largest) else f"{named.largest:g}"
         seen, needs = " ".join(named.instruments), " ".join(named.needs)
-        rows.append(_row(named.name, named.title, unit=unit, basis=", ".join(parts), much=much, seen=seen, needs=needs))
+        rows.append(
+            _row(named.name, named.title, unit=unit, basis=", ".join(parts), much=much, seen_by=seen, needs=needs)
+        )
     return rows
 
 
@@ -262,31 +242,13 @@ def _nameless(machine: Machine) -> list[Row]:
     return [_row(name, getattr(each, "title", "")) for name, each in absent]
 
 
-def _row(
-    name: str,
-    title: str,
-    *,
-    unit: str = "",
-    basis: str = "",
-    much: str = "",
-    seen: str = "",
-    needs: str = "",
-    squareness: str = "",
-) -> Row:
-    """A row of the table; the order is that of its columns."""
-    return {
-        "name": name,
-        "unit": unit,
-        "title": title,
-        "basis": basis,
-        "much": much,
-        "seen by": seen,
-        "needs": needs,
-        "squareness": squareness,
-    }
+def _row(name: str, title: str, **said: str) -> Row:
+    """A row of the table, whose columns are in this order."""
+    cells = {"name": name, "title": title, **said}
+    return {column: cells.get(column.replace(" ", "_"), "") for column in COLUMNS}
 
 
-def _basis_rows() -> list[Row]:
+def _bases() -> list[Row]:
     from dataclasses import fields
 
     from ncfix.machine.effects import kinds
@@ -347,19 +309,14 @@ def derive(
             derivation = symbolic.derive(load_machine(source), order, include, letters)
     if not as_json or target.file:
         with console.busy("writing the formulas"):
-            text = _formulas(derivation, form, vary.split(","))
+            if form == "protocol":
+                text = symbolic.measuring(derivation, vary.split(","))
+            else:
+                write = {"latex": symbolic.to_latex, "python": symbolic.to_python}.get(form or "", symbolic.to_text)
+                text = write(derivation)
         target.write(text.encode())
     if as_json:
         console.put_json(**_derivation_as_dict(derivation))
-
-
-def _formulas(derivation: Derivation, form: str | None, vary: list[str]) -> str:
-
-    from ncfix.machine.symbolic import measuring, to_latex, to_python, to_text
-
-    if form == "protocol":
-        return measuring(derivation, vary)
-    return {"latex": to_latex, "python": to_python}.get(form or "", to_text)(derivation)
 
 
 def _derivation_as_dict(derivation: Derivation) -> dict[str, Any]:

@@ -26,33 +26,23 @@ if TYPE_CHECKING:
     from ncfix.text.tree import Program
 
 
-@dataclass(frozen=True, slots=True)
-class LookedAt:
-    """What was found in a program, and the dialect in which it was read."""
-
-    dialect: str
-    checked: Checked
+Found = tuple["Checked", str]
+"""What is found in a program, and the name of the dialect in which it was read."""
 
 
-def looked_at(following: Following, path: str) -> LookedAt:
-    """Look at a program."""
-    with source_of(path) as source:
-        return through([source], lambda: _in_parts(following, source), lambda: _whole(following, source))
-
-
-def _in_parts(following: Following, source: Source) -> LookedAt:
+def _in_parts(following: Following, source: Source) -> Found:
     """While it is read; raises what that does, and `NotInPartsError`."""
     from ncfix.compensate.checking import survey_alone, survey_on
 
     dialect = dialect_in(following, source)
     if following.machine is None:
-        return LookedAt(dialect.name, survey_alone(*parts_of(following, source, dialect)))
-    return LookedAt(dialect.name, survey_on(task_of(following, source, dialect), source.read))
+        return survey_alone(*parts_of(following, source, dialect)), dialect.name
+    return survey_on(task_of(following, source, dialect), source.read), dialect.name
 
 
-def _whole(following: Following, source: Source) -> LookedAt:
+def _whole(following: Following, source: Source) -> Found:
     program = following.read(source.path, source.everything())
-    return LookedAt(program.dialect.name, following.checked(program, source.path))
+    return following.checked(program, source.path), program.dialect.name
 
 
 @click.command()
@@ -72,40 +62,28 @@ def check(
     following = Following.of(machine_path, dialect, given)
     outcomes = [_outcome(following, program.path) for program in program_files(programs)]
     if as_json:
-        console.put_json(files=[outcome.entry for outcome in outcomes])
-    return max(outcome.code for outcome in outcomes)
+        console.put_json(files=[entry for _, entry in outcomes])
+    return max(code for code, _ in outcomes)
 
 
-@dataclass(frozen=True, slots=True)
-class CheckOutcome:
-    """What was found in one program: its exit code and its entry in the JSON object."""
-
-    code: int
-    entry: dict[str, Any]
-
-
-def _outcome(following: Following, path: str) -> CheckOutcome:
+def _outcome(following: Following, path: str) -> tuple[int, dict[str, Any]]:
+    """What is found in one program: the exit code, and the entry in the JSON object."""
     entry: dict[str, Any] = {"path": shown(path)}
     try:
-        with console.busy(f"checking {shown(path)}"):
-            looked = looked_at(following, path)
+        with console.busy(f"checking {shown(path)}"), source_of(path) as source:
+            in_parts, whole = (lambda: _in_parts(following, source)), (lambda: _whole(following, source))
+            checked, dialect = through([source], in_parts, whole)
     except NcfixError as error:
         console.tell(*error.messages)
-        return CheckOutcome(error.exit_code, {**entry, "errors": _as_dicts(error.messages)})
-    checked, dialect = looked.checked, looked.dialect
+        return error.exit_code, {**entry, "errors": [message.as_dict() for message in error.messages]}
     console.tell_some(checked.findings)
     count = len(checked.findings)
     said = console.counted(count, "finding") if count else "nothing found"
     size = f"{console.counted(checked.blocks, 'block')}, {console.counted(checked.moves, 'motion')}"
     console.say(f"{visible(shown(path))}: {size}, {dialect}: {said}")
     entry |= {"dialect": dialect, "blocks": checked.blocks, "moves": checked.moves}
-    return CheckOutcome(
-        ExitCode.FINDINGS if count else ExitCode.DONE, {**entry, "findings": _as_dicts(checked.findings)}
-    )
-
-
-def _as_dicts(messages: tuple[Message, ...]) -> list[dict[str, object]]:
-    return [message.as_dict() for message in messages]
+    entry["findings"] = [message.as_dict() for message in checked.findings]
+    return ExitCode.FINDINGS if count else ExitCode.DONE, entry
 
 
 @click.command()

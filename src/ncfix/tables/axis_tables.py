@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.machine import Machine, State
-from ncfix.tables.compensation import NOTHING, Compensation, Term
+from ncfix.tables.compensation import NOTHING, Compensation, Term, own_terms
 from ncfix.tables.correction import (
     even_poses,
     exact_correction,
@@ -85,9 +85,7 @@ def positioning(machine: Machine, space: Array, tool_length: float, most: int, t
         for values in both:
             values[np.abs(values) < 1e-3 * limit] = 0.0  # values of less than a thousandth of the limit are none
         if any(values.any() for values in both):
-            grids = [Grid((name,), (nodes,), (name,), values[:, None]) for values in both]
-            terms = (Term((grid,), (name, way)) for grid, way in zip(grids, (1, -1), strict=True))
-            done = Compensation((*done.terms, *terms))
+            done = Compensation((*done.terms, *own_terms(name, nodes, *both)))
     return done
 
 
@@ -235,8 +233,7 @@ class Reversal:
 
     def terms(self) -> tuple[Term, Term]:
         """As tables."""
-        ahead, back = (Grid((self.axis,), (self.nodes,), (self.axis,), way * self.half[:, None]) for way in (1, -1))
-        return Term((ahead,), (self.axis, 1)), Term((back,), (self.axis, -1))
+        return own_terms(self.axis, self.nodes, self.half, -self.half)
 
 
 def reversals(machine: Machine, space: Array, tool_length: float, target: float, most: int) -> tuple[Reversal, ...]:

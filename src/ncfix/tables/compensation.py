@@ -47,6 +47,13 @@ class Term:
         return value
 
 
+def own_terms(axis: str, nodes: Array, ahead: Array, back: Array) -> tuple[Term, Term]:
+    """Tables of an axis over itself: what holds while it moves towards plus, and towards minus, (n,) each."""
+    both = (Grid((axis,), (nodes,), (axis,), values[:, None]) for values in (ahead, back))
+    first, second = (Term((grid,), (axis, way)) for grid, way in zip(both, (1, -1), strict=True))
+    return first, second
+
+
 @runtime_checkable
 class Tables(Protocol):
     """What a control does with its files: a sum of tables (`Compensation`), or whatever else it works out of them."""
