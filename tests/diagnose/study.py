@@ -109,7 +109,7 @@ def unknown(found: Diagnosis, scene: Scene, world: World) -> bool:
 
 
 def kin(found: Diagnosis, scene: Scene, world: World) -> bool:
-    """UnknownAxes, nothing, or a name of the same family."""
+    """Unknown, nothing, or a name of the same family."""
     families = {world.candidate(name).family for name in scene.names}
     named = {finding.candidate.family for finding in found.findings}
     return found.verdict in (UNKNOWN, NOTHING) or bool(families & named)

@@ -145,12 +145,12 @@ CODES: dict[str, Code] = {
         "The message says which.",
     ),
     "NCF227": Code(
-        "UnknownAxes G code",
+        "Unknown G code",
         "LinuxCNC has no such code.",
         "Correct it. If it is remapped on the machine, ncfix cannot know what it does.",
     ),
     "NCF228": Code(
-        "UnknownAxes G code, motions refused",
+        "Unknown G code, motions refused",
         "The code is not one that ncfix knows for ISO controls. It may move axes or change coordinates, so nothing "
         "after it is corrected.",
         "Name the dialect with --dialect, if there is one for the control. Of a code of the machine's builder that "
@@ -158,7 +158,7 @@ CODES: dict[str, Code] = {
         "words of axes or of a length (H) it is refused all the same.",
     ),
     "NCF229": Code(
-        "UnknownAxes M code",
+        "Unknown M code",
         "LinuxCNC has no such code.",
         "Correct it. If it is remapped on the machine, ncfix cannot know what it does.",
     ),
@@ -283,7 +283,7 @@ CODES: dict[str, Code] = {
         "docs/formats.md shows a setup file.",
     ),
     "NCF382": Code(
-        "UnknownAxes key in the setup file",
+        "Unknown key in the setup file",
         "A key is not one that ncfix knows; nothing is passed over in silence.",
         "Check its spelling.",
     ),
