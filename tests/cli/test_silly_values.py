@@ -75,14 +75,14 @@ def test_a_fault_ends_one_program_and_not_the_others(shop: Shop, ncfix: Ncfix, m
 
     other = shop.folder / "other.ngc"
     other.write_bytes(shop.program.read_bytes())
-    whole = batch.Job._whole
+    whole = batch.FixJob._whole
 
-    def broken(self: batch.Job, source: batch.Source, *rest: object) -> object:
+    def broken(self: batch.FixJob, source: batch.Source, *rest: object) -> object:
         if source.path.endswith("part.ngc"):
             raise KeyError("nobody foresaw this")
         return whole(self, source, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(batch.Job, "_whole", broken)
+    monkeypatch.setattr(batch.FixJob, "_whole", broken)
     arguments = ("fix", shop.program, other, "-m", shop.machine, "-o", shop.folder / "out", "--assume-zero", "--json")
     result = ncfix(*arguments)
     assert result.code == 5
