@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import json
 import os
 import re
 import resource
@@ -51,6 +52,7 @@ def main() -> int:
         "--show", action="store_true", help="write the texts of these cases, whether they differ or not"
     )
     parser.add_argument("--against", metavar="COMMIT", help="also write what that commit makes of them")
+    parser.add_argument("--resume", action="store_true", help="go on where a run of the same code was stopped")
     parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
     parser.add_argument("--most", type=int, default=20, help="cases with differences whose texts are written (20)")
     parser.add_argument("--texts", type=Path, metavar="FOLDER", help=argparse.SUPPRESS)
@@ -68,8 +70,9 @@ def main() -> int:
         return 0
     differing = 0
     for group in GROUPS:
-        of_group = [case for case in cases if case.group == group]
-        found = digests(of_group, given.jobs) if of_group else {}
+        late = [] if given.update else [name for name, each in read(group).items() if LATE in each.values()]
+        of_group = [case for case in cases if case.group == group and case.name not in late]
+        found = digests(of_group, given.jobs, OUT / f"{group}.done", resume=given.resume) if of_group else {}
         if given.update and of_group:
             update(group, found, is_whole=len(of_group) == len(chosen([group])))
         elif of_group:
@@ -103,19 +106,30 @@ def chosen(only: Sequence[str]) -> list[Case]:
 # -- running ----------------------------------------------------------------------------------------------------------
 
 
-def digests(cases: Sequence[Case], jobs: int) -> dict[str, Digests]:
-    """What comes of cases, worked out by so many processes; long cases first."""
+def digests(cases: Sequence[Case], jobs: int, keep: Path, *, resume: bool) -> dict[str, Digests]:
+    """What comes of cases, worked out by so many processes; long cases first.
+
+    keep    a file for what is done, to go on from there if `resume`
+    """
+    keep.parent.mkdir(parents=True, exist_ok=True)
+    if not resume:
+        keep.unlink(missing_ok=True)
+    before = dict(map(json.loads, keep.read_text().splitlines())) if keep.exists() else {}
+    found: dict[str, Digests] = {case.name: before[case.name] for case in cases if case.name in before}
     order = sorted(cases, key=lambda case: (not is_slow(case), case.name))
+    order = [case for case in order if case.name not in found]
     slow = sum(map(is_slow, order))
     lots = [order[at : at + 1] for at in range(slow)]
     lots += [order[at : at + TOGETHER] for at in range(slow, len(order), TOGETHER)]
-    found: dict[str, Digests] = {}
     with (
+        keep.open("a") as kept,
         tempfile.TemporaryDirectory(prefix="goldens-") as folder,
         ProcessPoolExecutor(jobs, initializer=begin, initargs=(folder,)) as pool,
     ):
         for done in as_completed([pool.submit(run, lot) for lot in lots]):
             found |= done.result()
+            kept.writelines(json.dumps(each) + "\n" for each in done.result().items())
+            kept.flush()
             if sys.stderr.isatty():
                 print(f"\r{len(found)} of {len(cases)} ", end="", file=sys.stderr, flush=True)
     if sys.stderr.isatty():
@@ -198,17 +212,14 @@ def compare(group: str, cases: Sequence[Case], found: Mapping[str, Digests], aga
     """Name the cases of a group that differ, write their texts, and print how many there are."""
     known = read(group)
     new = [case for case in cases if case.name not in known]
-    late = [case for case in cases if LATE in known.get(case.name, {}).values()]
-    differing = [
-        case for case in cases if case not in new and case not in late and found[case.name] != known[case.name]
-    ]
+    differing = [case for case in cases if case not in new and found[case.name] != known[case.name]]
     for case in differing:
         texts = [name for name, value in found[case.name].items() if known[case.name].get(name) != value]
         print(f"{case.name}: {' '.join(texts)}")
     if differing:
         write_texts(differing[:most], OUT, "new")
         tell(differing[:most], against)
-    notes = [f"{len(new)} without a golden"] * bool(new) + [f"{len(late)} not compared, as they take long"] * bool(late)
+    notes = [f"{len(new)} without a golden"] * bool(new)
     print(", ".join([f"{group}: {len(cases)} cases", f"{len(differing)} differences", *notes]), flush=True)
     return len(differing)
 

@@ -150,6 +150,6 @@ def of_corpus(corpus: Path) -> Iterator[Program]:
         dialect = GROUPS.get(folder.name, folder.name)
         options = ["--subprograms", f"../called/{folder.name}", *ZERO]
         for path in sorted(folder.iterdir()):
-            name = f"corpus/{folder.name}/{path.name}"
+            name = f"corpus/{folder.name}/{path.name.replace(' ', '_')}"
             text = path.read_bytes()
             yield Program(name, dialect, dialect, called(path.name), text, MACHINES[""], options, "5")
