@@ -24,7 +24,7 @@ def some(group: str) -> Iterator[Case]:
     return islice(sorted(quick, key=lambda case: crc32(case.name.encode())), EACH)
 
 
-@pytest.mark.parametrize("group", ["linuxcnc", "fanuc", "siemens", "machine"])
+@pytest.mark.parametrize("group", ["linuxcnc", "iso", "fanuc", "siemens", "heidenhain", "machine"])
 def test_the_same_comes_out(group: str, tmp_path: Path) -> None:
     place, known = Workplace(tmp_path / "place", None), read(group)
     for case in some(group):
