@@ -8,8 +8,8 @@ import pytest
 from measure.poses import machine, plan
 from ncfix.diagnostics import ExitCode
 from ncfix.machine import load
-from ncfix.measure.synthetic import Faults, simulate
-from ncfix.measure.writer import dumps
+from ncfix.measure.instruments import Faults, simulate
+from ncfix.measure.measurement import dumps
 
 
 @pytest.fixture(scope="module")

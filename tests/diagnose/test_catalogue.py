@@ -10,8 +10,8 @@ from ncfix.diagnose.diagnosis import diagnose
 from ncfix.diagnose.selection import TOLD_APART, act_alike
 from ncfix.machine import Effect
 from ncfix.machine.basis import Fourier
+from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
-from ncfix.measure.solve import orthonormal, without
 
 ROUNDING = 1e-9
 HARDLY = 2e-3

@@ -19,9 +19,9 @@ from ncfix.diagnose.residual_patterns import patterns
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Backlash
+from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.reader import reads
-from ncfix.measure.synthetic import Faults, simulate
 from ncfix.report.diagnosis import document
 from ncfix.report.rendering import html, markdown
 

@@ -11,7 +11,7 @@ from ncfix.diagnose.forms import tip_frames
 from ncfix.diagnose.residual_data import residual_data
 from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE
-from ncfix.measure.synthetic import Faults, simulate
+from ncfix.measure.instruments import Faults, simulate
 
 ROUNDING = 1e-9
 

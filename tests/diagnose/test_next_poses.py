@@ -20,10 +20,10 @@ from ncfix.diagnose.next_poses import (
     travels_of,
 )
 from ncfix.diagnose.residual_data import residual_data
-from ncfix.measure.program import skeleton
+from ncfix.measure.instruments import Faults, simulate
+from ncfix.measure.measurement import dumps
+from ncfix.measure.plan import skeleton
 from ncfix.measure.reader import reads
-from ncfix.measure.synthetic import Faults, simulate
-from ncfix.measure.writer import dumps
 
 OFFERED, HEIGHT, WIDTH = 60, 3, 9
 ROUNDING = 1e-8

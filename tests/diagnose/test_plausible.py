@@ -10,7 +10,7 @@ from ncfix.diagnose.catalogue import Candidate, catalogue
 from ncfix.diagnose.residual_data import ResidualData, residual_data
 from ncfix.machine import Effect
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
-from ncfix.measure.synthetic import Faults, simulate
+from ncfix.measure.instruments import Faults, simulate
 
 
 @pytest.fixture(scope="module")

@@ -23,8 +23,8 @@ from ncfix.diagnose.residual_data import ResidualData, residual_data
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import ConstantBasis
 from ncfix.measure.candidates import Room, candidates
+from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Array, Measurement
-from ncfix.measure.synthetic import Faults, simulate
 
 SIGMA_UM = 3.0
 SETS, REPEATED, TIMES = 4, 12, 5

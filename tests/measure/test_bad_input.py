@@ -10,11 +10,11 @@ import pytest
 
 from measure.poses import machine, perfect, plan
 from ncfix.diagnostics import NcfixError
-from ncfix.measure.calibrate import Calibration, calibrate
-from ncfix.measure.measurement import Measurement
+from ncfix.measure.calibrate import calibrate
+from ncfix.measure.estimate import Calibration
+from ncfix.measure.instruments import Faults, simulate
+from ncfix.measure.measurement import Measurement, dumps
 from ncfix.measure.reader import reads
-from ncfix.measure.synthetic import Faults, simulate
-from ncfix.measure.writer import dumps
 
 ROWS = 120
 SOUGHT = ("EA0B", "EC0B", "EX0B", "EZ0B", "EA0C", "EB0C", "EX0C", "EY0C", "EC0Y", "EA0Y", "EB0Z", "EYY", "EZZ")

@@ -10,9 +10,9 @@ import pytest
 from measure.poses import machine
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Backlash, Polynomial
-from ncfix.measure.ball_bar import BallBarFigures, figures
+from ncfix.measure.instruments import observe
+from ncfix.measure.lengths import BallBarFigures, ball_bar_figures
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.observe import observe
 
 RADIUS = 150.0
 THREE = machine("three_axis").replace(effects=())
@@ -33,7 +33,7 @@ def circle(known: Machine, offset=(0.0, 0.0, 0.0), normal: str = "Z") -> BallBar
     columns["radius"] = np.full(len(turn), RADIUS)
     plan = Measurement("length", (), columns)
     seen = observe(plan, THREE)
-    (found,) = figures(seen.with_values(seen.predict(known, np.asarray(offset))), THREE)
+    (found,) = ball_bar_figures(seen.with_values(seen.predict(known, np.asarray(offset))), THREE)
     return found
 
 
@@ -75,4 +75,4 @@ def test_the_plane_is_found():
 
 def test_other_lengths_have_no_such_figures():
     gauge = Measurement("length", (), {f"{end}{axis}": np.ones(3) for end in "ab" for axis in "xyz"})
-    assert list(figures(gauge, THREE)) == []
+    assert list(ball_bar_figures(gauge, THREE)) == []

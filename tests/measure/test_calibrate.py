@@ -10,11 +10,11 @@ import pytest
 from measure.poses import machine, perfect, plan
 from ncfix.diagnostics import UsageError
 from ncfix.machine import dumps, loads
-from ncfix.measure.calibrate import Calibration, calibrate
+from ncfix.measure.calibrate import calibrate, deviations, guesses, over_the_travels
+from ncfix.measure.estimate import Calibration
+from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.prediction import deviations, guesses, over_the_travels
 from ncfix.measure.selection import Selection
-from ncfix.measure.synthetic import Faults, simulate
 
 KINDS = ("tcp", "tcp6", "probe", "gauge", "bar", "tool", "axis")
 

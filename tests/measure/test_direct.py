@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from ncfix.machine import load
-from ncfix.measure.calibrate import Calibration, calibrate
+from ncfix.measure.calibrate import calibrate, guesses, over_the_travels
+from ncfix.measure.contradictions import misfit
+from ncfix.measure.estimate import Calibration, Residuals
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.misfit import misfit
-from ncfix.measure.prediction import guesses, over_the_travels
 from ncfix.measure.reader import reads
-from ncfix.measure.residuals import residuals, rms_by_set
 
 ROOT = Path(__file__).parents[2]
 MACHINE = load(ROOT / "examples" / "machines" / "three_axis.toml")
@@ -64,7 +63,7 @@ def test_angles_are_no_lengths_in_figures() -> None:
     assert both.before_um > 0.5
     assert lengths.after_um == pytest.approx(1.0, rel=0.3)
     assert both.after_um == pytest.approx(1.0, rel=0.3)
-    (size,) = rms_by_set(both.problem, residuals(both.problem, both.estimate)).values()
+    (size,) = Residuals.of(both.problem, both.estimate).rms_by_set().values()
     assert size == pytest.approx(both.after_um)
     assert np.isnan([angles.before_um, angles.after_um]).all()
     assert not guesses(angles, over_the_travels(angles))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.measure.exchange import Pool, best_addition, choose, variances
+from ncfix.measure.plan import Pool, best_addition, choose, variances
 
 
 def pool(seed: int, candidates: int = 150, targets: int = 200) -> Pool:

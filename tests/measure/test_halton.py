@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import qmc
 
-from ncfix.measure.halton import halton
+from ncfix.measure.candidates import halton
 
 
 def test_points_are_those_that_scipy_draws_from_the_same_numbers() -> None:

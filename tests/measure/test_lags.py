@@ -11,8 +11,8 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Polynomial
 from ncfix.machine.piecewise import Truncated
 from ncfix.measure.calibrate import calibrate
+from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.synthetic import Faults, simulate
 
 THREE = machine("three_axis").replace(effects=())
 

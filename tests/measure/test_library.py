@@ -11,8 +11,8 @@ from measure.poses import machine, plan
 from ncfix.machine import dumps, loads
 from ncfix.machine.effects import library
 from ncfix.measure.calibrate import calibrate
+from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.selection import select
-from ncfix.measure.synthetic import Faults, simulate
 
 THREE = machine("three_axis").replace(effects=())
 NAMES = (

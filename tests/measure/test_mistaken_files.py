@@ -32,11 +32,12 @@ from measure.poses import machine, perfect, plan
 from ncfix.diagnostics import NcfixError, RefusedError, UsageError
 from ncfix.machine import Machine, loads
 from ncfix.machine.plausible import doubts, much
-from ncfix.measure.calibrate import Calibration, calibrate
+from ncfix.measure.calibrate import calibrate
+from ncfix.measure.contradictions import refusals
+from ncfix.measure.estimate import Calibration
+from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.misfit import refusals
 from ncfix.measure.reader import reads
-from ncfix.measure.synthetic import Faults, simulate
 
 SEEDS = int(os.environ.get("NCFIX_MISTAKEN", "1"))
 HONEST = int(os.environ.get("NCFIX_HONEST", "6"))

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, plan
-from ncfix.measure.observe import observe
-from ncfix.measure.synthetic import Faults, simulate
+from ncfix.measure.instruments import Faults, observe, simulate
 
 KINDS = ("tcp", "tcp6", "probe", "gauge", "bar", "tool", "table", "axis")
 CASES = [

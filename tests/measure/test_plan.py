@@ -10,13 +10,12 @@ import pytest
 from measure.poses import machine
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
-from ncfix.measure.calibrate import Problem
 from ncfix.measure.candidates import Room, candidates
+from ncfix.measure.estimate import Problem
+from ncfix.measure.least_squares import solve
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.plan import joined, plan
-from ncfix.measure.program import skeleton
+from ncfix.measure.plan import joined, plan, skeleton
 from ncfix.measure.selection import select
-from ncfix.measure.solve import solve
 
 LOCATIONS = "EC0Y,EA0Z,EB0Z,EXX,EYY,EZZ,EYX,EZX,EXY,EZY,EXZ,EYZ"
 ROOM = Room(tool_lengths=(100.0, 200.0))

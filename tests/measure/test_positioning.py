@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ncfix.measure.direct import positioning_figures
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.positioning import figures
 
 
 def readings(value: np.ndarray, side: np.ndarray, component: str = "EXX") -> Measurement:
@@ -23,7 +23,7 @@ def test_figures_of_two_runs_worked_out_by_hand():
     up, down = np.array([[0.0, 4.0], [2.0, 6.0]]), np.array([[-3.0, 1.0], [-1.0, 3.0]])
     value = np.concatenate([up, down]) * 1e-3
     side = np.concatenate([np.ones((2, 2)), -np.ones((2, 2))])
-    (found,) = figures(readings(value, side))
+    (found,) = positioning_figures(readings(value, side))
     s = np.sqrt(2.0)  # of two values 2 um apart
     # means: up 1, 5; down -2, 2
     assert pytest.approx(7) == found.E
@@ -40,16 +40,16 @@ def test_the_order_that_laspas_s_tables_keep():
     for _ in range(20):
         side = np.concatenate([np.ones((5, 9)), -np.ones((5, 9))])
         value = 1e-3 * (random.standard_normal(9) * 5 + side * random.uniform(0, 4) + random.standard_normal((10, 9)))
-        (found,) = figures(readings(value, side))
+        (found,) = positioning_figures(readings(value, side))
         assert found.A >= found.E >= found.M
         assert found.R >= found.B >= abs(found.mean_reversal)
 
 
 def test_one_run_has_no_repeatability_and_one_side_no_reversal():
-    (found,) = figures(readings(np.array([[1e-6, 3e-6, 2e-6]]), np.ones((1, 3)), "EAX"))
+    (found,) = positioning_figures(readings(np.array([[1e-6, 3e-6, 2e-6]]), np.ones((1, 3)), "EAX"))
     assert np.isnan([found.A, found.R, found.B, found.mean_reversal]).all()
     assert pytest.approx(2) == found.E
 
 
 def test_other_kinds_have_none():
-    assert list(figures(Measurement("tcp", (), {"dx": np.zeros(3)}))) == []
+    assert list(positioning_figures(Measurement("tcp", (), {"dx": np.zeros(3)}))) == []

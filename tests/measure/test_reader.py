@@ -10,9 +10,9 @@ import pytest
 from measure.poses import machine, plan
 from ncfix.diagnostics import ConfigError
 from ncfix.machine import Effect, Machine, State
+from ncfix.measure.instruments import Faults, simulate
+from ncfix.measure.measurement import dumps
 from ncfix.measure.reader import read, reads
-from ncfix.measure.synthetic import Faults, simulate
-from ncfix.measure.writer import dumps
 
 HEAD = "# ncfix-measurement: 1\n# kind: tcp\n# noise_um: 1.5\n"
 GOOD = HEAD + "set,X,Y,Z,dir_X,time_s,tool_length,dx,dy,dz\n1,100.0,50.0,-20.0,1,0.0,160.0,0.0012,-0.0003,0.0041\n"

@@ -15,8 +15,8 @@ from measure.poses import machine
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Polynomial
 from ncfix.measure.calibrate import calibrate
+from ncfix.measure.contradictions import refusals
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.misfit import refusals
 
 AROUND = np.array([[80.0, 0.0, 20.0], [-50.0, 60.0, -30.0], [-30.0, -60.0, 10.0]])
 """mm, three reflectors about the tip; their mean is the tip."""

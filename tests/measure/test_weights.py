@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.measure import weights
-from ncfix.measure.solve import solve
+from ncfix.measure.least_squares import outliers, solve
 
 SHAPES = ((27, 24), (60, 50), (60, 30), (150, 30))
 
@@ -21,7 +20,7 @@ def problem(m: int, p: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def outlying(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return weights.outliers(solve(columns, np.zeros((len(values), 0)), values))
+    return outliers(solve(columns, np.zeros((len(values), 0)), values))
 
 
 @pytest.mark.parametrize(("m", "p"), SHAPES)

@@ -8,10 +8,9 @@ import numpy as np
 
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash
-from ncfix.measure.ball_bar import BallBarFigures, figures
-from ncfix.measure.lengths import BallBar
+from ncfix.measure.instruments import observe
+from ncfix.measure.lengths import BallBar, BallBarFigures, ball_bar_figures
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.observe import observe
 from ncfix.tables.correction import exact_correction
 from validation.esmaeili import (
     HU40,
@@ -72,7 +71,7 @@ def ball_bar(real: Machine, model: Machine | None = None) -> BallBarFigures:
     assert isinstance(seen, BallBar)
     moved = q if model is None else q + exact_correction(model, q, State(0.0))
     arm = real.actual_tip(moved, plan.state(real)) - seen.centre
-    (found,) = figures(seen.with_values(np.linalg.norm(arm, axis=1)), real)
+    (found,) = ball_bar_figures(seen.with_values(np.linalg.norm(arm, axis=1)), real)
     return found
 
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from measure.poses import machine
 from ncfix.machine import Machine
-from ncfix.measure.calibrate import Problem
 from ncfix.measure.candidates import Room, at_balls, candidates, has_r_test, r_test
+from ncfix.measure.estimate import Problem
+from ncfix.measure.instruments import observe
+from ncfix.measure.least_squares import solve
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.observe import observe
 from ncfix.measure.plan import CANDIDATES, Planned, plan, pool_of
 from ncfix.measure.selection import select
-from ncfix.measure.solve import solve
 
 COUNT, DRAWS, PLACES = 40, 20, 300
 LINEAR = "EC0Y,EA0Z,EB0Z,EXX,EYY,EZZ,EYX,EZX,EXY,EZY,EXZ,EYZ"

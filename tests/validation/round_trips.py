@@ -16,9 +16,9 @@ from measure.poses import NAMES, machine, perfect, plan
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine
 from ncfix.measure.calibrate import calibrate
+from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.selection import Selection
-from ncfix.measure.synthetic import Faults, simulate
 
 MACHINES = (*NAMES, "angle_head")
 KINDS = {

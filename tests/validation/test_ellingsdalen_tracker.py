@@ -14,8 +14,8 @@ import pytest
 from ncfix.machine import Effect, load
 from ncfix.machine.basis import Polynomial
 from ncfix.measure.calibrate import calibrate
+from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.synthetic import Faults, simulate
 
 K, P, Q = np.array([60.0, -80.0, 20.0]), np.array([-75.0, 40.0, 110.0]), np.array([50.0, 95.0, -65.0])
 THREE = load(str(Path(__file__).resolve().parents[2] / "examples" / "machines" / "three_axis.toml")).replace(effects=())

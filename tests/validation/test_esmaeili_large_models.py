@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from ncfix.machine import Machine
-from ncfix.measure.calibrate import Problem, calibrate
+from ncfix.measure.calibrate import calibrate
+from ncfix.measure.estimate import Problem
+from ncfix.measure.instruments import Faults, simulate
+from ncfix.measure.least_squares import solve
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.selection import Selection, select
-from ncfix.measure.solve import solve
-from ncfix.measure.synthetic import Faults, simulate
 from tables.table_4_2 import coefficients
 from validation.esmaeili import HU40
 from validation.test_esmaeili_models import AC, strategy

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from ncfix.machine import load
-from ncfix.measure.calibrate import Problem, calibrate
+from ncfix.measure.calibrate import calibrate
+from ncfix.measure.estimate import Problem
+from ncfix.measure.instruments import Faults, simulate
+from ncfix.measure.least_squares import solve
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.models import MODELS
-from ncfix.measure.selection import select
-from ncfix.measure.solve import solve
-from ncfix.measure.synthetic import Faults, simulate
+from ncfix.measure.selection import MODELS, select
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "machines"
 AC = load(str(EXAMPLES / "wCAYFXZSt.toml")).replace(effects=())

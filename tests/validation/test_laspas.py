@@ -16,9 +16,8 @@ from ncfix.machine import Effect, load
 from ncfix.machine.basis import Backlash
 from ncfix.measure.calibrate import calibrate
 from ncfix.measure.candidates import Room, candidates
+from ncfix.measure.instruments import Faults, observe, simulate
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.observe import observe
-from ncfix.measure.synthetic import Faults, simulate
 from validation import laspas
 
 THREE = load(str(Path(__file__).resolve().parents[2] / "examples" / "machines" / "three_axis.toml")).replace(effects=())

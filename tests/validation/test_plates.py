@@ -10,11 +10,12 @@ import pytest
 
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import Polynomial
-from ncfix.measure.calibrate import Problem, calibrate
+from ncfix.measure.calibrate import calibrate
+from ncfix.measure.estimate import Problem
+from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.reader import read
 from ncfix.measure.selection import Selection
-from ncfix.measure.solve import orthonormal, without
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "machines"
 # rms of both components in um: set-up only; with a scale difference and shear as well

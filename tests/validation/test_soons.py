@@ -14,12 +14,12 @@ import pytest
 from measure.poses import plan
 from ncfix.machine import Effect, load
 from ncfix.machine.basis import Polynomial
-from ncfix.measure.calibrate import Problem
-from ncfix.measure.exchange import Pool, choose
+from ncfix.measure.estimate import Problem
+from ncfix.measure.instruments import observe
+from ncfix.measure.least_squares import solve
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.observe import observe
+from ncfix.measure.plan import Pool, choose
 from ncfix.measure.selection import Selection
-from ncfix.measure.solve import solve
 
 THREE = load(str(Path(__file__).resolve().parents[2] / "examples" / "machines" / "three_axis.toml"))
 LINE = Polynomial(degree=(1,))

@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from ncfix.cli.targets import OutputTarget
     from ncfix.diagnose.diagnosis import Diagnosis
     from ncfix.machine import Machine
-    from ncfix.measure.calibrate import Calibration
+    from ncfix.measure.calibrate import Prediction
     from ncfix.measure.candidates import Room
+    from ncfix.measure.estimate import Calibration
     from ncfix.measure.plan import Planned
-    from ncfix.measure.prediction import Prediction
 
 LOSSES = ("auto", "none", "huber", "tukey")
 KINDS = ("tcp", "tcp6", "probe", "length")
@@ -96,8 +96,8 @@ def calibrate(
     from ncfix.machine import dumps
     from ncfix.machine.plausible import doubts
     from ncfix.measure.calibrate import calibrate as calibrated
-    from ncfix.measure.misfit import refusals
-    from ncfix.measure.prediction import guesses, over_the_travels
+    from ncfix.measure.calibrate import guesses, over_the_travels
+    from ncfix.measure.contradictions import refusals
     from ncfix.measure.reader import reads
 
     each_once(measured)
@@ -128,10 +128,10 @@ def calibrate(
 def _as_dict(calibration: Calibration, over: Prediction) -> dict[str, Any]:
     from dataclasses import asdict
 
-    from ncfix.measure.residuals import residuals, rms_by_set
+    from ncfix.measure.estimate import Residuals
 
     problem, estimate = calibration.problem, calibration.estimate
-    residual = residuals(problem, estimate)
+    residual = Residuals.of(problem, estimate)
     tests = {"ball_bar": _ball_bars(calibration), "positioning": _positioning(calibration)}
     values, sigma = estimate.coefficients.tolist(), calibration.sigma.tolist()
     unknowns = [label for each in problem.observations for label in each.unknowns.labels]
@@ -143,12 +143,12 @@ def _as_dict(calibration: Calibration, over: Prediction) -> dict[str, Any]:
         "covariance": calibration.covariance,
         "set_up": dict(zip(unknowns, estimate.unknowns.tolist(), strict=False)),
         "chi_square": calibration.chi_square,
-        "freedom": calibration.freedom,
+        "freedom": estimate.freedom,
         "condition": estimate.solution.condition,
         "rms_um": {
             "before": calibration.before_um,
             "after": calibration.after_um,
-            "sets": rms_by_set(problem, residual),
+            "sets": residual.rms_by_set(),
         },
         "prediction": asdict(over),
         "largest_cook": float(residual.cook.max(initial=0.0)),
@@ -160,19 +160,19 @@ def _ball_bars(calibration: Calibration) -> list[dict[str, Any]]:
     """What ball-bar tests say by themselves, um."""
     from dataclasses import asdict
 
-    from ncfix.measure.ball_bar import figures
+    from ncfix.measure.lengths import ball_bar_figures
 
     seen = (each.measurement for each in calibration.problem.observations)
-    return [asdict(each) for measurement in seen for each in figures(measurement, calibration.problem.machine)]
+    return [asdict(each) for measurement in seen for each in ball_bar_figures(measurement, calibration.problem.machine)]
 
 
 def _positioning(calibration: Calibration) -> list[dict[str, Any]]:
     """ISO 230-2 of direct readings, um and urad."""
     from dataclasses import asdict
 
-    from ncfix.measure.positioning import figures
+    from ncfix.measure.direct import positioning_figures
 
-    return [asdict(each) for seen in calibration.problem.observations for each in figures(seen.measurement)]
+    return [asdict(each) for seen in calibration.problem.observations for each in positioning_figures(seen.measurement)]
 
 
 def _print(calibration: Calibration, over: Prediction) -> None:
@@ -204,7 +204,7 @@ def _rows(calibration: Calibration) -> Iterator[tuple[str, str, str, str]]:
 
 def _noise(calibration: Calibration) -> str:
     """How the residuals go with the noise; where nobody knows it, they are all that says how large it is."""
-    freedom = f"{calibration.freedom} degrees of freedom"
+    freedom = f"{calibration.estimate.freedom} degrees of freedom"
     if calibration.problem.noise_known:
         return f"reduced chi-square {calibration.chi_square:.3f} with {freedom}"
     return f"noise neither given nor to be told from repeats: sigmas are those of the residuals ({freedom})"
@@ -266,10 +266,10 @@ def plan(
     as_json: bool,
 ) -> None:
     """Choose the poses to be measured, and write them as a measurement file to be filled in."""
+    from ncfix.measure.measurement import dumps
     from ncfix.measure.plan import plan as planned
-    from ncfix.measure.program import skeleton
+    from ncfix.measure.plan import skeleton
     from ncfix.measure.reader import reads
-    from ncfix.measure.writer import dumps
 
     sources = () if existing is None else (existing,)
     target = targets([machine_path], Outputs(output, force=force), sources)[0]
@@ -431,8 +431,8 @@ def diagnose(
 
 
 def _write_next(diagnosis: Diagnosis, target: OutputTarget) -> None:
-    from ncfix.measure.program import skeleton
-    from ncfix.measure.writer import dumps
+    from ncfix.measure.measurement import dumps
+    from ncfix.measure.plan import skeleton
 
     if diagnosis.proposal is None or diagnosis.proposal.plan is None:
         console.say("no further poses are proposed")

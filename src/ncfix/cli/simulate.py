@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ncfix.cli.columns import Columns
     from ncfix.compensate.figures.simulation import Along, TipError
     from ncfix.diagnostics import Message
-    from ncfix.measure.synthetic import Faults
+    from ncfix.measure.instruments import Faults
 
 NOT_NEGATIVE = FiniteRange(min=0.0, max=1e6)
 OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
@@ -69,7 +69,7 @@ def simulate(
         raise click.UsageError("give either --program or --plan")
     _check_apt(of_plan=plan is not None, of_program=dialect is not None or given != SetupOptions())
     if plan is not None:
-        from ncfix.measure.synthetic import Faults
+        from ncfix.measure.instruments import Faults
 
         faults = Faults(noise_um, None, drift_um, quantum_um, setup_error)
         _simulate_plan(machine_path, plan, faults, seed, output, force, as_json)
@@ -161,9 +161,9 @@ def _simulate_plan(
     machine_path: str, plan: str, faults: Faults, seed: int, output: str | None, force: bool, as_json: bool
 ) -> None:
     """Fill in a plan."""
+    from ncfix.measure.instruments import simulate as filled
+    from ncfix.measure.measurement import dumps
     from ncfix.measure.reader import reads
-    from ncfix.measure.synthetic import simulate as filled
-    from ncfix.measure.writer import dumps
 
     target = targets([plan], Outputs(output or STREAM, force=force), (machine_path,))[0]
     check_streams(JSON if as_json and output is not None else None, measurement=target)

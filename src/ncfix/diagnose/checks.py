@@ -11,7 +11,7 @@ from ncfix.diagnose.noise import ENOUGH_REPEATS, repeat_scatter
 from ncfix.diagnose.residual_data import ResidualData, misfit
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
-from ncfix.measure.calibrate import Problem
+from ncfix.measure.estimate import Problem
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.selection import Selection
 

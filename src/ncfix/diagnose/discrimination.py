@@ -17,9 +17,9 @@ from scipy.special import ndtr
 from ncfix.diagnose.evidence import Evidence
 from ncfix.diagnose.forms import EffectForm
 from ncfix.diagnose.selection import ALIKE
+from ncfix.measure.instruments import observe
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
-from ncfix.measure.observe import observe
 
 COUNT = 12
 """Poses that are chosen."""

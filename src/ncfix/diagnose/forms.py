@@ -42,9 +42,9 @@ from ncfix.diagnose.residual_data import UNTELLABLE, ResidualData
 from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE, Axis
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
-from ncfix.measure.geometry import base_from_workpiece
+from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
-from ncfix.measure.solve import orthonormal, without
+from ncfix.measure.observation import base_from_workpiece
 
 VISIBLE = 0.05
 """Share of an effect's squares that must be left beside what is free."""

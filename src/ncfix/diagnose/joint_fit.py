@@ -22,8 +22,8 @@ from ncfix.diagnose.selection import Selected, with_alternatives
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis, Fourier, Polynomial
 from ncfix.machine.effects import Unit, units
+from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index
-from ncfix.measure.solve import orthonormal, without
 
 Mask = NDArray[np.bool_]
 WIDE = 1e3

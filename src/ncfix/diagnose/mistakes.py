@@ -18,8 +18,8 @@ from ncfix.diagnose.catalogue import plain
 from ncfix.diagnose.residual_data import Misfit, ResidualData, misfit, residual_data
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
+from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Measurement
-from ncfix.measure.solve import orthonormal, without
 
 SUSPECT, SUSPECT_UM = 1.4, 1.5
 """Times the noise, and um above it, from which on a mistake is looked for."""

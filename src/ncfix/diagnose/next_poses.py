@@ -23,8 +23,7 @@ from ncfix.diagnose.residual_data import ResidualData
 from ncfix.diagnose.selection import Selected, aliases
 from ncfix.machine import Machine
 from ncfix.measure.candidates import Room, candidates
-from ncfix.measure.kinds import STATES
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import STATES, Array, Measurement
 
 NEAR = 10.0
 """Log odds within which another name is near enough to ask for poses that tell them apart."""

@@ -29,8 +29,8 @@ from scipy.special import chdtrc, fdtrc
 from ncfix.diagnose.evidence import MISSHAPEN, SIZES, Background, entry_price, in_noise, log_odds, marginal
 from ncfix.diagnose.forms import EffectForm, shape_variations, without_lacking_constants
 from ncfix.diagnose.residual_data import ResidualData
+from ncfix.measure.least_squares import orthonormal
 from ncfix.measure.measurement import Array, groups
-from ncfix.measure.solve import orthonormal
 
 REFLECTIONS = 64
 """Reflections that are carried out together."""

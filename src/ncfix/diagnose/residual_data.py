@@ -19,7 +19,8 @@ from ncfix.diagnose.catalogue.candidate import MeasuredRange
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import SPINDLE, Axis
 from ncfix.machine.basis import ConstantBasis, Polynomial
-from ncfix.measure.calibrate import Problem
+from ncfix.measure.estimate import Problem
+from ncfix.measure.least_squares import gauss_newton
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.selection import Selection
 
@@ -204,14 +205,17 @@ def residual_data(measurements: Sequence[Measurement], machine: Machine) -> Resi
     selection = Selection(machine.effects, tuple(is_free(effect) for effect in machine.effects))
     problem = Problem.of(measurements, machine, selection)
     relative = relative_noise(problem)
-    coefficients, unknowns = selection.start.copy(), problem.start
-    for _ in range(STEPS):
+    base: Array
+
+    def step(at: tuple[Array, Array]) -> tuple[tuple[Array, Array], float]:
+        nonlocal base
+        coefficients, unknowns = at
         base = UM * np.concatenate([problem.nuisance(unknowns), problem.design], axis=1)
         change = damped(base / relative[:, None], UM * problem.residual(coefficients, unknowns) / relative)
-        unknowns = unknowns + change[: len(unknowns)]
-        coefficients = coefficients + change[len(unknowns) :]
-        if np.abs(base @ change).max(initial=0.0) < SETTLED_UM:
-            break
+        moved = coefficients + change[len(unknowns) :], unknowns + change[: len(unknowns)]
+        return moved, float(np.abs(base @ change).max(initial=0.0))
+
+    (coefficients, unknowns), _ = gauss_newton(step, (selection.start, problem.start), STEPS, SETTLED_UM)
     residual = problem.residual(coefficients, unknowns)
     return ResidualData(problem, coefficients, unknowns, UM * residual, base, _rows(problem), relative)
 
@@ -302,23 +306,26 @@ def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequenc
 
 def _fitted(problem: Problem, relative: Array, sigma: float, prior_um: float, free: int) -> tuple[float, Array]:
     """Least squares with a prior on the constants, on the exact model."""
-    start, unknowns = problem.selection.start, problem.start
-    coefficients, k = start.copy(), len(unknowns)
-    for _ in range(EXACT_STEPS):
+    start, k = problem.selection.start, len(problem.start)
+    held: Array
+
+    def step(at: tuple[Array, Array]) -> tuple[tuple[Array, Array], float]:
+        nonlocal held
+        coefficients, unknowns = at
         columns = UM * np.concatenate([problem.nuisance(unknowns), problem.design], axis=1) / relative[:, None]
         size = np.sqrt((columns**2).mean(axis=0))
         size = np.where(size > 0, size, 1.0)
         allowed = np.full(columns.shape[1], WIDE_UM)
         allowed[k : len(allowed) - free] = prior_um
-        pull = sigma / allowed
+        held = sigma / allowed * size
         y = UM * problem.residual(coefficients, unknowns) / relative
-        back = -pull * size * np.concatenate([np.zeros(k), coefficients - start])
-        stacked = np.concatenate([columns / size, np.diag(pull)])
+        back = -held * np.concatenate([np.zeros(k), coefficients - start])
+        stacked = np.concatenate([columns / size, np.diag(sigma / allowed)])
         change = np.linalg.lstsq(stacked, np.concatenate([y, back]), rcond=1e-9)[0] / size
-        unknowns, coefficients = unknowns + change[:k], coefficients + change[k:]
-        if np.abs(columns @ change).max(initial=0.0) < EXACT_SETTLED_UM:
-            break
+        return (coefficients + change[k:], unknowns + change[:k]), float(np.abs(columns @ change).max(initial=0.0))
+
+    (coefficients, unknowns), _ = gauss_newton(step, (start, problem.start), EXACT_STEPS, EXACT_SETTLED_UM)
     y = np.abs(UM * problem.residual(coefficients, unknowns) / relative)
     y = np.sort(np.where(np.isfinite(y), y, 1e12))[: int(TRIM * len(y))]
-    moved = (pull * size * np.concatenate([np.zeros(k), coefficients - start]))[k:]
+    moved = held[k:] * (coefficients - start)
     return float(np.sqrt(((y**2).sum() + (moved**2).sum()) / len(y))), coefficients

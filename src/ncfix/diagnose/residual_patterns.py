@@ -14,8 +14,8 @@ from scipy.special import chdtrc
 
 from ncfix.diagnose.evidence import Background
 from ncfix.diagnose.residual_data import ResidualData
+from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
-from ncfix.measure.solve import orthonormal, without
 
 SHOWN = 6
 UNLIKELY = 1e-3

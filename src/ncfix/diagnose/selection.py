@@ -24,8 +24,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix.diagnose.evidence import SIZES, Comparison, Evidence, Member, Members, entry_price
+from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
-from ncfix.measure.solve import orthonormal, without
 
 SAME = 0.8
 """Share of what either may show, its squares beside what is free, that the other must be able to show."""

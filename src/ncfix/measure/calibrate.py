@@ -1,207 +1,45 @@
-"""Calibration: the errors of a machine from measurements, by weighted least squares on the exact model.
+"""Calibration: from measurements to a machine whose errors are known, and what has to be said about it.
 
-Each step solves the linear problem with the set-up eliminated (`ncfix.measure.solve`) and adds the change; the residual
-is always that of the exact, composed machine, so that what converges is the exact model (Gauss-Newton with the
-Jacobian at the first guess, so that what cannot be told is the same in every step; its own error is of the size of the
-errors and does not change where the iteration ends).
+`calibrate` estimates by weighted least squares on the exact model (`ncfix.measure.estimate`). Besides the machine it
+gives what the measurements cannot tell, in words; `over_the_travels` says how well the error of the tool tip is known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+import datetime
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
 
+from ncfix import __version__
 from ncfix.diagnostics import Message, RefusedError, UsageError
-from ncfix.machine import Machine
-from ncfix.machine.plausible import functions, much
-from ncfix.measure import weights
-from ncfix.measure.measurement import Array, Index, Measurement
-from ncfix.measure.observation import Mask, Observation
-from ncfix.measure.observe import observe
+from ncfix.machine import Effect, Machine, State
+from ncfix.machine.error_model import signals_of
+from ncfix.measure import contradictions
+from ncfix.measure.candidates import Room, candidates
+from ncfix.measure.estimate import Calibration, Estimate, Problem, Residuals, fit, noise_scale
+from ncfix.measure.least_squares import AUTO, Combination, Solution, orthonormal, without
+from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.observation import Mask
+from ncfix.measure.refine import pruned, with_time_constants
 from ncfix.measure.selection import Selection, select
-from ncfix.measure.solve import Solution, solve
 
-STEPS = 25
-"""Most steps of the iteration."""
-CONVERGED = 1e-5
-"""Change of the predictions, in units of the noise, that is none."""
-FAR = 1e6
-"""The same: from here on it is no iteration any more."""
-TINY = 1e-300
-UNLIKELY = 0.01
-"""Probability of so large a chi-square below which the noise is taken to be larger than it is said to be."""
-ROUNDING = 1e-9
-"""mm of reading per mm or rad of error: a column that is nowhere larger is made of rounding errors."""
-
-HOPELESS = 240.0
-"""A coefficient whose standard deviation is so many times what is much is held. What is held leads the others astray by
-what it really is, so this is beyond what can be told together (Esmaeili 2021, 84 errors by 109 probings: 200 times),
-and before single ones come out as centimetres, since only their sum is seen."""
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Where the iteration ended.
-
-    coefficients, unknowns  of the effects and of the set-up
-    solution                the last linear step
-    residual                values minus predictions, (m,), mm or rad
-    weight                  (m,) 0 ... 1
-    share                   how much of the squares of normal noise the weights leave: 1 if values count in full
-    """
-
-    coefficients: Array
-    unknowns: Array
-    solution: Solution
-    residual: Array
-    weight: Array
-    share: float = 1.0
-
-    def reduced(self, sigma: Array, freedom: int) -> float:
-        """The reduced chi-square for standard deviations (m,): 1 if the residuals are as large as the noise."""
-        squares = self.weight * (self.residual / sigma) ** 2
-        return float(squares.sum() / (self.share * freedom))
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Several observations of one machine, stacked."""
-
-    machine: Machine
-    selection: Selection
-    observations: tuple[Observation, ...]
-    values: Array
-    sigma: Array
-    design: Array
-    sizes: tuple[int, ...] = field(default=())
-
-    @staticmethod
-    def of(measurements: Sequence[Measurement], machine: Machine, selection: Selection) -> Problem:
-        """Stack what the instruments saw."""
-        seen = tuple(observe(measurement, machine) for measurement in measurements)
-        values = np.concatenate([each.values for each in seen])
-        sigma = np.concatenate([each.sigma for each in seen])
-        design = np.concatenate([each.design(selection.estimated) for each in seen])
-        design[:, np.abs(design).max(axis=0, initial=0.0) < ROUNDING] = 0.0
-        return Problem(
-            machine, selection, seen, values, sigma, design, tuple(len(each.unknowns.start) for each in seen)
-        )
-
-    @cached_property
-    def stated(self) -> Mask:
-        """Which values were stated by a certificate and not read, (m,): calibrated distances."""
-        rows: Index = np.concatenate([each.rows for each in self.observations])
-        return rows < 0
-
-    @cached_property
-    def limits(self) -> Array:
-        """`HOPELESS` times what is much for each coefficient, (p,), mm or rad: who knows no better knows nothing."""
-        parts = [np.zeros(0)]
-        for effect in self.selection.estimated:
-            largest = np.abs(functions(self.machine, effect)).max(axis=1)
-            parts.append(HOPELESS * much(self.machine, effect.name) / np.maximum(largest, TINY))
-        return np.concatenate(parts)
-
-    @property
-    def start(self) -> Array:
-        """The first guess of what is unknown about the set-ups, one after another, (k,), mm or rad."""
-        return np.concatenate([np.zeros(0), *(each.unknowns.start for each in self.observations)])
-
-    @property
-    def noise_known(self) -> bool:
-        """Whether all instruments' noise is known."""
-        return all(each.noise_known for each in self.observations)
-
-    def residual(self, coefficients: Array, unknowns: Array) -> Array:
-        """Values minus exact predictions, (m,), mm or rad, for coefficients (p,) and unknowns (k,)."""
-        machine = self.selection.machine(self.machine, coefficients.tolist())
-        parts = np.split(unknowns, np.cumsum(self.sizes)[:-1])
-        predicted = [each.predict(machine, part) for each, part in zip(self.observations, parts, strict=True)]
-        return self.values - np.concatenate(predicted)
-
-    def nuisance(self, unknowns: Array) -> Array:
-        """The derivative of predictions by the unknowns at `unknowns` (k,): (m, k), a block for each observation."""
-        columns = np.zeros((len(self.values), sum(self.sizes)))
-        parts = np.split(unknowns, np.cumsum(self.sizes)[:-1])
-        row = column = 0
-        for each, part in zip(self.observations, parts, strict=True):
-            block = each.unknown_design(part)
-            columns[row : row + len(block), column : column + block.shape[1]] = block
-            row, column = row + len(block), column + block.shape[1]
-        return columns
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """A calibrated machine and how well it is known.
-
-    machine     with the estimated coefficients and their covariances
-    problem     what was solved
-    estimate    where it ended
-    scale       factor on the standard deviations: 1 if the noise was known and explains the residuals
-    remarks     what the user should know: what could not be told, outliers, noise
-    before_um   rms of the lengths about the machine as it was, set-up fitted; after_um the same about the result; NaN
-                if only angles were measured
-    """
-
-    machine: Machine
-    problem: Problem
-    estimate: Estimate
-    scale: float
-    remarks: tuple[Message, ...]
-    before_um: float
-    after_um: float
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """The names of the estimated coefficients."""
-        return self.problem.selection.labels
-
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom that are left."""
-        return int((self.estimate.weight > 0).sum()) - self.estimate.solution.rank
-
-    @property
-    def chi_square(self) -> float:
-        """The reduced chi-square: 1 if the residuals are as large as the noise."""
-        return self.estimate.reduced(self.problem.sigma, max(self.freedom, 1))
-
-    @property
-    def covariance(self) -> Array:
-        """Of all coefficients, (p, p); NaN where they were held."""
-        p, kept = len(self.labels), self.estimate.solution.kept
-        full = np.full((p, p), np.nan)
-        full[np.ix_(kept, kept)] = self.estimate.solution.covariance * self.scale**2
-        return full
-
-    @property
-    def sigma(self) -> Array:
-        """The standard deviations of all coefficients, (p,); NaN where they were held."""
-        deviations: Array = np.sqrt(np.diag(self.covariance))
-        return deviations
-
-    def uncertainty(self, design: Array) -> Array:
-        """Standard deviation of a prediction with this design over the coefficients, (..., p) -> (...).
-
-        `machine.design(q, state, selection.estimated)` gives that of the pose error. What was held counts as known.
-        """
-        kept = self.estimate.solution.kept
-        own = design[..., kept]
-        covariance = self.estimate.solution.covariance * self.scale**2
-        deviation: Array = np.sqrt(np.einsum("...i,ij,...j->...", own, covariance, own))
-        return deviation
+ALIKE = 0.02
+"""Factors this near to 1 or -1 count as such."""
+NAMED = 20
+"""Outliers that are named one by one."""
+PLACES = 400
+"""Poses over the travels at which the tip error is predicted."""
+UM = 1e3
 
 
 def calibrate(
     measurements: Sequence[Measurement],
     machine: Machine,
     effects: str | Selection | None = None,
-    loss: str = weights.AUTO,
+    loss: str = AUTO,
     prune: float | None = None,
     knots: int = 0,
     time_constants: bool = False,
@@ -216,27 +54,37 @@ def calibrate(
 
     Raises `UsageError` NCF630, NCF635, NCF637, NCF639, and `RefusedError` NCF623.
     """
-    from ncfix.measure import contradictions, lags, pruning, results, suspects
-
     nothing = [message for each in measurements if (message := contradictions.untouched(each)) is not None]
     if nothing:
         raise RefusedError(tuple(nothing))
-
     selection = effects if isinstance(effects, Selection) else select(machine, effects, _point(measurements), knots)
-    remarks: tuple[Message, ...] = ()
+    time_remarks: tuple[Message, ...] = ()
     if time_constants:
-        late = lags.found(measurements, machine, selection)
-        selection, remarks = late.selection, late.remarks
+        selection, time_remarks = with_time_constants(measurements, machine, selection)
     problem = Problem.of(measurements, machine, selection)
     try:
-        estimate = settle(problem, loss)
+        estimate = fit(problem, loss)
     except UsageError as error:
-        why = suspects.suspected(problem) if error.code == "NCF637" else ()
+        why = contradictions.suspected(problem) if error.code == "NCF637" else ()
         raise UsageError((*error.messages, *why, *(each for data in measurements for each in data.remarks))) from error
     if prune is not None:
-        problem, estimate = pruning.pruned(problem, estimate, prune, loss)
-    found = results.result(problem, estimate, loss)
-    return replace(found, remarks=(*found.remarks, *remarks))
+        problem, estimate = pruned(problem, estimate, prune, loss)
+    scale = noise_scale(problem, estimate)
+    residuals = Residuals.of(problem, estimate)
+    before = _rms_before(problem, residuals)
+    after = _rms(residuals, estimate.residual, estimate.weight > 0)
+    found = _machine(problem, estimate, scale, {"rms_before_um": before, "rms_after_um": after, "loss": loss})
+    remarks = [
+        *(each for data in measurements for each in data.remarks),
+        *untold(estimate.solution, problem.selection.labels),
+        *_outliers(estimate, residuals),
+        *_noise(problem, scale),
+        *contradictions.conflicts(problem, estimate),
+        *contradictions.suspected(problem),
+        *(message for seen in problem.observations for message in seen.doubts(found)),
+        *time_remarks,
+    ]
+    return Calibration(found, problem, estimate, scale, tuple(remarks), before, after)
 
 
 def _point(measurements: Sequence[Measurement]) -> list[float] | None:
@@ -245,73 +93,169 @@ def _point(measurements: Sequence[Measurement]) -> list[float] | None:
     return [float(part) for part in texts.pop().split()] if len(texts) == 1 else None
 
 
-def settle(problem: Problem, loss: str = weights.AUTO) -> Estimate:
-    """Iterate to convergence; with `auto` once more without the outliers that a robust look finds."""
-    _enough(problem)
-    ones = np.ones(len(problem.values))
-    estimate = _iterate(problem, ones, loss)
-    if loss == weights.AUTO:
-        outlying = weights.outliers(estimate.solution) & ~problem.stated
-        if outlying.any():
-            estimate = _iterate(problem, np.where(outlying, 0.0, ones), loss)
-    scale = _scale(problem, estimate)
-    unknown = np.sqrt(np.diag(estimate.solution.covariance)) * scale > problem.limits[estimate.solution.kept]
-    if unknown.any() or (scale < 1 and (estimate.solution.weak or estimate.solution.combinations)):
-        kept = estimate.weight if loss == weights.AUTO else ones
-        estimate = _iterate(problem, kept, loss, scale)
-    return estimate
+def _machine(problem: Problem, estimate: Estimate, scale: float, figures: dict[str, Any]) -> Machine:
+    """The calibrated machine, with covariances and provenance."""
+    machine = problem.selection.machine(problem.machine, estimate.coefficients.tolist())
+    covariance = estimate.covariance(scale)
+    effects, start = [], 0
+    for effect, free in zip(machine.effects, problem.selection.free, strict=True):
+        stop = start + (effect.basis.size if free else 0)
+        effects.append(_known(effect, covariance[start:stop, start:stop]) if free else effect)
+        start = stop
+    sources = ", ".join(dict.fromkeys(each.measurement.path for each in problem.observations))
+    notes = {"date": datetime.date.today(), "source": sources, "calibrated_from": problem.machine.hash}
+    notes["calibrated_by"] = f"ncfix {__version__}"
+    told = {key: value for key, value in figures.items() if value == value}
+    rounded = {key: round(value, 3) if isinstance(value, float) else value for key, value in told.items()}
+    return machine.replace(effects=tuple(effects), provenance={**problem.machine.provenance, **notes, **rounded})
 
 
-def _scale(problem: Problem, estimate: Estimate) -> float:
-    """How many times larger the noise is than its standard deviations say."""
-    freedom = max(int((estimate.weight > 0).sum()) - estimate.solution.rank, 1)
-    return noise_scale(problem, estimate.reduced(problem.sigma, freedom), freedom) or 1.0
+def _known(effect: Effect, covariance: Array) -> Effect:
+    """The effect with its covariance, if all of its coefficients were estimated."""
+    if not np.isfinite(covariance).all():
+        return replace(effect, covariance=None)
+    even = (covariance + covariance.T) / 2
+    return replace(effect, covariance=tuple(tuple(float(value) for value in row) for row in even))
 
 
-def _enough(problem: Problem) -> None:
-    """Refuse if nothing would be left to tell noise from error."""
-    m, p = len(problem.values), int((np.abs(problem.design) > 0).any(axis=0).sum())
-    nuisance = problem.nuisance(problem.start)
-    k = int(np.linalg.matrix_rank(nuisance)) if nuisance.shape[1] else 0
-    if m <= p + k:
-        text = f"{m} values for {p} coefficients and {k} unknowns of the set-up"
-        raise UsageError.of("NCF630", text, hint="measure more poses, or estimate fewer effects: --effects")
+def _rms(residuals: Residuals, values: Array, keep: Mask) -> float:
+    """The rms of lengths among values (m,) mm, calibrated distances apart, in um; NaN if there are none."""
+    chosen = values[(residuals.row >= 0) & ~residuals.turns & keep]
+    return float(UM * np.sqrt((chosen**2).mean())) if chosen.size else np.nan
 
 
-def _iterate(problem: Problem, weight: Array, loss: str, scale: float = 1.0) -> Estimate:
-    """Gauss-Newton steps to convergence; `scale`: the noise is this many times larger than it is said to be."""
-    coefficients, unknowns = problem.selection.start.copy(), problem.start
-    design = problem.design / problem.sigma[:, None]
-    nuisance = problem.nuisance(unknowns) / problem.sigma[:, None]
-    for _ in range(STEPS):
-        residual = problem.residual(coefficients, unknowns)
-        target = residual / problem.sigma
-        root = np.sqrt(weight)
-        solution = solve(design * root[:, None], nuisance * root[:, None], target * root, problem.limits / scale)
-        rest = (target - design @ solution.change) * root
-        moved = np.linalg.lstsq(nuisance * root[:, None], rest, rcond=1e-11)[0] if nuisance.shape[1] else unknowns
-        coefficients, unknowns = coefficients + solution.change, unknowns + moved
-        change = design @ solution.change + nuisance @ moved
-        settled = bool(np.abs(change).max(initial=0.0) < CONVERGED)
-        if loss in (weights.HUBER, weights.TUKEY):
-            before = weight
-            weight = np.where(problem.stated, 1.0, weights.of(loss, target - change))
-            settled = settled and bool(np.abs(weight - before).max() < 1e-3)
-        if settled:
-            residual = problem.residual(coefficients, unknowns)
-            return Estimate(coefficients, unknowns, solution, residual, weight, weights.share(loss))
-    if loss in (weights.HUBER, weights.TUKEY) and np.abs(change).max() < 0.1:
-        residual = problem.residual(coefficients, unknowns)
-        return Estimate(coefficients, unknowns, solution, residual, weight, weights.share(loss))
-    size = float(np.abs(change).max())
-    still = f"still change by {size:.3g} times the noise" if size < FAR else "run away"
-    text = f"after {STEPS} steps the predictions {still}"
-    raise UsageError.of("NCF637", text, hint="are the measurements of this machine, in mm and degree?")
+def _rms_before(problem: Problem, residuals: Residuals) -> float:
+    """The same about the machine as it was, with the set-up fitted."""
+    residual = problem.residual(problem.selection.start, problem.start) / problem.sigma
+    basis = orthonormal(problem.nuisance(problem.start) / problem.sigma[:, None])
+    return _rms(residuals, without(basis, residual) * problem.sigma, np.ones(len(residual), dtype=bool))
 
 
-def noise_scale(problem: Problem, chi_square: float, freedom: int) -> float:
-    """The factor on the standard deviations: estimated if the noise is not known, never below one if it is."""
-    if not problem.noise_known:
-        return float(np.sqrt(chi_square))
-    improbable = chdtrc(freedom, chi_square * freedom) < UNLIKELY
-    return float(np.sqrt(chi_square)) if improbable else 1.0
+# -- what has to be said ----------------------------------------------------------------------------------------------
+
+
+def _outliers(estimate: Estimate, residuals: Residuals) -> Iterator[Message]:
+    aside = np.flatnonzero(estimate.weight == 0)
+    for index in aside[np.argsort(-np.abs(residuals.studentised[aside]))][:NAMED].tolist():
+        factor, unit = (1e6, "urad") if residuals.turns[index] else (1e3, "um")
+        size = f"{residuals.value[index] * factor:+.1f} {unit}"
+        text = f"{residuals.component[index]} is {size} from the model: an outlier, given no weight"
+        yield Message("NCF633", text, residuals.place(index), "look at that row; --loss none keeps it")
+    if len(aside) > NAMED:
+        yield Message("NCF633", f"{len(aside) - NAMED} more outliers")
+
+
+def _noise(problem: Problem, scale: float) -> Iterator[Message]:
+    if problem.noise_known and scale > 1:
+        times = f"{scale:.2f}" if scale < 100 else f"{scale:.0f}"
+        text = f"the residuals are {times} times the noise: an effect is missing, or the noise is larger"
+        yield Message("NCF634", text, hint="`ncfix diagnose` looks for what is missing")
+
+
+def untold(solution: Solution, labels: Sequence[str]) -> list[Message]:
+    """What could not be told, and what was found instead."""
+    found = _unseen(_listed(solution.unseen, labels), "nothing that was measured depends on")
+    found += _unseen(_listed(solution.set_up, labels), "the unknown set-up takes the place of")
+    found += [_combined(combination, labels) for combination in solution.combinations]
+    if weak := _listed(solution.weak, labels):
+        are = "is held as it is" if len(weak) == 1 else "are held as they are"
+        text = f"{', '.join(weak)} {are}: these measurements would tell it to no better than what is much"
+        found.append(Message("NCF620", text, hint="measure where it acts: `ncfix plan`"))
+    if solution.condition > 1e4:
+        text = f"the estimates depend strongly on one another: condition {solution.condition:.0f}"
+        found.append(Message("NCF638", text, hint="measure at more varied poses, or estimate fewer effects"))
+    return found
+
+
+def _unseen(names: Sequence[str], why: str) -> list[Message]:
+    if not names:
+        return []
+    are, them = ("is held as it is", "it") if len(names) == 1 else ("are held as they are", "them")
+    return [Message("NCF632", f"{', '.join(names)} {are}: {why} {them}")]
+
+
+def _listed(held: Sequence[int], labels: Sequence[str]) -> list[str]:
+    """The coefficients by their names; where all of an effect's are held, the effect by its own."""
+    free = {name.split()[0] for k, name in enumerate(labels) if k not in set(held)}
+    names = [labels[k] for k in held]
+    return list(dict.fromkeys(name if name.split()[0] in free else name.split()[0] for name in names))
+
+
+def _combined(combination: Combination, labels: Sequence[str]) -> Message:
+    held = labels[combination.held]
+    names = [labels[k] for k in combination.others]
+    hint = "`ncfix plan --separate` finds poses that tell them apart"
+    if len(names) > 4:
+        text = f"{held} and {', '.join(names[:4])} and {len(names) - 4} more: only combinations; {held} is held"
+        return Message("NCF631", text, hint=hint)
+    listed = f"{', '.join([held, *names[:-1]])} and {names[-1]}"
+    return Message("NCF631", f"{listed}: only {_what(combination, held, names)}; {held} is held as it is", hint=hint)
+
+
+def _what(combination: Combination, held: str, names: Sequence[str]) -> str:
+    """What of a combination is determined: each of the others plus its factor times the held one."""
+    signs = ["+" if factor > 0 else "-" for factor in combination.factors]
+    alike = [abs(abs(factor) - 1) < ALIKE for factor in combination.factors]
+    if len(names) == 1 and alike[0]:
+        return "their sum" if signs[0] == "+" else "their difference"
+    sizes = ["" if same else f" {abs(factor):.3g} x" for same, factor in zip(alike, combination.factors, strict=True)]
+    return " and ".join(f"{name} {sign}{size} {held}" for name, sign, size in zip(names, signs, sizes, strict=True))
+
+
+# -- how well the tip is known -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """The standard deviation of the predicted tip error, um, the largest of three directions at each pose.
+
+    What was held counts as known; other signals than positions are taken where they were in the middle of the data.
+    """
+
+    worst_um: float
+    rms_um: float
+    at: Mapping[str, float]
+
+
+def over_the_travels(calibration: Calibration) -> Prediction:
+    """At poses all over the travels, with the tools that were measured with."""
+    machine = calibration.problem.machine
+    lengths = {
+        float(length) for each in calibration.problem.observations for length in each.measurement.column("tool_length")
+    }
+    places = candidates(machine, "tcp", PLACES, Room(tool_lengths=sorted(lengths)))
+    state = State(places.column("tool_length"), places.state(machine).direction, _inputs(calibration, machine))
+    sigma = UM * deviations(calibration, places.positions(machine), state).max(axis=1)
+    row = int(sigma.argmax())
+    at = {name: float(places.columns[name][row]) for name in (*machine.axis_names, "tool_length")}
+    return Prediction(float(sigma[row]), float(np.sqrt((sigma**2).mean())), at)
+
+
+def guesses(calibration: Calibration, over: Prediction) -> tuple[Message, ...]:
+    """A warning (NCF641) if somewhere in the travels the tip error is known to less than what was to be corrected."""
+    if not over.worst_um > calibration.before_um:
+        return ()
+    at = ", ".join(f"{name} {value:g}" for name, value in over.at.items() if name != "tool_length")
+    text = (
+        f"at {at} the tip error is known to {over.worst_um:.1f} um (1 sigma), and only {calibration.before_um:.1f} um "
+        "rms were there before: away from the measured poses the model is a guess"
+    )
+    hint = "measure where `ncfix plan --existing` says, or estimate fewer effects: --effects, --prune 0.99"
+    return (Message("NCF641", text, hint=hint),)
+
+
+def deviations(calibration: Calibration, q: Array, state: State) -> Array:
+    """Standard deviation of the predicted tip error at any poses, (n, 3) mm, directions of the workpiece frame."""
+    design = calibration.problem.machine.design(q, state, calibration.problem.selection.estimated)
+    return calibration.uncertainty(design[:, :3])
+
+
+def _inputs(calibration: Calibration, machine: Machine) -> dict[str, Array]:
+    """The middle of every signal that the estimated effects need."""
+    signals = (each for effect in calibration.problem.selection.estimated for each in signals_of(machine.axes, effect))
+    names = {name for signal in signals if signal is not None for name in signal.inputs} - {"tool_length"}
+    values = {}
+    for name in names:
+        columns = [each.measurement.column(name) for each in calibration.problem.observations]
+        values[name] = np.full(PLACES, float(np.median(np.concatenate(columns))))
+    return values

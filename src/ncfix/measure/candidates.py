@@ -1,7 +1,7 @@
 """Poses from which a plan chooses: spread over the travels without a common step, and their ends.
 
-Positions come from a Halton sequence, so no axis is sampled at even distances: an error that repeats with a screw's
-pitch cannot hide (Soons, section 2.3).
+Positions come from Halton's sequence with the digits of every place shuffled (Owen 2017), so no axis is sampled at even
+distances: an error that repeats with a screw's pitch cannot hide (Soons, section 2.3).
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.axes import Axis
-from ncfix.measure.halton import halton
 from ncfix.measure.measurement import Array, Measurement
 
 DECIMALS = 3
@@ -39,6 +38,8 @@ APART = 60.0
 """mm: between balls."""
 UNLIMITED_MM = 100.0
 """Half the travel that is taken for a linear axis without a range."""
+FINEST = 2.0**-54
+"""Digits count down to this: below it a number next to one cannot be told from one."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def _within_reach(machine: Machine, kind: str, count: int, room: Room, random: n
         return found
     parts, kept = [], 0
     for _ in range(TRIES):
-        inside = _reached(machine, found, room)
+        inside = _inside(machine.tip(_poses(machine, found), found["tool_length"]), room)
         parts.append({name: values[inside] for name, values in found.items()})
         kept += int(inside.sum())
         if kept >= count:
@@ -97,6 +98,11 @@ def _within_reach(machine: Machine, kind: str, count: int, room: Room, random: n
     limits = ", ".join(f"{low:g} < {name} < {high:g}" for name, (low, high) in room.reach.items())
     text = f"{kept} of {TRIES * count} poses tried have their tip within {limits}"
     raise UsageError.of("NCF636", text, hint="wider --reach, or --range of axes that lead there")
+
+
+def _poses(machine: Machine, columns: Mapping[str, Array]) -> Array:
+    """Positions of all axes, (n, n_axes), mm and rad."""
+    return np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
 
 
 def _drawn(machine: Machine, count: int, room: Room, random: np.random.Generator) -> dict[str, Array]:
@@ -118,12 +124,6 @@ def _sides(axis: Axis, position: Array, wanted: Array, room: Room) -> Array:
     low, high = room.of(axis)
     step = APPROACH["rotary" if axis.rotary else "linear"]
     return np.where(position - low < step, -1.0, np.where(high - position < step, 1.0, wanted))
-
-
-def _reached(machine: Machine, columns: Mapping[str, Array], room: Room) -> NDArray[np.bool_]:
-    """Where the tip is within reach."""
-    q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
-    return _inside(machine.tip(q, columns["tool_length"]), room)
 
 
 def _inside(tip: Array, room: Room) -> NDArray[np.bool_]:
@@ -183,7 +183,7 @@ def _moved_to(
     machine: Machine, columns: Mapping[str, Array], places: Array, room: Room
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """The columns with X, Y and Z where the tip is at the places (n, 3), and which of these the travels allow."""
-    q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
+    q = _poses(machine, columns)
     linear, moved = _towards(machine, q, columns["tool_length"], places)
     limits = np.array([room.of(machine.axes[k]) for k in linear])
     found = dict(columns)
@@ -210,7 +210,7 @@ def _reachable_balls(
 ) -> dict[str, tuple[float, float, float]]:
     """Places within reach, apart from each other, that most positions of the rotary axes can bring to the tip."""
     columns = _within_reach(machine, "tcp", LOOKED_AT, room, random)
-    q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
+    q = _poses(machine, columns)
     tips = machine.tip(q, columns["tool_length"])
     if not room.reach:
         tips = np.concatenate([np.array(list(_default_balls(machine, room).values())), tips])
@@ -231,7 +231,7 @@ def at_balls(machine: Machine, columns: dict[str, Array], room: Room, random: np
     balls = room.balls or _default_balls(machine, room)
     keys = list(balls)
     which = random.integers(len(keys), size=len(columns["X"]))
-    q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
+    q = _poses(machine, columns)
     places = np.array([balls[key] for key in keys])[which]
     linear, moved = _towards(machine, q, columns["tool_length"], places)
     q[:, linear] = moved
@@ -261,3 +261,30 @@ def _lengths(columns: Mapping[str, Array]) -> Measurement:
     found |= {f"a{axis.lower()}": columns[axis] for axis in "XYZ"}
     found |= {f"b{axis.lower()}": np.roll(columns[axis], 1) for axis in "XYZ"}
     return Measurement("length", (), found, {"set": ("1",) * len(columns["X"])})
+
+
+def halton(count: int, sides: int, random: np.random.Generator) -> Array:
+    """So many points of the unit cube, (count, sides). `random` itself is drawn no number from.
+
+    The n-th point has, along each side, the digits of n to a prime base, mirrored behind the point; shuffling the
+    digits of each place takes away the stripes that the larger primes have.
+    """
+    own = random.spawn(1)[0]
+    primes: list[int] = []
+    number = 2
+    while len(primes) < sides:
+        if all(number % each for each in primes):
+            primes.append(number)
+        number += 1
+    return np.stack([_mirrored(count, base, own) for base in primes], axis=-1)
+
+
+def _mirrored(count: int, base: int, random: np.random.Generator) -> Array:
+    """The numbers 0 ... count - 1 as digits of this base behind the point, until one no longer counts: (count,)."""
+    places = int(np.ceil(-np.log2(FINEST) / np.log2(base))) - 1
+    rest, place, found = np.arange(count), 1.0 / base, np.zeros(count)
+    for digits in np.tile(np.arange(base), (places, 1)):
+        random.shuffle(digits)
+        found += digits[rest % base] * place
+        rest, place = rest // base, place / base
+    return found

@@ -9,9 +9,8 @@ import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Machine
-from ncfix.machine.axes import COMPONENTS, NAME
-from ncfix.measure.kinds import ENDS
-from ncfix.measure.measurement import Array, Index, Measurement, groups
+from ncfix.machine.axes import COMPONENTS
+from ncfix.measure.measurement import ENDS, Array, Index, Measurement, component_of, groups
 
 LARGE_MM, LARGE_RAD = 2.0, 0.02
 """Errors of which half the rows exceed this are in another unit."""
@@ -99,13 +98,6 @@ def _lengths(measurement: Measurement) -> Iterator[Message]:
         way = measurement.stacked(*ENDS[3:]) - measurement.stacked(*ENDS[:3])
         for row in np.flatnonzero((way == 0).all(axis=1)):
             yield Message("NCF612", "both ends of this length are the same position", measurement.place(int(row)))
-
-
-def component_of(axis: str, component: str) -> str | None:
-    """The ISO 230-1 name of a component given as `EYX` or as `Y`; None if it is none of this axis."""
-    name = f"E{component}{axis}" if component in tuple(COMPONENTS) else component
-    match = NAME.fullmatch(name)
-    return name if match and match[3] == axis and not match[2] else None
 
 
 def _twice(measurement: Measurement) -> Iterator[Message]:

@@ -3,27 +3,31 @@
 What is read is the component at the point where it was measured, in the sense of the body's motion, whatever it
 carries. Without `# point:` that is the point that the effect itself refers to. The instrument's zero is not known, nor
 is how a straightness instrument's line is aligned: a constant, and a slope across a linear axis, per set and component.
+
+`positioning_figures` has the figures of ISO 230-2 and 230-3, run by run and from both sides.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
 from ncfix.machine.error_model import dependence_of, unit_motion
-from ncfix.machine.state import State, flatten, with_lags
-from ncfix.measure.checks import component_of
-from ncfix.measure.measurement import Array, Index, Measurement, groups
+from ncfix.machine.state import flatten, with_lags
+from ncfix.measure.measurement import Array, Index, Measurement, component_of, groups
 from ncfix.measure.observation import DEFAULT_NOISE, LEVER, Mask, Observation, Unknowns, repeatability
 
 ANGLE = 1e-4
 """rad: how far an angle instrument's zero may be off, in simulations."""
+RUNS = 2
+"""With fewer runs at any place there is no repeatability."""
+K = 2.0
+"""Standard deviations of a band."""
 
 
 class DirectReading(Observation):
@@ -38,18 +42,14 @@ class DirectReading(Observation):
         each = np.arange(len(measurement))
         units = np.array([axis.unit for axis in machine.axes])
         self.q[each, self.axis_index] = measurement.columns["position"] * units[self.axis_index]
-        self.state = self._with_direction(self.state)
+        if "direction" in measurement.columns:
+            direction = np.array(np.broadcast_to(self.state.direction, self.q.shape), dtype=np.float64)
+            direction[each, self.axis_index] = measurement.columns["direction"]
+            self.state = replace(self.state, direction=direction)
         texts = [f"{name} in set {group}" for name, group in zip(self.names, measurement.sets, strict=True)]
         self.series, self.series_index = groups(texts)
         point = measurement.header("point")
         self.point = np.array([float(part) for part in point.split()]) if point else None
-
-    def _with_direction(self, state: State) -> State:
-        if "direction" not in self.measurement.columns:
-            return state
-        direction = np.array(np.broadcast_to(state.direction, self.q.shape), dtype=np.float64)
-        direction[np.arange(len(self.q)), self.axis_index] = self.measurement.columns["direction"]
-        return replace(state, direction=direction)
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -86,7 +86,7 @@ class DirectReading(Observation):
     @property
     def turns(self) -> Mask:
         """See `Observation`: each row says for itself."""
-        return self.rotational
+        return np.array([name[1] in "ABC" for name in self.names])
 
     @cached_property
     def unknowns(self) -> Unknowns:
@@ -94,7 +94,7 @@ class DirectReading(Observation):
         if self.measurement.header("setup") == "none":
             return Unknowns.joined([])
         first = [int(np.flatnonzero(self.series_index == k)[0]) for k in range(len(self.series))]
-        spread = np.where(self.rotational[first], ANGLE, ANGLE * LEVER)
+        spread = np.where(self.turns[first], ANGLE, ANGLE * LEVER)
         zero = Unknowns(tuple(f"zero of {name}" for name in self.series), np.zeros(len(first)), spread)
         sloped = [self.series[k] for k in self._sloped]
         slope = Unknowns(
@@ -122,22 +122,12 @@ class DirectReading(Observation):
         position = self.q[np.arange(len(self.q)), self.axis_index]
         return np.concatenate([zero, zero[:, self._sloped] * position[:, None]], axis=1)
 
-    @property
-    def rotational(self) -> NDArray[np.bool_]:
-        """Which rows are angles, (n,)."""
-        return np.array([name[1] in "ABC" for name in self.names])
-
     @cached_property
     def _sloped(self) -> Index:
         """The series that are straightness of a linear axis."""
         rotary = {axis.name: axis.rotary for axis in self.machine.axes}
-        straight = [name[1] in "XYZ" and name[1] != name[2] and not rotary[name[2]] for name in self.series_names]
+        straight = [name[1] in "XYZ" and name[1] != name[2] and not rotary[name[2]] for name in self.series]
         return np.flatnonzero(straight)
-
-    @property
-    def series_names(self) -> list[str]:
-        """The component of each series."""
-        return [name.split()[0] for name in self.series]
 
     def _columns(self, effect: Effect) -> Array:
         """What the coefficients of one effect change in each row: (n, k)."""
@@ -172,3 +162,81 @@ class DirectReading(Observation):
             arm = np.einsum("nij,nj->ni", axis.motion(position)[:, :3, :3], arm)
         shifted: Array = (motion[:3] + np.cross(motion[3:], arm)) @ along
         return shifted
+
+
+# -- figures of ISO 230-2 and 230-3 ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Positioning:
+    """One error motion in one set; um, or urad for angles. From both sides unless only one was measured.
+
+    A  accuracy: the band of means and twice the standard deviations
+    R  repeatability: the largest band at one place, both sides; NaN with less than two runs
+    E  systematic deviation: the range of all means; M the range of the means of both sides
+    B  largest reversal; mean_reversal: over all places; NaN if one side only was measured
+
+    Values are errors of the body along the base axes: of a table axis, whose body goes towards minus as its number
+    grows, the mean reversal has another sign than that of its deviations.
+    """
+
+    component: str
+    name: str
+    A: float
+    R: float
+    E: float
+    M: float
+    B: float
+    mean_reversal: float
+
+
+def positioning_figures(measurement: Measurement) -> Iterator[Positioning]:
+    """The figures of each component and set of direct readings; nothing for other kinds."""
+    if measurement.kind != "axis" or "value" not in measurement.columns:
+        return
+    pairs = zip(measurement.labels["axis"], measurement.labels["component"], strict=True)
+    names = [component_of(axis, component) or component for axis, component in pairs]
+    keys, index = groups([f"{name}\n{group}" for name, group in zip(names, measurement.sets, strict=True)])
+    for k, key in enumerate(keys):
+        rows = index == k
+        component, name = key.split("\n")
+        unit = 1e6 if component[1] in "ABC" else 1e3
+        value = unit * measurement.columns["value"][rows]
+        side = measurement.column("direction")[rows]
+        yield _series_figures(component, name, measurement.columns["position"][rows], side, value)
+
+
+def _series_figures(component: str, name: str, position: Array, side: Array, value: Array) -> Positioning:
+    places = np.unique(position)
+    sides = [each for each in (1.0, -1.0) if (side == each).any()] or [0.0]
+    mean = np.full((len(sides), len(places)), np.nan)
+    sigma = np.full_like(mean, np.nan)
+    for i, each in enumerate(sides):
+        for j, place in enumerate(places):
+            found = value[(side == each) & (position == place)]
+            mean[i, j] = found.mean() if len(found) else np.nan
+            sigma[i, j] = found.std(ddof=1) if len(found) >= RUNS else np.nan
+    reversal = mean[0] - mean[1] if len(sides) == 2 else np.full(len(places), np.nan)
+    centre = mean.mean(axis=0)
+    spread = np.nan_to_num(sigma)
+    accuracy = float(np.nanmax(mean + K * spread) - np.nanmin(mean - K * spread))
+    return Positioning(
+        component,
+        name,
+        accuracy if np.isfinite(sigma).any() else float("nan"),
+        _repeatability(sigma, reversal),
+        float(np.nanmax(mean) - np.nanmin(mean)),
+        float(np.nanmax(centre) - np.nanmin(centre)) if np.isfinite(centre).any() else float("nan"),
+        float(np.nanmax(np.abs(reversal))) if np.isfinite(reversal).any() else float("nan"),
+        float(np.nanmean(reversal)) if np.isfinite(reversal).any() else float("nan"),
+    )
+
+
+def _repeatability(sigma: Array, reversal: Array) -> float:
+    """The largest of 4 s from one side and of 2 s + 2 s + |B| from both."""
+    if not np.isfinite(sigma).any():
+        return float("nan")
+    bands = [*(2 * K * each for each in sigma)]
+    if len(sigma) == 2:
+        bands.append(K * sigma.sum(axis=0) + np.abs(reversal))
+    return float(np.nanmax(np.concatenate(bands)))

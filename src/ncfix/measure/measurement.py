@@ -1,7 +1,8 @@
-"""Measured rows with their commanded state, column by column."""
+"""Measured rows with their commanded state, column by column: what each kind has, and as text (docs/formats.md, 3)."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -10,17 +11,106 @@ from numpy.typing import NDArray
 
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
-from ncfix.measure.kinds import CHOICES, KINDS, STATES, Kind
+from ncfix.machine.axes import COMPONENTS, NAME
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+DIGITS = 9
+"""Decimals of mm, degree and rad in files: below any instrument."""
+STATES = re.compile(r"time_s|load_kgm?|feed_mm_min|spindle_rpm|tool_length|spindle_deg|temp_[a-z0-9_]+")
+"""Optional columns of the state that are numbers; directions and labels are apart."""
+NOTES = ("instrument", "date", "origin", "operator", "note")
+"""Header lines for people."""
+COMMON = ("ncfix-measurement", "kind", "noise_um", "noise_urad", *NOTES)
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """The columns of a kind of measurement besides axes and state.
+
+    measured  the columns that the instrument filled in: empty in a plan
+    labels    columns that are names, not numbers
+    headers   header lines besides the common ones
+    any_of    at least one of `measured` is enough
+    """
+
+    name: str
+    title: str
+    required: tuple[str, ...]
+    measured: tuple[str, ...]
+    optional: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+    headers: tuple[str, ...] = ()
+    any_of: bool = False
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All columns of its own."""
+        return (*self.required, *self.measured, *self.optional)
+
+
+SHIFTS, TURNS = ("dx", "dy", "dz"), ("rx", "ry", "rz")
+CENTRE, ENDS = ("cx", "cy", "cz"), ("ax", "ay", "az", "bx", "by", "bz")
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("tcp", "position error of the tool point", (), SHIFTS, headers=("frame", "setup"), any_of=True),
+        Kind("tcp6", "position and orientation error", (), SHIFTS + TURNS, headers=("frame", "setup"), any_of=True),
+        Kind(
+            "probe",
+            "axis positions with the stylus in a ball's centre",
+            ("ball",),
+            ("mx", "my", "mz"),
+            labels=("ball",),
+            headers=("distance",),
+        ),
+        Kind(
+            "axis",
+            "one error motion of one axis",
+            ("axis", "component", "position"),
+            ("value",),
+            optional=("run", "direction"),
+            labels=("axis", "component"),
+            headers=("point", "setup"),
+        ),
+        Kind(
+            "points",
+            "targets in the frame of an instrument that stands on the foundation",
+            ("target",),
+            ("x", "y", "z"),
+            labels=("target",),
+            headers=("carried_by", "target", "frame"),
+        ),
+        Kind(
+            "length",
+            "distances: a gauge between two positions, or a ball-bar",
+            (),
+            ("length",),
+            optional=("nominal", "radius", *ENDS, *CENTRE),
+            headers=("setup",),
+        ),
+    )
+}
+CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
+    "setup": {
+        "tcp": ("ball", "none", "rigid"),
+        "tcp6": ("ball", "none", "rigid"),
+        "axis": ("line", "none"),
+        "length": ("known", "unknown", "none"),
+    },
+    "frame": {"tcp": ("workpiece", "base"), "tcp6": ("workpiece", "base"), "points": ("instrument", "base")},
+    "carried_by": {"points": ("tool", "spindle", "workpiece")},
+}
+"""What a header line may say, by kind; the first is the default."""
 
 
 @dataclass(frozen=True)
 class Measurement:
     """One measurement file.
 
-    kind      see `ncfix.measure.kinds`
+    kind      see `KINDS`
     headers   header lines in their order: (key, text)
     columns   name -> (n,) numbers as in the file: mm, degree, s
     labels    name -> n texts (ball, target, axis, component, set)
@@ -120,3 +210,29 @@ def groups(labels: Sequence[str]) -> tuple[tuple[str, ...], Index]:
     names = tuple(dict.fromkeys(labels))
     places = {name: index for index, name in enumerate(names)}
     return names, np.array([places[label] for label in labels], dtype=np.int64)
+
+
+def component_of(axis: str, component: str) -> str | None:
+    """The ISO 230-1 name of a component given as `EYX` or as `Y`; None if it is none of this axis."""
+    name = f"E{component}{axis}" if component in tuple(COMPONENTS) else component
+    match = NAME.fullmatch(name)
+    return name if match and match[3] == axis and not match[2] else None
+
+
+def dumps(measurement: Measurement, empty: tuple[str, ...] = ()) -> str:
+    """The text of a measurement file; columns `empty` are written without values, to be filled in."""
+    heads = {"ncfix-measurement": "1", "kind": measurement.kind}
+    lines = [f"# {key}: {value}" for key, value in heads.items()]
+    lines += [f"# {key}: {value}" for key, value in measurement.headers if key not in heads]
+    texts = {name: list(values) for name, values in measurement.labels.items()}
+    texts |= {name: [number(value) for value in values] for name, values in measurement.columns.items()}
+    texts |= {name: [""] * len(measurement) for name in empty}
+    lines.append(",".join(texts))
+    lines += [",".join(row) for row in zip(*texts.values(), strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def number(value: float) -> str:
+    """A number as short as it is at nine decimals."""
+    text = f"{value:.{DIGITS}f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text

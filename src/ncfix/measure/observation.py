@@ -4,6 +4,8 @@ An observation has `values` (m,), the numbers that were read, one after another:
 of the second. `predict` says what they would be for a machine and a guess of what is unknown about the set-up; `design`
 and `unknown_design` are its derivatives to first order, by the coefficients of effects and by those unknowns. The
 design matrix `projection(q) . Jacobian(q) . basis(state)` is made here and nowhere else.
+
+Behind it: the branches of a machine by themselves, and the small algebra of points and rotations that instruments need.
 """
 
 from __future__ import annotations
@@ -16,8 +18,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnostics import Message
-from ncfix.machine import Effect, Machine
+from ncfix.diagnostics import ConfigError, Message
+from ncfix.machine import Effect, Machine, Tool, se3
+from ncfix.machine.axes import SPINDLE
 from ncfix.measure.measurement import Array, Index, Measurement, groups
 
 Mask = NDArray[np.bool_]
@@ -28,6 +31,7 @@ FREEDOM_LEAST = 10
 """Degrees of freedom below which repeats do not tell the noise: what they say may be off by a quarter."""
 DEFAULT_NOISE = 1e-3
 """mm, where neither a header nor repeats tell; only the ratio of noises matters then."""
+TOOL, WORKPIECE = "tool", "workpiece"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +70,7 @@ class Observation(ABC):
         self.machine = machine
         self.q = measurement.positions(machine)
         self.state = measurement.state(machine)
+        self.set_names, self.set_index = groups(measurement.sets)
 
     def doubts(self, machine: Machine) -> Iterator[Message]:
         """What had to be assumed of the set-up and matters with the errors of this machine."""
@@ -186,11 +191,70 @@ def repeatability(
 def _states(measurement: Measurement) -> list[str]:
     """The state of each row, as text: what repeats of it share; none where nothing but readings was noted."""
     labels = [value for name, value in measurement.labels.items() if name != "repeat"]
-    names = [name for name in measurement.columns if not _varies(name) and name not in measurement.measured]
+    between = (*measurement.measured, "time_s", "run")
+    names = [name for name in measurement.columns if name not in between and not name.startswith("temp_")]
     numbers = [tuple(measurement.columns[name].tolist()) for name in names]
     return [str(state) for state in zip(*labels, *numbers, strict=True)]
 
 
-def _varies(name: str) -> bool:
-    """Whether a column may differ between repeats."""
-    return name in ("time_s", "run") or name.startswith("temp_")
+# -- geometry ----------------------------------------------------------------------------------------------------------
+
+
+def vector_columns(index: Index, count: int, matrices: Array) -> Array:
+    """The derivative by `count` vectors, (n, r, 3 count), of rows that depend on vector `index` (n,) by matrices
+    (n, r, 3).
+    """
+    columns, each = np.zeros((len(index), matrices.shape[1], 3 * count)), np.arange(len(index))
+    for k in range(3):
+        columns[each, :, 3 * index + k] = matrices[:, :, k]
+    return columns
+
+
+def linear_axes(measurement: Measurement, machine: Machine) -> list[int]:
+    """The indices of the axes X Y Z; raises `ConfigError` NCF610 if the machine has not all three."""
+    names = list(machine.axis_names)
+    for axis in "XYZ":
+        if axis not in names:
+            raise ConfigError.of("NCF610", f"the machine has no axis {axis}", measurement.place(0))
+    return [names.index(axis) for axis in "XYZ"]
+
+
+def base_from_workpiece(machine: Machine, q: Array) -> Array:
+    """The nominal rotation of the workpiece's axes against the base, (n, n_axes) -> (n, 3, 3)."""
+    turned = np.broadcast_to(np.eye(3), (len(q), 3, 3))
+    for index in reversed(range(len(machine.axes))):
+        if machine.axes[index].workpiece_side:
+            turned = turned @ machine.axes[index].motion(q[:, index])[:, :3, :3]
+    return np.array(turned)
+
+
+def branch(machine: Machine, side: str) -> tuple[Machine, list[int]]:
+    """The tool or the workpiece branch as a machine of its own, and which of the axes it has.
+
+    The other end stands on the foundation: of the tool branch `nominal` is base_from_tool, of the workpiece branch
+    workpiece_from_base.
+    """
+    held = side == WORKPIECE
+    keep = [index for index, axis in enumerate(machine.axes) if axis.workpiece_side == held]
+    axes = tuple(machine.axes[index] for index in keep)
+    joints = {axis.name for axis in axes} | (set() if held else {SPINDLE})
+    letters = " ".join(axis.name for axis in axes)
+    order = f"w {letters} F t" if held else f"w F {letters} t"
+    effects = tuple(effect for effect in machine.effects if effect.joint in joints)
+    changes = {"topology": " ".join(order.split()), "axes": axes, "effects": effects}
+    tool = Tool() if held else machine.tool
+    offset = machine.workpiece_offset if held else (0.0, 0.0, 0.0)
+    return machine.replace(**changes, tool=tool, workpiece_offset=offset), keep
+
+
+def spindle_turn(machine: Machine, angle_deg: Array) -> Array:
+    """The rotation of what the spindle holds, about the tool direction, (n,) degree -> (n, 3, 3)."""
+    return se3.rotation(np.deg2rad(angle_deg)[:, None] * np.asarray(machine.tool.direction))
+
+
+def best_rotation(moved: Array, fixed: Array) -> Array:
+    """The rotation R that takes vectors `fixed` nearest to `moved` (both (n, 3)), after Kabsch."""
+    left, _, right = np.linalg.svd(moved.T @ fixed)
+    sign = np.sign(np.linalg.det(left @ right))
+    rotation: Array = left @ np.diag([1.0, 1.0, sign]) @ right
+    return rotation

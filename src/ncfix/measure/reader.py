@@ -1,6 +1,6 @@
 """Measurement files: text to `Measurement`, with every fault of the file named at once.
 
-The text is split into a head (comment lines), the names of the columns, and rows of cells; each is read with its
+The text is split into a head (lines `# key: value`), the names of the columns, and rows of cells; each is read with its
 faults noted. What is well formed but odd is looked at afterwards, in `ncfix.measure.checks`.
 """
 
@@ -10,18 +10,26 @@ import codecs
 import math
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix import files
-from ncfix.diagnostics import ConfigError, Place
+from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Machine
 from ncfix.machine.fields import LARGEST, did_you_mean
-from ncfix.measure import checks, headers
-from ncfix.measure.kinds import KINDS, STATES, Kind
-from ncfix.measure.lines import Cell, Text
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure import checks, foreign
+from ncfix.measure.measurement import CENTRE, CHOICES, COMMON, ENDS, KINDS, STATES, Array, Kind, Measurement
 
+SHOWN = 25
+"""Faults that are named one by one; a file with more has a fault of another sort."""
+VERSION = 1
+NUMBERS = {"noise_um": 1, "noise_urad": 1, "point": 3}
+"""Header lines that are so many numbers."""
+ONCE = ("ncfix-measurement", "kind", "noise_um", "noise_urad", "point", "frame", "setup", "carried_by")
+"""Header lines of which there can only be one."""
+NAMED = {"distance": (2, 2), "target": (1, 3)}
+"""Header lines that are names and then numbers: `distance: 1 2 304.6686 0.0012`."""
 SEPARATED = "cells are separated by commas, numbers have a decimal point"
 COMMA = re.compile(r"[-+]?\d+,\d+")
 LABELS = ("set", "repeat")
@@ -42,8 +50,6 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
     Raises `ConfigError` with NCF600 ... NCF616, all faults at once. Instruments' own formats are recognised by what
     they look like, see `ncfix.measure.foreign`.
     """
-    from ncfix.measure import foreign
-
     text = _decoded(source, path)
     if not text.startswith("#"):
         found = foreign.recognised(text, machine, path)
@@ -66,19 +72,19 @@ def _decoded(source: bytes, path: str) -> str:
 
 
 def _measurement(text: Text, machine: Machine, plan: bool) -> Measurement:
-    pairs = headers.read(text)
-    kind = headers.kind_of(text, pairs)
+    pairs = _header_lines(text)
+    kind = _kind_of(text, pairs)
     text.stop()
     form = KINDS[kind]
-    headers.check(text, pairs, kind)
+    _check_header(text, pairs, kind)
     start = next((i for i, line in enumerate(text.lines) if line.strip() and not line.startswith("#")), None)
     if start is None:
         text.note("NCF609", "there are no columns and no rows", len(text.lines))
         text.stop()
     assert start is not None
-    headers.stray(text, start, kind)
+    _note_stray(text, start, kind)
     names = _cells(text.lines[start], start + 1)
-    if _separated_otherwise(names):
+    if len(names) == 1 and any(mark in names[0].text for mark in ";\t"):
         text.note("NCF604", "the columns are not separated by commas", start + 1, 0, SEPARATED)
         text.stop()
     _check_names(text, names, form, machine, plan)
@@ -89,6 +95,133 @@ def _measurement(text: Text, machine: Machine, plan: bool) -> Measurement:
     found = np.array([row[0].line for row in rows], dtype=np.int64)
     notes = tuple((key.text, value.text) for key, value in pairs)
     return Measurement(kind, notes, columns, labels, found, text.path)
+
+
+@dataclass(slots=True)
+class Text:
+    """The lines of a file and what is wrong with them."""
+
+    path: str
+    lines: list[str]
+    messages: list[Message] = field(default_factory=list)
+
+    def note(self, code: str, text: str, line: int = 0, column: int = 0, hint: str = "") -> None:
+        """Note a fault at a line and column, counted from 1."""
+        source = self.lines[line - 1] if line else ""
+        self.messages.append(Message(code, text, Place(self.path, line, column, source), hint))
+
+    def mark(self, cell: Cell, code: str, text: str, hint: str = "") -> None:
+        """Note a fault at a cell."""
+        self.note(code, text, cell.line, cell.column, hint)
+
+    def stop(self) -> None:
+        """Raise what was noted, if anything."""
+        if self.messages:
+            self.messages.sort(key=lambda each: (each.place.line, each.place.column) if each.place else (0, 0))
+            more = len(self.messages) - SHOWN
+            rest = [Message(self.messages[0].code, f"{more} more faults", Place(self.path))] if more > 0 else []
+            raise ConfigError.collected([*self.messages[:SHOWN], *rest])
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A cell's text with its line and column from 1."""
+
+    text: str
+    line: int
+    column: int
+
+
+# -- the head ----------------------------------------------------------------------------------------------------------
+
+
+def _header_lines(text: Text) -> list[tuple[Cell, Cell]]:
+    """The header lines before the columns; a comment without a colon is one for people."""
+    pairs = []
+    for number, line in enumerate(text.lines, 1):
+        if line.strip() and not line.startswith("#"):
+            break
+        key, colon, value = line.removeprefix("#").partition(":")
+        if colon:
+            at = line.index(":") + 2 + len(value) - len(value.lstrip())
+            pairs.append((Cell(key.strip(), number, line.index(key.strip()) + 1), Cell(value.strip(), number, at)))
+    return pairs
+
+
+def _note_stray(text: Text, start: int, kind: str) -> None:
+    """Note header lines after the first `start` lines: there they would be taken for a comment."""
+    for number, line in enumerate(text.lines[start:], start + 1):
+        key, colon, _ = line.removeprefix("#").partition(":")
+        if line.startswith("#") and colon and key.strip() in (*COMMON, *KINDS[kind].headers):
+            hint = "header lines stand above the columns"
+            text.note("NCF602", f"header line {key.strip()!r} below the columns", number, 1, hint)
+
+
+def _kind_of(text: Text, pairs: list[tuple[Cell, Cell]]) -> str:
+    """The kind; what is wrong with version and kind is noted."""
+    found = {key.text: value for key, value in pairs}
+    version = found.get("ncfix-measurement")
+    if version is None:
+        text.note("NCF600", "there is no line `# ncfix-measurement: 1`", 1 if text.lines else 0)
+    elif version.text != str(VERSION):
+        text.mark(version, "NCF600", f"version {version.text!r}, this ncfix reads {VERSION}")
+    kind = found.get("kind")
+    if kind is None:
+        text.note("NCF601", "there is no line `# kind: ...`", 1 if text.lines else 0, 0, f"one of {', '.join(KINDS)}")
+        return ""
+    if kind.text not in KINDS:
+        hint = did_you_mean(kind.text, KINDS) or f"one of {', '.join(KINDS)}"
+        text.mark(kind, "NCF601", f"there is no kind {kind.text!r}", hint)
+    return kind.text
+
+
+def _check_header(text: Text, pairs: list[tuple[Cell, Cell]], kind: str) -> None:
+    """Note unknown keys and values that cannot be."""
+    known = (*COMMON, *KINDS[kind].headers)
+    said: set[str] = set()
+    for key, value in pairs:
+        if key.text in said and key.text in ONCE:
+            text.mark(key, "NCF602", f"header line {key.text!r} is there twice")
+        said.add(key.text)
+        if key.text not in known:
+            hint = did_you_mean(key.text, known) or f"notes go under {', '.join(COMMON[4:])}"
+            text.mark(key, "NCF602", f"unknown header line {key.text!r}", hint)
+        elif key.text in NUMBERS:
+            _header_numbers(text, value, key.text, NUMBERS[key.text])
+        elif key.text in NAMED:
+            _named(text, value, key.text, *NAMED[key.text])
+        elif kind in CHOICES.get(key.text, {}) and value.text not in CHOICES[key.text][kind]:
+            one = " or ".join(CHOICES[key.text][kind])
+            text.mark(value, "NCF603", f"{key.text} is {one}, not {value.text!r}")
+
+
+def _header_numbers(text: Text, value: Cell, key: str, count: int) -> None:
+    found = [_finite(part) for part in value.text.split()]
+    if len(found) != count or any(number is None for number in found):
+        wanted = "a number" if count == 1 else f"{count} numbers"
+        text.mark(value, "NCF603", f"{key} is {wanted}, not {value.text!r}")
+    elif key.startswith("noise") and (found[0] or 0.0) <= 0:
+        text.mark(value, "NCF603", f"{key} is above zero, not {value.text}")
+
+
+def _named(text: Text, value: Cell, key: str, names: int, numbers: int) -> None:
+    parts = value.text.split()
+    if len(parts) != names + numbers or any(_finite(part) is None for part in parts[names:]):
+        wanted = f"{names} names and {numbers} numbers"
+        text.mark(value, "NCF603", f"{key} is {wanted}, not {value.text!r}")
+    elif key == "distance" and min(float(part) for part in parts[names:]) <= 0:
+        text.mark(value, "NCF603", "a distance and its uncertainty are above zero")
+
+
+def _finite(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+# -- columns and rows --------------------------------------------------------------------------------------------------
 
 
 def _cells(line: str, number: int) -> list[Cell]:
@@ -109,14 +242,16 @@ def _check_names(text: Text, names: list[Cell], form: Kind, machine: Machine, pl
     seen: set[str] = set()
     for name in names:
         if name.text in seen:
-            text.note("NCF604", f"column {name.text!r} is there twice", name.line, name.column)
+            text.mark(name, "NCF604", f"column {name.text!r} is there twice")
         seen.add(name.text)
         if name.text not in known and not STATES.fullmatch(name.text):
             _unknown_name(text, name, known, form, machine)
     if form.name == "length":
         _check_length_form(text, seen, names[0].line)
     if form.name == "probe" or (form.name == "length" and "ax" in seen):
-        _check_named_once(text, names, form)
+        instead = "mx, my, mz" if form.name == "probe" else "ax, ay, az and bx, by, bz"
+        for name in (name for name in names if name.text in ("X", "Y", "Z")):
+            text.mark(name, "NCF604", f"column {name.text!r} beside {instead}, which say it")
     _check_missing(text, seen, form, names[0].line, plan)
 
 
@@ -133,36 +268,20 @@ def _unknown_name(text: Text, name: Cell, known: set[str], form: Kind, machine: 
     axis = name.text.removeprefix("dir_")
     if len(axis) == 1 and axis.isalpha() and axis.isupper():
         has = " ".join(machine.axis_names)
-        text.note("NCF610", f"the machine has no axis {axis}, only {has}", name.line, name.column)
+        text.mark(name, "NCF610", f"the machine has no axis {axis}, only {has}")
         return
     if not name.text:
-        text.note("NCF604", "a column without a name", name.line, name.column, "is there a comma too many?")
+        text.mark(name, "NCF604", "a column without a name", "is there a comma too many?")
         return
     hint = did_you_mean(name.text, known) or f"kind {form.name} has {', '.join(form.columns)}"
-    text.note("NCF604", f"unknown column {name.text!r}", name.line, name.column, hint)
-
-
-def _separated_otherwise(names: list[Cell]) -> bool:
-    """Whether columns are separated by something else than commas."""
-    return len(names) == 1 and any(mark in names[0].text for mark in ";\t")
+    text.mark(name, "NCF604", f"unknown column {name.text!r}", hint)
 
 
 def _check_length_form(text: Text, seen: set[str], line: int) -> None:
-    gauge, bar = {"ax", "ay", "az", "bx", "by", "bz"}, {"cx", "cy", "cz", "radius"}
-    if gauge <= seen and not bar & seen:
-        return
-    if bar <= seen and not gauge & seen:
-        return
-    forms = "ax,ay,az,bx,by,bz,length[,nominal] or cx,cy,cz,radius,length"
-    text.note("NCF605", f"kind length has the columns {forms}", line)
-
-
-def _check_named_once(text: Text, names: list[Cell], form: Kind) -> None:
-    """Note columns of linear axes where other columns say how these stand."""
-    instead = "mx, my, mz" if form.name == "probe" else "ax, ay, az and bx, by, bz"
-    for name in names:
-        if name.text in ("X", "Y", "Z"):
-            text.note("NCF604", f"column {name.text!r} beside {instead}, which say it", name.line, name.column)
+    gauge, bar = set(ENDS), {*CENTRE, "radius"}
+    if not (gauge <= seen and not bar & seen) and not (bar <= seen and not gauge & seen):
+        forms = "ax,ay,az,bx,by,bz,length[,nominal] or cx,cy,cz,radius,length"
+        text.note("NCF605", f"kind length has the columns {forms}", line)
 
 
 def _rows(text: Text, names: list[Cell], start: int) -> list[list[Cell]]:
@@ -190,9 +309,7 @@ def _columns(
         if name in form.measured and not any(cell.text for cell in cells):
             if not plan:
                 said = f"column {name!r} is empty in all rows"
-                text.note(
-                    "NCF607", said, cells[0].line, cells[0].column, "fill it in, or leave it out if it was not measured"
-                )
+                text.mark(cells[0], "NCF607", said, "fill it in, or leave it out if it was not measured")
             columns |= {name: np.full(len(cells), math.nan)} if form.any_of or not plan else {}
             continue
         if name in (*LABELS, *form.labels):
@@ -204,7 +321,7 @@ def _columns(
 
 def _label(text: Text, cell: Cell, name: str) -> str:
     if not cell.text:
-        text.note("NCF607", f"column {name!r} is empty in this row", cell.line, cell.column)
+        text.mark(cell, "NCF607", f"column {name!r} is empty in this row")
     return cell.text
 
 
@@ -214,17 +331,15 @@ def _numbers(text: Text, cells: Iterable[Cell], name: str) -> Array:
 
 def _number(text: Text, cell: Cell, name: str) -> float:
     if not cell.text:
-        text.note("NCF607", f"column {name!r} is empty in this row", cell.line, cell.column)
+        text.mark(cell, "NCF607", f"column {name!r} is empty in this row")
         return math.nan
     try:
         value = float(cell.text.replace("_", "?"))
     except ValueError:
-        text.note("NCF608", f"column {name!r}: {cell.text!r} is not a number", cell.line, cell.column)
+        text.mark(cell, "NCF608", f"column {name!r}: {cell.text!r} is not a number")
         return math.nan
     if not math.isfinite(value):
-        text.note("NCF608", f"column {name!r}: {cell.text} is not a finite number", cell.line, cell.column)
+        text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is not a finite number")
     elif abs(value) > LARGEST:
-        text.note(
-            "NCF608", f"column {name!r}: {cell.text} is more than anything that is measured", cell.line, cell.column
-        )
+        text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is more than anything that is measured")
     return value

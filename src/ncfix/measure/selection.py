@@ -2,10 +2,15 @@
 
 New effects get a basis that leaves out what another effect has: straightness no linear part (that is squareness),
 radial and tilt motions of a rotary axis no part once per revolution (that is where its axis line lies).
+
+Named models are those of S. Esmaeili Marzdashti, PhD thesis, Polytechnique Montreal, 2021. Location errors are
+inter-axis errors, carried by what follows (`carried`). Error motions are ordinary cubics in mm and rad, Eq. 19; `b` is
+a backlash. The models of 10 and 12 have no length standard: EYY and EZZ are gains relative to X.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -15,12 +20,15 @@ import numpy as np
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import COMPONENTS, NAME, SPINDLE, Axis
-from ncfix.machine.basis import Basis, ConstantBasis, Fourier, Polynomial
+from ncfix.machine.basis import Backlash, Basis, ConstantBasis, Fourier, Polynomial
 from ncfix.machine.effects import library
 from ncfix.machine.fields import did_you_mean
 from ncfix.machine.piecewise import Truncated
 
 ALL = "all"
+TERM = re.compile(r"([XYZABC][A-Z])(\d|b)(?:-(\d))?")
+RADIAN = 180 / np.pi
+"""The file's unit of a rotary axis is the degree: this scale makes u radians."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +91,12 @@ def select(
     which new effects refer; with `knots` the new error motions of linear axes are piecewise, with so many knots.
     Raises `UsageError` NCF635.
     """
-    from ncfix.measure.models import MODELS
-
     point = None if reference is None else (float(reference[0]), float(reference[1]), float(reference[2]))
     if wanted in MODELS:
         return _with_new((), (), MODELS[wanted].effects(machine))
     if wanted is None and machine.effects:
         return Selection(machine.effects, (True,) * len(machine.effects))
-    meant = _Meant.of(machine, wanted or ALL)
+    meant = _Wanted.of(machine, wanted or ALL)
     present, there = {effect.name for effect in machine.effects}, {form(effect) for effect in machine.effects}
     new = [effect for effect in meant.physical if form(effect) not in there]
     new += [effect for name in meant.patterns for effect in _new(machine, name, present, point, knots)]
@@ -98,19 +104,19 @@ def select(
 
 
 @dataclass(frozen=True, slots=True)
-class _Meant:
+class _Wanted:
     """What a list of names means: names and patterns of errors, and the effects of names of the library."""
 
     patterns: tuple[str, ...]
     physical: tuple[Effect, ...]
 
     @staticmethod
-    def of(machine: Machine, text: str) -> _Meant:
+    def of(machine: Machine, text: str) -> _Wanted:
         """A list such as `EC0Y,E?X,wind-up-X`."""
         names = [name.strip() for name in text.split(",") if name.strip()]
         known = library(machine)
         physical = tuple(effect for name in names if name in known for effect in known[name].effects)
-        return _Meant(tuple(name for name in names if name not in known), physical)
+        return _Wanted(tuple(name for name in names if name not in known), physical)
 
     def has(self, effect: Effect) -> bool:
         """Whether an effect that is there is meant."""
@@ -137,21 +143,19 @@ def _new(
     machine: Machine, name: str, present: set[str], point: tuple[float, float, float] | None, knots: int
 ) -> list[Effect]:
     """Effects of this name or pattern that the machine does not have yet."""
-    possible = [each for each in candidates(machine, knots) if _matches(each.name, name)]
+    possible = [each for each in candidate_effects(machine, knots) if _matches(each.name, name)]
     fresh = [each for each in possible if each.name not in present]
     if fresh or any(_matches(each, name) for each in present):
         return fresh if point is None else [each if each.location else replace(each, reference=point) for each in fresh]
     match = NAME.fullmatch(name)
     if match and match[3] in (*machine.axis_names, SPINDLE):
         return [default(machine, name, knots)]
-    from ncfix.measure.models import MODELS
-
-    known = [*MODELS, *library(machine), *present, *(each.name for each in candidates(machine))]
+    known = [*MODELS, *library(machine), *present, *(each.name for each in candidate_effects(machine))]
     hint = did_you_mean(name, known) or "`ncfix effects` lists the names"
     raise UsageError.of("NCF635", f"there is no effect {name!r} of this machine", hint=hint)
 
 
-def candidates(machine: Machine, knots: int = 0) -> list[Effect]:
+def candidate_effects(machine: Machine, knots: int = 0) -> list[Effect]:
     """Every location error and error motion that can matter for this machine, zero, with its default basis."""
     found = []
     for axis in machine.axes:
@@ -208,3 +212,62 @@ def _along(axis: Axis, name: str) -> bool:
     """Whether a component acts along or about the axis itself."""
     triad = np.asarray(axis.error_axes[COMPONENTS.index(name[1]) % 3])
     return bool(abs(triad @ np.asarray(axis.direction)) > 1 - 1e-9)
+
+
+# -- named models ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A named set: location errors, and terms of error motions such as `YX2-3` or `BBb`."""
+
+    name: str
+    title: str
+    located: tuple[str, ...]
+    motions: str = ""
+
+    def effects(self, machine: Machine) -> list[Effect]:
+        """The effects with zero coefficients; raises `UsageError` NCF635 if the machine lacks an axis."""
+        found = [Effect(name, (0.0,), carried=not name.endswith(SPINDLE)) for name in self.located]
+        found += [effect for text in self.motions.split() for effect in _terms(machine, text)]
+        missing = {effect.joint for effect in found} - {*machine.axis_names, SPINDLE}
+        if missing:
+            text = f"the model {self.name} is for machines with the axes {' '.join(sorted(missing))}"
+            raise UsageError.of("NCF635", text, hint=f"this machine has {' '.join(machine.axis_names)}")
+        return found
+
+
+def _terms(machine: Machine, text: str) -> list[Effect]:
+    match = TERM.fullmatch(text)
+    assert match is not None, text
+    name, first, last = f"E{match[1]}", match[2], match[3]
+    if first == "b":
+        return [Effect(name, (0.0,), Backlash())]
+    rotary = next((axis.rotary for axis in machine.axes if axis.name == name[-1]), False)
+    degree = tuple(range(int(first), int(last or first) + 1))
+    return [Effect(name, (0.0,) * len(degree), Polynomial(degree=degree), scale=RADIAN if rotary else 1.0)]
+
+
+TEN = ("EB0A", "EC0A", "EY0C", "EA0C", "EB0C", "EC0X", "EA0Z", "EB0Z")
+THIRTEEN_BC = ("EA0B", "EC0B", "EX0C", "EA0C", "EB0C", "EB0Z", "EA0Y", "EC0Y", "EY0S", "EX0S")
+GAINS = "XX1 YY1 ZZ1"
+MOTIONS_84 = (
+    "XX1-3 YX2-3 ZX2-3 AX0-3 BX1-3 CX0-3 XY0 XY2-3 YY0-3 ZY2-3 XZ1-3 YZ2-3 ZZ1-3 AZ0-3 CZ0-3 XB0-3 YB1-3 ZB1-3 "
+    "AB0-3 BB0-3 BBb CB1-3 XC1-3 YC1-3 ZC1-3 AC1-3 BC1-3 CC1-3 CCb"
+)
+MOTIONS_81 = (
+    "XX2-3 YX1-3 ZX2-3 AX0-3 BX0-3 XY2-3 YY1-3 ZY2-3 AY1-3 BY0-3 CY0-3 XZ2-3 YZ2-3 ZZ1-3 XA1-3 YA0-3 ZA1-3 AA0-3 AAb "
+    "BA0-3 CA1-3 XC1-3 YC1-3 ZC1-3 AC1-3 BC1-3 CC1-3 CCb"
+)
+
+MODELS = {
+    model.name: model
+    for model in (
+        Model("esmaeili-10", "locations and relative gains of an AC table, chapter 6", TEN, "YY1 ZZ1"),
+        Model("esmaeili-12", "the same with the backlash of A and C, chapter 5", TEN, "YY1 ZZ1 AAb CCb"),
+        Model("esmaeili-13-bc", "locations, spindle and gains of a BC table, chapter 4", THIRTEEN_BC, GAINS),
+        Model("esmaeili-13-ac", "the same of an AC table, chapter 7", (*TEN, "EX0S", "EZ0S"), GAINS),
+        Model("esmaeili-81", "cubics of all axes of an AC table, chapter 5", (), MOTIONS_81),
+        Model("esmaeili-84", "cubics of all axes of a BC table, chapter 4", (), MOTIONS_84),
+    )
+}

@@ -1,7 +1,13 @@
-"""Kinds `tcp` and `tcp6`: the error of the tool point relative to the workpiece (R-test, ball plates, machined parts).
+"""Kinds `tcp`, `tcp6` and `probe`: where the tip of the tool really is, relative to the workpiece or to balls on it.
 
-What is read is actual minus nominal, plus where the instrument's own zero lies. With the actual pose (R, p), the
-nominal one (R0, p0), ball offset b and stylus offset t, kind `tcp` reads p + R t - p0 - b in the workpiece frame.
+Kinds `tcp` and `tcp6` (R-test, ball plates, machined parts) read actual minus nominal, plus where the instrument's own
+zero lies. With the actual pose (R, p), the nominal one (R0, p0), ball offset b and stylus offset t, kind `tcp` reads
+p + R t - p0 - b in the workpiece frame.
+
+Kind `probe` (SAMBA, RUMBA, chase-the-ball) reads axis positions with which the stylus tip sits in the centre of a ball.
+The tip of the real machine at the positions read is where the ball is: p(m) + R(m) t = P. To first order the position
+read is m - A^-1 (p(m) + R t - P), A the derivative of the tip by the linear axes; that is what `predict` gives, and at
+the true positions it is exact. Ball positions P (workpiece frame) and stylus offsets t (tool frame) are unknown.
 """
 
 from __future__ import annotations
@@ -11,16 +17,25 @@ from functools import cached_property
 
 import numpy as np
 
+from ncfix.diagnostics import ConfigError
 from ncfix.machine import Effect, Machine, se3
-from ncfix.measure.geometry import base_from_workpiece, spindle_turn
-from ncfix.measure.kinds import SHIFTS, TURNS
-from ncfix.measure.measurement import Array, Measurement, groups
-from ncfix.measure.observation import Observation, Unknowns
+from ncfix.measure.measurement import SHIFTS, TURNS, Array, Measurement, groups
+from ncfix.measure.observation import (
+    Observation,
+    Unknowns,
+    base_from_workpiece,
+    linear_axes,
+    spindle_turn,
+    vector_columns,
+)
 
 SAME = 1e-9
 BALL, RIGID, NONE = "ball", "rigid", "none"
 TILT = 1e-4
 """rad: how far an instrument may stand askew, in simulations."""
+READ = ("mx", "my", "mz")
+COVERAGE = 2.0
+"""Calibrated distances come with an expanded uncertainty, k = 2, as certificates state it."""
 
 
 class TipErrors(Observation):
@@ -30,17 +45,10 @@ class TipErrors(Observation):
         super().__init__(measurement, machine)
         self.setup = measurement.header("setup")
         self.nominal = machine.nominal(self.q, self.state.tool_length)
-        self.set_names, self.set_index = groups(measurement.sets)
         self.tool_names, self.tool_index = groups([f"{value:g}" for value in measurement.column("tool_length")])
-        turned = spindle_turn(machine, measurement.column("spindle_deg"))
-        self.held: Array = turned
-        self.observed_turn = self._observed_turn()
-
-    def _observed_turn(self) -> Array | None:
+        self.held = spindle_turn(machine, measurement.column("spindle_deg"))
+        self.observed_turn = base_from_workpiece(machine, self.q) if measurement.header("frame") == "base" else None
         """From workpiece axes to those in which the values are given, (n, 3, 3); None where these are the same."""
-        if self.measurement.header("frame") == "base":
-            return base_from_workpiece(self.machine, self.q)
-        return None
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -110,31 +118,137 @@ class TipErrors(Observation):
 
     def _setup(self, unknowns: Array, turned: Array) -> Array:
         """The derivative by the unknowns with the tool turned like this, (m, k)."""
-        n, size = len(self.measurement), len(unknowns)
-        columns = np.zeros((n, 6, size))
-        if not size:
-            return self._picked(columns)
-        rows = np.arange(n)[:, None]
-        at = 0
-        if self._turns or self.setup == RIGID:
-            places = at + 3 * self.set_index[:, None] + np.arange(3)
-            for k in range(3):
-                columns[rows[:, 0], 3 + k, places[:, k]] = -1.0
-            if self.setup == RIGID:
-                arms = se3.skew(self.nominal[:, :3, 3])
-                for k in range(3):
-                    columns[rows[:, 0], :3, places[:, k]] = arms[:, :, k]
-            at += 3 * len(self.set_names)
-        if self._shifts:
-            places = at + 3 * self.set_index[:, None] + np.arange(3)
-            for k in range(3):
-                columns[rows[:, 0], k, places[:, k]] = -1.0
-            at += 3 * len(self.set_names)
-        carried = turned @ self.held
-        for part, wanted in (slice(0, 3), self._shifts), (slice(3, 6), self._turns):
-            if self.has_stylus and wanted:
-                places = at + 3 * self.tool_index[:, None] + np.arange(3)
-                for k in range(3):
-                    columns[rows[:, 0], part, places[:, k]] = carried[:, :, k]
-                at += 3 * len(self.tool_names)
-        return self._picked(columns)
+        n = len(self.measurement)
+        none, less = np.zeros((n, 3, 3)), np.broadcast_to(np.diag([-1.0, -1.0, -1.0]), (n, 3, 3))
+        sets, tools = (self.set_index, len(self.set_names)), (self.tool_index, len(self.tool_names))
+        rigid, stylus = self.setup == RIGID, self.has_stylus
+        parts = [np.zeros((n, 6, 0))]
+        for wanted, vectors, shift, turn in (
+            (self._turns or rigid, sets, se3.skew(self.nominal[:, :3, 3]) if rigid else none, less),
+            (self._shifts, sets, less, none),
+            (self._shifts and stylus, tools, turned @ self.held, none),
+            (self._turns and stylus, tools, none, turned @ self.held),
+        ):
+            if wanted and len(unknowns):
+                parts.append(vector_columns(*vectors, np.concatenate([shift, turn], axis=1)))
+        return self._picked(np.concatenate(parts, axis=2))
+
+
+class Probing(Observation):
+    """Rows of ball, mx my mz."""
+
+    def __init__(self, measurement: Measurement, machine: Machine) -> None:
+        super().__init__(measurement, machine)
+        self.linear = linear_axes(measurement, machine)
+        if all(name in measurement.columns for name in READ):
+            self.q[:, self.linear] = measurement.stacked(*READ)
+        self.balls, self.ball_index = groups(measurement.labels["ball"])
+        self.tools, self.tool_index = groups([f"{value:g}" for value in measurement.column("tool_length")])
+        self.held = spindle_turn(machine, measurement.column("spindle_deg"))
+        tip_by_axes = machine.axis_jacobian(self.q, self.state.tool_length)[:, :3, self.linear]
+        self.axes_by_tip = np.asarray(np.linalg.inv(tip_by_axes), dtype=np.float64)
+        self.found, self.meant = self._consistent()
+        self.nominal = machine.nominal(self.meant, self.state.tool_length)
+        self.distances = [_distance(text, self.balls, measurement) for text in measurement.all_headers("distance")]
+
+    def _consistent(self) -> tuple[Array, Array]:
+        """Where a perfect machine finds the balls on average, and the positions at which it would find them there.
+
+        Derivatives are taken at those: at the positions read, which err, what the set-up can and cannot explain would
+        be blurred by their errors.
+        """
+        tips = self.machine.tip(self.q, self.state.tool_length)
+        counts = np.bincount(self.ball_index)[:, None]
+        found = np.stack([np.bincount(self.ball_index, tips[:, k]) for k in range(3)], axis=-1) / counts
+        meant = self.q.copy()
+        meant[:, self.linear] -= np.einsum("nij,nj->ni", self.axes_by_tip, tips - found[self.ball_index])
+        return found, meant
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """The positions of the three linear axes."""
+        return READ
+
+    @property
+    def extra_values(self) -> Array:
+        """The calibrated distances, (e,), mm."""
+        return np.array([length for _, _, length, _ in self.distances])
+
+    @property
+    def extra_sigma(self) -> Array:
+        """Half of their expanded uncertainties (k = 2), (e,), mm."""
+        return np.array([uncertainty / COVERAGE for *_, uncertainty in self.distances])
+
+    @cached_property
+    def has_stylus(self) -> bool:
+        """Whether tools or orientations vary, so that the stylus offset is no common shift of all balls."""
+        turned = self.nominal[:, :3, :3] @ self.held
+        return len(self.tools) > 1 or bool(np.abs(turned - turned[:1]).max() > SAME)
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """Ball positions, starting from where a perfect machine would have found them; stylus offsets per tool."""
+        parts = [Unknowns.vectors("position of ball ", self.balls, self.found)]
+        if self.has_stylus:
+            parts.append(Unknowns.vectors("stylus offset of tool ", self.tools))
+        return Unknowns.joined(parts)
+
+    def predict(self, machine: Machine, unknowns: Array) -> Array:
+        """See `Observation`; exact where the values are."""
+        actual = machine.actual(self.q, self.state)
+        gap = actual[:, :3, 3] - self._balls(unknowns)[self.ball_index]
+        if self.has_stylus:
+            gap = gap + np.einsum("nij,nj->ni", actual[:, :3, :3] @ self.held, self._stylus(unknowns)[self.tool_index])
+        read = self.q[:, self.linear] - np.einsum("nij,nj->ni", self.axes_by_tip, gap)
+        return np.concatenate([read.ravel(), self._lengths(unknowns)])
+
+    def design(self, effects: Sequence[Effect]) -> Array:
+        """See `Observation`."""
+        tip = self.machine.design(self.meant, self.state, effects)[:, :3]
+        rows = -np.einsum("nij,njk->nik", self.axes_by_tip, tip)
+        rows = rows.reshape(3 * len(self.measurement), rows.shape[-1])
+        return np.concatenate([rows, np.zeros((len(self.distances), rows.shape[1]))])
+
+    def unknown_design(self, unknowns: Array) -> Array:
+        """See `Observation`."""
+        parts = [vector_columns(self.ball_index, len(self.balls), self.axes_by_tip)]
+        if self.has_stylus:
+            carried = -self.axes_by_tip @ self.nominal[:, :3, :3] @ self.held
+            parts.append(vector_columns(self.tool_index, len(self.tools), carried))
+        rows = np.concatenate(parts, axis=2).reshape(3 * len(self.measurement), -1)
+        return np.concatenate([rows, self._lengths_design(unknowns)])
+
+    def with_bars(self, unknowns: Array, random: np.random.Generator) -> Array:
+        """The unknowns (k,) with the second ball of each calibrated distance as far away as its certificate has it."""
+        moved = unknowns.copy()
+        for first, second, length, uncertainty in self.distances:
+            balls = self._balls(moved)
+            way = balls[second] - balls[first]
+            true = length + uncertainty / COVERAGE * random.standard_normal()
+            balls[second] = balls[first] + way * (true / float(np.linalg.norm(way)))
+        return moved
+
+    def _balls(self, unknowns: Array) -> Array:
+        return unknowns[: 3 * len(self.balls)].reshape(-1, 3)
+
+    def _stylus(self, unknowns: Array) -> Array:
+        return unknowns[3 * len(self.balls) :].reshape(-1, 3)
+
+    def _lengths(self, unknowns: Array) -> Array:
+        balls = self._balls(unknowns)
+        return np.array([np.linalg.norm(balls[b] - balls[a]) for a, b, *_ in self.distances])
+
+    def _lengths_design(self, unknowns: Array) -> Array:
+        balls, rows = self._balls(unknowns), np.zeros((len(self.distances), len(unknowns)))
+        for row, (a, b, *_) in zip(rows, self.distances, strict=True):
+            way = (balls[b] - balls[a]) / np.linalg.norm(balls[b] - balls[a])
+            row[3 * a : 3 * a + 3], row[3 * b : 3 * b + 3] = -way, way
+        return rows
+
+
+def _distance(text: str, balls: tuple[str, ...], measurement: Measurement) -> tuple[int, int, float, float]:
+    first, second, length, uncertainty = text.split()
+    for ball in (first, second):
+        if ball not in balls:
+            raise ConfigError.of("NCF612", f"distance {text!r}: ball {ball} was not measured", measurement.place(0))
+    return balls.index(first), balls.index(second), float(length), float(uncertainty)

@@ -1,7 +1,8 @@
-"""Measurements that never were: what an instrument would read on a machine, with noise and the faults of measuring.
+"""From a measurement to its instrument's view of a machine, and back: what an instrument would read there.
 
-The same observation models as for calibration, so what they cannot see is not in the data either; the set-up is drawn
-at random and nobody is told.
+`observe` gives the observation model of a measurement. `simulate` makes measurements that never were, with noise and
+the faults of measuring, by the same observation models as for calibration, so what they cannot see is not in the data
+either; the set-up is drawn at random and nobody is told.
 """
 
 from __future__ import annotations
@@ -10,16 +11,52 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
+from ncfix.measure.direct import DirectReading
+from ncfix.measure.lengths import BallBar, Gauge
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
-from ncfix.measure.observe import observe
-from ncfix.measure.probing import Probing
+from ncfix.measure.tip_errors import Probing, TipErrors
+from ncfix.measure.tracker import Targets
 
+UNKNOWNS = 6
+"""Of a set, at most: a shift and a turn."""
+MOST = 60_000_000
+"""Numbers in the matrix of what is unknown: half a gigabyte, of which some copies are needed."""
+FEW_SETS = 100
+"""Sets that are never too many."""
 ROUNDS = 50
 """Most iterations to find them."""
 SETTLED = 1e-9
 """mm: readings that change by less are found."""
+
+VIEWS: dict[str, type[Observation]] = {
+    "tcp": TipErrors,
+    "tcp6": TipErrors,
+    "probe": Probing,
+    "axis": DirectReading,
+    "points": Targets,
+}
+
+
+def observe(measurement: Measurement, machine: Machine) -> Observation:
+    """The observation model of this measurement's kind, for this machine's chain.
+
+    Raises `UsageError` NCF624 if it has so many set-ups that what is unknown about them cannot be worked out.
+    """
+    labels = measurement.labels
+    names = [len(set(labels[name])) for name in ("ball", "target") if name in labels]
+    zeros = [labels["component"]] if measurement.kind == "axis" else []
+    sets = len(set(zip(measurement.sets, *zeros, strict=True)))
+    values, unknowns = 3 * len(measurement), UNKNOWNS * sets + 3 * sum(names)
+    if values * unknowns > MOST and sets > FEW_SETS:
+        text = f"{sets} sets of {len(measurement)} rows: some {unknowns} unknowns of set-ups, too many to work out"
+        hint = "rows that were measured in one set-up have one and the same `set`"
+        raise UsageError.of("NCF624", text, measurement.place(0), hint)
+    if measurement.kind == "length":
+        return (BallBar if "radius" in measurement.columns else Gauge)(measurement, machine)
+    return VIEWS[measurement.kind](measurement, machine)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +88,10 @@ def simulate(plan: Measurement, machine: Machine, faults: Faults | None = None, 
         setup = seen.with_bars(setup, random)
     filled, model = _settled(plan, machine, setup)
     values = model.predict(machine, setup)[: len(plan) * len(model.components)]
-    turns = np.tile(_angles(model), 1 if len(_angles(model)) == len(values) else len(plan))
-    values = values + _noise(values.shape, turns, faults, random) + _drift(filled, model, turns, faults, random)
+    turns = model.turns
+    urad = faults.noise_urad if faults.noise_urad is not None else faults.noise_um * 10.0
+    noise = np.where(turns, urad * 1e-6, faults.noise_um * 1e-3) * random.standard_normal(values.shape)
+    values = values + noise + np.where(turns, 0.0, _drift(filled, model, faults, random))
     if faults.quantum_um:
         step = np.where(turns, faults.quantum_um * 1e-5, faults.quantum_um * 1e-3)
         values = np.round(values / step) * step
@@ -88,23 +127,10 @@ def _settled(plan: Measurement, machine: Machine, setup: Array) -> tuple[Measure
     return plan, model
 
 
-def _angles(model: Observation) -> Array:
-    """Which values are angles: per component, or per value where rows differ."""
-    rotational = getattr(model, "rotational", None)
-    return np.asarray(model.angular if rotational is None else rotational, dtype=bool)
-
-
-def _noise(shape: tuple[int, ...], turns: Array, faults: Faults, random: np.random.Generator) -> Array:
-    urad = faults.noise_urad if faults.noise_urad is not None else faults.noise_um * 10.0
-    size = np.where(turns, urad * 1e-6, faults.noise_um * 1e-3)
-    noise: Array = size * random.standard_normal(shape)
-    return noise
-
-
-def _drift(plan: Measurement, model: Observation, turns: Array, faults: Faults, random: np.random.Generator) -> Array:
+def _drift(plan: Measurement, model: Observation, faults: Faults, random: np.random.Generator) -> Array:
+    """What a length in each value drifts, (m,)."""
     time = plan.columns.get("time_s", np.arange(len(plan), dtype=np.float64))
-    span = float(np.ptp(time)) or 1.0
-    share = (time - time.min()) / span
+    share = (time - time.min()) / (float(np.ptp(time)) or 1.0)
     ways = random.uniform(-1.0, 1.0, len(model.components)) * faults.drift_um * 1e-3
     drift: Array = np.outer(share, ways).ravel()
-    return np.where(turns, 0.0, drift)
+    return drift

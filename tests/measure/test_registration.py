@@ -10,8 +10,7 @@ import pytest
 from measure.poses import TARGETS, machine, plan
 from ncfix.machine import se3
 from ncfix.measure.calibrate import calibrate
-from ncfix.measure.observe import observe
-from ncfix.measure.synthetic import Faults, simulate
+from ncfix.measure.instruments import Faults, observe, simulate
 
 PLACES = np.array([[0.0, 0.0, 0.0], [180.0, 30.0, -60.0], [-90.0, 165.0, 30.0]])
 
@@ -47,7 +46,7 @@ def test_what_the_readings_leave_open_stays_where_the_header_says():
     data, clean = seen_from(turn, np.array([800.0, -900.0, 300.0]), "tool", "wCBXFZYSt", targets)
     seen = observe(data, clean)
     assert np.abs(seen.places - PLACES).max() < 1e-6
-    assert np.abs(seen.stands[0, :3, :3] - turn).max() < 1e-9
+    assert np.abs(seen.instrument_from_base[0, :3, :3] - turn).max() < 1e-9
 
 
 def test_one_target_that_the_header_has_places_the_others():

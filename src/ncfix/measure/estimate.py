@@ -1,0 +1,343 @@
+"""Least squares on the exact model of a machine: the stacked problem, where its iteration ends, and what is left.
+
+Each step solves the linear problem with the set-up eliminated (`ncfix.measure.least_squares`) and adds the change; the
+residual is always that of the exact, composed machine, so that what converges is the exact model. The Jacobian is that
+at the first guess, so that what cannot be told is the same in every step; its own error is of the size of the errors
+and does not change where the iteration ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import chdtrc
+
+from ncfix.diagnostics import Message, Place, UsageError
+from ncfix.machine import Machine
+from ncfix.machine.plausible import functions, much
+from ncfix.measure import least_squares
+from ncfix.measure.instruments import observe
+from ncfix.measure.least_squares import Solution, gauss_newton, solve
+from ncfix.measure.measurement import Array, Index, Measurement
+from ncfix.measure.observation import Mask, Observation
+from ncfix.measure.selection import Selection
+
+STEPS = 25
+"""Most steps of the iteration."""
+CONVERGED = 1e-5
+"""Change of the predictions, in units of the noise, that is none."""
+STEADY, CLOSE = 1e-3, 0.1
+"""Change of robust weights that is none; of predictions that will do where robust weights go on changing."""
+FAR = 1e6
+"""The same: from here on it is no iteration any more."""
+TINY = 1e-300
+UNLIKELY = 0.01
+"""Probability of so large a chi-square below which the noise is taken to be larger than it is said to be."""
+ROUNDING = 1e-9
+"""mm of reading per mm or rad of error: a column that is nowhere larger is made of rounding errors."""
+
+HOPELESS = 240.0
+"""A coefficient whose standard deviation is so many times what is much is held. What is held leads the others astray by
+what it really is, so this is beyond what can be told together (Esmaeili 2021, 84 errors by 109 probings: 200 times),
+and before single ones come out as centimetres, since only their sum is seen."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Where the iteration ended.
+
+    coefficients, unknowns  of the effects and of the set-up
+    solution                the last linear step
+    residual                values minus predictions, (m,), mm or rad
+    weight                  (m,) 0 ... 1
+    share                   how much of the squares of normal noise the weights leave: 1 if values count in full
+    """
+
+    coefficients: Array
+    unknowns: Array
+    solution: Solution
+    residual: Array
+    weight: Array
+    share: float = 1.0
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom that are left."""
+        return int((self.weight > 0).sum()) - self.solution.rank
+
+    def chi_square(self, sigma: Array) -> float:
+        """The reduced chi-square for standard deviations (m,): 1 if the residuals are as large as the noise."""
+        squares = self.weight * (self.residual / sigma) ** 2
+        return float(squares.sum() / (self.share * max(self.freedom, 1)))
+
+    def covariance(self, scale: float) -> Array:
+        """Of all coefficients for a noise `scale` times as large as it is said to be, (p, p); NaN where held."""
+        full = np.full((len(self.coefficients), len(self.coefficients)), np.nan)
+        full[np.ix_(self.solution.kept, self.solution.kept)] = self.solution.covariance * scale**2
+        return full
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Several observations of one machine, stacked."""
+
+    machine: Machine
+    selection: Selection
+    observations: tuple[Observation, ...]
+    values: Array
+    sigma: Array
+    design: Array
+
+    @staticmethod
+    def of(measurements: Sequence[Measurement], machine: Machine, selection: Selection) -> Problem:
+        """Stack what the instruments saw."""
+        seen = tuple(observe(measurement, machine) for measurement in measurements)
+        values = np.concatenate([each.values for each in seen])
+        sigma = np.concatenate([each.sigma for each in seen])
+        design = np.concatenate([each.design(selection.estimated) for each in seen])
+        design[:, np.abs(design).max(axis=0, initial=0.0) < ROUNDING] = 0.0
+        return Problem(machine, selection, seen, values, sigma, design)
+
+    @cached_property
+    def sizes(self) -> tuple[int, ...]:
+        """How many numbers are unknown about each set-up."""
+        return tuple(len(each.unknowns.start) for each in self.observations)
+
+    @cached_property
+    def stated(self) -> Mask:
+        """Which values were stated by a certificate and not read, (m,): calibrated distances."""
+        rows: Index = np.concatenate([each.rows for each in self.observations])
+        return rows < 0
+
+    @cached_property
+    def limits(self) -> Array:
+        """`HOPELESS` times what is much for each coefficient, (p,), mm or rad: who knows no better knows nothing."""
+        parts = [np.zeros(0)]
+        for effect in self.selection.estimated:
+            largest = np.abs(functions(self.machine, effect)).max(axis=1)
+            parts.append(HOPELESS * much(self.machine, effect.name) / np.maximum(largest, TINY))
+        return np.concatenate(parts)
+
+    @property
+    def start(self) -> Array:
+        """The first guess of what is unknown about the set-ups, one after another, (k,), mm or rad."""
+        return np.concatenate([np.zeros(0), *(each.unknowns.start for each in self.observations)])
+
+    @property
+    def noise_known(self) -> bool:
+        """Whether all instruments' noise is known."""
+        return all(each.noise_known for each in self.observations)
+
+    @cached_property
+    def columns(self) -> Array:
+        """What coefficients and set-ups do to the values, in units of the noise, at the first guess: (m, p + k)."""
+        columns: Array = np.concatenate([self.design, self.nuisance(self.start)], axis=1) / self.sigma[:, None]
+        return columns
+
+    def residual(self, coefficients: Array, unknowns: Array) -> Array:
+        """Values minus exact predictions, (m,), mm or rad, for coefficients (p,) and unknowns (k,)."""
+        machine = self.selection.machine(self.machine, coefficients.tolist())
+        parts = np.split(unknowns, np.cumsum(self.sizes)[:-1])
+        predicted = [each.predict(machine, part) for each, part in zip(self.observations, parts, strict=True)]
+        return self.values - np.concatenate(predicted)
+
+    def nuisance(self, unknowns: Array) -> Array:
+        """The derivative of predictions by the unknowns at `unknowns` (k,): (m, k), a block for each observation."""
+        columns = np.zeros((len(self.values), sum(self.sizes)))
+        parts = np.split(unknowns, np.cumsum(self.sizes)[:-1])
+        row = column = 0
+        for each, part in zip(self.observations, parts, strict=True):
+            block = each.unknown_design(part)
+            columns[row : row + len(block), column : column + block.shape[1]] = block
+            row, column = row + len(block), column + block.shape[1]
+        return columns
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibrated machine and how well it is known.
+
+    machine     with the estimated coefficients and their covariances
+    problem     what was solved
+    estimate    where it ended
+    scale       factor on the standard deviations: 1 if the noise was known and explains the residuals
+    remarks     what the user should know: what could not be told, outliers, noise
+    before_um   rms of the lengths about the machine as it was, set-up fitted; after_um the same about the result; NaN
+                if only angles were measured
+    """
+
+    machine: Machine
+    problem: Problem
+    estimate: Estimate
+    scale: float
+    remarks: tuple[Message, ...]
+    before_um: float
+    after_um: float
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The names of the estimated coefficients."""
+        return self.problem.selection.labels
+
+    @property
+    def chi_square(self) -> float:
+        """The reduced chi-square: 1 if the residuals are as large as the noise."""
+        return self.estimate.chi_square(self.problem.sigma)
+
+    @property
+    def covariance(self) -> Array:
+        """Of all coefficients, (p, p); NaN where they were held."""
+        return self.estimate.covariance(self.scale)
+
+    @property
+    def sigma(self) -> Array:
+        """The standard deviations of all coefficients, (p,); NaN where they were held."""
+        deviations: Array = np.sqrt(np.diag(self.covariance))
+        return deviations
+
+    def uncertainty(self, design: Array) -> Array:
+        """Standard deviation of a prediction with this design over the coefficients, (..., p) -> (...).
+
+        `machine.design(q, state, selection.estimated)` gives that of the pose error. What was held counts as known.
+        """
+        kept = self.estimate.solution.kept
+        own = design[..., kept]
+        covariance = self.estimate.solution.covariance * self.scale**2
+        deviation: Array = np.sqrt(np.einsum("...i,ij,...j->...", own, covariance, own))
+        return deviation
+
+
+def fit(problem: Problem, loss: str = least_squares.AUTO) -> Estimate:
+    """Iterate to convergence; with `auto` once more without the outliers that a robust look finds.
+
+    Raises `UsageError` NCF630 and NCF637.
+    """
+    _enough(problem)
+    ones = np.ones(len(problem.values))
+    estimate = _iterate(problem, ones, loss)
+    if loss == least_squares.AUTO:
+        outlying = least_squares.outliers(estimate.solution) & ~problem.stated
+        if outlying.any():
+            estimate = _iterate(problem, np.where(outlying, 0.0, ones), loss)
+    scale = noise_scale(problem, estimate) or 1.0
+    unknown = np.sqrt(np.diag(estimate.solution.covariance)) * scale > problem.limits[estimate.solution.kept]
+    if unknown.any() or (scale < 1 and (estimate.solution.weak or estimate.solution.combinations)):
+        kept = estimate.weight if loss == least_squares.AUTO else ones
+        estimate = _iterate(problem, kept, loss, scale)
+    return estimate
+
+
+def _enough(problem: Problem) -> None:
+    """Refuse if nothing would be left to tell noise from error."""
+    m, p = len(problem.values), int((np.abs(problem.design) > 0).any(axis=0).sum())
+    nuisance = problem.nuisance(problem.start)
+    k = int(np.linalg.matrix_rank(nuisance)) if nuisance.shape[1] else 0
+    if m <= p + k:
+        text = f"{m} values for {p} coefficients and {k} unknowns of the set-up"
+        raise UsageError.of("NCF630", text, hint="measure more poses, or estimate fewer effects: --effects")
+
+
+def _iterate(problem: Problem, weight: Array, loss: str, scale: float = 1.0) -> Estimate:
+    """Gauss-Newton steps to convergence; `scale`: the noise is this many times larger than it is said to be."""
+    design = problem.design / problem.sigma[:, None]
+    nuisance = problem.nuisance(problem.start) / problem.sigma[:, None]
+    robust = loss in (least_squares.HUBER, least_squares.TUKEY)
+    solution: Solution
+    change: Array
+
+    def step(at: tuple[Array, Array, Array]) -> tuple[tuple[Array, Array, Array], float]:
+        nonlocal solution, change
+        coefficients, unknowns, weight = at
+        target = problem.residual(coefficients, unknowns) / problem.sigma
+        root = np.sqrt(weight)
+        solution = solve(design * root[:, None], nuisance * root[:, None], target * root, problem.limits / scale)
+        rest = (target - design @ solution.change) * root
+        moved = np.linalg.lstsq(nuisance * root[:, None], rest, rcond=1e-11)[0] if nuisance.shape[1] else unknowns
+        change = design @ solution.change + nuisance @ moved
+        size = float(np.abs(change).max(initial=0.0))
+        if robust:
+            new = np.where(problem.stated, 1.0, least_squares.robust_weights(loss, target - change))
+            size = max(size, CONVERGED / STEADY * float(np.abs(new - weight).max()))
+            weight = new
+        return (coefficients + solution.change, unknowns + moved, weight), size
+
+    start = problem.selection.start.copy(), problem.start, weight
+    (coefficients, unknowns, weight), size = gauss_newton(step, start, STEPS, CONVERGED)
+    if not size < CONVERGED and not (robust and np.abs(change).max() < CLOSE):
+        size = float(np.abs(change).max())
+        still = f"still change by {size:.3g} times the noise" if size < FAR else "run away"
+        text = f"after {STEPS} steps the predictions {still}"
+        raise UsageError.of("NCF637", text, hint="are the measurements of this machine, in mm and degree?")
+    residual = problem.residual(coefficients, unknowns)
+    return Estimate(coefficients, unknowns, solution, residual, weight, least_squares.weighted_share(loss))
+
+
+def noise_scale(problem: Problem, estimate: Estimate) -> float:
+    """The factor on the standard deviations: estimated if the noise is not known, never below one if it is."""
+    chi_square, freedom = estimate.chi_square(problem.sigma), max(estimate.freedom, 1)
+    improbable = chdtrc(freedom, chi_square * freedom) < UNLIKELY
+    return float(np.sqrt(chi_square)) if improbable or not problem.noise_known else 1.0
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """One entry per value, (m,).
+
+    measurements  those that were calibrated with
+    observation   which of them, row of it (-1: a calibrated distance), and component
+    turns         whether it is an angle
+    value         mm or rad, actual minus predicted
+    studentised   divided by its own standard deviation
+    cook          Cook's distance: how far all estimates move if this value is left out
+    """
+
+    measurements: tuple[Measurement, ...]
+    observation: Index
+    row: Index
+    component: tuple[str, ...]
+    turns: Mask
+    value: Array
+    studentised: Array
+    cook: Array
+
+    @staticmethod
+    def of(problem: Problem, estimate: Estimate) -> Residuals:
+        """The residuals with their diagnostics; those without weight are studentised as new values would be."""
+        solution, weight = estimate.solution, estimate.weight
+        size = estimate.residual / problem.sigma
+        scale = np.sqrt(estimate.chi_square(problem.sigma)) or 1.0
+        leverage = np.where(weight > 0, solution.leverage, 0.0).clip(0.0, 1 - 1e-9)
+        studentised = size / (scale * np.sqrt(1 - leverage))
+        cook = studentised**2 * leverage / ((1 - leverage) * max(solution.rank, 1))
+        seen = problem.observations
+        names = [name for each in seen for name in (*each.value_names, *["distance"] * len(each.extra_values))]
+        return Residuals(
+            tuple(each.measurement for each in seen),
+            np.repeat(np.arange(len(seen)), [len(each.values) for each in seen]),
+            np.concatenate([each.rows for each in seen]),
+            tuple(names),
+            np.concatenate([turn for each in seen for turn in (each.turns, np.zeros(len(each.extra_values), bool))]),
+            estimate.residual,
+            studentised,
+            cook,
+        )
+
+    def place(self, index: int) -> Place:
+        """Where a value stands in its file."""
+        measurement, row = self.measurements[int(self.observation[index])], int(self.row[index])
+        return Place(measurement.path) if row < 0 else measurement.place(row)
+
+    def rms_by_set(self) -> dict[str, float]:
+        """The rms of lengths in um, per file and set."""
+        sizes: dict[str, float] = {}
+        for index, measurement in enumerate(self.measurements):
+            mine = np.flatnonzero((self.observation == index) & (self.row >= 0) & ~self.turns)
+            sets = np.array(measurement.sets)[self.row[mine]]
+            for name in dict.fromkeys(measurement.sets):
+                chosen = self.value[mine[sets == name]]
+                if chosen.size:
+                    sizes[f"{measurement.path} set {name}"] = float(1e3 * np.sqrt((chosen**2).mean()))
+        return sizes

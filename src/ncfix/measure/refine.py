@@ -1,0 +1,210 @@
+"""A model made to fit its data: which coefficients stay in it, and how late effects follow their inputs.
+
+Stepwise regression (Soons 1993, section 3.3): coefficients that cannot be told from zero are taken out, one at a time.
+The least significant one goes first; one that went comes back if it has become significant. A coefficient that is out
+is zero; one that the measurements cannot tell stays at what the machine file says. Tests are two-sided t-tests with the
+noise that the residuals show.
+
+Time constants (section 2.7): an effect with a lag is linear in its coefficients once its time constant is known. So
+only the constants are searched for, on a coarse scale of times first and then by descent, with all else solved for at
+each try (variable projection).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import stdtr
+
+from ncfix.diagnostics import Message, UsageError
+from ncfix.machine import Effect, Machine
+from ncfix.machine.basis import Basis, Polynomial
+from ncfix.machine.piecewise import Truncated
+from ncfix.measure.estimate import Estimate, Problem, fit
+from ncfix.measure.least_squares import orthonormal, without
+from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.observation import Mask
+from ncfix.measure.selection import Selection
+
+SCALE = 24
+"""Time constants tried first, from the shortest step of time to three times the whole."""
+STEP = 1e-3
+"""Relative change of a time constant that is none."""
+
+
+def pruned(problem: Problem, estimate: Estimate, level: float, loss: str) -> tuple[Problem, Estimate]:
+    """The problem with only the coefficients that are significant at this level, and its solution."""
+    chosen = _significant(problem, estimate, 1 - level)
+    if chosen.all():
+        return problem, estimate
+    smaller = _without(problem, chosen)
+    return smaller, fit(smaller, loss)
+
+
+def _significant(problem: Problem, estimate: Estimate, risk: float) -> Mask:
+    """Which coefficients stay, by backward elimination with a look back after each step."""
+    inside = np.zeros(len(estimate.coefficients), dtype=np.bool_)
+    inside[estimate.solution.kept] = True
+    held = ~inside & (estimate.coefficients != 0)
+    root = np.sqrt(estimate.weight) / problem.sigma
+    basis = estimate.solution.nuisance
+    design = without(basis, problem.design * root[:, None])
+    asked = np.where(held, 0.0, estimate.coefficients)
+    target = without(basis, (estimate.residual + problem.design @ asked) * root)
+    start = int((estimate.weight > 0).sum()) - basis.shape[1]
+    banned = set(np.flatnonzero(held).tolist())
+    while inside.any():
+        chances, left = _chances(design[:, inside], target, start)
+        worst = int(np.flatnonzero(inside)[np.argmax(chances)])
+        if chances.max() <= risk:
+            back = _best_outside(design, left, inside, start, banned)
+            if back is None or back[1] > risk:
+                break
+            inside[back[0]] = True
+            banned.add(back[0])
+            continue
+        inside[worst] = False
+    stays: Mask = inside | held
+    return stays
+
+
+def _chances(design: Array, target: Array, start: int) -> tuple[Array, Array]:
+    """The probability of each estimate by chance, and the residual."""
+    orthogonal, triangle = np.linalg.qr(design)
+    inverse = np.linalg.inv(triangle)
+    value = inverse @ (orthogonal.T @ target)
+    left = target - design @ value
+    freedom = max(start - design.shape[1], 1)
+    deviation = np.sqrt((inverse**2).sum(1) * float(left @ left) / freedom)
+    chances: Array = 2 * stdtr(freedom, -np.abs(value) / np.maximum(deviation, 1e-300))
+    return chances, left
+
+
+def _best_outside(design: Array, left: Array, inside: Mask, start: int, banned: set[int]) -> tuple[int, float] | None:
+    """The coefficient outside that would be most significant, once each."""
+    orthogonal, _ = np.linalg.qr(design[:, inside])
+    best: tuple[int, float] | None = None
+    for k in np.flatnonzero(~inside):
+        column = without(orthogonal, design[:, k])
+        size = float(np.linalg.norm(column))
+        if int(k) in banned or size <= 1e-6 * float(np.linalg.norm(design[:, k])):
+            continue
+        explained = float(column @ left / size)
+        freedom = max(start - int(inside.sum()) - 1, 1)
+        rest = max(float(left @ left) - explained**2, 1e-300)
+        chance = float(2 * stdtr(freedom, -abs(explained) / np.sqrt(rest / freedom)))
+        if best is None or chance < best[1]:
+            best = int(k), chance
+    return best
+
+
+def _without(problem: Problem, chosen: Mask) -> Problem:
+    """The same problem without the coefficients that are not chosen."""
+    effects: list[Effect] = []
+    free: list[bool] = []
+    at = 0
+    for effect, estimated in zip(problem.selection.effects, problem.selection.free, strict=True):
+        keep = chosen[at : at + effect.basis.size] if estimated else None
+        at += effect.basis.size if estimated else 0
+        kept = effect if keep is None else _reduced(effect, keep)
+        if kept is not None:
+            effects.append(kept)
+            free.append(estimated)
+    selection = Selection(tuple(effects), tuple(free))
+    machine = problem.machine.replace(effects=tuple(effects))
+    return Problem.of([each.measurement for each in problem.observations], machine, selection)
+
+
+def _reduced(effect: Effect, keep: Mask) -> Effect | None:
+    """The effect with fewer powers or knots; None if nothing is left of it. Other bases stay whole if any part does."""
+    if not keep.any():
+        return None
+    if keep.all() or not isinstance(effect.basis, Polynomial | Truncated):
+        return effect
+    values = tuple(c for c, k in zip(effect.coefficients, keep, strict=True) if k)
+    if isinstance(effect.basis, Truncated):
+        basis: Basis = effect.basis.without_knots(keep)
+    else:
+        basis = replace(effect.basis, degree=tuple(d for d, k in zip(effect.basis.degree, keep, strict=True) if k))
+    return replace(effect, basis=basis, coefficients=values, covariance=None)
+
+
+# -- time constants ----------------------------------------------------------------------------------------------------
+
+
+def with_time_constants(
+    measurements: Sequence[Measurement], machine: Machine, selection: Selection
+) -> tuple[Selection, tuple[Message, ...]]:
+    """The selection with time constants that fit best, and these in words, with their standard deviations.
+
+    Of the effects that are estimated and have one; effects that share one keep to it. Raises `UsageError` NCF639 if no
+    effect lags, or nothing tells the time.
+    """
+    from scipy.optimize import minimize
+
+    constants = sorted({effect.time_constant_s for effect in selection.estimated if effect.time_constant_s})
+    if not constants:
+        text = "no effect that is estimated has a time constant"
+        raise UsageError.of("NCF639", text, hint="for example spindle-growth-late; `time_constant_s` in a machine file")
+    low, high = _times(measurements)
+
+    def left(logs: Array) -> float:
+        """The squares that are left, in units of the noise, all coefficients and the set-up solved for."""
+        tried = _with(selection, constants, np.exp(logs))
+        problem = Problem.of(measurements, machine.replace(effects=tried.effects), tried)
+        residual = problem.residual(tried.start, problem.start) / problem.sigma
+        rest = without(orthonormal(problem.columns), residual)
+        return float(rest @ rest)
+
+    start = np.log(np.clip(constants, low, high))
+    scale = np.linspace(np.log(low), np.log(high), SCALE)
+    for k in range(len(start)):
+        options = [np.concatenate([start[:k], [value], start[k + 1 :]]) for value in scale]
+        start = min(options, key=left)
+    bounds = [(np.log(low), np.log(high))] * len(start)
+    best = minimize(left, start, method="Nelder-Mead", bounds=bounds, options={"xatol": STEP, "fatol": 1e-3})
+    chosen = _with(selection, constants, np.exp(best.x))
+    sigmas = [_sigma(left, best.x, k, float(best.fun)) for k in range(len(constants))]
+    words = [_words(chosen, float(np.exp(x)), sigma, (low, high)) for x, sigma in zip(best.x, sigmas, strict=True)]
+    return chosen, tuple(words)
+
+
+def _times(measurements: Sequence[Measurement]) -> tuple[float, float]:
+    """The shortest and longest time constants that measured times can tell."""
+    times = [np.unique(each.columns["time_s"]) for each in measurements if "time_s" in each.columns]
+    spans = [float(np.ptp(each)) for each in times if len(each) > 1]
+    if not spans:
+        raise UsageError.of("NCF639", "no column says the time", hint="a lag needs a column time_s")
+    steps = [float(np.median(np.diff(each))) for each in times if len(each) > 1]
+    return max(min(steps) / 3, 1e-3), 3 * max(spans)
+
+
+def _with(selection: Selection, constants: Sequence[float], values: Array) -> Selection:
+    """The selection with other time constants."""
+    new = dict(zip(constants, values.tolist(), strict=True))
+    effects = tuple(
+        replace(effect, time_constant_s=new[effect.time_constant_s])
+        if free and effect.time_constant_s in new
+        else effect
+        for effect, free in zip(selection.effects, selection.free, strict=True)
+    )
+    return Selection(effects, selection.free)
+
+
+def _sigma(left: Callable[[Array], float], best: Array, k: int, least: float) -> float:
+    """The relative standard deviation of a constant, from how the squares grow beside the minimum."""
+    step = np.zeros(len(best))
+    step[k] = 0.05
+    curvature = (left(best + step) + left(best - step) - 2 * least) / 0.05**2
+    return float(np.sqrt(2 / curvature)) if curvature > 0 else float("inf")
+
+
+def _words(selection: Selection, constant: float, sigma: float, limits: tuple[float, float]) -> Message:
+    late = [effect for effect in selection.estimated if effect.time_constant_s == constant]
+    text = f"{', '.join(each.name for each in late)} follows {late[0].input} with a time constant of "
+    if sigma > 0.5 or not limits[0] * 1.01 < constant < limits[1] / 1.01:
+        text += f"about {constant:.3g} s, which these times do not tell"
+        return Message("NCF639", text, hint="measure over several time constants, warming and cooling")
+    return Message("NCF640", f"{text}{constant:.4g} s, sigma {constant * sigma:.2g} s")

@@ -1,0 +1,327 @@
+"""Kind `points`: targets on the spindle head or the table, seen from an instrument that stands on the foundation.
+
+A laser tracker reads x = Q (B p) + s: p the target's place on its body, B the body's real pose in the base frame, Q and
+s how the instrument stands. Places and stand are unknown. Three or more targets show all six errors of a body.
+
+Places are those in the base frame with all axes at zero. A target that the tool carries is there with the tool of its
+first row; a longer one moves it away from the spindle along the tool. One on the spindle head stays where it is.
+
+Before any error is known, `register` finds how the instrument stands and where its targets are. Every reading is
+x = Q (R p + t) + s: R and t the nominal pose of the body. For a turn Q that is given, places and shifts follow from
+linear equations; from there Gauss-Newton steps lead to the nearest turn that explains the readings. An instrument may
+stand any way round, so the steps start from all 24 turns that take coordinate axes to coordinate axes; no turn is more
+than 63 degrees from all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import permutations, product
+
+import numpy as np
+
+from ncfix.diagnostics import Message
+from ncfix.machine import Effect, Machine, State, se3
+from ncfix.measure.least_squares import gauss_newton
+from ncfix.measure.measurement import Array, Index, Measurement, groups
+from ncfix.measure.observation import (
+    LEVER,
+    TOOL,
+    WORKPIECE,
+    Mask,
+    Observation,
+    Unknowns,
+    best_rotation,
+    branch,
+    vector_columns,
+)
+
+STEPS = 40
+"""Gauss-Newton steps from one start; a good one takes some ten."""
+STRIDE = 0.5
+"""rad: how far one step may turn an instrument, since the equations are linear for small turns only."""
+ENOUGH = 400
+"""Readings of a set that the search for its turn looks at."""
+CLEARLY = 0.5
+"""A later start replaces an earlier one if it leaves less than this of its rms."""
+CHEAP = 1e5
+"""A shift of the instrument is this much likelier than one of the targets, where the readings leave the choice."""
+FIRM = 1e-2
+"""A target whose place the header has moves this much less than one whose place nobody said, for the same reason."""
+OPEN = 1e-9
+"""Combinations that the readings show this much less than the best are left as they are."""
+READ = ("x", "y", "z")
+STOOD = 0.02
+"""rad: how far the instrument may be turned against the base, in simulations."""
+
+
+class Targets(Observation):
+    """Rows of target, x y z."""
+
+    def __init__(self, measurement: Measurement, machine: Machine) -> None:
+        super().__init__(measurement, machine)
+        self.side = measurement.header("carried_by")
+        self.body, self.axes = branch(machine, self.side)
+        self.own = self.q[:, self.axes]
+        direction = np.asarray(self.state.direction)[:, self.axes]
+        self.lengths = measurement.column("tool_length")
+        self.own_state = State(self.lengths, direction, {**self._other_axes(), **self.state.inputs})
+        self.names, self.index = groups(measurement.labels["target"])
+        self.first_tip = self.body.tool.tip(self.lengths[np.unique(self.index, return_index=True)[1]])
+        self.poses = self._base_from_body(self.body.nominal(self.own, self.lengths))
+        stated = self._stated()
+        known = np.array([name in stated for name in self.names])
+        self.sights = Sights(self.poses, self.index, self.set_index, known)
+        self.instrument_from_base, self.places = self._first_guess(stated)
+
+    def _other_axes(self) -> dict[str, Array]:
+        """The axes of the other branch, which errors of this one may depend on, as inputs in the file's units."""
+        others = [k for k in range(len(self.machine.axes)) if k not in self.axes]
+        return {self.machine.axes[k].name: self.q[:, k] / self.machine.axes[k].unit for k in others}
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """The instrument's x y z."""
+        return READ
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """Places of the targets on their body; stand of the instrument per set, as a shift and a small turn."""
+        return Unknowns.joined(
+            [
+                Unknowns.vectors("place of target ", self.names, self.places, spread=1.0),
+                Unknowns.vectors(
+                    "place of the instrument in set ", self.set_names, self.instrument_from_base[:, :3, 3], spread=50.0
+                ),
+                Unknowns.vectors("turn of the instrument in set ", self.set_names, spread=STOOD),
+            ]
+        )
+
+    def predict(self, machine: Machine, unknowns: Array) -> Array:
+        """See `Observation`."""
+        places, shifts, turns = self._parts(unknowns)
+        body, _ = branch(machine, self.side)
+        poses = self._base_from_body(body.actual(self.own, self.own_state))
+        turned = se3.rotation(turns) @ self.instrument_from_base[:, :3, :3]
+        return replace(self.sights, poses=poses).seen(places, turned, shifts).ravel()
+
+    def design(self, effects: Sequence[Effect]) -> Array:
+        """See `Observation`; the errors of the other branch are not seen."""
+        joints = {axis.name for axis in self.body.axes} | (set() if self.side == WORKPIECE else {"S"})
+        parts = [np.zeros((3 * len(self.measurement), 0))]
+        for effect in effects:
+            seen = effect.joint in joints
+            size = effect.basis.size
+            parts.append(self._columns(effect) if seen else np.zeros((3 * len(self.measurement), size)))
+        return np.concatenate(parts, axis=1)
+
+    def unknown_design(self, unknowns: Array) -> Array:
+        """See `Observation`."""
+        places, _, turns = self._parts(unknowns)
+        return self.sights.design(places, se3.rotation(turns) @ self.instrument_from_base[:, :3, :3])
+
+    def doubts(self, machine: Machine) -> Iterator[Message]:
+        """See `Observation`: angles act by levers, which no reading shows where only linear axes move."""
+        start, perfect = self.unknowns.start, machine.replace(effects=())
+
+        def shown(unknowns: Array) -> Array:
+            return self.predict(machine, unknowns) - self.predict(perfect, unknowns)
+
+        changes = self.sights.left_open(self.places, self.instrument_from_base[:, :3, :3])
+        levers = [shown(start + change) - shown(start) for change in changes]
+        size = max((float(np.linalg.norm(each / self.sigma)) for each in levers), default=0.0)
+        if size > 1:
+            most = 1e3 * max(float(np.abs(each).max()) for each in levers)
+            text = (
+                f"the readings do not tell where the targets are on what carries them; {LEVER:g} mm elsewhere, "
+                f"the estimated angles would move them by up to {most:.1f} um more or less"
+            )
+            yield Message("NCF643", text, self.measurement.place(0), "a line `# target: NAME x y z` in the header")
+
+    def _parts(self, unknowns: Array) -> tuple[Array, Array, Array]:
+        t, s = len(self.names), len(self.set_names)
+        parts = np.split(unknowns.reshape(-1, 3), [t, t + s])
+        return parts[0], parts[1], parts[2]
+
+    def _base_from_body(self, poses: Array) -> Array:
+        """base_from_body of poses (n, 4, 4) of each row's tip; with all axes at zero places are those in the base."""
+        tips = self.first_tip[self.index] if self.side == TOOL else self.body.tool.tip(self.lengths)
+        shifted: Array = poses @ se3.shift(-tips)
+        return se3.inverse(shifted) if self.side == WORKPIECE else shifted
+
+    def _columns(self, effect: Effect) -> Array:
+        """What one effect moves, seen from the instrument at its first guess: (m, k)."""
+        error = self.body.design(self.own, self.own_state, [effect])
+        places = self.places[self.index]
+        at = self.body.nominal(self.own, self.lengths)[:, :3, 3]
+        if self.side == WORKPIECE:
+            moved = error[:, :3] + np.einsum("nij,njk->nik", -se3.skew(places - at), error[:, 3:])
+            base = -np.einsum("nij,njk->nik", self.poses[:, :3, :3], moved)
+        else:
+            points = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places) + self.poses[:, :3, 3]
+            base = error[:, :3] + np.einsum("nij,njk->nik", -se3.skew(points - at), error[:, 3:])
+        seen = np.einsum("nij,njk->nik", self.instrument_from_base[self.set_index][:, :3, :3], base)
+        result: Array = seen.reshape(-1, seen.shape[-1])
+        return result
+
+    def _stated(self) -> dict[str, list[float]]:
+        """Where targets are nearly, by name, mm, as the header has it."""
+        lines = [text.split() for text in self.measurement.all_headers("target")]
+        return {name: [float(each) for each in numbers] for name, *numbers in lines}
+
+    def _first_guess(self, stated: dict[str, list[float]]) -> tuple[Array, Array]:
+        """Stand per set (s, 4, 4) and places (t, 3): from the header, and from a perfect machine's motions."""
+        likely = self.first_tip if self.side == TOOL else np.zeros_like(self.first_tip)
+        places = np.array([stated.get(name, place) for name, place in zip(self.names, likely.tolist(), strict=True)])
+        if not all(name in self.measurement.columns for name in READ):
+            return np.broadcast_to(np.eye(4), (len(self.set_names), 4, 4)).copy(), places
+        along_base = self.measurement.header("frame") == "base"
+        found = register(self.sights, self.measurement.stacked(*READ), places, along_base)
+        return found.instrument_from_base, found.places
+
+
+# -- registration ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Sights:
+    """What belongs to each of n readings: base_from_body (n, 4, 4), and the numbers of the target and of the set.
+
+    known  (t,) of which targets the header says nearly where they are
+    """
+
+    poses: Array
+    target: Index
+    sets: Index
+    known: Mask
+
+    def base(self, places: Array) -> Array:
+        """Where the targets are in the base frame, places (t, 3) -> (n, 3)."""
+        turned: Array = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places[self.target])
+        return turned + self.poses[:, :3, 3]
+
+    def seen(self, places: Array, turns: Array, shifts: Array) -> Array:
+        """What instruments with these turns (s, 3, 3) and shifts (s, 3) read, (n, 3)."""
+        found: Array = np.einsum("nij,nj->ni", turns[self.sets], self.base(places)) + shifts[self.sets]
+        return found
+
+    def design(self, places: Array, turns: Array) -> Array:
+        """Derivatives of the readings by places, shifts and small further turns, (3 n, 3 t + 6 s)."""
+        n, t, s = len(self.poses), len(places), len(turns)
+        turned = turns[self.sets]
+        parts = [
+            vector_columns(self.target, t, turned @ self.poses[:, :3, :3]),
+            vector_columns(self.sets, s, np.broadcast_to(np.eye(3), (n, 3, 3))),
+            vector_columns(self.sets, s, -se3.skew(np.einsum("nij,nj->ni", turned, self.base(places)))),
+        ]
+        return np.concatenate(parts, axis=2).reshape(3 * n, -1)
+
+    def left_open(self, places: Array, turns: Array) -> Array:
+        """Changes of places, shifts and turns that no reading shows, places that are known apart: rows (k, 3 t + 6 s).
+
+        In each of them the target that moves most moves by `LEVER`.
+        """
+        free = np.concatenate([np.repeat(~self.known, 3), np.ones(6 * len(turns), dtype=bool)])
+        design = self.design(places, turns)[:, free]
+        size = np.linalg.norm(design, axis=0)
+        size[size == 0] = 1.0
+        _, values, right = np.linalg.svd(design / size, full_matrices=False)
+        changes = np.zeros(((values < OPEN * values[0]).sum(), len(free)))
+        changes[:, free] = right[values < OPEN * values[0]] / size
+        most = np.abs(changes[:, : places.size]).max(axis=1, initial=0.0)
+        moving = most > OPEN * np.abs(changes).max(axis=1, initial=0.0)
+        found: Array = changes[moving] * (LEVER / most[moving])[:, None]
+        return found
+
+    def of_set(self, number: int) -> tuple[Sights, Index]:
+        """Some readings of one set, as if there were no other, and which these are."""
+        rows = np.flatnonzero(self.sets == number)
+        rows = rows[np.unique(np.linspace(0, len(rows) - 1, ENOUGH).astype(int))]
+        return Sights(self.poses[rows], self.target[rows], np.zeros(len(rows), int), self.known), rows
+
+    def step(self, places: Array, turns: Array, gap: Array, turning: bool = True) -> Array:
+        """The least change of places, shifts and, if `turning`, turns that explains a gap (n, 3) in the readings."""
+        scale = np.repeat([CHEAP, 1.0], 3 * len(turns))
+        scale = np.concatenate([np.repeat(np.where(self.known, FIRM, 1.0), 3), scale])
+        columns = len(scale) if turning else len(scale) - 3 * len(turns)
+        design = self.design(places, turns)[:, :columns] * scale[:columns]
+        change: Array = scale[:columns] * np.linalg.lstsq(design, gap.ravel(), rcond=OPEN)[0]
+        return change
+
+
+@dataclass(frozen=True)
+class Registration:
+    """Places (t, 3) of the targets, turns (s, 3, 3) and shifts (s, 3) of the instrument, and the rms they leave."""
+
+    places: Array
+    turns: Array
+    shifts: Array
+    rms: float
+
+    @property
+    def instrument_from_base(self) -> Array:
+        """Per set, (s, 4, 4)."""
+        return se3.rigid(self.turns, self.shifts)
+
+
+def register(sights: Sights, readings: Array, places: Array, along_base: bool) -> Registration:
+    """Where the instrument stood in each set and where the targets are, from the motions of a perfect machine.
+
+    `places` (t, 3) is where the targets are nearly, mm, of those that are known; what the readings leave open stays as
+    it is there. `along_base`: the instrument's axes are nearly those of the base.
+    """
+    count = int(sights.sets.max()) + 1
+    if along_base:
+        return _fitted(sights, readings, places, np.stack([np.eye(3)] * count))
+    turns = []
+    for number in range(count):
+        part, rows = sights.of_set(number)
+        turns.append(_turn(part, readings[rows], places))
+    return _refined(sights, readings, _fitted(sights, readings, places, np.concatenate(turns)))
+
+
+def _turn(sights: Sights, readings: Array, places: Array) -> Array:
+    """The turn of the instrument in one set, (1, 3, 3): of all starts the one that leads nearest to the readings."""
+    best: Registration | None = None
+    for start in _starts(sights, readings, places):
+        found = _refined(sights, readings, _fitted(sights, readings, places, start[None]))
+        if best is None or found.rms < CLEARLY * best.rms:
+            best = found
+    assert best is not None
+    return best.turns
+
+
+def _starts(sights: Sights, readings: Array, places: Array) -> Iterator[Array]:
+    rows = sights.known[sights.target]
+    if rows.any():
+        base = sights.base(places)[rows]
+        yield best_rotation(readings[rows] - readings[rows].mean(0), base - base.mean(0))
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            turn = np.eye(3)[list(order)] * np.array(signs)
+            if np.linalg.det(turn) > 0:
+                yield turn
+
+
+def _fitted(sights: Sights, readings: Array, places: Array, turns: Array) -> Registration:
+    """Places and shifts for turns that are given."""
+    shifts = np.zeros((len(turns), 3))
+    step = sights.step(places, turns, readings - sights.seen(places, turns, shifts), turning=False)
+    places, shifts = places + step[: places.size].reshape(-1, 3), step[places.size :].reshape(-1, 3)
+    gap = readings - sights.seen(places, turns, shifts)
+    return Registration(places, turns, shifts, float(np.sqrt(np.mean(gap**2))))
+
+
+def _refined(sights: Sights, readings: Array, start: Registration) -> Registration:
+    """The nearest registration whose rms no small change makes less."""
+
+    def step(at: Registration) -> tuple[Registration, float]:
+        gap = readings - sights.seen(at.places, at.turns, at.shifts)
+        change = sights.step(at.places, at.turns, gap)[at.places.size + at.shifts.size :].reshape(-1, 3)
+        change *= min(1.0, STRIDE / max(float(np.abs(change).max()), 1e-300))
+        moved = _fitted(sights, readings, at.places, se3.rotation(change) @ at.turns)
+        return (at, 0.0) if moved.rms > at.rms * (1 - 1e-6) else (moved, np.inf)
+
+    return gauss_newton(step, start, STEPS, 1.0)[0]
