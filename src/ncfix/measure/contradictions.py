@@ -226,7 +226,8 @@ def suspected(problem: Problem) -> tuple[Message, ...]:
     Each is undone in turn, and everything is fitted anew: noise and missing effects hardly ever look like one of these
     few, a mistake is explained by it nearly all.
     """
-    data = [_thinned(each.measurement) for each in problem.observations]
+    data = [each.measurement for each in problem.observations]
+    data = [each.rows(np.unique(np.linspace(0, len(each) - 1, ENOUGH).astype(int))) for each in data]
     scattered = _scattered(data, problem.machine)
     if scattered:
         return scattered
@@ -278,11 +279,6 @@ def _spread(measurement: Measurement, machine: Machine) -> float:
     every = [tips[names == name] for name in dict.fromkeys(measurement.sets)]
     large = [each - each.mean(axis=0) for each in every if len(each) >= ROWS]
     return float(np.median([np.sqrt((each**2).sum(axis=1).mean()) for each in large])) if large else np.inf
-
-
-def _thinned(measurement: Measurement) -> Measurement:
-    rows = np.unique(np.linspace(0, len(measurement) - 1, ENOUGH).astype(int))
-    return measurement if len(rows) == len(measurement) else measurement.rows(rows)
 
 
 def _left(data: Sequence[Measurement], problem: Problem, suspect: Suspect | None = None) -> tuple[float, int] | None:
@@ -421,29 +417,32 @@ def _exchanged(data: Sequence[Measurement], problem: Problem) -> Iterator[tuple[
     files = [file for file in files if readings.problem.observations[file].components == names]
     size = len(names)
     ways = list(product(permutations(range(size)), product((1, -1), repeat=size)))[1:]
-    parts = [("", file, [(file, np.ones(len(data[file]), dtype=bool))]) for file in files]
+    parts = [("", [(file, np.ones(len(data[file]), dtype=bool))]) for file in files]
     if len(files) > 1:
-        parts.append(("", files[0], [rows for _, _, (rows,) in parts]))
+        parts.append(("", [rows for _, (rows,) in parts]))
     for file in files:
         sets = list(dict.fromkeys(data[file].sets))
-        mine = [(f"in set {name} ", file, [(file, np.array(data[file].sets) == name)]) for name in sets[:MOST_SETS]]
-        parts += mine if len(sets) > 1 else []
-    for where, first, together in parts:
+        rows_of = np.array(data[file].sets)
+        parts += [(f"in set {name} ", [(file, rows_of == name)]) for name in sets[:MOST_SETS] if len(sets) > 1]
+    for where, together in parts:
         tried = {}
         for order, signs in ways:
             if where and order == tuple(range(size)) and sum(signs) == -size:
                 continue
             values = readings.problem.values.copy()
             for file, rows in together:
-                mine_values = values[_part(readings.problem, file)].reshape(-1, size)
-                mine_values[rows] = mine_values[rows][:, order] * signs
-                values[_part(readings.problem, file)] = mine_values.ravel()
+                part = values[_part(readings.problem, file)].reshape(-1, size)  # a view
+                part[rows] = part[rows][:, order] * signs
             tried[order, signs] = readings.left(values)
         least = min(tried.values())
-        close = [(way, squares) for way, squares in tried.items() if squares <= ALIKE * least]
-        (order, signs), squares = min(close, key=lambda pair: (_changes(*pair[0]), pair[1]))
-        look = _look(names, order, signs)
-        yield squares, replace(look, text=where + look.text, file=first, measurement=data[first]), len(tried)
+        changed = {
+            way: sum(k != place or sign < 0 for k, (place, sign) in enumerate(zip(*way, strict=True)))
+            for way, squares in tried.items()
+            if squares <= ALIKE * least
+        }
+        way = min(changed, key=lambda way: (changed[way], tried[way]))
+        first, look = together[0][0], _look(names, *way)
+        yield tried[way], replace(look, text=where + look.text, file=first, measurement=data[first]), len(tried)
 
 
 def _negated(data: Sequence[Measurement], problem: Problem) -> Iterator[tuple[float, Suspect, int]]:
@@ -481,11 +480,6 @@ def _negated(data: Sequence[Measurement], problem: Problem) -> Iterator[tuple[fl
         text = f"the readings of sets {names} have the other sign than the others"
         file = min(turned)[0]
         yield least, Suspect(text, OTHER_SIGN, file, data[file]), tries
-
-
-def _changes(order: tuple[int, ...], signs: tuple[int, ...]) -> int:
-    """How many columns are elsewhere or of another sign."""
-    return sum(place != k or sign < 0 for k, (place, sign) in enumerate(zip(order, signs, strict=True)))
 
 
 def _look(names: Sequence[str], order: tuple[int, ...], signs: tuple[int, ...]) -> Suspect:
