@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 
 from ncfix.control.coordinates import INDEX
 from ncfix.control.setup import POINTLESS
@@ -14,10 +14,13 @@ from ncfix_fanuc.macro.rules import RULES
 from ncfix_fanuc.macro.scaling import Scaling
 from ncfix_fanuc.macro.squaring import stands_square
 from ncfix_fanuc.macro.variables import Variables
+from ncfix_fanuc.macro.vectors import COMPONENTS
 from ncfix_iso.rs274.control import Block, Control
 
 NO_POINT = "NCF240"
 DEFAULT_SYSTEM = "IS-B"
+ANGLE = ",A"
+"""The address of the angle by which a line is given."""
 
 
 class MacroControl(Control):
@@ -50,6 +53,11 @@ class MacroControl(Control):
 
     def lasting(self) -> None:
         """Not said."""
+
+    def path_word(self, words: Collection[str]) -> str:
+        """As of all controls of RS274; the angle of a line, and the direction of the tool (G43.5)."""
+        own = (ANGLE, *COMPONENTS) if self.vectors else (ANGLE,)
+        return next((word for word in own if word in words), super().path_word(words))
 
     @property
     def probes_nominally(self) -> bool:

@@ -10,12 +10,10 @@ from ncfix.control.coordinates import LETTERS
 from ncfix.control.faults import Fault
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE, drill, place_hole, repeats
-from ncfix_iso.rs274.systems import check_system, words_of
+from ncfix_iso.rs274.systems import check_system
 
 BACK_BORING = 870
 """G87 goes in to R, below, and cuts upwards to its depth."""
-
-AFTER_NONE = "where the axis {} stands after a cycle without a hole (K0, L0) differs from control to control"
 
 
 def cycle(control: Control, block: Block, code: int) -> None:
@@ -32,10 +30,7 @@ def cycle(control: Control, block: Block, code: int) -> None:
         levels = f"{modal.cycle.r:g} and {modal.cycle.depth:g} mm"
         raise Fault(BAD_CYCLE, f"R is below the bottom of the hole ({levels})")
     clear = modal.cycle.r if modal.retract_to_r else max(initial, modal.cycle.r)
-    count = repeats(control, block)
-    if count == 0:
-        control.lose([index for index in words_of(block) if index != across], AFTER_NONE)
-    for _ in range(count):
+    for _ in range(repeats(control, block)):
         place_hole(control, block, program)
         drill(control, block, code, program, modal.cycle.depth, modal.cycle.r, clear)
 

@@ -15,7 +15,7 @@ from ncfix.control.values import Unknown, nominal
 from ncfix.text.language import Run
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import dynamic, polar, scaling, system, vectors
-from ncfix_fanuc.macro.control import MacroControl
+from ncfix_fanuc.macro.control import ANGLE, MacroControl
 from ncfix_fanuc.macro.corners import CORNER
 from ncfix_fanuc.macro.expressions import is_vacant, variable_number
 from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
@@ -35,7 +35,6 @@ G65, G66_1, G67 = 650, 661, 670
 SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
 NO_UNIT = "NCF215"
 NOT_SET = "NCF244"
-ANGLE = ",A"
 BY_ANGLE = "a line that is given by its angle (,A) is not followed"
 AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
 COMMAND_NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"

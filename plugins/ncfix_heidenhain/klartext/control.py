@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Collection, Hashable
 from dataclasses import dataclass, field
 
 from ncfix.control import control as base
@@ -20,6 +20,7 @@ from ncfix.text.language import Run
 from ncfix_heidenhain.klartext.calculate import Parameters, Scope
 from ncfix_heidenhain.klartext.free import Leg
 from ncfix_heidenhain.klartext.patterns import Place
+from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING
 from ncfix_heidenhain.klartext.transformations import Transformations
 
 START = "PRESET"
@@ -230,10 +231,14 @@ class Control(base.Control):
         """What is not known is so because the control itself has led the axes somewhere."""
         return bool(unknown) and LED_BY_CONTROL.issuperset(unknown.values())
 
+    def path_word(self, words: Collection[str]) -> str:
+        """Words of axes, polar coordinates and directions, and path functions that need none."""
+        names = (word for word in words if word in ALWAYS_MOVING or word.startswith(LEADING))
+        return min(MOVING.intersection(words), default="") or next(names, "").upper()
+
     def refuse_here(self, reason: str) -> None:
-        """A motion that is not followed: none of the axes is known afterwards."""
-        unknown = dict.fromkeys(self.machine, f"where the axis {{}} stands is not known after this: {reason}")
-        super().make(Motion(Kind.FEED, 0, self.position[:], unknown, 10, refusal=reason))
+        """As of every control."""
+        super().refuse_here(reason)
         self.path.tangent = None
 
     def pass_here(self, passing: Passing, lost: str, letters: str) -> None:

@@ -229,6 +229,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         """A block of path words and M codes; True if it ends the program."""
         control = self.control
         codes = frozenset(code for code, _ in plan.codes)
+        control.enter_block((*words.values, plan.name))
         self.feed(words, plan)
         values = {address: value for address, value in words.values.items() if address not in NOT_OF_MOTION}
         step = Step(plan.name, Words(values, words.runtime & values.keys()), plan.flags, codes)
@@ -274,6 +275,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         control = self.control
         if step.name == "cc":
             set_pole(control, step.words)
+            control.claim_words()
             return
         if step.name in CORNERS:
             control.path.corner = True

@@ -87,6 +87,9 @@ MOVING = CARTESIAN | POLAR | VECTOR
 ALWAYS_MOVING = frozenset({"c", "cp", "cr", "ct", "ctp", "ln"})
 """Path functions that move even where they name no end: `C DR-` is a full circle."""
 
+LEADING = ("appr ", "dep ", "cycl call")
+"""How other blocks begin that lead somewhere, or drill where the tool stands."""
+
 
 def owners(items: Sequence[Item]) -> dict[int, int]:
     """Words that belong to an M code before them (`M118 X1 Y1`), not to the motion: place of the item -> that code."""

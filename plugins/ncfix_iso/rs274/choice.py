@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from ncfix.control.faults import Fault
 from ncfix.control.modal import NO_MOTION
-from ncfix_iso.rs274.control import Control
-from ncfix_iso.rs274.groups import LENGTH, TURNING_CYCLES
+from ncfix_iso.rs274.control import ARCS, Control
+from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS, LENGTH, TURNING_CYCLES
 from ncfix_iso.rs274.motion import BAD_MOTION, NO_CODE
 from ncfix_iso.rs274.plans import Codes, Plan
 
-ARCS = (20, 30)
 WITHOUT_AXES = frozenset((0, 10, *ARCS, 52, NO_MOTION, *TURNING_CYCLES))
 """Motion codes that need no axis word."""
 
@@ -19,7 +18,7 @@ def motion_of(control: Control, plan: Plan, codes: Codes) -> int | None:
     has_axes = plan.axes != 0
     if codes.motion is not None:
         return explicit_motion(control, codes, codes.motion, has_axes)
-    if codes.takes or (has_axes and codes.g.get(LENGTH) in (431, 432)):
+    if codes.takes or (has_axes and codes.g.get(LENGTH) in DYNAMIC_OFFSETS):
         return None
     modal = control.modal.motion
     if has_axes and modal in (NO_MOTION, -1):

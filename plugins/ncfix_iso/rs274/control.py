@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass, replace
 
 from ncfix.control import control as shared
@@ -27,6 +27,13 @@ PASSING = frozenset(
     }
 )
 """Of a control: what never changes, what `lasting` looks into or a checkpoint says, and what each block sets anew."""
+
+
+ARCS = (20, 30)
+POLAR = frozenset("@^")
+"""Addresses that together stand for X and Y."""
+
+AXES = frozenset(LETTERS) | POLAR
 
 
 @dataclass(slots=True)
@@ -96,6 +103,15 @@ class Control(shared.Control):
     def take_variables(self, variables: Store) -> None:
         """See `Control`."""
         self.parameters.numbers = variables.copy()
+
+    def path_word(self, words: Collection[str]) -> str:
+        """Axes; words of arcs while G2 or G3 is in force; in a canned cycle, its level."""
+        leading = set(AXES)
+        if self.modal.motion in ARCS:
+            leading |= {*"IJKR"}
+        elif self.modal.motion in self.rules.cycles:
+            leading.add("R")
+        return min(leading.intersection(words), default="")
 
     @property
     def closure_mm(self) -> float:

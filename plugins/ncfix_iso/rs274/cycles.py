@@ -16,10 +16,11 @@ from ncfix.control.moves import FeedMode, Kind
 from ncfix.control.places import mask_of
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.expressions import whole
-from ncfix_iso.rs274.systems import check_system
+from ncfix_iso.rs274.systems import check_system, words_of
 from ncfix_iso.rs274.targets import by_radius_and_angle, unknown_after, unnamed
 
 BAD_CYCLE = "NCF226"
+AFTER_NONE = "where the axis {} stands after a cycle without a hole (K0, L0) differs from control to control"
 NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
 """Words without which LinuxCNC refuses to begin a cycle."""
 
@@ -97,6 +98,9 @@ def repeats(control: Control, block: Block) -> int:
     control.budget.spend(max(count, 0))
     if count < 1 and control.rules.strict:
         raise Fault(BAD_CYCLE, "L, the number of repeats, must be 1 or more")
+    if count < 1:
+        control.claim_words()
+        control.lose([index for index in words_of(block) if index != control.modal.plane.across], AFTER_NONE)
     return count
 
 

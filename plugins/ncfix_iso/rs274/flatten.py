@@ -20,8 +20,8 @@ from ncfix.control.values import nominal
 from ncfix.diagnostics import SourceError
 from ncfix.text.number_style import decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Literal, Opaque, Parameter, Word
-from ncfix_iso.rs274.control import RUNTIME_BRANCH, Block, Control
-from ncfix_iso.rs274.plans import POLAR, Codes, Plan
+from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, Control
+from ncfix_iso.rs274.plans import Codes, Plan
 
 if TYPE_CHECKING:
     from ncfix_iso.rs274.interpreter import RS274Interpreter

@@ -41,6 +41,9 @@ USER = "user-defined"
 CALL = "subprogram"
 
 CYCLES = (730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890)
+DYNAMIC_OFFSETS = (431, 432)
+"""G43.1 and G43.2, which take the axis words of blocks without a motion code."""
+
 PROBES = (382, 383, 384, 385)
 SPLINES = (50, 51, 52)
 THREADS = (330, 331, 760)

@@ -16,12 +16,13 @@ from ncfix.text.language import Run
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
 from ncfix_iso.rs274.choice import motion_of
-from ncfix_iso.rs274.control import RUNTIME_BRANCH, Block, Control
+from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, Control
 from ncfix_iso.rs274.expressions import number_of, whole
 from ncfix_iso.rs274.flow import OWords
+from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS, LENGTH, NON_MODAL
 from ncfix_iso.rs274.motion import BAD_MOTION, in_machine_coordinates
-from ncfix_iso.rs274.order import MACHINE, MOTIONS
-from ncfix_iso.rs274.plans import POLAR, Codes, Plan, RS274Unit, grouped_codes, has_words
+from ncfix_iso.rs274.order import DWELL, MACHINE, MOTIONS
+from ncfix_iso.rs274.plans import Codes, Plan, RS274Unit, grouped_codes, has_words
 from ncfix_iso.rs274.settings import unknown_code
 from ncfix_iso.rs274.wordcheck import check_words
 
@@ -36,6 +37,9 @@ LAST_PROGRAM = 9999
 POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 UNREADABLE = "NCF236"
+DWELL_TIME = "PUX"
+"""The words of G4 on ISO controls."""
+
 INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not followed"
 
 
@@ -154,11 +158,14 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             raise Fault(UNREADABLE, "this line cannot be read, and the control gets to it")
         if plan.fault is not None:
             raise plan.fault
+        control.enter_block(plan.letters)
         block = self.evaluate(plan, index)
         codes = plan.codes or self.computed_codes(plan)
         if codes.unknown:
             self.unknown_codes(plan, codes)
         motion = self.motion_of(plan, codes)
+        if codes.takes or (motion is None and codes.g.get(LENGTH) in DYNAMIC_OFFSETS):
+            control.claim_words(DWELL_TIME if codes.g.get(NON_MODAL) == DWELL else None)
         check_words(control, plan, codes, motion)
         if plan.command is not None:
             self.command(plan.command)

@@ -34,6 +34,7 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix_iso.rs274 import groups
+from ncfix_iso.rs274.control import POLAR
 from ncfix_iso.rs274.groups import TOOL_CHANGE, Rules
 from ncfix_iso.rs274.order import Step, steps_of
 
@@ -41,9 +42,6 @@ DWELL_WORDS = "P"
 """With G4: how long."""
 NO_WORDS = frozenset("GMNO")
 """Addresses that do not come as values to the steps of a block."""
-
-POLAR = frozenset("@^")
-"""Addresses that together stand for X and Y."""
 
 SMOOTHING = 51
 """G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, say for which axes it is, and move nothing."""

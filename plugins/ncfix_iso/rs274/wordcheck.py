@@ -9,13 +9,12 @@ from collections.abc import Set
 from dataclasses import dataclass
 
 from ncfix.control.faults import Fault
-from ncfix_iso.rs274.control import Control
+from ncfix_iso.rs274.control import ARCS, Control
 from ncfix_iso.rs274.groups import CYCLES, TURNING_CYCLES
 from ncfix_iso.rs274.plans import Codes, Plan
 
 UNUSED = "NCF209"
 
-ARCS = (20, 30)
 DRILLING = tuple(code for code in CYCLES if code >= 810)
 
 

@@ -180,6 +180,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         if plan.opaque:
             self.opaque(plan, unit.program.text_of(block))
         words = self.evaluate(plan, block)
+        control.enter_block(words.values)
         turn = Turn(words, plan, self.at_once)
         for step in plan.steps:
             self.span = step.span

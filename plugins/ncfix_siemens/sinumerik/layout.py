@@ -27,9 +27,8 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix_siemens.sinumerik.circles import VIA
-from ncfix_siemens.sinumerik.orientation import ANGLES, VECTOR
 from ncfix_siemens.sinumerik.poles import has_partial
-from ncfix_siemens.sinumerik.vocabulary import DRILLING, HARMLESS, MOTIONS, POLAR
+from ncfix_siemens.sinumerik.vocabulary import ANGLES, DRILLING, HARMLESS, MOTIONS, POLAR, VECTOR
 
 END_OF_SUBPROGRAM = frozenset({17.0})
 """M17."""

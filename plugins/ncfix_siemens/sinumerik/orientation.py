@@ -24,16 +24,9 @@ from ncfix_siemens.sinumerik.affine import turned
 from ncfix_siemens.sinumerik.destination import Words
 from ncfix_siemens.sinumerik.directions import NO_LENGTH
 from ncfix_siemens.sinumerik.state import Sinumerik
+from ncfix_siemens.sinumerik.vocabulary import ANGLES, NORMALS, OTHERS, VECTOR
 
 FloatArray = NDArray[np.float64]
-
-VECTOR = ("A3", "B3", "C3")
-ANGLES = ("A2", "B2", "C2")
-NORMALS = frozenset(["A4", "B4", "C4", "A5", "B5", "C5"])
-"""Normals of the surface: with them the control offsets the contour, and leads the tool along it with ORIPATH."""
-
-OTHERS = frozenset(["A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA", "PSI", "PHI", "NUT"])
-"""Other ways to say how the tool stands, which are not followed."""
 
 BAD_VECTOR = "NCF254"
 WAY = "NCF253"

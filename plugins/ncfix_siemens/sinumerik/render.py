@@ -17,8 +17,7 @@ from ncfix.writer.target import TANGENTIAL
 from ncfix_siemens.sinumerik.circles import VIA, circle_through
 from ncfix_siemens.sinumerik.destination import turned
 from ncfix_siemens.sinumerik.layout import SinumerikLayout
-from ncfix_siemens.sinumerik.orientation import VECTOR
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, INCREMENTAL, MOTIONS
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, INCREMENTAL, MOTIONS, VECTOR
 
 FloatArray = NDArray[np.float64]
 

@@ -8,14 +8,14 @@ one unknown coordinate would hide three axes.
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ncfix.control import rollover, tcp
-from ncfix.control.control import Control
-from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
+from ncfix.control.control import AFTER_THAT, Control
+from ncfix.control.coordinates import CENTRE_LETTERS, DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
 from ncfix.control.modal import Modal
 from ncfix.control.motion import AT_START, Motion, UnknownAxes
 from ncfix.control.moves import Kind, Rule
@@ -30,12 +30,13 @@ from ncfix_siemens.sinumerik.affine import WORLD, shifted
 from ncfix_siemens.sinumerik.increments import Footing, footings, stand
 from ncfix_siemens.sinumerik.modes import Frames, Modes, Named
 from ncfix_siemens.sinumerik.variables import Variables, key_of
-from ncfix_siemens.sinumerik.vocabulary import TURNING
+from ncfix_siemens.sinumerik.vocabulary import MOTIONS, PATH_WORDS, TURNING
 
 if TYPE_CHECKING:
     from ncfix_siemens.sinumerik.destination import Leg, Words
 
 GEOMETRY = (X, Y, Z)
+ROUND = frozenset({20, 30, MOTIONS["cip"]})
 TURNED = "where the axis {} stands in the turned coordinates is not known"
 RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
 
@@ -225,6 +226,18 @@ class Sinumerik(Control):
         if self.is_rotated and gone & set(GEOMETRY):
             gone |= {index for index in GEOMETRY if index in self.machine}
         self.lost |= dict.fromkeys(sorted(gone), reason)
+
+    def path_word(self, words: Collection[str]) -> str:
+        """See `PATH_WORDS`; I J K are words of arcs, and lead nowhere beside a straight motion."""
+        leading = min(PATH_WORDS.intersection(words), default="")
+        if not leading and self.modal.motion in ROUND:
+            leading = min({*CENTRE_LETTERS}.intersection(words), default="")
+        return leading
+
+    def refuse_here(self, reason: str) -> None:
+        """As of every control."""
+        super().refuse_here(reason)
+        self.lose_all(AFTER_THAT.format(reason))
 
     def settle_all(self) -> None:
         """All start positions matter: they are given, or lacking and taken as zero."""

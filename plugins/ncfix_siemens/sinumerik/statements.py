@@ -14,10 +14,8 @@ from ncfix.text.tree import Call, Expression, NamedParameter
 from ncfix_siemens.sinumerik import framing, motion
 from ncfix_siemens.sinumerik.affine import WORLD
 from ncfix_siemens.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
-from ncfix_siemens.sinumerik.circles import VIA
 from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import Words, set_pole
-from ncfix_siemens.sinumerik.orientation import ANGLES, NORMALS, OTHERS, VECTOR
 from ncfix_siemens.sinumerik.plans import LISTS, Calling, Plan, evaluates
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.swivel import swivel
@@ -28,6 +26,7 @@ from ncfix_siemens.sinumerik.vocabulary import (
     HARMLESS,
     MADE_BY_THE_CONTROL,
     MOTIONS,
+    PATH_WORDS,
     POLAR,
     TURNS_OF_THE_TOOL,
     UNFOLLOWED,
@@ -61,14 +60,8 @@ SETTINGS: dict[int, Handler] = {
     **dict.fromkeys((400, 410, 420), framing.compensation),
     **dict.fromkeys((540, 550, 560, 570, 5000, *range(5050, 6000, 10)), framing.settable),
 }
-MOVING = frozenset({"AP", "RP", "ANG", *VECTOR, *ANGLES}) | NORMALS | OTHERS
-"""Words that make a block move even where no axis is named."""
-
 ANGLE_KINDS = frozenset({"orieuler", "orirpy", "orirpy2", "orivirt1", "orivirt2"})
 """What A2 B2 C2 are: the names of one group of G codes."""
-
-CIRCLE = frozenset({"I", "J", "K", "AR", "TURN", "CR"})
-"""Those that do it while G2 or G3 is in force; the point on the way, while CIP is."""
 
 STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
 
@@ -271,6 +264,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
     codes(control, turn)
     if turn.frame:
         framing.programmable(control, turn.frame, words)
+        control.claim_words()
         return
     framing.tool(control, words, 60 in turn.m, turn.at_once and bool(words.values.keys() & {"T"} or words.texts))
     feed(control, turn)
@@ -285,17 +279,10 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         turn.special.add("meas")
     if turn.used:
         return
-    if plan.axes or words.values.keys() & MOVING or is_circle(control, words):
+    if control.path_word(words.values):
         motion.moved(control, words, frozenset(turn.special))
     elif "soft" in turn.special:
         control.lose_axes(GEOMETRY, motion.AFTER_APPROACH)  # the next block says where the approach leads
-
-
-def is_circle(control: Sinumerik, words: Words) -> bool:
-    """An arc with no end point: it ends where it began, or where its angle leads."""
-    if control.modal.motion == motion.CIP:
-        return not words.values.keys().isdisjoint((*VIA, *CIRCLE))
-    return control.modal.motion in (20, 30) and bool(words.values.keys() & CIRCLE)
 
 
 def codes(control: Sinumerik, turn: Turn) -> None:
@@ -328,8 +315,10 @@ def takes_words(control: Sinumerik, turn: Turn, code: int) -> None:
         motion.to_reference(control, turn.words, code)
     elif code in POLES:
         set_pole(control, turn.words, code)
+        control.claim_words()
     elif code in (580, 590):
         framing.programmed_shift(control, turn.words, code)
+        control.claim_words()
 
 
 def feed(control: Sinumerik, turn: Turn) -> None:
@@ -345,7 +334,7 @@ def strangers(control: Sinumerik, words: Words) -> None:
     """Axes that the program moves and the machine lacks."""
     for address in words.values:
         extended = len(address) > 1 and address[0] in "XYZABCUVWQ" and address[1:].isdigit()
-        if address in MOVING:
+        if address in PATH_WORDS and address not in INDEX:
             continue
         lacking = address in INDEX and INDEX[address] not in control.machine
         if (lacking or extended) and address not in control.foreign:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import re
 
+from ncfix.control.coordinates import INDEX
+
 _SETTERS = """
     ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos
     ovr ovrra fl fb fz fprda spos sposa meas meaw meawa measa po pl pw sd prio rpl lims disrp dism
@@ -16,6 +18,17 @@ SETTERS = frozenset(_SETTERS.split())
 
 POLAR = frozenset({"AP", "RP"})
 """Polar coordinates: angle and radius about the pole."""
+
+VECTOR = ("A3", "B3", "C3")
+ANGLES = ("A2", "B2", "C2")
+NORMALS = frozenset(["A4", "B4", "C4", "A5", "B5", "C5"])
+"""Normals of the surface: with them the control offsets the contour, and leads the tool along it with ORIPATH."""
+
+OTHERS = frozenset(["A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA", "PSI", "PHI", "NUT"])
+"""Other ways to say how the tool stands, which are not followed."""
+
+PATH_WORDS = POLAR | NORMALS | OTHERS | {*INDEX, *VECTOR, *ANGLES, "ANG", "CR", "AR", "TURN", "I1", "J1", "K1"}
+"""The words that lead somewhere, whatever motion is in force."""
 
 ABSOLUTE, INCREMENTAL = "ac", "ic"
 TURNING = frozenset({"dc", "acp", "acn"})

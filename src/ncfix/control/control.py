@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from abc import abstractmethod
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -33,6 +34,8 @@ ADRIFT = "the program has not said where the axis {} stands, and this motion wou
 
 RIGHT = 42
 """The control offsets the contour to the right of the way."""
+NOT_ACCOUNTED = "nothing is known that the control would make of the word {} in this block"
+AFTER_THAT = "where the axis {{}} stands is not known after this: {}"
 SQUARE = 1 - 1e-12
 """A component of a turned axis that is no less lies along the axis itself."""
 
@@ -54,6 +57,7 @@ class Control(Standing):
     at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `contour`
     handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
+    block_words  the addresses of the block that is executed, as long as it has made no motion and no setting took them
     """
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
@@ -72,6 +76,7 @@ class Control(Standing):
         self.points = False
         self.whole = self.at_corner = False
         self.beside = 0
+        self.block_words: Collection[str] = ()
         self.handedness = 1.0
 
     def lasting(self) -> str | None:
@@ -117,6 +122,36 @@ class Control(Standing):
         self.refusal = f"{name} is not known, and may move axes or change coordinates"
         self.warn("NCF228", self.refusal, TAKEN if passed else NEITHER.format(name))
 
+    # -- blocks -------------------------------------------------------------------------------------------------------
+
+    def enter_block(self, words: Collection[str]) -> None:
+        """A block is executed that has words of these addresses."""
+        self.block_words = words
+
+    def claim_words(self, words: Collection[str] | None = None) -> None:
+        """A setting of the block takes these of its words for itself, or all of them: they lead nowhere."""
+        self.block_words = () if words is None else [word for word in self.block_words if word not in words]
+
+    def leave_block(self) -> None:
+        """The block is over. If it has a word that leads somewhere, and has made no motion, it is refused.
+
+        That is the one rule for all languages: no such word is ever passed over. Interpreters call this behind every
+        block; what goes through a lane makes motions only.
+        """
+        words, self.block_words = self.block_words, ()
+        word = self.path_word(words) if words else ""
+        if word:
+            self.refuse_here(NOT_ACCOUNTED.format(word))
+
+    @abstractmethod
+    def path_word(self, words: Collection[str]) -> str:
+        """The first of a block's words that leads somewhere in the modes in force; empty if none does."""
+
+    def refuse_here(self, reason: str) -> None:
+        """A block of which it is not known where it leads: none of the axes is known afterwards."""
+        unknown = dict.fromkeys(self.machine, AFTER_THAT.format(reason))
+        self.make(Motion(Kind.FEED, 0, self.position[:], unknown, 10, refusal=reason))
+
     @property
     def frame(self) -> int:
         """The index of the frame that is in force."""
@@ -143,6 +178,8 @@ class Control(Standing):
             self.builder.arc(fate.arc)
         if not fate.passing and fate.kind != Kind.DWELL:
             self.builder.rests(contour.resting(self, fate))
+        if fate.kind != Kind.DWELL:
+            self.block_words = ()
         start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
         self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, adrift)
         if self.ends is not None:

@@ -180,7 +180,9 @@ class Interpreter(ABC, Generic[U]):
                 control.row_block = block
             if plan.skip is not None and control.is_deleted(plan.skip):
                 continue
-            if self.execute(plan, unit, block):
+            ended = self.execute(plan, unit, block)
+            control.leave_block()
+            if ended:
                 return True
             if flow.unit is unit and flow.block <= block:
                 self._look_round(block)
