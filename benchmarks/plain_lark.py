@@ -3,10 +3,10 @@
 import sys
 from itertools import islice
 
-from ncfix.text import dialects
+from ncfix.text.dialects import get
 from ncfix.text.grammar import parse, squeeze
 
-dialect = dialects.get("linuxcnc")
+dialect = get("linuxcnc")
 with open(sys.argv[1]) as program:
     for line in islice(program, int(sys.argv[2])):
         parse(dialect, squeeze(line.rstrip("\r\n")).code)

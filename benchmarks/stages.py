@@ -15,10 +15,11 @@ from typing import Any
 from ncfix import fast
 from ncfix.compensate import FixOptions, driver, plain, solve
 from ncfix.compensate.following import Task
-from ncfix.control import following, parts
+from ncfix.control import parts
+from ncfix.control.following import Follower
 from ncfix.control.setup import Setup
 from ncfix.machine import load
-from ncfix.text import dialects
+from ncfix.text.dialects import get
 
 SETUP = Setup(work_offsets={"G54": dict.fromkeys("XYZBC", 0.0)}, assume_zero=True)
 MACHINE = Path(__file__).with_name("five_axis.toml")
@@ -29,7 +30,7 @@ SHOWN = 16
 
 STAGES: tuple[tuple[str, Any, str], ...] = (
     ("read the text (twice)", parts.PartReader, "read"),
-    ("follow it (twice)", following.Follower, "follow"),
+    ("follow it (twice)", Follower, "follow"),
     ("plan: correct ends, judge the path between them, split", plain.Planner, "plan"),
     ("plan, the long way", driver, "agree"),
     ("write: which words change, digits", driver, "written"),
@@ -55,7 +56,7 @@ def main() -> None:
 
 def corrected(source: bytes) -> None:
     """Correct a program, part by part."""
-    task = Task(load(MACHINE), SETUP, FixOptions(), None, "part.nc", dialects.get("linuxcnc"))
+    task = Task(load(MACHINE), SETUP, FixOptions(), None, "part.nc", get("linuxcnc"))
     driver.Stream(task, io.BytesIO(source).read, lambda data: None).run()
 
 

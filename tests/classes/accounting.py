@@ -19,7 +19,7 @@ from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.text import dialects
+from ncfix.text.dialects import detect
 from ncfix.text.reader import read
 
 FAMILIES = {
@@ -86,7 +86,7 @@ class Account:
 
 def dialect_of(source: bytes, name: str, dialect: str) -> str:
     """The dialect of a folder, or a near relative that the file shows."""
-    found = dialects.detect(source, name).name
+    found = detect(source, name).name
     return found if found in RELATIVES.get(dialect, ()) else dialect
 
 

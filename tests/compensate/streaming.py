@@ -16,7 +16,7 @@ from ncfix.compensate.workers import Ground
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine
-from ncfix.text import dialects
+from ncfix.text.dialects import get
 from ncfix.text.reader import read
 
 OPTIONS = FixOptions(tolerance_um=5.0, allow_refused=True)
@@ -36,7 +36,7 @@ def streamed(
     files: Mapping[str, bytes] | None = None,
 ) -> Found:
     """Text and report of a program that is corrected in parts of so many bytes; raises `NotInPartsError`."""
-    task = Task(machine, setup, OPTIONS, (files or {}).get, "p.nc", dialects.get(dialect), size)
+    task = Task(machine, setup, OPTIONS, (files or {}).get, "p.nc", get(dialect), size)
     text, done = run(task, source, jobs)
     stamp = done.stamp
     assert text[stamp.at : stamp.at + len(stamp.written)] == stamp.written

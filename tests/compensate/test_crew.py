@@ -28,7 +28,7 @@ from ncfix.compensate.workers import GoneError, Post, lines_between
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError, UsageError
 from ncfix.machine import Machine, load
-from ncfix.text import dialects
+from ncfix.text.dialects import get
 from ncfix.text.reader import read
 
 SECONDS = 20
@@ -131,7 +131,7 @@ def test_messages_of_any_size_that_nobody_hears_yet(monkeypatch: pytest.MonkeyPa
 
 def test_what_is_read_of_a_pipe_is_told(machine: Machine) -> None:
     source = program(5, 400, 0.0)
-    task = Task(machine, SETUP, OPTIONS, None, "p.ngc", dialects.get("linuxcnc"), 1000)
+    task = Task(machine, SETUP, OPTIONS, None, "p.ngc", get("linuxcnc"), 1000)
     with TemporaryFile(buffering=0) as kept, TemporaryFile(buffering=0) as out:
         source_of_pipe = Source("-", io.BytesIO(source), kept)
         stream = Stream(task, source_of_pipe.read, Outlet(out, False, bool).put, 3, source_of_pipe.ground(out.fileno()))
@@ -179,7 +179,7 @@ def test_a_tool_that_is_used_within_one_part(change: tuple[bytes, bytes], at: in
     setup = Setup(work_offsets={"G54": zero}, initial=zero, tools={0: Tool(length=50.0)})
     told = []
     for jobs in (1, 2, 3):
-        task = Task(machine, setup, OPTIONS, None, "p.ngc", dialects.get("linuxcnc"), 2000)
+        task = Task(machine, setup, OPTIONS, None, "p.ngc", get("linuxcnc"), 2000)
         with pytest.raises(UsageError) as caught:
             Stream(task, io.BytesIO(source).read, lambda _: None, jobs).run()
         told.append([str(message) for message in caught.value.messages])

@@ -16,7 +16,7 @@ from ncfix.compensate.following import Task
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, load
-from ncfix.text import dialects
+from ncfix.text.dialects import get
 from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, initial={"X": 0.0, "Y": 0.0, "Z": 100.0})
@@ -77,7 +77,7 @@ def test_a_program_in_parts_is_judged_by_more_than_the_first(machine: Machine, s
     """Too little is in each part to tell; it is told before anything of the program is passed on."""
     once, _ = corrected(pocket(2, seed=1), machine)
     again = unstamped(once)
-    task = Task(machine, SETUP, FixOptions(), None, "part.ngc", dialects.get("linuxcnc"), size)
+    task = Task(machine, SETUP, FixOptions(), None, "part.ngc", get("linuxcnc"), size)
     for jobs in (1, 2):
         with pytest.raises(RefusedError) as caught:
             run(task, again, jobs)
@@ -95,5 +95,5 @@ def test_the_beginning_of_a_long_program_is_judged(machine: Machine, monkeypatch
     monkeypatch.setattr(driver, "LOOKED", 10)
     _, codes = corrected(again, machine)
     assert "NCF438" not in codes
-    task = Task(machine, SETUP, FixOptions(), None, "part.ngc", dialects.get("linuxcnc"), 500)
+    task = Task(machine, SETUP, FixOptions(), None, "part.ngc", get("linuxcnc"), 500)
     assert "NCF438" not in {message.code for message in run(task, again, 1)[1].report.warnings}

@@ -19,7 +19,7 @@ from ncfix.control.moves import Moves
 from ncfix.control.parts import TABLES
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.text import dialects
+from ncfix.text.dialects import get
 
 SIZE = 1200
 
@@ -59,7 +59,7 @@ class Hearing(Share):
 
 
 def gone_through(source: bytes, machine: Machine, dialect: str, share: Share) -> tuple[Units, list[Part]]:
-    task = Task(machine, SETUP, OPTIONS, None, "p.nc", dialects.get(dialect), SIZE)
+    task = Task(machine, SETUP, OPTIONS, None, "p.nc", get(dialect), SIZE)
     units = PartCorrector(task, Ahead(io.BytesIO(source).read)).units
     units.share = share
     return units, [unit.part for unit in units]
@@ -104,7 +104,7 @@ def test_a_control_goes_on_as_if_it_had_followed_what_was_passed_over(
 
 @pytest.mark.parametrize("dialect", ["linuxcnc", "iso"])
 def test_all_that_a_control_keeps_can_be_compared(dialect: str, machine: Machine) -> None:
-    follower = Task(machine, SETUP, OPTIONS, None, "p.nc", dialects.get(dialect), SIZE).follower()
+    follower = Task(machine, SETUP, OPTIONS, None, "p.nc", get(dialect), SIZE).follower()
     kept = follower.control.lasting()
     assert kept is not None
     assert " object at 0x" not in kept

@@ -22,7 +22,7 @@ from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import Backlash
-from ncfix.text import dialects
+from ncfix.text.dialects import get
 from ncfix.text.reader import read
 from ncfix.text.writer import Splices, spliced
 
@@ -34,7 +34,7 @@ SIZES = (150, 1500)
 def streamed(
     source: bytes, machine: Machine, size: int, options: FixOptions = OPTIONS, jobs: int = 1
 ) -> tuple[bytes, dict[str, Any]]:
-    task = Task(machine, SETUP, options, None, "p.ngc", dialects.get("linuxcnc"), size)
+    task = Task(machine, SETUP, options, None, "p.ngc", get("linuxcnc"), size)
     text, done = run(task, source, jobs)
     stamp = done.stamp
     assert text[stamp.at : stamp.at + len(stamp.written)] == stamp.written

@@ -15,9 +15,8 @@ from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError
-from ncfix.text import number_text
 from ncfix.text.language import language_of
-from ncfix.text.number_style import NumberStyle
+from ncfix.text.number_text import NumberStyle, in_style, is_plain, laid_out, rounded, styles_of
 from ncfix.text.reader import read
 from ncfix.text.tree import Program
 from ncfix.text.writer import Edit, Splices, apply, spliced
@@ -301,21 +300,21 @@ def test_numbers_in_their_style(rows: list[tuple[str, float, int]]) -> None:
     texts = [text.encode() for text, _, _ in rows]
     stops = np.cumsum([len(text) + 1 for text in texts]) - 1
     spans = np.stack((stops - [len(text) for text in texts], stops), axis=1)
-    styles = number_text.styles_of(np.frombuffer(b" ".join(texts) + b" ", np.uint8), spans)
+    styles = styles_of(np.frombuffer(b" ".join(texts) + b" ", np.uint8), spans)
     assert styles.clear.all()
     values, decimals = np.array([row[1] for row in rows]), np.array([row[2] for row in rows])
-    clear = np.flatnonzero(number_text.is_plain(values, np.maximum(decimals, styles.decimals)))
+    clear = np.flatnonzero(is_plain(values, np.maximum(decimals, styles.decimals)))
     digits = np.maximum(decimals, styles.decimals)[clear]
-    found = number_text.laid_out(number_text.in_style(values[clear], styles.rows(clear), decimals[clear]))
+    found = laid_out(in_style(values[clear], styles.rows(clear), decimals[clear]))
     expected = [NumberStyle.of(rows[i][0]).write(rows[i][1], rows[i][2]) for i in clear]
     assert found.data.decode() == "".join(expected)
     assert found.length.tolist() == [len(text) for text in expected]
-    assert number_text.rounded(values[clear], digits).tolist() == [float(text) for text in expected]
+    assert rounded(values[clear], digits).tolist() == [float(text) for text in expected]
 
 
 def test_the_middle_between_two_outputs_goes_one_by_one() -> None:
     values, decimals = np.array([0.0625, 0.06251, 1e9, np.nan]), np.array([3, 3, 3, 3])
-    assert number_text.is_plain(values, decimals).tolist() == [False, True, False, False]
+    assert is_plain(values, decimals).tolist() == [False, True, False, False]
 
 
 def test_words_of_more_digits_than_the_control_resolves() -> None:

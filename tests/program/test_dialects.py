@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.text import dialects
-from ncfix.text.content import check_content
 from ncfix.text.dialect import Dialect
+from ncfix.text.dialects import check_content, detect, get, names
 from ncfix.text.grammar import find_grammar, parser
 from ncfix.text.reader import read
 from ncfix.text.tree import Word
@@ -18,8 +17,8 @@ from program.lanes import assert_read_right
 
 
 def test_the_built_in_dialects_are_there() -> None:
-    assert {"iso", "linuxcnc"} <= set(dialects.names())
-    assert dialects.get("iso").name == "iso"
+    assert {"iso", "linuxcnc"} <= set(names())
+    assert get("iso").name == "iso"
 
 
 @pytest.mark.parametrize(
@@ -41,13 +40,13 @@ def test_the_built_in_dialects_are_there() -> None:
     ],
 )
 def test_detection(source: bytes, path: str, expected: str) -> None:
-    assert dialects.detect(source, path).name == expected
+    assert detect(source, path).name == expected
     assert read(source, path).dialect.name == expected
 
 
 @pytest.mark.parametrize("name", ["fanuc", "haas", "iso", "siemens"])
 def test_signs_of_another_language_in_a_comment_are_none(name: str) -> None:
-    dialect = dialects.get(name)
+    dialect = get(name)
     comment = b"(T# < 2 OR > 5) (G15 H3)" if name != "siemens" else b"; #<side> o<a> call"
     check_content(b"G0 X1 " + comment + b"\nG1 X2 F100\n", "part.nc", dialect)
 
@@ -65,7 +64,7 @@ def test_signs_of_another_language_in_a_comment_are_none(name: str) -> None:
 def test_what_a_family_has_is_read_as_the_control_of_the_machine_has_it(
     source: bytes, control: str, expected: str
 ) -> None:
-    assert dialects.detect(source, "part.nc", control).name == expected
+    assert detect(source, "part.nc", control).name == expected
 
 
 @pytest.mark.parametrize("dialect", ["iso", "fanuc", "haas", "mitsubishi"])
@@ -80,7 +79,7 @@ def test_what_milling_machines_do_is_no_sign_of_a_lathe(text: str, dialect: str)
 def test_a_long_line_of_cycles_is_searched_for_signs_of_a_lathe_in_no_time() -> None:
     """Not for every cycle to the end of the line: that takes ten seconds and more."""
     begun = time.process_time()
-    check_content(b"G73 P1 Q2 " * 6000, "part.nc", dialects.get("fanuc"))
+    check_content(b"G73 P1 Q2 " * 6000, "part.nc", get("fanuc"))
     assert time.process_time() - begun < 3.0
 
 

@@ -16,7 +16,7 @@ from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError, UsageError
 from ncfix.machine import load, loads
-from ncfix.text import dialects
+from ncfix.text.dialects import detect
 from ncfix.text.reader import read
 from ncfix.text.tree import Opaque, Word
 from program.lanes import assert_read_right
@@ -108,7 +108,7 @@ def test_numbers_with_and_without_a_point_have_templates_of_their_own() -> None:
     ],
 )
 def test_detection(source: bytes, expected: str) -> None:
-    assert dialects.detect(source, "part.nc").name == expected
+    assert detect(source, "part.nc").name == expected
 
 
 def test_a_word_e_may_stand_close_to_the_one_before() -> None:

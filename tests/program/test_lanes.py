@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.lark import from_lark
 
 from ncfix.diagnostics import SourceError
-from ncfix.text import dialects
-from ncfix.text.content import check_content
 from ncfix.text.dialect import Dialect
+from ncfix.text.dialects import check_content, get
 from ncfix.text.faults import BlockError
 from ncfix.text.grammar import parser_of
 from ncfix.text.reader import read
@@ -58,7 +57,7 @@ def is_legal(dialect: Dialect, text: str) -> bool:
 @settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data(), seed=st.integers(0, 2**32))
 def test_generated_blocks_mean_what_the_grammar_says(name: str, data: st.DataObject, seed: int) -> None:
-    dialect, random = dialects.get(name), Random(seed)
+    dialect, random = get(name), Random(seed)
     plain = data.draw(from_lark(unkept(dialect.grammar), start="block", alphabet=ALPHABET))
     texts = [plain, with_blanks(random, plain), with_blanks(random, plain)]
     texts += [with_other_numbers(random, text) for text in texts for _ in range(2)]
@@ -96,7 +95,7 @@ LINES = (
 def test_a_damaged_block_is_read_by_the_grammar_or_refused_with_its_place(
     name: str, line: str, data: st.DataObject
 ) -> None:
-    dialect = dialects.get(name)
+    dialect = get(name)
     for _ in range(data.draw(st.integers(1, 3))):
         start = data.draw(st.integers(0, len(line)))
         stop = data.draw(st.integers(start, min(len(line), start + 2)))

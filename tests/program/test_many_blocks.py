@@ -12,7 +12,7 @@ from random import Random
 import pytest
 
 from ncfix import fast
-from ncfix.text import dialects
+from ncfix.text.dialects import get
 from ncfix.text.reader import read
 from ncfix.text.templates import shapes_of
 from ncfix.text.tree import Literal, Template, Word
@@ -106,7 +106,7 @@ def test_many_blocks(name: str, compiled: bool, monkeypatch: pytest.MonkeyPatch)
 
 def test_a_broken_template_is_caught() -> None:
     text = b"G1 X1.5 Y-2.25 F100.\n"
-    dialect = dialects.get("linuxcnc")
+    dialect = get("linuxcnc")
     program = read(text, "broken.nc", dialect)
     (shape,) = {key for key in (b"G1 X\x01 Y\x01 F\x01",) if shapes_of(dialect).recall(key) is not None}
     good = program.templates[int(program.template[0])]

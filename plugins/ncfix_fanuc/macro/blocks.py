@@ -6,8 +6,18 @@ import re
 
 from lark import Token, UnexpectedInput
 
-from ncfix.text.block_checks import check_exponents, check_numbers
-from ncfix.text.build import Branch, Builder, Node, Parsed, TooDeepError, build, edges, kind
+from ncfix.text.build import (
+    Branch,
+    Builder,
+    Node,
+    Parsed,
+    TooDeepError,
+    build,
+    check_exponents,
+    check_numbers,
+    edges,
+    kind,
+)
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, explain
 from ncfix.text.grammar import Squeezed, parse

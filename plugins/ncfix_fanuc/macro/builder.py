@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from ncfix.control.coordinates import mask_of
 from ncfix.control.modal import NO_MOTION
-from ncfix.control.places import mask_of
 from ncfix_iso.rs274.control import Control
 
 LOCKED = range(8000, 10000)

@@ -5,10 +5,9 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable data input
 
 from __future__ import annotations
 
-from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z
+from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of
 from ncfix.control.motion import Motion
 from ncfix.control.moves import Kind
-from ncfix.control.places import mask_of
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.settings import AFTER_UNFOLLOWED

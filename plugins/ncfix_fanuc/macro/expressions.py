@@ -17,11 +17,14 @@ from ncfix.control.expressions import (
     Evaluate,
     Expressions,
     Scope,
+    Unknown,
+    Value,
+    nominal,
     power,
     remainder,
+    signed,
 )
 from ncfix.control.faults import Fault
-from ncfix.control.values import Unknown, Value, nominal, signed
 from ncfix.text.tree import Expression
 
 VACANT = math.nan

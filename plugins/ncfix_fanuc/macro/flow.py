@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.control.expressions import Unknown
 from ncfix.control.faults import Fault
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Flow, Jump, Let, OpenCall, Operation, Return
 from ncfix.control.parts import NotInPartsError
-from ncfix.control.values import Unknown
 from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
 from ncfix.text.tree import Flow as FlowItem
 from ncfix_fanuc.macro import builder

@@ -7,11 +7,10 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z
+from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z, mask_of
+from ncfix.control.expressions import Unknown, nominal
 from ncfix.control.faults import Fault
 from ncfix.control.parts import NotInPartsError
-from ncfix.control.places import mask_of
-from ncfix.control.values import Unknown, nominal
 from ncfix.text.language import Run
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import dynamic, polar, scaling, system, vectors

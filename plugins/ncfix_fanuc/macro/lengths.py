@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.control.coordinates import Z
-from ncfix.control.places import mask_of
+from ncfix.control.coordinates import Z, mask_of
 from ncfix.text.tree import Comment, Tape, Word
 from ncfix_fanuc.macro.data import CHANGED
 from ncfix_fanuc.macro.vectors import INCLINED

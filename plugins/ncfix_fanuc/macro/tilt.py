@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ncfix.control import tcp
 from ncfix.control.coordinates import (
     IDENTITY,
     LETTERS,
@@ -24,6 +23,7 @@ from ncfix.control.coordinates import (
 from ncfix.control.motion import Motion
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
+from ncfix.control.tcp import switch
 from ncfix_fanuc.macro.planes import are_square, by_axes, by_points, euler, in_order
 from ncfix_fanuc.macro.squaring import SQUARED, Squared, turned_square
 from ncfix_iso.rs274.expressions import whole
@@ -117,7 +117,7 @@ def begin(control: MacroControl, rotation: Rotation, origin: Block) -> None:
         feature[index] = control.modal.unit * origin.get(LETTERS[index])
     control.offsets.feature = feature
     control.tilted, control.said = True, None
-    tcp.switch(control, control.offsets.tool, True)
+    switch(control, control.offsets.tool, True)
     control.refresh()
 
 
@@ -142,7 +142,7 @@ def end(control: MacroControl) -> None:
         return
     control.tilted, control.said = False, None
     control.offsets.rotation, control.offsets.feature = IDENTITY, zeros()
-    tcp.switch(control, control.offsets.tool, control.setup.tcp or control.tip_control)
+    switch(control, control.offsets.tool, control.setup.tcp or control.tip_control)
     turned_back(control)
     control.refresh()
 

@@ -10,8 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ncfix.control.expressions import FUNCTIONS, SUMS, Evaluate, Expressions
-from ncfix.control.values import Unknown, Value, nominal
+from ncfix.control.expressions import FUNCTIONS, SUMS, Evaluate, Expressions, Unknown, Value, nominal
 
 EQUAL = 1e-9
 """Two numbers are equal that differ by less."""

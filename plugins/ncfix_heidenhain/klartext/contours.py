@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 
 from ncfix.control.coordinates import PLANES, X, Y, dot, rotated
-from ncfix.control.values import Unknown, Value, nominal, signed
+from ncfix.control.expressions import Unknown, Value, nominal, signed
 from ncfix_heidenhain.klartext.control import FREELY, Control
 from ncfix_heidenhain.klartext.free import Element, Leg, solved
 from ncfix_heidenhain.klartext.step import IN_PLANE, somewhere

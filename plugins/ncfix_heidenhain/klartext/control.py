@@ -7,14 +7,12 @@ from collections.abc import Collection, Hashable
 from dataclasses import dataclass, field
 
 from ncfix.control import control as base
-from ncfix.control import tcp
-from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
-from ncfix.control.knowledge import WORK_OFFSET
+from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, mask_of, rotated, zeros
 from ncfix.control.motion import AT_START, Motion, UnknownAxes, first_reason
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
-from ncfix.control.places import mask_of
-from ncfix.control.setup import Setup, Tool
+from ncfix.control.setup import WORK_OFFSET, Setup, Tool
+from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_heidenhain.klartext.calculate import Parameters, Scope
@@ -148,9 +146,9 @@ class Control(base.Control):
         self.doubt_turned_datum()
         if on != self.tcp:
             self.ask_for_tool()
-            why = next(iter(self.unknown.values())) if self.is_led(self.unknown) else tcp.TURNED
-            tcp.switch(self, self.offsets.tool, on)
-            self.unknown = {i: why if reason is tcp.TURNED else reason for i, reason in self.unknown.items()}
+            why = next(iter(self.unknown.values())) if self.is_led(self.unknown) else TURNED
+            switch(self, self.offsets.tool, on)
+            self.unknown = {i: why if reason is TURNED else reason for i, reason in self.unknown.items()}
         self.refresh()
 
     def doubt_turned_datum(self) -> None:

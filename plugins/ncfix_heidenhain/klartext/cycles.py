@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ncfix.control.coordinates import X, Y, Z
+from ncfix.control.coordinates import X, Y, Z, mask_of
+from ncfix.control.expressions import numbers
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion
 from ncfix.control.moves import Kind
-from ncfix.control.places import mask_of
-from ncfix.control.values import numbers
 from ncfix_heidenhain.klartext import trans_cycles
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, Control
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from ncfix.control.expressions import nominal
 from ncfix.control.flatten import Change, FlatLine, Flattener
-from ncfix.control.values import nominal
-from ncfix.text.number_style import decimals_for
+from ncfix.text.number_text import decimals_for
 from ncfix.text.tree import Assignment, Constant, Expression, Literal, Opaque, Span, Text, Word
 from ncfix_heidenhain.klartext.calculate import compiled
 from ncfix_heidenhain.klartext.contours import written_out

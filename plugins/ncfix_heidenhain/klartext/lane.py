@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.control.arcs import CLOCKWISE, COUNTER
-from ncfix.control.builder import Arc, Circles
-from ncfix.control.contour import plane_of, resting_of_many
+from ncfix.control.arcs import CLOCKWISE, COUNTER, plane_of, resting_of_many
+from ncfix.control.builder import Arc, Circles, Stretch
 from ncfix.control.lane import SHORTEST, before_placing
 from ncfix.control.moves import FeedMode, Kind
 from ncfix.control.stage import LONGEST, filled, followed, followed_compiled
-from ncfix.control.stretch import Stretch
 from ncfix_heidenhain.klartext.arc_lane import keep_pole, turned
 from ncfix_heidenhain.klartext.arcs import direction_at_end
 from ncfix_heidenhain.klartext.control import Control

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from ncfix.control import lane_tables as shared
 from ncfix.control.arcs import CLOCKWISE, COUNTER
-from ncfix.control.coordinates import INDEX
+from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.lane_tables import Lane
-from ncfix.control.places import mask_of
 from ncfix.text.tree import Constant, Literal, Template
 from ncfix_heidenhain.klartext.plans import LETTERS, Plan
 from ncfix_heidenhain.klartext.step import IN_PLANE

@@ -6,12 +6,11 @@ Source: TNC 640, "Programming: contours", "Multiple axis machining", "Miscellane
 import math
 from collections.abc import Sequence
 
-from ncfix.control import tcp
-from ncfix.control.coordinates import LETTERS, Vector, dot
+from ncfix.control.coordinates import LETTERS, Vector, dot, mask_of
 from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
-from ncfix.control.places import mask_of
+from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import DEPARTED, Control
 from ncfix_heidenhain.klartext.posture import angles_for
 from ncfix_heidenhain.klartext.step import Step, refuse, with_increments
@@ -146,7 +145,7 @@ def take_short_way(control: Control, step: Step, target: Vector, axes: int) -> s
 def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: UnknownAxes, axes: int) -> None:
     """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
     linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
-    tcp.switch(control, control.offsets.tool, False)
+    switch(control, control.offsets.tool, False)
     control.refresh()
     control.path.said = None
     for index in control.machine:
@@ -175,7 +174,7 @@ def at_machine(control: Control, step: Step) -> None:
         unknown |= {i: NOT_GIVEN for i in control.machine if step.words.axes >> i & 1}
     was = control.tcp
     if was:
-        tcp.switch(control, control.offsets.tool, False)
+        switch(control, control.offsets.tool, False)
         control.refresh()
         target, unknown = in_machine(control, step.words)
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ncfix.text.number_style import NumberStyle
+from ncfix.text.number_text import NumberStyle
 
 
 @dataclass(frozen=True, slots=True)

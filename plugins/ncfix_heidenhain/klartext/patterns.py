@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from ncfix.control.values import Value, nominal, numbers, signed
+from ncfix.control.expressions import Value, nominal, numbers, signed
 from ncfix_heidenhain.klartext.calculate import Parameters
 
 ON_CIRCLE, ON_LINES = 220, 221

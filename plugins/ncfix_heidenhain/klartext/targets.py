@@ -11,12 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from ncfix.control import tcp
 from ncfix.control.control import ADRIFT
-from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
+from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z, mask_of
 from ncfix.control.faults import Fault
 from ncfix.control.motion import AT_START, UnknownAxes
-from ncfix.control.places import mask_of
+from ncfix.control.tcp import along_frame, mixed_into
 from ncfix_heidenhain.klartext.control import SPATIAL, Control
 from ncfix_heidenhain.klartext.plans import MOVING
 
@@ -104,7 +103,7 @@ def frame(control: Control) -> tuple[object, ...]:
 
 def inner_unknown(control: Control, unknown: UnknownAxes) -> UnknownAxes:
     """What is not known along the axes of the frame."""
-    return dict(tcp.along_frame(control, unknown))
+    return dict(along_frame(control, unknown))
 
 
 def destination(control: Control, words: Words) -> tuple[Vector, UnknownAxes]:
@@ -175,7 +174,7 @@ def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unkno
             target[index] = position
     unknown = where.unknown
     if control.is_rotated and unknown:
-        unknown = tcp.mixed_into(unknown, control.rotation)
+        unknown = mixed_into(unknown, control.rotation)
         control.path.said = Said(Where(where.inner[:], dict(where.unknown)), target, frame(control))
     found = {index: why for index, why in unknown.items() if index in control.machine}
     control.saying = found, where.unknown

@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ncfix.control import tcp
 from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, Rotation, angles_in_words, product
 from ncfix.control.faults import Fault
 from ncfix.control.motion import AT_START, Motion
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
+from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import MOVED_ALONG, TILTED, Control
 from ncfix_heidenhain.klartext.posture import NOT_NORMAL, angles_for, apart, normal_of, posture, stands_normal
 from ncfix_heidenhain.klartext.targets import Words
@@ -192,7 +192,7 @@ def turn_axes(control: Control, way: dict[int, float] | None) -> None:
         control.pass_here(TURNED, POSITIONED, rotary_letters(control))
         return
     if control.tcp:
-        tcp.switch(control, control.offsets.tool, False)
+        switch(control, control.offsets.tool, False)
         control.refresh()
     target, unknown = control.position[:], {k: why for k, why in control.unknown.items() if k not in way}
     for index, angle in way.items():

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import math
 
-from ncfix.control import tcp
-from ncfix.control.coordinates import Z, zeros
-from ncfix.control.places import mask_of
+from ncfix.control.coordinates import Z, mask_of, zeros
 from ncfix.control.setup import Tool
+from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import TOOL, Control
 from ncfix_heidenhain.klartext.targets import Words
 
@@ -76,7 +75,7 @@ def set_length(control: Control, length: float) -> None:
     tool = zeros()
     tool[Z] = length
     if control.tcp:
-        tcp.switch(control, tool, True)
+        switch(control, tool, True)
     control.offsets.tool = tool
     control.refresh()
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from ncfix.control.coordinates import DEGREE, INDEX
-from ncfix.control.values import Unknown
+from ncfix.control.expressions import Unknown
 from ncfix_heidenhain.klartext.control import PRESET, Control
 from ncfix_heidenhain.klartext.targets import Words
 from ncfix_heidenhain.klartext.tilting import cycle_19

@@ -6,8 +6,7 @@ import re
 
 from lark import UnexpectedInput
 
-from ncfix.text.block_checks import check_exponents, check_numbers, start_of
-from ncfix.text.build import Parsed, TooDeepError, build
+from ncfix.text.build import Parsed, TooDeepError, build, check_exponents, check_numbers, start_of
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, bare_expression, explain
 from ncfix.text.grammar import Squeezed, parse, squeeze

@@ -6,11 +6,10 @@ from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass, replace
 
 from ncfix.control import control as shared
-from ncfix.control import rollover
 from ncfix.control.coordinates import INCH, LETTERS, zeros
-from ncfix.control.expressions import Evaluate
+from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
 from ncfix.control.modal import Saved
-from ncfix.control.values import Unknown, Value, nominal
+from ncfix.control.turns import watch
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_iso.rs274.groups import RULES, Rules
@@ -84,7 +83,7 @@ class Control(shared.Control):
         self.left_out = False
         self.unwritten = ""
         if not self.rules.strict:
-            rollover.watch(self)
+            watch(self)
         self.refresh()
 
     def lasting(self) -> str | None:

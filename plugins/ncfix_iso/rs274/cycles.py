@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 
-from ncfix.control import tcp
-from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot
+from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot, mask_of
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import FeedMode, Kind
-from ncfix.control.places import mask_of
+from ncfix.control.tcp import lost_in_frame, lost_of_axes
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.systems import check_system, words_of
@@ -128,7 +127,7 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
     across = control.modal.plane.across
     unknown = hole_unknown(control, block)
     refusal = "a word of the cycle is known only at run time" if control.modal.cycle.runtime else ""
-    height = tcp.lost_in_frame(control).get(across)
+    height = lost_in_frame(control).get(across)
     if not control.modal.incremental and not unknown and not control.modal.diameter:
         program[across] = r
         control.builder.approach(command(control, block, program))
@@ -143,13 +142,13 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
     program[across] = clear
     control.position = command(control, block, program)
     if height is not None and not control.modal.retract_to_r:
-        control.unknown = tcp.lost_of_axes(control, {**unknown, across: height})
+        control.unknown = lost_of_axes(control, {**unknown, across: height})
 
 
 def hole_unknown(control: Control, block: Block) -> UnknownAxes:
     """Which axes are not known at the bottom of a hole."""
     modal = control.modal
-    unknown = dict(unknown_after(control, block, modal.incremental, tcp.lost_in_frame(control)))
+    unknown = dict(unknown_after(control, block, modal.incremental, lost_in_frame(control)))
     if not modal.incremental:
         unknown.pop(modal.plane.across, None)
         if modal.plane.across in control.shaky:

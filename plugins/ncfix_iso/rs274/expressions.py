@@ -10,9 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ncfix.control.expressions import ARITHMETIC, FUNCTIONS, SUMS, Evaluate, Expressions, power, remainder
+from ncfix.control.expressions import (
+    ARITHMETIC,
+    FUNCTIONS,
+    SUMS,
+    Evaluate,
+    Expressions,
+    Unknown,
+    Value,
+    nominal,
+    power,
+    remainder,
+)
 from ncfix.control.faults import Fault
-from ncfix.control.values import Unknown, Value, nominal
 from ncfix.text.tree import NamedParameter, Parameter
 
 EQUAL = 1e-6

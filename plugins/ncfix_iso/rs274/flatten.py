@@ -11,14 +11,13 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y
+from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, mask_of
+from ncfix.control.expressions import nominal
 from ncfix.control.faults import Fault
 from ncfix.control.flatten import RUNTIME, Change, FlatLine, Flattener
-from ncfix.control.places import mask_of
 from ncfix.control.unit import TextUnit
-from ncfix.control.values import nominal
 from ncfix.diagnostics import SourceError
-from ncfix.text.number_style import decimals_for
+from ncfix.text.number_text import decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Literal, Opaque, Parameter, Word
 from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, Control
 from ncfix_iso.rs274.plans import Codes, Plan

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from ncfix.control.coordinates import LETTERS, N_LETTERS
+from ncfix.control.coordinates import LETTERS, N_LETTERS, mask_of
+from ncfix.control.expressions import Unknown
 from ncfix.control.faults import Fault
 from ncfix.control.flow import NEVER_ENDS, WAITS, Flow
 from ncfix.control.interpreter import NO_END, Interpreter
-from ncfix.control.places import mask_of
-from ncfix.control.values import Unknown
 from ncfix.text.language import Run
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems

@@ -6,10 +6,9 @@ programming manual.
 
 from __future__ import annotations
 
-from ncfix.control import tcp
-from ncfix.control.coordinates import LETTERS, Vector, X, Y, Z, zeros
+from ncfix.control.coordinates import LETTERS, Vector, X, Y, Z, mask_of, zeros
 from ncfix.control.faults import Fault
-from ncfix.control.places import mask_of
+from ncfix.control.tcp import switch
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.systems import BAD_G10, SYSTEM_NAMES, first_parameter, set_system, stored, words_of
@@ -58,7 +57,7 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
     on = control.setup.tcp or control.tip_control or control.tilted
     across = (X, Y) if on and not (control.tcp and control.stands_square()) else ()
     if on or control.tcp:
-        tcp.switch(control, tool, on)
+        switch(control, tool, on)
     control.places.shift(mask_of((*across, Z)))
     control.offsets.tool, control.tools.offset = tool, number if on or any(tool) or lacking else None
     control.modal.tool_code = 490 if number is None else 430

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from ncfix.control import tcp
-from ncfix.control.coordinates import INDEX, N_LETTERS, Vector, rotated
+from ncfix.control.coordinates import INDEX, N_LETTERS, Vector, mask_of, rotated
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import FeedMode, Kind
 from ncfix.control.passing import Pass, Passing
-from ncfix.control.places import mask_of
+from ncfix.control.tcp import from_machine
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.feeds import check_feed
 from ncfix_iso.rs274.systems import REFERENCES, is_given, store, stored
@@ -126,7 +125,7 @@ def reference_target(control: Control, name: str, axes: int) -> tuple[Vector, Un
             if not given and not assumed(control, name):
                 unknown[index] = AFTER_REFERENCE
     if control.tcp:
-        tcp.from_machine(control, target, unknown)
+        from_machine(control, target, unknown)
     return target, unknown
 
 

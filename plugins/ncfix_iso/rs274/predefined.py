@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import partial
 
 from ncfix.control.coordinates import LETTERS
-from ncfix.control.values import Value
+from ncfix.control.expressions import Value
 from ncfix_iso.rs274.control import Control
 from ncfix_iso.rs274.flow import OWords
 

@@ -6,9 +6,8 @@ and for G68 and G69 the Fanuc 30i programming manual.
 
 from __future__ import annotations
 
-from ncfix.control.coordinates import IDENTITY, LETTERS, N_LETTERS, about, product, zeros
+from ncfix.control.coordinates import IDENTITY, LETTERS, N_LETTERS, about, mask_of, product, zeros
 from ncfix.control.faults import Fault
-from ncfix.control.places import mask_of
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.settings import ENDS, unfollowed
 from ncfix_iso.rs274.systems import (

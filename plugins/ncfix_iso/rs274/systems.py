@@ -18,13 +18,13 @@ from ncfix.control.coordinates import (
     X,
     Y,
     about,
+    mask_of,
     rotated,
     transposed,
 )
+from ncfix.control.expressions import nominal
 from ncfix.control.faults import Fault
 from ncfix.control.motion import UnknownAxes
-from ncfix.control.places import mask_of
-from ncfix.control.values import nominal
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.expressions import whole
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 
-from ncfix.control import tcp
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, X, Y, rotated
+from ncfix.control.expressions import nominal
 from ncfix.control.faults import Fault
 from ncfix.control.motion import UnknownAxes
-from ncfix.control.values import nominal
+from ncfix.control.tcp import from_machine, lost_in_frame, lost_of_axes
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.systems import check_system
 
@@ -98,8 +98,8 @@ def rotated_destination(control: Control, block: Block, incremental: bool) -> tu
 
 def rotated_unknown(control: Control, block: Block, incremental: bool) -> UnknownAxes:
     """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
-    own = unknown_after(control, block, incremental, tcp.lost_in_frame(control))
-    unknown = tcp.lost_of_axes(control, own) if own else {}
+    own = unknown_after(control, block, incremental, lost_in_frame(control))
+    unknown = lost_of_axes(control, own) if own else {}
     control.saying = unknown, own
     return unknown
 
@@ -145,5 +145,5 @@ def machine_destination(control: Control, block: Block) -> tuple[Vector, Unknown
             if letter in block.runtime:
                 unknown[index] = RUNTIME
     if control.tcp:
-        tcp.from_machine(control, target, unknown)
+        from_machine(control, target, unknown)
     return target, unknown

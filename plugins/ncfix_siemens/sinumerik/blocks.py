@@ -7,8 +7,7 @@ import re
 from lark import UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
-from ncfix.text.block_checks import check_exponents, check_numbers, start_of
-from ncfix.text.build import Parsed, TooDeepError
+from ncfix.text.build import Parsed, TooDeepError, check_exponents, check_numbers, start_of
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError
 from ncfix.text.grammar import parse

@@ -12,8 +12,8 @@ import re
 from dataclasses import dataclass
 
 from ncfix.control.coordinates import LETTERS, rotated
+from ncfix.control.expressions import Unknown, number
 from ncfix.control.moves import CycleCall, Kind
-from ncfix.control.values import Unknown, number
 from ncfix_siemens.sinumerik.destination import End, Leg, Words
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.increments import stand

@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ncfix.control.builder import Arc
-from ncfix.control.coordinates import INDEX, LETTERS, Vector, rotated
+from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of, rotated
 from ncfix.control.faults import Fault
 from ncfix.control.motion import UnknownAxes
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Passing
-from ncfix.control.places import mask_of
 from ncfix_siemens.sinumerik.increments import unsteady
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING

@@ -13,8 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.pointing import Pointing, Ways
-from ncfix.control.pointing_angles import FloatArray, to_each
+from ncfix.control.pointing import FloatArray, Pointing, Ways, to_each
 from ncfix.text.tree import Program
 
 NO_LENGTH = 1e-9

@@ -16,11 +16,13 @@ from ncfix.control.expressions import (
     Evaluate,
     Expressions,
     Scope,
+    Unknown,
+    Value,
     divide,
     left_out,
+    number,
     power,
 )
-from ncfix.control.values import Unknown, Value, number
 from ncfix.text.tree import Binary, Constant, Expression, Parameter
 from ncfix_siemens.sinumerik.build import BRACKET
 

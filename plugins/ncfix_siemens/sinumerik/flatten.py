@@ -11,10 +11,10 @@ import re
 from collections.abc import Mapping
 
 from ncfix.control.coordinates import LETTERS
+from ncfix.control.expressions import Unknown, number
 from ncfix.control.faults import Fault
 from ncfix.control.flatten import RUNTIME, Change, Flattener
-from ncfix.control.values import Unknown, number
-from ncfix.text.number_style import decimals_for
+from ncfix.text.number_text import decimals_for
 from ncfix.text.tree import (
     Assignment,
     Call,

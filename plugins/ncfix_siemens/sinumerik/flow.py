@@ -6,10 +6,9 @@ import copy
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from ncfix.control.expressions import Evaluate
+from ncfix.control.expressions import Evaluate, Unknown, Value, number
 from ncfix.control.faults import Fault
 from ncfix.control.flow import NO_LABEL, Flow, Jump, Let, OpenCall, Operation, Repeat
-from ncfix.control.values import Unknown, Value, number
 from ncfix.text.tree import Expression, NamedParameter, Parameter
 from ncfix_siemens.sinumerik.expressions import Key, compiled
 from ncfix_siemens.sinumerik.plans import Branching, Letting

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ncfix.control.coordinates import INCH, INDEX, PLANES, Vector, zeros
-from ncfix.control.places import mask_of
-from ncfix.control.values import Unknown
+from ncfix.control.coordinates import INCH, INDEX, PLANES, Vector, mask_of, zeros
+from ncfix.control.expressions import Unknown
 from ncfix_siemens.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
 from ncfix_siemens.sinumerik.destination import Words
 from ncfix_siemens.sinumerik.increments import had_from_the_start

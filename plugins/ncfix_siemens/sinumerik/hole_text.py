@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import CycleCall
-from ncfix.text.number_style import NumberStyle
+from ncfix.text.number_text import NumberStyle
 from ncfix.text.tree import Program, Word
 from ncfix.writer.target import LINE, Rendered, Target
 from ncfix_siemens.sinumerik.flatten import argument, written

@@ -9,13 +9,13 @@ from operator import or_
 
 import numpy as np
 
+from ncfix.control.coordinates import mask_of
+from ncfix.control.expressions import number
 from ncfix.control.flatten import RUNTIME
 from ncfix.control.flow import Call
 from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Moves
 from ncfix.control.parts import NotInPartsError
-from ncfix.control.places import mask_of
-from ncfix.control.values import number
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
 from ncfix.text.tree import Program

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import INDEX, LETTERS
+from ncfix.control.expressions import number
 from ncfix.control.moves import Kind
-from ncfix.control.values import number
 from ncfix_siemens.sinumerik.destination import End, Leg, Words, destination
 from ncfix_siemens.sinumerik.plans import Letting
 from ncfix_siemens.sinumerik.state import Sinumerik

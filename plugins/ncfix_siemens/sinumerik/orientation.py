@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import DEGREE, LETTERS, angles_in_words, product
+from ncfix.control.expressions import number
 from ncfix.control.faults import Fault
-from ncfix.control.pointing import Pointing
-from ncfix.control.pointing_angles import Triple, dot
-from ncfix.control.values import number
+from ncfix.control.pointing import Pointing, Triple, dot
 from ncfix_siemens.sinumerik.affine import turned
 from ncfix_siemens.sinumerik.destination import Words
 from ncfix_siemens.sinumerik.directions import NO_LENGTH

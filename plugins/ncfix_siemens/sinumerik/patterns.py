@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ncfix.control.values import number
+from ncfix.control.expressions import number
 from ncfix_siemens.sinumerik.destination import End, Words, command
 
 if TYPE_CHECKING:

@@ -13,16 +13,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ncfix.control import rollover, tcp
 from ncfix.control.control import AFTER_THAT, Control
-from ncfix.control.coordinates import CENTRE_LETTERS, DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
+from ncfix.control.coordinates import (
+    CENTRE_LETTERS,
+    DEGREE,
+    INDEX,
+    LETTERS,
+    Vector,
+    X,
+    Y,
+    Z,
+    mask_of,
+    transposed,
+    zeros,
+)
+from ncfix.control.expressions import Unknown, Value
 from ncfix.control.modal import Modal
 from ncfix.control.motion import AT_START, Motion, UnknownAxes
 from ncfix.control.moves import Kind, Rule
 from ncfix.control.passing import Pass
-from ncfix.control.places import mask_of
 from ncfix.control.setup import Tool
-from ncfix.control.values import Unknown, Value
+from ncfix.control.tcp import switch
+from ncfix.control.turns import Winding, watch
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_siemens.sinumerik import heading
@@ -87,8 +99,8 @@ class Sinumerik(Control):
         self.refresh()
         self.lost = dict(self.unknown)
         self.counted: list[Footing] = list(self.footing)
-        rollover.watch(self)
-        self.builder.winding = rollover.Winding(np.zeros(len(run.axes), dtype=np.bool_))
+        watch(self)
+        self.builder.winding = Winding(np.zeros(len(run.axes), dtype=np.bool_))
         at_start = DIAMETERS.get(self.variables.value(key_of(RESET_OF_DIAMETER)))
         if at_start:
             self.count_in(at_start)
@@ -203,7 +215,7 @@ class Sinumerik(Control):
         new = self.offsets.tool if tool is None else tool
         if on or self.tcp:
             known = dict(self.unknown)
-            tcp.switch(self, new, on)
+            switch(self, new, on)
             self.lost |= {index: why for index, why in self.unknown.items() if index not in known}
         self.tcp = on
         self.offsets.tool = new

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ncfix.control.coordinates import INDEX
-from ncfix.control.expressions import Evaluate
+from ncfix.control.expressions import Evaluate, number
 from ncfix.control.faults import Fault
-from ncfix.control.values import number
 from ncfix.text.tree import Call, Expression, NamedParameter
 from ncfix_siemens.sinumerik import framing, motion
 from ncfix_siemens.sinumerik.affine import WORLD

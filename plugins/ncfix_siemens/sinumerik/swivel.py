@@ -13,12 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ncfix.control.coordinates import X, Y, Z, angles_in_words, as_rotation
+from ncfix.control.coordinates import X, Y, Z, angles_in_words, as_rotation, mask_of
+from ncfix.control.expressions import number
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
-from ncfix.control.places import mask_of
 from ncfix.control.tcp import rotary_at_zero
-from ncfix.control.values import number
 from ncfix.text.tree import Text
 from ncfix_siemens.sinumerik.affine import WORLD, Affine, shifted, turned
 from ncfix_siemens.sinumerik.destination import End, Leg, Words

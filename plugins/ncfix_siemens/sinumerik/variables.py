@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from ncfix.control.values import Unknown, Value, number
+from ncfix.control.expressions import Unknown, Value, number
 from ncfix_siemens.sinumerik.expressions import Key
 
 CONSTANTS: dict[str, Value] = {"true": 1.0, "false": 0.0, "$pi": math.pi}

@@ -15,8 +15,7 @@ import numpy as np
 from ncfix.control.coordinates import DEGREE
 from ncfix.control.lane import SHORTEST, before_placing, is_open, take
 from ncfix.control.moves import FeedMode
-from ncfix.control.pointing import Pointing, Ways
-from ncfix.control.pointing_angles import nearest
+from ncfix.control.pointing import Pointing, Ways, nearest
 from ncfix.control.stage import IntArray, Stage, stage_of
 from ncfix_siemens.sinumerik.orientation import BY_AXES, FAR, ON_CURVES, is_choice
 from ncfix_siemens.sinumerik.state import Sinumerik

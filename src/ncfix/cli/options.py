@@ -206,11 +206,11 @@ def read_program(path: str, dialect: str | None, machine: Machine | None = None,
 
 def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None) -> Dialect:
     """The dialect of that name, else what the beginning of a program shows, else that of the machine's control."""
-    from ncfix.text import dialects
+    from ncfix.text.dialects import detect, get
 
     if name is not None:
-        return dialects.get(name)
-    return dialects.detect(head, path, (machine and machine.control) or "")
+        return get(name)
+    return detect(head, path, (machine and machine.control) or "")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,12 @@
-"""Motions gathered as columns: single ones in lists, stretches as arrays; no object is kept per motion."""
+"""Motions gathered as columns: single ones in lists, stretches as arrays; no object is kept per motion.
+
+Motions as they are gathered: many that came together as columns, single ones in lists that become columns later.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,8 +15,7 @@ from numpy.typing import NDArray
 from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
 from ncfix.control.moves import CycleCall, Frame, Kind, Moves, Rule
 from ncfix.control.passing import Pass
-from ncfix.control.rollover import Winding, doubtful, extremes, overturned
-from ncfix.control.stretch import Buffer, Stretch
+from ncfix.control.turns import Winding, doubtful, extremes, overturned
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -398,3 +401,53 @@ def _joined_ends(parts: Sequence[Stretch], columns: list[int]) -> tuple[FloatArr
 def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """Columns one behind the other; a single one as it is."""
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
+
+
+@dataclass(slots=True)
+class Stretch:
+    """Consecutive motions as columns; `programmed` and `adrift` are bit masks by letter, `start` and `end` (n, 9).
+
+    path  (n + 1, 9) what both are views of, where each motion begins where the one before it ends
+    """
+
+    block: IntArray
+    programmed: IntArray
+    style: IntArray
+    feed: FloatArray
+    start: FloatArray
+    end: FloatArray
+    adrift: IntArray
+    path: FloatArray | None = None
+
+    def ends(self, columns: list[int]) -> tuple[FloatArray, FloatArray]:
+        """Where the motions start and end, by some of the letters; views of one path where they go on."""
+        if self.path is None:
+            start, end = (each.take(columns, axis=1, mode="clip") for each in (self.start, self.end))
+            return start, end
+        path = self.path.take(columns, axis=1, mode="clip")
+        return path[:-1], path[1:]
+
+
+@dataclass(slots=True)
+class Buffer:
+    """Motions that came one by one."""
+
+    block: list[int] = field(default_factory=list)
+    programmed: list[int] = field(default_factory=list)
+    style: list[int] = field(default_factory=list)
+    feed: list[float] = field(default_factory=list)
+    start: list[float] = field(default_factory=list)
+    end: list[float] = field(default_factory=list)
+    adrift: list[int] = field(default_factory=list)
+
+    def stretch(self) -> Stretch:
+        """The motions as columns."""
+        return Stretch(
+            np.array(self.block, dtype=np.int64),
+            np.array(self.programmed, dtype=np.int64),
+            np.array(self.style, dtype=np.int64),
+            np.array(self.feed, dtype=np.float64),
+            np.array(self.start, dtype=np.float64).reshape(-1, N_LETTERS),
+            np.array(self.end, dtype=np.float64).reshape(-1, N_LETTERS),
+            np.array(self.adrift, dtype=np.int64),
+        )

@@ -9,16 +9,16 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
-from ncfix.control import contour, tcp
+from ncfix.control.arcs import plane_of, resting
 from ncfix.control.builder import Builder, Style
-from ncfix.control.coordinates import LETTERS, Vector
+from ncfix.control.coordinates import LETTERS, Vector, mask_of
 from ncfix.control.flow import Budget
 from ncfix.control.motion import AT_START, Motion, UnknownAxes, blanked, first_reason, leaves_unknown
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.passing import Pass, Passing, may_pass
-from ncfix.control.places import mask_of
 from ncfix.control.pointing import Pointing
 from ncfix.control.standing import Standing
+from ncfix.control.tcp import along_frame, lost_in_frame, pointing_of
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
@@ -103,7 +103,7 @@ class Control(Standing):
     @cached_property
     def pointing(self) -> Pointing | None:
         """How the machine's two rotary axes point the tool; None if that cannot be known."""
-        return tcp.pointing_of(self)
+        return pointing_of(self)
 
     def moves(self) -> Moves:
         """The motions so far."""
@@ -177,7 +177,7 @@ class Control(Standing):
         if fate.arc is not None:
             self.builder.arc(fate.arc)
         if not fate.passing and fate.kind != Kind.DWELL:
-            self.builder.rests(contour.resting(self, fate))
+            self.builder.rests(resting(self, fate))
         if fate.kind != Kind.DWELL:
             self.block_words = ()
         start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
@@ -224,7 +224,7 @@ class Control(Standing):
         """What is not known at the end of a motion, along the axes of the program's frame."""
         if self.saying is not None and self.saying[0] is motion.unknown:
             return self.saying[1]
-        return tcp.lost_in_frame(self) if motion.kind == Kind.DWELL else tcp.along_frame(self, motion.unknown)
+        return lost_in_frame(self) if motion.kind == Kind.DWELL else along_frame(self, motion.unknown)
 
     def ends_in_hole(self, motion: Motion) -> bool:
         """Whether there is a hole where the motion ends: then it matters where that is, as in a cut."""
@@ -240,7 +240,7 @@ class Control(Standing):
         """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
         if not rapid.unknown or rapid.kind != Kind.RAPID or rapid.refusal or self.refusal or self.suspended:
             return False
-        before = {*self.unknown.values(), *tcp.lost_in_frame(self).values()}
+        before = {*self.unknown.values(), *lost_in_frame(self).values()}
         return leaves_unknown(rapid, before, self._lost_at_end(rapid))
 
     def _adrift(self, settled: int) -> int:
@@ -253,7 +253,7 @@ class Control(Standing):
 
     def still_beside(self, axes: int) -> int:
         """Axes of the plane that get no word in a motion across it, see `contour`."""
-        plane = contour.plane_of(self) if self.modal.compensated else 0
+        plane = plane_of(self) if self.modal.compensated else 0
         return 0 if axes & plane else plane
 
     def end_compensation(self) -> None:

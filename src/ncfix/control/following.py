@@ -1,4 +1,7 @@
-"""Following a program part by part, and what goes on from one part to the next: one for all languages."""
+"""Following a program part by part, and what goes on from one part to the next: one for all languages.
+
+What there is to say when a program has been followed, the same for all languages.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control import rollover
 from ncfix.control.control import Control
-from ncfix.control.finish import check_reach
 from ncfix.control.interpreter import Interpreter
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import Kind, Moves, Rule, Trace
 from ncfix.control.parts import NotInPartsError
-from ncfix.diagnostics import Message
+from ncfix.control.turns import remarks, say
+from ncfix.diagnostics import Message, SourceError, UsageError
+from ncfix.text import stamp
 from ncfix.text.language import Run
 from ncfix.text.tree import Program
 
@@ -77,7 +80,7 @@ class Follower:
             raise NotInPartsError("blocks with / may be skipped, and all positions of block delete are looked at")
         moves = control.moves()
         check_reach(program, moves)
-        rollover.say(control, program)
+        say(control, program)
         interpreter.check_motions(program, moves)
         self.unchanged = begun is not None and begun == control.lasting()
         return moves
@@ -119,7 +122,7 @@ class Follower:
     @property
     def messages(self) -> tuple[Message, ...]:
         """What there is to say so far."""
-        return rollover.remarks(self.control)
+        return remarks(self.control)
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -132,3 +135,44 @@ def _changes_tools(moves: Moves) -> bool:
     tool, length = moves.tool, moves.tool_length
     same = (length == length[-1]) | (np.isnan(length) & np.isnan(length[-1]))
     return bool((tool != tool[-1]).any() or not same.all())
+
+
+FAR = 1e9
+"""mm or rad; no machine goes farther from zero, and sums of such numbers do not tell micrometres apart."""
+TOO_FAR = "NCF248"
+
+
+def check_reach(program: Program, moves: Moves) -> None:
+    """Raise SourceError at the first motion that leads farther away than any machine goes."""
+    far, arcs = _are_far(moves.end), np.flatnonzero(moves.kind == Kind.ARC)
+    far[arcs] |= _are_far(moves.centre[arcs])
+    rows = np.flatnonzero(far & (moves.rule != Rule.REFUSE))
+    if rows.size:
+        text = "this leads farther away than any machine goes (1e9 mm or radians)"
+        raise SourceError.of(TOO_FAR, text, program.place(int(moves.block[rows[0]])), "check the numbers of the block")
+
+
+def _are_far(places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) which of (n, k) places are too far away."""
+    rows = np.zeros(len(places), dtype=np.bool_)
+    if not places.size or max(places.max(), -places.min()) <= FAR:
+        return rows
+    rows[np.flatnonzero(np.abs(places) > FAR) // places.shape[1]] = True
+    return rows
+
+
+def finished(control: Control, program: Program, moves: Moves) -> Trace:
+    """The trace of a program; raises UsageError with all that was not given."""
+    check_reach(program, moves)
+    say(control, program)
+    lacking = (*control.foreign.values(), *control.knowledge.missing.values())
+    if lacking:
+        raise UsageError.collected(lacking)
+    marked = stamp.find(program)
+    return Trace(
+        moves=moves,
+        messages=remarks(control),
+        assumed=tuple(control.knowledge.assumed),
+        stamp="" if marked is None else program.text_of(marked),
+        switches=frozenset(control.switches),
+    )

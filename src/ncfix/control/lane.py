@@ -11,15 +11,12 @@ from typing import Protocol
 
 import numpy as np
 
-from ncfix.control.ahead import Ahead, rows_before
-from ncfix.control.arcs import CLOCKWISE, COUNTER
-from ncfix.control.builder import Circles
-from ncfix.control.contour import resting_of_many
+from ncfix.control.arcs import CLOCKWISE, COUNTER, resting_of_many
+from ncfix.control.builder import Circles, Stretch
 from ncfix.control.control import Control
 from ncfix.control.lane_tables import Lane
 from ncfix.control.moves import FeedMode, Kind
-from ncfix.control.stage import IntArray, Mask, Stage, Text
-from ncfix.control.stretch import Stretch
+from ncfix.control.stage import Ahead, IntArray, Mask, Stage, Text, rows_before
 
 SHORTEST = 16
 """Stretches of fewer blocks go one by one."""

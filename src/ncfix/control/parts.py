@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import Moves
-from ncfix.text.content import check_content, check_zeros, header_length
 from ncfix.text.dialect import Dialect
+from ncfix.text.dialects import check_content, check_zeros, header_length
 from ncfix.text.language import Language, language_of
 from ncfix.text.reader import Reading
 from ncfix.text.tree import Program, Skip, Template

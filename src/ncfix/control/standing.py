@@ -12,6 +12,7 @@ from ncfix.control.coordinates import (
     INDEX,
     LETTERS,
     ROTARY_LETTERS,
+    Places,
     Rotation,
     Vector,
     Z,
@@ -21,10 +22,9 @@ from ncfix.control.coordinates import (
     transposed,
     zeros,
 )
-from ncfix.control.knowledge import Knowledge
 from ncfix.control.modal import Modal, Offsets, Tools
 from ncfix.control.motion import AT_START, UnknownAxes
-from ncfix.control.places import Places
+from ncfix.control.setup import Knowledge
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run

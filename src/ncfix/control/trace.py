@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ncfix.control.finish import finished
+from ncfix.control.following import finished
 from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Kinematics, Trace
 from ncfix.control.setup import Setup

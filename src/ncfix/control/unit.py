@@ -10,8 +10,8 @@ from typing import Any, Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.ahead import Ahead
 from ncfix.control.lane_tables import LaneTables
+from ncfix.control.stage import Ahead
 from ncfix.text.tree import Program, Template, view
 
 P = TypeVar("P")

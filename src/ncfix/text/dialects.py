@@ -1,14 +1,16 @@
-"""Which dialects there are, and which of them a text is written in."""
+"""Which dialects there are, and which of them a text is written in.
+
+Whether bytes are an NC program at all, before anyone tries to read them.
+"""
 
 from __future__ import annotations
 
 import re
 from pathlib import PurePath
 
-from ncfix.diagnostics import UsageError
+from ncfix.diagnostics import Place, SourceError, UsageError
 from ncfix.plugins import nearest, registry, working
-from ncfix.text.content import beginning_without_comments
-from ncfix.text.dialect import Dialect
+from ncfix.text.dialect import HINTS, Dialect
 
 DEFAULT = "iso"
 """What a text is read as if neither its name nor its content says more."""
@@ -47,3 +49,59 @@ def signature_rank(dialect: Dialect, head: bytes) -> int | None:
     with working("dialects", dialect.name):
         found = (rank for rank, pattern in enumerate(dialect.signature) if re.search(pattern, head))
         return next(found, None)
+
+
+UTF8_MARK = b"\xef\xbb\xbf"
+UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+
+ANOTHER = "--dialect NAME, if it is for another control than the machine's; `ncfix dialects` lists them"
+
+PROBE_BYTES = 1 << 16
+"""How much of a text is looked at to find out what it is."""
+
+COMMENT = re.compile(rb"(?<=\()(?:[^()\r\n]|\([^()\r\n]*\))+|(?<=;)(?![ \t]*\$PATH)[^\r\n]+")
+"""What a comment says, up to its closing bracket or the end of the line; in `;$PATH=` SINUMERIK says where a program
+is kept."""
+
+
+def check_content(source: bytes, path: str, dialect: Dialect) -> None:
+    """Refuse what is not text (NCF101), holds nothing (NCF102), or is another family's language (NCF103)."""
+    if source.startswith(UTF16_MARKS):
+        raise SourceError.of("NCF101", "the text is UTF-16", Place(path, 1), "save it as ASCII, Latin-1 or UTF-8")
+    check_zeros(source, path)
+    if not source.removeprefix(UTF8_MARK).strip():
+        raise SourceError.of("NCF102", "there is no block in the program", Place(path))
+    code = beginning_without_comments(source)
+    for family, pattern in dialect.foreign:
+        if found := re.search(pattern, code):
+            text = f"this is {family}, not {dialect.title}"
+            place = place_of(source, found.start(found.re.groups and 1), path, "utf-8")
+            raise SourceError.of("NCF103", text, place, HINTS.get(family, ANOTHER))
+
+
+def beginning_without_comments(source: bytes) -> bytes:
+    """The first `PROBE_BYTES` of a text with blanks for what its comments say, byte for byte: signs of a language count
+    outside comments only. The brackets of a comment stay, as in other languages they enclose arguments."""
+    return COMMENT.sub(lambda found: b" " * len(found[0]), source[:PROBE_BYTES])
+
+
+def check_zeros(source: bytes, path: str, first_line: int = 1) -> None:
+    """Refuse zero bytes (NCF101); `first_line` is that of the file on which the text begins."""
+    zero = source.find(b"\0")
+    if zero >= 0:
+        found = place_of(source, zero, path)
+        place = Place(path, found.line + first_line - 1, found.column)
+        raise SourceError.of("NCF101", "there is a zero byte in the file", place)
+
+
+def place_of(source: bytes, byte: int, path: str, encoding: str = "") -> Place:
+    """The line and column of a byte, with the line's text if an encoding is given."""
+    line = source.count(b"\n", 0, byte) + 1
+    start = source.rfind(b"\n", 0, byte) + 1
+    text = source[start:].split(b"\n", 1)[0].rstrip().decode(encoding, "replace") if encoding else ""
+    return Place(path, line, byte - start + 1, text)
+
+
+def header_length(source: bytes) -> int:
+    """How many bytes stand before the first block: the mark of UTF-8, if it is there."""
+    return len(UTF8_MARK) if source.startswith(UTF8_MARK) else 0

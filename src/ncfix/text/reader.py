@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import Place, SourceError
-from ncfix.text import dialects
 from ncfix.text.build import Parsed
-from ncfix.text.content import check_content, header_length
 from ncfix.text.dialect import Dialect
+from ncfix.text.dialects import check_content, detect, get, header_length
 from ncfix.text.faults import BlockError
 from ncfix.text.language import Language, language_of
 from ncfix.text.reach import UNREAD, Reach
@@ -52,8 +51,8 @@ def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None =
     Raises SourceError NCF101 to NCF103 if the bytes are no program of that kind, NCF105 to NCF119 with the first line
     that cannot be read, and UsageError NCF104 for an unknown dialect.
     """
-    chosen = dialects.detect(source, path) if dialect is None else dialect
-    known = dialects.get(chosen) if isinstance(chosen, str) else chosen
+    chosen = detect(source, path) if dialect is None else dialect
+    known = get(chosen) if isinstance(chosen, str) else chosen
     check_content(source, path, known)
     language = language_of(known)
     blocks = language.split(source)

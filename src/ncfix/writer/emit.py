@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import FeedMode, Kind, Kinematics, Moves, Rule
-from ncfix.control.standstill import jumps, passed_through, renamed
+from ncfix.control.tcp import jumps, passed_through, renamed
 from ncfix.control.turns import UNTIMED, at_their_pace, is_dragged, minutes, turn_alone, turns_alone
 from ncfix.text.language import BlockLayout, language_of
 from ncfix.text.tree import Program, view

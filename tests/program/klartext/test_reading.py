@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.text import dialects
+from ncfix.text.dialects import detect
 from ncfix.text.reach import UNREAD
 from ncfix.text.reader import read
 from ncfix.text.tree import Assignment, Command, Flow, Opaque, Program, Word
@@ -81,8 +81,8 @@ def test_klartext_read_as_something_else_is_an_error(name: str) -> None:
 
 @pytest.mark.parametrize("path", ["t.h", "t.nc", "t.ptp", "t"])
 def test_the_beginning_shows_the_language(path: str) -> None:
-    assert dialects.detect(program("L X+1"), path).name == "heidenhain"
-    assert dialects.detect(b"\r\n0   BEGIN PGM 5 INCH\r\n", path).name == "heidenhain"
+    assert detect(program("L X+1"), path).name == "heidenhain"
+    assert detect(b"\r\n0   BEGIN PGM 5 INCH\r\n", path).name == "heidenhain"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.text import dialects
+from ncfix.text.dialects import detect
 from ncfix.text.reader import read
 from ncfix.text.tree import Assignment, Call, Command, Flow, Literal, NamedParameter, Opaque, Program, Word
 from program.lanes import assert_read_right
@@ -105,7 +105,7 @@ def test_the_corpus_is_read(shared: Callable[[str], Path], figures: Callable[[st
     unreadable, blocks, opaque = 0, 0, 0
     for path in files:
         source = path.read_bytes()
-        assert dialects.detect(source, path.name).name == "siemens", path.name
+        assert detect(source, path.name).name == "siemens", path.name
         try:
             program = read(source, path.name, "siemens")
         except SourceError:
