@@ -148,7 +148,9 @@ def test_the_floors_and_modules_of_the_documents_are_there(root: Path) -> None:
     packages = [name for name in floors if (root / "src/ncfix" / name).is_dir()]
     assert re.findall(r"^\| `src/ncfix/(\w+)`", contributing, re.MULTILINE) == packages
     assert set(packages) == {path.parent.name for path in root.glob("src/ncfix/*/__init__.py")}
-    named = re.findall(r"`([\w/]+\.py)`", (root / "docs/architecture.md").read_text())
-    there = {str(path.relative_to(root)) for path in [*root.glob("src/ncfix/**/*.py"), *root.glob("plugins/**/*.py")]}
+    pages = [*root.glob("docs/*.md"), root / "README.md", root / "CONTRIBUTING.md"]
+    named = {(page.name, name) for page in pages for name in re.findall(r"`([\w/]+\.py)`", page.read_text())}
+    folders = ("src", "plugins", "tests", "benchmarks", "examples")
+    there = {f"/{path.relative_to(root)}" for folder in folders for path in (root / folder).rglob("*.py")}
     assert len(named) > 20
-    assert not [name for name in named if not any(("/" + path).endswith("/" + name) for path in there)]
+    assert not [found for found in named if not any(path.endswith(f"/{found[1]}") for path in there)]

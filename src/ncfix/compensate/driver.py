@@ -283,12 +283,9 @@ def fix_flat(
         note = Message("NCF447", text, Place(program.path), "--block-skip on or off says which one")
         return replace(fixed, report=replace(fixed.report, warnings=(note, *fixed.report.warnings)))
     steps = np.where(machine.rotary, np.degrees(machine.least_increment[1]), machine.least_increment[0]).tolist()
-    names, rotary, by_name = (
-        machine.axis_names,
-        rotary_names(machine),
-        dict(zip(machine.axis_names, steps, strict=True)),
-    )
-    flat = flatten(program, setup, names, rotary, by_name, resolve, kinematics_of(machine))
+    names = machine.axis_names
+    by_name = dict(zip(names, steps, strict=True))
+    flat = flatten(program, setup, names, rotary_names(machine), by_name, resolve, kinematics_of(machine))
     again = fix_program(flat.program, machine, setup, options, resolve)
     if {each.line for each in fixed.report.refused} <= {flat.lines[each.line - 1] for each in again.report.refused}:
         return fixed

@@ -1,7 +1,7 @@
 """Arcs in the fast lane: the circles of all arcs of a stretch, as the interpreters find that of one block.
 
 What blocks say is read as columns; where a centre lies, whether the control accepts the arc, and how far it turns, is
-asked of `follow.arcs`, arc by arc.
+asked of `arcs`, arc by arc.
 """
 
 from __future__ import annotations

@@ -1,18 +1,14 @@
-"""Arcs in their plane: centre, closure and sweep from the words of a block. Pure geometry, mm and rad.
+"""Arcs in their plane, and what the control changes of contours by itself.
 
-Points are (first, second) coordinates of the plane relative to the arc's start. Rules and tolerances are LinuxCNC's
-(interp_arc.cc, interp_internal.hh, read for the facts; tried out on `rs274`).
+Arcs: centre, closure and sweep from the words of a block. Pure geometry, mm and rad; points are (first, second)
+coordinates of the plane relative to the arc's start. Rules and tolerances are LinuxCNC's (interp_arc.cc,
+interp_internal.hh, read for the facts; tried out on `rs274`).
 
-What may not move beside a contour that the control changes by itself.
-
-Motions that make no way in the plane while the control offsets the contour (cutter radius compensation).
-
-The least way in the plane would be offset by the radius, in whatever direction it leads. So a motion that makes none
-must make none when it is corrected: axes of the plane that it does not name get no word, and those that it names, as
-`X40` where X stands at 40, stay where they stand.
-
-Motions that meet at a corner which the control rounds or breaks: it puts in nothing where a motion leaves the plane, so
-that one which does not must not when it is corrected.
+Contours: while the control offsets them (cutter radius compensation), it would offset the least way in the plane by the
+radius, in whatever direction it leads. So a motion that makes no way in the plane must make none when it is corrected:
+axes of the plane that it does not name get no word, and those that it names, as `X40` where X stands at 40, stay where
+they stand. At a corner that the control rounds or breaks it puts in nothing where a motion leaves the plane; so a
+motion that does not leave it must not do so when it is corrected.
 Source: Siemens, "SINUMERIK 840D sl, NC programming, fundamentals": chamfer, rounding (CHF, CHR, RND, RNDM).
 """
 

@@ -1,6 +1,5 @@
-"""Motions gathered as columns: single ones in lists, stretches as arrays; no object is kept per motion.
-
-Motions as they are gathered: many that came together as columns, single ones in lists that become columns later.
+"""Motions gathered as columns: single ones in lists, which become columns later, and stretches that came together as
+arrays. No object is kept per motion.
 """
 
 from __future__ import annotations

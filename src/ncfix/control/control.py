@@ -54,7 +54,7 @@ class Control(Standing):
     ends       where the motions of a block end, if somebody wants to know
     points     a block gave the direction of the tool as a vector
     whole      the motions of the block must not be split, as under cutter compensation
-    at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `contour`
+    at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `arcs`
     handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
     block_words  the addresses of the block that is executed, as long as it has made no motion and no setting took them
@@ -252,7 +252,7 @@ class Control(Standing):
         return adrift
 
     def still_beside(self, axes: int) -> int:
-        """Axes of the plane that get no word in a motion across it, see `contour`."""
+        """Axes of the plane that get no word in a motion across it, see `arcs`."""
         plane = plane_of(self) if self.modal.compensated else 0
         return 0 if axes & plane else plane
 

@@ -1,6 +1,5 @@
-"""The axis letters of all languages, how their words become millimetres and radians, and rotations of X Y Z.
-
-Which axes the program itself has brought to where they stand, in the coordinates that are in force.
+"""The axis letters of all languages, how their words become millimetres and radians, rotations of X Y Z, and which
+axes the program itself has brought to where they stand.
 
 A correction may want a word for an axis that its block does not name. Such a word says where the axis stands already,
 but for some um, and that must be the program's own knowledge: if it rests on what tables or people say of the start,

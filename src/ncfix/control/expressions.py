@@ -1,12 +1,10 @@
-"""Expressions of a block made into functions, once per shape: one evaluator for all languages.
+"""Expressions of a block made into functions, once per shape, and the values that they give: one evaluator for all
+languages.
 
-A function reads the numbers of the block that is executed from a `Scope` and gives a `Value`. What operators and
-functions a language has, and what it counts as a number, is in its own `Expressions`. Angles are degrees.
-
-Values while a program is followed: numbers, texts, and what is known only at run time.
-
-`Unknown` is the only word for a value that nobody knows before the machine runs: a probed position, an input, a
-variable that an earlier program has left. What is computed from it is unknown, too, for the same reason.
+A function reads the numbers of the block that is executed from a `Scope` and gives a `Value`: a number, a text, or
+`Unknown`, which nobody knows before the machine runs (a probed position, an input, a variable that an earlier program
+has left). What is computed from it is unknown, too, for the same reason. What operators and functions a language has,
+and what it counts as a number, is in its own `Expressions`. Angles are degrees.
 """
 
 from __future__ import annotations

@@ -271,7 +271,7 @@ class Flow(Generic[U]):
     def finish(self, kind: str = "", *, again: bool = True) -> None:
         """Return from a call, or run it again (if that is `again` wanted); the program ends where none is open."""
         while kind and self.calls and self.calls[-1].kind != kind:
-            self.calls.pop()
+            self.calls.pop().leave()
         if not self.calls:
             self.ended = True
             return

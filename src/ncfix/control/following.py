@@ -1,6 +1,5 @@
-"""Following a program part by part, and what goes on from one part to the next: one for all languages.
-
-What there is to say when a program has been followed, the same for all languages.
+"""Following a program part by part, what goes on from one part to the next, and what there is to say at the end: the
+same for all languages.
 """
 
 from __future__ import annotations

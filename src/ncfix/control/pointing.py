@@ -1,13 +1,13 @@
-"""How two rotary axes point the tool in the workpiece, found out from a machine's own kinematics, and turned round.
+"""How two rotary axes point the tool in the workpiece, found out from a machine's own kinematics, and the angles with
+which they point it along a direction.
 
 Whatever the chain, the direction from the tip to the spindle is `turn(outer axis) @ turn(inner axis) @ tool`: each
 rotary axis turns it about a line that is fixed in the workpiece, or that only the other axis carries. Where these lines
 lie shows in three positions of each axis.
 
-The angles with which two rotary axes point the tool along a direction, for one direction or for many at once.
-
-Many are solved in columns with the same operations in the same order as one, so that the results are the same to the
-last bit: the functions of the standard library are called on number after number, since numpy's may round otherwise.
+Many directions are solved in columns with the same operations in the same order as one, so that the results are the
+same to the last bit: the functions of the standard library are called on number after number, since numpy's may round
+otherwise.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 Columns = tuple[FloatArray, FloatArray, FloatArray]
 
 Ways = tuple[tuple[float, float], tuple[float, float]]
-"""Two ways to point the tool, of which `pointing_angles.nearest` takes one: angles of outer and inner axis, rad."""
+"""Two ways to point the tool, of which `nearest` takes one: angles of outer and inner axis, rad."""
 
 Directions = Callable[[float, float], FloatArray]
 """Angles of the two rotary axes, rad -> the unit vector (3,) from the tip to the spindle in the workpiece."""

@@ -1,6 +1,5 @@
-"""What a program cannot know: work offsets, tool lengths, start position. Read from the setup file or from options.
-
-What a program uses and cannot know: asked of the setup; what is not there is collected, once each.
+"""What a program uses and cannot know: work offsets, tool lengths, start position. They are read from the setup file or
+from options; what a program asks for and is not there is collected, once each.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Blocks of plain numbers as columns: what they say, and where they lead.
-
-Looking ahead: what the blocks of numbers say and where they lead, found out for many stretches at once.
-"""
+"""Blocks of plain numbers as columns: what they say, and where they lead, of one stretch or of many ahead at once."""
 
 from __future__ import annotations
 

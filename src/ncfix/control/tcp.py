@@ -1,13 +1,12 @@
-"""Tool-centre-point control: what is known of X Y Z when it goes on and off, or the tool length changes in it.
+"""Tool-centre-point control (TCP): what is known of X Y Z when it goes on and off, or the tool length changes in it.
 
 X Y Z of a command are then those of the tip in the workpiece. Only the machine's kinematics connect them with axis
 positions; where they are not given, only while all rotary axes stand at zero is known how the two differ: by the tool
 length along Z.
 
-Where the control believes its axes to stand after what moves axes of the machine, or none, but its tip.
-
-When tool-centre-point control (TCP) goes on or off the machine stands still, and X Y Z have other numbers; in machine
-coordinates some axes move and others do not. That holds also for axes that a correction has put beside their places.
+When TCP goes on or off the machine stands still, and X Y Z have other numbers; in machine coordinates some axes move
+and others do not. `renamed` and `passed_through` tell where the control believes its axes to stand then, also of
+axes that a correction has put beside their places.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Blocks that turn rotary axes alone: their feed is degrees per minute, until a correction moves a linear axis too.
+"""Turns of rotary axes: the feed of blocks that turn them alone, and axes that may roll over.
+
+The feed of a block that turns rotary axes alone is degrees per minute, until a correction moves a linear axis too.
 
 Many controls take F as the speed of the linear axes as soon as one of them moves, and let rotary axes keep pace. A
 correction of some micrometres at 500 mm/min is done in milliseconds, and so would be the turn. A corrected turn is
@@ -8,9 +10,8 @@ long; else in inverse time (G93), which means the same everywhere. What was in f
 In inverse time LinuxCNC moves linear axes no slower than `LEAST_PACE`. A turn that this would hurry gets the F of its
 little linear motion too, in feed per minute (G94), and G93 again behind it.
 
-Rotary axes that may roll over: a parameter of the control lets an absolute word lead them the shorter way round.
-
-Nobody sees it in the program. Up to half a turn both ways are one; beyond it a control with roll-over turns the other
+Axes roll over where a parameter of the control lets an absolute word lead them the shorter way round. Nobody sees it in
+the program. Up to half a turn both ways are one; beyond it a control with roll-over turns the other
 way, and pieces of the longer way would lead the axis round against what the program did. So such a motion stays whole:
 its end is right either way. An axis that counts from 0 to 360 degrees and that increments have led out of them stands
 at another number than one that goes on counting: where words do not go the shorter way, a plain word behind that leads

@@ -1,7 +1,4 @@
-"""From the parser's tree of one block to the template of its shape.
-
-What a grammar cannot say of the words of a block, in every language that has words.
-"""
+"""From the parser's tree of one block to the template of its shape, and what a grammar cannot say of its words."""
 
 from __future__ import annotations
 

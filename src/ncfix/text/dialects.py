@@ -1,7 +1,4 @@
-"""Which dialects there are, and which of them a text is written in.
-
-Whether bytes are an NC program at all, before anyone tries to read them.
-"""
+"""Which dialects there are, which of them a text is written in, and whether bytes are an NC program at all."""
 
 from __future__ import annotations
 

@@ -1,12 +1,10 @@
-"""Many numbers as text at once: the manner of written numbers as columns, and other values written in it.
-
-What `number_style` does for one number, for all numbers of a text, byte for byte. A value that lies so close to the
-middle between two outputs that a product of doubles cannot tell which of them is nearer is marked, and left to it.
-
-How a number is written in a block, and how another value is written in the same style.
+"""How numbers are written in a block, and how other values are written in the same style: one, or all of a text at
+once.
 
 One rule for all output: a value is printed with a fixed number of decimals, correctly rounded from the double
-(an exact half goes to the even digit, as the C library does), and minus zero is zero.
+(an exact half goes to the even digit, as the C library does), and minus zero is zero. Many numbers are written as
+columns, byte for byte the same; a value that lies so close to the middle between two outputs that a product of doubles
+cannot tell which of them is nearer is marked, and written by itself.
 """
 
 from __future__ import annotations
