@@ -1,12 +1,13 @@
 """What becomes of the motion blocks of the world's programs, by dialect: corrected, passed, refused and why.
 
 `python -m classes.accounting` (with `tests` on the path) prints the table of all dialects, or of those named;
-`--flatten` with flat programs.
+`--flatten` with flat programs. The corpus is beside the project, or where NCFIX_SHARED says.
 """
 
 from __future__ import annotations
 
 import csv
+import os
 import re
 import sys
 from collections import Counter
@@ -136,7 +137,7 @@ def account(
 def main() -> None:
     """Print the table."""
     root = Path(__file__).resolve().parents[2]
-    corpus = root.parent / "shared" / "corpus"
+    corpus = Path(os.environ.get("NCFIX_SHARED") or root.parent / "shared") / "corpus"
     machine = load(str(root / "examples/machines/three_axis.toml"))
     with (corpus / "manifest.csv").open(newline="", encoding="utf-8") as manifest:
         present = {row["dialect"] for row in csv.DictReader(manifest)}

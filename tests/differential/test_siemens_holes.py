@@ -25,6 +25,7 @@ from ncfix.machine import Machine, load
 from ncfix.text.reader import read
 
 EACH = int(os.environ.get("NCFIX_SIEMENS_HOLES", "1"))
+FIRST = int(os.environ.get("NCFIX_SEED", "0"))
 FIGURE = 0.1e-3
 """mm: two models of a machine, and figures with four decimals of a micrometre."""
 
@@ -86,7 +87,7 @@ def taken(strategy: str, root: Path, each: int) -> Tally:
     """What becomes of programs of every kind."""
     model, machine, tally = errors.load(root / MACHINE), load(str(root / MACHINE)), Tally()
     for number, kind in enumerate(COMBINATIONS):
-        for seed in range(each):
+        for seed in range(FIRST, FIRST + each):
             text = program(1000 * number + seed, *kind)
             wrong = len(tally.wrong)
             judged(text, strategy, model, machine, tally)

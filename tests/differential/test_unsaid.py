@@ -1,6 +1,7 @@
 """After whatever leaves axes unsaid nothing is wrong without a word, in any frame, language and strategy.
 
-`NCFIX_UNSAID=20 pytest tests/differential/test_unsaid.py` judges as many programs of every kind.
+`NCFIX_UNSAID=20 pytest tests/differential/test_unsaid.py` judges as many programs of every kind,
+from the seed NCFIX_SEED on.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import pytest
 
 from differential import unsaid
 
-SEEDS = range(int(os.environ.get("NCFIX_UNSAID", "1")))
+FIRST = int(os.environ.get("NCFIX_SEED", "0"))
+SEEDS = range(FIRST, FIRST + int(os.environ.get("NCFIX_UNSAID", "1")))
 KINDS = None if os.environ.get("NCFIX_UNSAID") else 8
 """Of the 32 kinds of programs so many are judged by default, others with each strategy."""
 
