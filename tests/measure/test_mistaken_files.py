@@ -123,6 +123,17 @@ def test_a_mistaken_file_gives_no_machine(kind: str, what: str, topology: str) -
         assert outcome(everywhere(files, *change)), (seed, what)
 
 
+@pytest.mark.parametrize(
+    ("family", "topology", "seed", "change"),
+    [("clutter", "wCAYFXZSt", 31001, exchanged("dx", "dy")), ("small", "wCAYFXZSt", 52000, times(["dy"], -1))],
+)
+def test_a_mistaken_set_is_judged_by_itself(family: str, topology: str, seed: int, change: Change) -> None:
+    """Among many right sets one leaves little, and among poor ones it leaves not all of it."""
+    files = honest(seed, family, topology, "tcp")
+    assert "NCF617" in outcome(everywhere(files, one_set(change)))
+    assert outcome(files) == ()
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_honest_files_of_richer_machines_are_not_refused(kind: str) -> None:
     topologies = FIVE if kind == "probe" else (*FIVE, "wXFYZSt")

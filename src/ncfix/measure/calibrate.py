@@ -17,7 +17,7 @@ from ncfix import __version__
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.error_model import signals_of
-from ncfix.measure import contradictions
+from ncfix.measure import contradictions, mistakes
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.estimate import Calibration, Estimate, Problem, Residuals, fit, noise_scale
 from ncfix.measure.least_squares import AUTO, Combination, Solution, orthonormal, without
@@ -65,7 +65,7 @@ def calibrate(
     try:
         estimate = fit(problem, loss)
     except UsageError as error:
-        why = contradictions.suspected(problem) if error.code == "NCF637" else ()
+        why = mistakes.suspected(problem) if error.code == "NCF637" else ()
         raise UsageError((*error.messages, *why, *(each for data in measurements for each in data.remarks))) from error
     if prune is not None:
         problem, estimate = pruned(problem, estimate, prune, loss)
@@ -80,7 +80,7 @@ def calibrate(
         *_outliers(estimate, residuals),
         *_noise(problem, scale),
         *contradictions.conflicts(problem, estimate),
-        *contradictions.suspected(problem),
+        *mistakes.suspected(problem),
         *(message for seen in problem.observations for message in seen.doubts(found)),
         *time_remarks,
     ]
