@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ncfix.text.number_text import NumberStyle, decimals_for
+from ncfix.text.spelling import NumberStyle, decimals_for
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.text.layout import CENTRE_LETTERS, Layout
-from ncfix.text.number_text import NumberStyle
+from ncfix.text.spelling import NumberStyle
 from ncfix.text.tree import Literal, Program, Word
 from ncfix.writer.render import BlockRenderer
 from ncfix.writer.target import Rendered, Target

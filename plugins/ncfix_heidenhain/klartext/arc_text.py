@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.arcs import Point, sweep_angle
-from ncfix_heidenhain.klartext.number_text import Style, value_of
+from ncfix.text.spelling import Spelling, value_of
 
 FloatArray = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ class InPlane(NamedTuple):
     turn: float | None
 
 
-def arc_text(arc: PieceOfArc, style: Style) -> ArcText:
+def arc_text(arc: PieceOfArc, style: Spelling) -> ArcText:
     """Put an arc into words."""
     first, second, across = (arc.spatial[index] for index in arc.plane)
     begin, end, centre = arc.begin.tolist(), arc.end.tolist(), arc.centre.tolist()
@@ -120,7 +120,7 @@ def swept(arc: InPlane, middle: Point) -> float:
     return sweep_angle(to_centre, to_end, 1, clockwise=arc.clockwise)
 
 
-def by_radius(arc: InPlane, style: Style) -> tuple[str, Point] | None:
+def by_radius(arc: InPlane, style: Spelling) -> tuple[str, Point] | None:
     """R as written, and the centre that it means; None if that is over an output step from where it belongs."""
     (x, y), end, wanted = arc.begin, arc.end, arc.middle
     size = (distance(arc.begin, wanted) + distance(end, wanted)) / 2
@@ -139,7 +139,7 @@ def by_radius(arc: InPlane, style: Style) -> tuple[str, Point] | None:
     return (text, middle) if distance(middle, wanted) <= 10.0**-arc.digits else None
 
 
-def pole_text(middle: Point, style: Style, digits: int) -> tuple[str, str]:
+def pole_text(middle: Point, style: Spelling, digits: int) -> tuple[str, str]:
     """The coordinates of a pole as they are written."""
     return style.number(middle[0], digits), style.number(middle[1], digits)
 
@@ -154,7 +154,7 @@ def pole_words(plane: tuple[int, int, int], texts: tuple[str, str]) -> tuple[str
     return tuple(sorted(("XYZ"[plane[0]] + texts[0], "XYZ"[plane[1]] + texts[1])))
 
 
-def helix(arc: InPlane, style: Style) -> tuple[tuple[str, str], str, Point]:
+def helix(arc: InPlane, style: Spelling) -> tuple[tuple[str, str], str, Point]:
     """CP: a pole that is about equally far from both ends, IPA, and the end that the control works out of these.
 
     The angle is put on its digits before the pole is: about a far one that leads nearer to the end. About a near one
@@ -181,7 +181,7 @@ def turned_by(arc: InPlane, middle: Point) -> float:
     return angle if arc.turn is None else angle + 2 * math.pi * round((arc.turn - angle) / (2 * math.pi))
 
 
-def on_digits(angle: float, style: Style) -> str:
+def on_digits(angle: float, style: Spelling) -> str:
     """An angle as the control takes it."""
     return style.number(math.degrees(angle), ANGLE_DIGITS)
 

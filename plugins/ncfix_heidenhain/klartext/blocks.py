@@ -15,6 +15,7 @@ from ncfix.text.build import MAX_DEPTH, Branch, Builder, Node, Parsed, TooDeepEr
 from ncfix.text.dialect import Dialect
 from ncfix.text.grammar import Squeezed, parse
 from ncfix.text.reach import UNREAD
+from ncfix.text.spelling import value_of
 from ncfix.text.tree import (
     END,
     Anchor,
@@ -130,11 +131,6 @@ def place_of(anchor: Anchor, spans: tuple[tuple[int, int], ...]) -> int:
     """The place in the block that an anchor stands for."""
     slot, offset = anchor
     return offset if slot < 0 else spans[slot][1] + offset
-
-
-def value_of(token: str) -> float:
-    """The value of a number as written: comma or point, sign apart."""
-    return float("".join(token.split()).replace(",", "."))
 
 
 class Maker:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from ncfix.control.coordinates import PLANES, X, Y, dot, rotated
 from ncfix.control.expressions import Unknown, Value, nominal, signed
+from ncfix.text.spelling import value_of
 from ncfix_heidenhain.klartext.control import FREELY, Control
 from ncfix_heidenhain.klartext.free import Element, Leg, solved
 from ncfix_heidenhain.klartext.step import IN_PLANE, somewhere
@@ -150,7 +151,7 @@ def element_of(control: Control, text: str) -> Element | None:
 def number(control: Control, text: str) -> Value:
     """The value of a number or a Q parameter."""
     bare = "".join(text.split()).lstrip("+-")
-    value = control.scope.parameters.get(bare.upper()) if bare[0] in "Qq" else float(bare.replace(",", "."))
+    value = control.scope.parameters.get(bare.upper()) if bare[0] in "Qq" else value_of(bare)
     return signed(-1.0 if text.startswith("-") else 1.0, value)
 
 

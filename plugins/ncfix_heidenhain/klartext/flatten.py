@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from ncfix.control.expressions import nominal
 from ncfix.control.flatten import Change, FlatLine, Flattener
-from ncfix.text.number_text import decimals_for
+from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Constant, Expression, Literal, Opaque, Span, Text, Word
 from ncfix_heidenhain.klartext.calculate import compiled
 from ncfix_heidenhain.klartext.contours import written_out
@@ -19,7 +19,6 @@ from ncfix_heidenhain.klartext.control import Control
 from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import uses_comma
-from ncfix_heidenhain.klartext.number_text import Style
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
 from ncfix_heidenhain.klartext.plans import Plan
 from ncfix_heidenhain.klartext.units import KlartextUnit
@@ -41,9 +40,9 @@ NOT_WRITTEN = ("CALL PGM", "SEL PGM", "CALL SELECTED", "FN 14")
 
 
 class KlartextFlattener(Flattener):
-    """See `Flattener`; `style`: of numbers."""
+    """See `Flattener`; `style`: how numbers are written."""
 
-    def __init__(self, control: Control, steps: Mapping[str, float], limit: int, style: Style) -> None:
+    def __init__(self, control: Control, steps: Mapping[str, float], limit: int, style: Spelling) -> None:
         super().__init__(steps, limit)
         self.control, self.style = control, style
 
@@ -76,7 +75,7 @@ class KlartextFlattener(Flattener):
             parameters.assign(name, *scope.value_of(value))
         places = pattern_of_cycle(int(plan.name.removeprefix("cycl def ")), parameters) or ()
         shared = [name for name, _ in plan.assignments if name in SHARED]
-        set_anew = [f"FN 0: {name} = {self.short(nominal(parameters.get(name)))}" for name in shared]
+        set_anew = [f"FN 0: {name} = {self.style.short(nominal(parameters.get(name)), OTHERS)}" for name in shared]
         return [*set_anew, *(f"L {self.place(place)} R0 FMAX M99" for place in places)] if places else []
 
     def point(self, place: complex) -> str:
@@ -90,10 +89,6 @@ class KlartextFlattener(Flattener):
     def written(self, value: float, address: str) -> str:
         """A number of a word."""
         return self.style.number(value, self.digits(address))
-
-    def short(self, value: float) -> str:
-        """A number without zeros at its end."""
-        return self.style.number(value, OTHERS).rstrip("0").rstrip(".,")
 
     def is_left_out(self, statement: tuple[str, Span]) -> bool:
         """Whether a statement is not written: program ends, and what only makes sense with labels and calls."""
@@ -127,12 +122,14 @@ class KlartextFlattener(Flattener):
         found, at_runtime = self.control.scope.value_of(compiled(value))
         if at_runtime:
             return None
-        return self.short(found) if digits == OTHERS else self.style.number(found, digits)
+        write = self.style.short if digits == OTHERS else self.style.number
+        return write(found, digits)
 
 
 def unrolled(interpreter: KlartextInterpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """Follow a program and write down its blocks; raises SourceError NCF237 and NCF238."""
-    flattener = KlartextFlattener(interpreter.control, steps, limit, Style(uses_comma(interpreter.main.program.source)))
+    style = Spelling(signed=True, comma=uses_comma(interpreter.main.program.source), point=False)
+    flattener = KlartextFlattener(interpreter.control, steps, limit, style)
     interpreter.watcher = flattener
     interpreter.run()
     program = interpreter.main.program

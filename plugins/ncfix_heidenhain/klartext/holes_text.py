@@ -6,9 +6,9 @@ the tool stands, so that gets a word.
 
 from __future__ import annotations
 
+from ncfix.text.spelling import value_of
 from ncfix.text.tree import Word
 from ncfix_heidenhain.klartext.control import BY_DEPTH
-from ncfix_heidenhain.klartext.number_text import value_of
 from ncfix_heidenhain.klartext.words_text import WordWriter
 
 SURFACE = "Q203"

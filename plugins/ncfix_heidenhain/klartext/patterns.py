@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from ncfix.control.expressions import Value, nominal, numbers, signed
+from ncfix.text.spelling import value_of
 from ncfix_heidenhain.klartext.calculate import Parameters
 
 ON_CIRCLE, ON_LINES = 220, 221
@@ -66,7 +67,7 @@ def holes(values: Values) -> float:
 
 def number(sign: str, text: str, parameters: Parameters) -> Value:
     """The value of a number or a Q parameter."""
-    value = parameters.get(text.upper()) if text[0] in "Qq" else float(text.replace(",", "."))
+    value = parameters.get(text.upper()) if text[0] in "Qq" else value_of(text)
     return signed(-1.0 if sign == "-" else 1.0, value)
 
 

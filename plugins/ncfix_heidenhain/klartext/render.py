@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.arcs import CLOCKWISE
+from ncfix.text.spelling import value_of
 from ncfix.text.tree import Literal, Program
 from ncfix.writer.target import Rendered, Target
 from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text
 from ncfix_heidenhain.klartext.control import BY_DEPTH, FROM_START
 from ncfix_heidenhain.klartext.holes_text import HoleWriter
 from ncfix_heidenhain.klartext.layout import Layout, poles_move
-from ncfix_heidenhain.klartext.number_text import value_of
 from ncfix_heidenhain.klartext.poles import is_relied_on, pole_in_force
 
 FloatArray = NDArray[np.float64]

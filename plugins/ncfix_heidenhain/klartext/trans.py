@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 
 from ncfix.control.coordinates import INDEX
+from ncfix.text.spelling import value_of
 from ncfix_heidenhain.klartext.control import Control
 
 FORM = re.compile(r"TRANS\s+(?P<kind>MIRROR|ROTATION|SCALE|DATUM)\s*(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
@@ -48,7 +49,7 @@ def put_in_force(control: Control, kind: str, rest: str) -> bool:
     trans = control.transformations
     reset, number = rest.upper() == "RESET", NUMBER.match(rest)
     word = "RESET" if reset else number["word"].upper() if number else ""
-    value = float("".join(number["value"].split()).replace(",", ".")) if number else 0.0
+    value = value_of(number["value"]) if number else 0.0
     if kind == "MIRROR" and (reset or AXES.match(rest)):
         trans.mirror_axes(frozenset(rest.upper().split()[1:]))
     elif kind == "ROTATION" and word in ("RESET", "ROT", "IROT"):

@@ -10,13 +10,11 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
+from ncfix.text.spelling import value_of
+
 FULL = 360.0
 UNCORRECTED = 1e-9
 """Degrees: what an angle is off for nothing but the rounding of doubles."""
-
-
-def _plain(number: bytes) -> bytes:
-    return b"".join(number.split()).replace(b",", b".")
 
 
 @lru_cache(maxsize=16)
@@ -24,7 +22,7 @@ def extremes(source: bytes, letter: str) -> tuple[float, float]:
     """The smallest and largest angle that a program writes for a rotary axis, degrees; 0 at least is among them."""
     code = re.sub(rb";[^\r\n]*", b"", source)
     found = re.findall(rb"(?i)(?<![A-Z0-9])" + letter.encode() + rb"[ \t]*([+-]?[ \t]*[\d.,]*\d)", code)
-    angles = [float(number) for number in map(_plain, found) if number.count(b".") < 2]
+    angles = [value_of(text) for text in map(bytes.decode, found) if text.count(".") + text.count(",") < 2]
     return min(angles, default=0.0), max(angles, default=0.0)
 
 

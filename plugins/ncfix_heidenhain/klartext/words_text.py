@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.text.number_text import ROUNDED
+from ncfix.text.spelling import Spelling, value_of
 from ncfix.text.tree import Literal, Program, Span, Word
 from ncfix.writer.block_words import BlockWriter
 from ncfix.writer.target import Target
 from ncfix_heidenhain.klartext.layout import Layout, tilts
-from ncfix_heidenhain.klartext.number_text import Style, value_of
 from ncfix_heidenhain.klartext.turns import UNCORRECTED, on_its_side
 
 FloatArray = NDArray[np.float64]
@@ -27,7 +27,7 @@ class WordWriter(BlockWriter[Layout]):
 
     def __init__(self, program: Program, block: int, layout: Layout, target: Target) -> None:
         super().__init__(program, block, layout, target)
-        self.style = Style(layout.comma)
+        self.style = Spelling(signed=True, comma=layout.comma)
         self.own_pole = False
 
     def _polar_columns(self) -> tuple[int, ...]:

@@ -17,7 +17,7 @@ from ncfix.control.faults import Fault
 from ncfix.control.flatten import RUNTIME, Change, FlatLine, Flattener
 from ncfix.control.unit import TextUnit
 from ncfix.diagnostics import SourceError
-from ncfix.text.number_text import decimals_for
+from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Literal, Opaque, Parameter, Word
 from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, Control
 from ncfix_iso.rs274.plans import Codes, Plan
@@ -36,6 +36,7 @@ KEPT = frozenset({"program name", "control character", "command"})
 """Opaque text that a flat program keeps."""
 
 OTHER_DECIMALS, VARIABLE_DECIMALS = 4, 6
+PLAIN = Spelling()
 LENGTHS = frozenset((*CENTRE_LETTERS, "R", "Q"))
 
 
@@ -156,7 +157,7 @@ class RS274Flattener(Flattener):
             what = f"what #{number} is set to"
             raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
         value = nominal(parameters.numbered(number))
-        return "#0" if math.isnan(value) else trimmed(value, VARIABLE_DECIMALS)
+        return "#0" if math.isnan(value) else PLAIN.short(value, VARIABLE_DECIMALS)
 
     def word(self, word: Word) -> Change | None:
         """What becomes of a word."""
@@ -197,9 +198,9 @@ class RS274Flattener(Flattener):
         """A value as text; a coordinate is rounded to the least increment, and the rest is carried."""
         if letter not in self.steps:
             decimals = self.decimals("X") if letter in LENGTHS else OTHER_DECIMALS
-            return trimmed(value, decimals)
+            return PLAIN.short(value, decimals)
         carried = value + (self.carry.get(letter, 0.0) if self.control.modal.incremental else 0.0)
-        text = trimmed(carried, self.decimals(letter))
+        text = PLAIN.short(carried, self.decimals(letter))
         self.carry[letter] = carried - float(text)
         return text
 
@@ -252,7 +253,7 @@ class RS274Flattener(Flattener):
     def number_at(self, letter: str, value: float) -> str:
         """An absolute value as text."""
         self.carry[letter] = 0.0
-        return trimmed(value, self.decimals(letter if letter in self.steps else "Z"))
+        return PLAIN.short(value, self.decimals(letter if letter in self.steps else "Z"))
 
     # -- lines --------------------------------------------------------------------------------------------------------
 
@@ -287,15 +288,6 @@ def unrolled(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: i
     if begins and (not ends or len(lines) == 1):
         flattener.write("%")
     return lines
-
-
-def trimmed(value: float, decimals: int) -> str:
-    """A number with at most so many decimals, and always with a point."""
-    text = f"{value:.{decimals}f}"
-    if "." in text:
-        text = text.rstrip("0")
-    text = text if "." in text else text + "."
-    return "0." if text in ("-0.", "-.") else text
 
 
 def is_setting(word: Word) -> bool:

@@ -7,14 +7,13 @@ read, R parameters, global data and those of the control, is set as it was.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.expressions import Unknown, number
 from ncfix.control.faults import Fault
 from ncfix.control.flatten import RUNTIME, Change, Flattener
-from ncfix.text.number_text import decimals_for
+from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import (
     Assignment,
     Call,
@@ -37,6 +36,8 @@ from ncfix_siemens.sinumerik.statements import Turn
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.variables import Variables, key_of
 from ncfix_siemens.sinumerik.vocabulary import FORMS, HARMLESS
+
+BARE = Spelling(point=False)
 
 OTHER_DECIMALS = 5
 """Of words that are no axes."""
@@ -110,7 +111,7 @@ class SinumerikFlattener(Flattener):
         """What gets a value, as it is written."""
         if name == "r":
             return f"R{places[0]:.0f}"
-        return name.upper() + (f"[{','.join(written(place, 0) for place in places)}]" if places else "")
+        return name.upper() + (f"[{','.join(BARE.short(place, 0) for place in places)}]" if places else "")
 
     def number(self, word: Word) -> str:
         """The value of a computed word as it is written, within its brackets if it has a form."""
@@ -122,7 +123,7 @@ class SinumerikFlattener(Flattener):
             raise Fault(RUNTIME, f"the value of {word.address} is known only at run time")
         step = self.steps.get(word.address)
         digits = OTHER_DECIMALS if step is None else decimals_for(step) + MORE_DECIMALS
-        shown = written(value, digits)
+        shown = BARE.short(value, digits)
         found = FORM.match(text) if isinstance(word.value, Call) and word.value.name in FORMS else None
         return shown if found is None else text[: found.start("value")] + shown + text[found.end("value") :]
 
@@ -132,7 +133,7 @@ class SinumerikFlattener(Flattener):
         letters = [LETTERS[index] for index in (plane.first, plane.second)]
         digits = [decimals_for(self.steps[letter]) + MORE_DECIMALS for letter in letters]
         words = zip(letters, point, digits, strict=True)
-        return " ".join(["G0", *(f"{letter}{written(value, places)}" for letter, value, places in words)])
+        return " ".join(["G0", *(f"{letter}{BARE.short(value, places)}" for letter, value, places in words)])
 
     def command(self, command: Command) -> Change | None:
         """What becomes of a name."""
@@ -196,15 +197,9 @@ def argument(value: float | str | None) -> str:
     """An argument as it is written."""
     if value is None:
         return ""
-    return f'"{value}"' if isinstance(value, str) else written(value, OTHER_DECIMALS)
+    return f'"{value}"' if isinstance(value, str) else BARE.short(value, OTHER_DECIMALS)
 
 
 def assigned(value: float | str) -> str:
     """A value that a variable gets, to all digits."""
     return f'"{value}"' if isinstance(value, str) else f"{value:.15g}".replace("e", "EX")
-
-
-def written(value: float, digits: int) -> str:
-    """A number without superfluous zeros."""
-    text = re.sub(r"\.?0+$", "", f"{value:.{digits}f}") if digits else f"{value:.0f}"
-    return "0" if text in ("-0", "") else text

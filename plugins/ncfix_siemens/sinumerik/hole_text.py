@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import CycleCall
-from ncfix.text.number_text import NumberStyle
+from ncfix.text.spelling import NumberStyle
 from ncfix.text.tree import Program, Word
 from ncfix.writer.target import LINE, Rendered, Target
-from ncfix_siemens.sinumerik.flatten import argument, written
+from ncfix_siemens.sinumerik.flatten import BARE, argument
 from ncfix_siemens.sinumerik.layout import END_OF_SUBPROGRAM, SinumerikLayout
 from ncfix_siemens.sinumerik.render import SinumerikRenderer
 
@@ -142,13 +142,13 @@ def shifted(call: CycleCall, off: float, decimals: int) -> tuple[list[str] | Non
     """
     (first, sense), *_ = call.depths
     value = number_of(call, first)
-    shown = written(value + sense * off, decimals)
+    shown = BARE.short(value + sense * off, decimals)
     sunk = sense * (float(shown) - value) if off else 0.0
     if sunk == 0.0:
         return None, 0.0
     arguments = [argument(value) for value in call.arguments]
     for place, sense in call.depths:
-        arguments[place] = written(number_of(call, place) + sense * sunk, decimals)
+        arguments[place] = BARE.short(number_of(call, place) + sense * sunk, decimals)
     return arguments, sunk
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.control.pointing import Pointing
 from ncfix.text.layout import CENTRE_LETTERS
-from ncfix.text.number_text import NumberStyle
+from ncfix.text.spelling import NumberStyle
 from ncfix.text.tree import Call, Literal, Word
 from ncfix.writer.render import BlockRenderer
 from ncfix.writer.target import TANGENTIAL

@@ -1,15 +1,11 @@
-"""How numbers are written in a block, and how other values are written in the same style: one, or all of a text at
-once.
+"""Many numbers of a text, and how they are written: as columns, byte for byte as `spelling` writes one.
 
-One rule for all output: a value is printed with a fixed number of decimals, correctly rounded from the double
-(an exact half goes to the even digit, as the C library does), and minus zero is zero. Many numbers are written as
-columns, byte for byte the same; a value that lies so close to the middle between two outputs that a product of doubles
-cannot tell which of them is nearer is marked, and written by itself.
+A value that lies so close to the middle between two outputs that a product of doubles cannot tell which of them is
+nearer is marked, and written by itself.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +35,7 @@ ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
 
 @dataclass(frozen=True, slots=True)
 class Styles:
-    """The manner of m written numbers, as in `NumberStyle`; `clear` (m,): nothing but a sign, digits and a point."""
+    """The manner of m numbers, as in `spelling.NumberStyle`; `clear` (m,): nothing but a sign, digits and a point."""
 
     decimals: IntArray
     point: Mask
@@ -74,7 +70,7 @@ def styles_of(text: NDArray[np.uint8], spans: IntArray, *, signed: bool = False)
 
 
 @dataclass(frozen=True, slots=True)
-class Spelling:
+class NumberColumns:
     """How m numbers are to be written, columns.
 
     heads     four bytes that stand before each, as one number; a zero byte for none
@@ -92,10 +88,10 @@ class Spelling:
     least: IntArray
     point: Mask
 
-    def and_then(self, other: Spelling, order: IntArray) -> Spelling:
+    def and_then(self, other: NumberColumns, order: IntArray) -> NumberColumns:
         """These numbers and others behind them, all put in an order."""
         names = self.__dataclass_fields__
-        return Spelling(*(np.concatenate((getattr(self, k), getattr(other, k))).take(order) for k in names))
+        return NumberColumns(*(np.concatenate((getattr(self, k), getattr(other, k))).take(order) for k in names))
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +118,7 @@ def rounded(values: FloatArray, decimals: IntArray | int) -> FloatArray:
     return result
 
 
-def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> Spelling:
+def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> NumberColumns:
     """Values in the styles of written numbers, as `NumberStyle.write` does it; all `is_plain`, all `clear`."""
     kept = np.maximum(decimals, styles.decimals)
     steps = _steps(values, kept)
@@ -134,10 +130,10 @@ def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> Spelling
     sign = styles.plus * np.uint8(PLUS)
     sign[(values < 0) & (steps != 0)] = MINUS
     least = np.maximum(styles.width, styles.leading_zero | (kept == 0))
-    return Spelling(np.zeros(len(steps), np.uint32), sign, steps, kept, least, styles.point | (kept > 0))
+    return NumberColumns(np.zeros(len(steps), np.uint32), sign, steps, kept, least, styles.point | (kept > 0))
 
 
-def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8], *, signed: bool = False) -> Spelling:
+def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8], *, signed: bool = False) -> NumberColumns:
     """Values with exactly so many decimals, as `f"{value:.{decimals}f}"` does it; all `is_plain`.
 
     heads   (m, 4) bytes to put before each, 0 for none
@@ -146,7 +142,9 @@ def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8], *, s
     steps = _steps(values, decimals)
     negative = (values < 0) & (steps != 0) if signed else np.signbit(values)
     sign = np.where(negative, MINUS, PLUS if signed else 0).astype(np.uint8)
-    return Spelling(heads.view(np.uint32)[:, 0], sign, steps, decimals, np.ones(len(steps), np.int64), decimals > 0)
+    return NumberColumns(
+        heads.view(np.uint32)[:, 0], sign, steps, decimals, np.ones(len(steps), np.int64), decimals > 0
+    )
 
 
 def _steps(values: FloatArray, decimals: IntArray) -> NDArray[np.uint32]:
@@ -155,7 +153,7 @@ def _steps(values: FloatArray, decimals: IntArray) -> NDArray[np.uint32]:
     return steps
 
 
-def laid_out(numbers: Spelling) -> Texts:
+def laid_out(numbers: NumberColumns) -> Texts:
     """Numbers as text: what stands before, sign, digits, point and decimals in columns, and zero where nothing is."""
     decimals, most = numbers.decimals, int(numbers.decimals.max(initial=0))
     if int(decimals.min(initial=most)) == most:
@@ -213,64 +211,3 @@ def without_zeros(columns: list[NDArray[Any]]) -> bytes:
         cells[:, at : at + column.itemsize].view(column.dtype)[:, 0] = column
         at += column.itemsize
     return cells.tobytes().translate(None, b"\0")
-
-
-@dataclass(frozen=True, slots=True)
-class NumberStyle:
-    """The manner of one written number.
-
-    decimals       digits after the point
-    point          a decimal point is written even when no digit follows it
-    plus           a plus sign is written
-    leading_zero   a zero is written before the point of numbers below one
-    width          digits before the point, where they were padded with zeros (`X007.5` -> 3), else 0
-    """
-
-    decimals: int = 0
-    point: bool = True
-    plus: bool = False
-    leading_zero: bool = True
-    width: int = 0
-
-    @classmethod
-    def of(cls, text: str) -> NumberStyle:
-        """The style of a number as written, blanks inside it ignored."""
-        compact = "".join(text.split())
-        digits = compact.lstrip("+-")
-        whole, point, fraction = digits.partition(".")
-        padded = len(whole) > 1 and whole.startswith("0")
-        return cls(
-            decimals=len(fraction),
-            point=bool(point),
-            plus=compact.startswith("+"),
-            leading_zero=bool(whole),
-            width=len(whole) if padded else 0,
-        )
-
-    def write(self, value: float, decimals: int) -> str:
-        """`value` in this style, with at most `decimals` digits but never fewer than the style's own.
-
-        Zeros beyond the style's own decimals are dropped: `X50.` moved by 12 um is `X50.012`, not `X50.0120`.
-        """
-        text = f"{abs(value):.{max(decimals, self.decimals)}f}"
-        whole, _, fraction = text.partition(".")
-        fraction = fraction.rstrip("0").ljust(self.decimals, "0")
-        sign = self._sign(value, whole, fraction)
-        if not self.leading_zero and whole == "0" and fraction:
-            whole = ""
-        whole = whole.zfill(self.width)
-        return sign + whole + ("." + fraction if fraction or self.point else "")
-
-    def _sign(self, value: float, whole: str, fraction: str) -> str:
-        is_zero = not (whole + fraction).strip("0")
-        if value < 0 and not is_zero:
-            return "-"
-        return "+" if self.plus else ""
-
-
-def decimals_for(step: float) -> int:
-    """How many decimals the control's least increment needs: 0.001 -> 3, 0.0005 -> 4, 1/25400 -> 5.
-
-    `step` is in the unit of the word.
-    """
-    return max(0, math.ceil(-math.log10(step) - 1e-9))

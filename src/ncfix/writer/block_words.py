@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ncfix.control.turns import is_dragged
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
-from ncfix.text.number_text import NumberStyle
+from ncfix.text.spelling import NumberStyle
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.writer.target import TANGENTIAL, Rendered, Target
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ncfix import fast
 from ncfix.control.moves import Frame, Kind, Moves
 from ncfix.text.language import Language
-from ncfix.text.number_text import Spelling, Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
+from ncfix.text.number_text import NumberColumns, Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
 from ncfix.writer.bulk_arcs import CentreWords, Manner, whole_arcs
@@ -349,14 +349,14 @@ class Stretch:
         lined = self.bulk.layouts.manner.lined and self.further.any()
         return self._in_lines(words, rows, np.argsort(order)[len(spans) :]) if lined else words
 
-    def _rewritten(self) -> tuple[IntArray, Spelling]:
+    def _rewritten(self) -> tuple[IntArray, NumberColumns]:
         """The words that get another value: where they stand, (m, 2), and how they are to be written."""
         cells = np.flatnonzero(self.rewrite)
         values, decimals = self.wanted.ravel().take(cells), self.decimals.take(cells % len(self.decimals))
         spans = self.bulk.program.number_spans.take(self.words.ravel().take(cells), axis=0)
         return spans, in_style(values, self.styles, decimals)
 
-    def _added(self) -> tuple[IntArray, IntArray, Spelling]:
+    def _added(self) -> tuple[IntArray, IntArray, NumberColumns]:
         """The words that are missing, and those of further pieces, in the order in which programs write them.
 
         Returns the row of each, the place where it is put in, and how it is to be written.

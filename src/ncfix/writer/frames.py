@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import Frame
-from ncfix.text.number_text import decimals_for
+from ncfix.text.spelling import decimals_for
 
 FloatArray = NDArray[np.float64]
 

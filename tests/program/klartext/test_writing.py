@@ -12,9 +12,9 @@ from ncfix.compensate.driver import fix_program
 from ncfix.compensate.solve import SelfCheckError
 from ncfix.machine import loads
 from ncfix.text.reader import read
+from ncfix.text.spelling import Spelling
 from ncfix.text.writer import apply
 from ncfix_heidenhain.klartext.arc_text import PieceOfArc, arc_text
-from ncfix_heidenhain.klartext.number_text import Style
 from ncfix_heidenhain.klartext.poles import pole_in_force
 from ncfix_heidenhain.klartext.render import NOT_CLOSED
 from program.klartext.tnc import KNOWN, THREE, fixed, follow, program
@@ -274,7 +274,7 @@ def test_an_angle_of_as_many_digits_as_a_control_takes_leads_to_the_end(radius: 
     begin, middle = np.array([7.1234, -3.4321, 5.0]), np.array([7.1234 - radius, -3.4321, 5.0])
     end = middle + radius * np.array([np.cos(turn), np.sin(turn), 0.0]) + [0, 0, 2.0]
     arc = PieceOfArc(begin, end, middle, (0, 1, 2), (0, 1, 2), degrees < 0, turn, np.full(3, 4))
-    text = arc_text(arc, Style())
+    text = arc_text(arc, Spelling(signed=True))
     assert text.function == "CP"
     assert len(text.words[0].partition(".")[2]) <= 4
     off = radius * 1e-4 * np.pi / 360 if abs(degrees) > 180 else 0.0
@@ -290,6 +290,6 @@ def test_rounded_ends_of_a_nearly_full_circle_do_not_lead_its_pole_astray() -> N
     begin, end = np.array([-79.002, -59.446, 3.001]), np.array([-78.390, -58.062, 1.237])
     middle = np.array([-81.72646, -57.41652, 3.0])
     arc = PieceOfArc(begin, end, middle, (0, 1, 2), (0, 1, 2), True, np.radians(-334.27), np.full(3, 3))
-    text = arc_text(arc, Style())
+    text = arc_text(arc, Spelling(signed=True))
     assert 2 * np.hypot(*(text.centre - middle)[:2]) < 1e-3
     assert np.hypot(*(text.end - end)[:2]) < 1e-3

@@ -26,7 +26,7 @@ from ncfix.compensate.plan.sampling import reach
 from ncfix.compensate.plan.segments import Segments, sweep_between
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine
-from ncfix.text.number_text import decimals_for
+from ncfix.text.spelling import decimals_for
 from ncfix.writer.emit import Emission
 from ncfix.writer.pieces import Pieces
 
