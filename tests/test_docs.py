@@ -16,21 +16,12 @@ from ncfix import plugins
 from ncfix.cli.main import VERBS, cli
 from ncfix.control.setup_file import loads
 
-DOCUMENTS = (
-    "README.md",
-    "CHANGELOG.md",
-    "CONTRIBUTING.md",
-    "docs/architecture.md",
-    "docs/plugins.md",
-    "docs/formats.md",
-    "docs/conventions.md",
-    "docs/derive.md",
-)
+DOCUMENTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "docs/guide/*.md", "examples/stories/*/*.md")
 
 COLUMN = 72
 """Where README.md says at the latest what a command does."""
 
-LINK = re.compile(r"\[[^]]*\]\(([^)#\s]+)(#[^)\s]*)?\)")
+LINK = re.compile(r"\[[^]]*\]\(([^)#\s]*)(#[^)\s]*)?\)")
 
 
 def commands() -> Iterator[tuple[str, click.Command]]:
@@ -107,12 +98,23 @@ def test_the_plugin_of_the_document_is_the_one_that_the_tests_run(root: Path) ->
     assert said == {key: project[key] for key in said}
 
 
-@pytest.mark.parametrize("document", DOCUMENTS)
-def test_links_lead_somewhere(root: Path, document: str) -> None:
-    path = root / document
-    for link, _ in LINK.findall(path.read_text()):
-        if "://" not in link:
-            assert (path.parent / link).exists(), f"{document}: {link}"
+def anchors(text: str) -> set[str]:
+    """What a link to a heading of a page may be, as GitHub makes it."""
+    headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE)
+    return {"#" + re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("documents", DOCUMENTS)
+def test_links_lead_somewhere(root: Path, documents: str) -> None:
+    pages = list(root.glob(documents))
+    assert pages
+    for page in pages:
+        for link, anchor in LINK.findall(page.read_text()):
+            if "://" in link:
+                continue
+            target = page.parent / link if link else page
+            assert target.exists(), f"{page}: {link}"
+            assert not anchor or anchor in anchors(target.read_text()), f"{page}: {link}{anchor}"
 
 
 def test_every_module_says_what_it_is(root: Path) -> None:

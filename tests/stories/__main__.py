@@ -1,4 +1,4 @@
-"""`python -m tests.stories`: run the stories and write what their commands print into their READMEs."""
+"""`python -m tests.stories [NAME...]`: run stories and pages of the guide, and write what their commands print into them."""
 
 from __future__ import annotations
 
@@ -7,21 +7,23 @@ import sys
 import tempfile
 from pathlib import Path
 
-from .story import written_anew
+from .story import GUIDE, written_anew
 
-STORIES = Path(__file__).resolve().parents[2] / "examples" / "stories"
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def main(names: list[str]) -> None:
-    """All stories, or these."""
-    for folder in sorted(path.parent for path in STORIES.glob("*/README.md")):
-        if names and folder.name not in names:
+    """All stories and pages, or these: a story by its folder, a page of the guide by its name without `.md`."""
+    stories = {path.parent.name: (path, path.parent) for path in (ROOT / "examples" / "stories").glob("*/README.md")}
+    pages = {path.stem: (path, ROOT / GUIDE) for path in (ROOT / "docs" / "guide").glob("[a-z]*.md")}
+    for name, (page, folder) in sorted({**stories, **pages}.items()):
+        if names and name not in names:
             continue
         with tempfile.TemporaryDirectory(prefix="story-") as place:
             copy = Path(place) / folder.name
             shutil.copytree(folder, copy)
-            text = written_anew((folder / "README.md").read_text(), copy)
-        (folder / "README.md").write_text(text)
+            text = written_anew(page.read_text(), copy)
+        page.write_text(text)
 
 
 if __name__ == "__main__":

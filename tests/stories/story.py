@@ -1,4 +1,5 @@
-"""A worked story: a folder with a README whose console blocks are what a user types and sees.
+"""A worked story: a folder with a README whose console blocks are what a user types and sees. So are the pages of the
+guide (docs/guide), each in a copy of one folder.
 
 Blocks start with three backticks and `console`; in them a line that starts with `$ ` is a command, the lines up to the
 next one are what it prints on a terminal (standard error included), and a line `...` stands for lines left out.
@@ -19,12 +20,15 @@ from pathlib import Path
 
 FENCE = re.compile(r"(?<=^```console\n).*?(?=^```$)", re.MULTILINE | re.DOTALL)
 LEFT_OUT = "..."
+GUIDE = "examples/guide"
+"""The folder in which every page of the guide begins."""
 NUMBER = re.compile(r"(?<![A-Za-z0-9_.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z0-9_])")
 UNSTEADY = re.compile(r"p = \S+(?=[),;])|log odds \d+|, \d+ less")
 """Figures that the last digits of a computer's arithmetic decide."""
 RELATIVE, ABSOLUTE = 0.1, 0.15
 """How far figures may be from the printed ones: sums in another order, another release of a library."""
-FINDINGS = 1
+ENDS = (0, 1, 2, 4)
+"""Exit codes of a step: done, findings, something that has to be given, a refusal; never a fault."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +52,25 @@ def _steps(block: str) -> Iterator[Step]:
 
 
 def run(command: str, folder: Path) -> list[str]:
-    """The lines that a command prints in a folder; it may end with findings (exit code 1), not with an error."""
+    """The lines that a command prints in a folder; `> FILE` at its end puts its standard output there instead.
+
+    RuntimeError: it ended with a fault, or cannot read a file.
+    """
     program, *arguments = shlex.split(command)
     if program != "ncfix":
         raise ValueError(f"{command}: a story runs ncfix only")
+    target = folder / arguments[-1] if arguments[-2:-1] == [">"] else None
     done = subprocess.run(
-        [str(Path(sys.executable).with_name("ncfix")), *arguments], cwd=folder, text=True, check=False, timeout=300,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, "NO_COLOR": "1", "COLUMNS": "120"},
+        [str(Path(sys.executable).with_name("ncfix")), *(arguments[:-2] if target else arguments)], cwd=folder, text=True,
+        check=False, timeout=300, stdout=subprocess.PIPE, stderr=subprocess.PIPE if target else subprocess.STDOUT,
+        env={**os.environ, "NO_COLOR": "1", "COLUMNS": "120"},
     )  # fmt: skip
-    if done.returncode > FINDINGS:
-        raise RuntimeError(f"{command}: exit code {done.returncode}\n{done.stdout}")
-    return done.stdout.rstrip("\n").split("\n") if done.stdout else []
+    printed = done.stderr if target else done.stdout
+    if done.returncode not in ENDS:
+        raise RuntimeError(f"{command}: exit code {done.returncode}\n{printed}")
+    if target:
+        target.write_text(done.stdout)
+    return printed.rstrip("\n").split("\n") if printed else []
 
 
 def alike(shown: tuple[str, ...], printed: list[str]) -> bool:
