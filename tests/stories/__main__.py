@@ -1,4 +1,4 @@
-"""`python -m tests.stories [NAME...]`: run stories and pages of the guide, and write what their commands print into them."""
+"""`python -m tests.stories [NAME...]`: run stories and pages of the guide; what their commands print goes into them."""
 
 from __future__ import annotations
 

@@ -61,9 +61,9 @@ def run(command: str, folder: Path) -> list[str]:
         raise ValueError(f"{command}: a story runs ncfix only")
     target = folder / arguments[-1] if arguments[-2:-1] == [">"] else None
     done = subprocess.run(
-        [str(Path(sys.executable).with_name("ncfix")), *(arguments[:-2] if target else arguments)], cwd=folder, text=True,
-        check=False, timeout=300, stdout=subprocess.PIPE, stderr=subprocess.PIPE if target else subprocess.STDOUT,
-        env={**os.environ, "NO_COLOR": "1", "COLUMNS": "120"},
+        [str(Path(sys.executable).with_name("ncfix")), *(arguments[:-2] if target else arguments)],
+        cwd=folder, text=True, check=False, timeout=300, env={**os.environ, "NO_COLOR": "1", "COLUMNS": "120"},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE if target else subprocess.STDOUT,
     )  # fmt: skip
     printed = done.stderr if target else done.stdout
     if done.returncode not in ENDS:

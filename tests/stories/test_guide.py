@@ -20,7 +20,7 @@ def test_all_pages_are_run(root: Path) -> None:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_shows_what_its_commands_print(root: Path, tmp_path: Path, name: str) -> None:
-    """Else: `python -m tests.stories NAME` writes the page anew. Excerpts of files have lines that are in a file then."""
+    """Else: `python -m tests.stories NAME` writes the page anew. Every line of an excerpt is in some file then."""
     page = (root / "docs" / "guide" / f"{name}.md").read_text()
     folder = tmp_path / "guide"
     shutil.copytree(root / GUIDE, folder)
