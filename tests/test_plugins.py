@@ -20,8 +20,8 @@ from ncfix.text.dialect import Dialect
 
 @hookimpl
 def register_dialects(register):
-    register(Dialect("{0}", "Good", "iso.lark", ()))
-    register(Dialect("other", "Good", "iso.lark", ()), name="{0}-too")
+    register(Dialect("{0}", "Good", "iso.lark", (), language="mine:LANGUAGE"))
+    register(Dialect("other", "Good", "iso.lark", (), language="mine:LANGUAGE"), name="{0}-too")
 """
 
 BROKEN = {

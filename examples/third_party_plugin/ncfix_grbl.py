@@ -1,10 +1,8 @@
-from ncfix.hookspecs import hookimpl
-from ncfix.text.dialect import Dialect
+from ncfix.plugin import family, hookimpl
 
-GRBL = Dialect(
-    name="grbl",
+GRBL = family("iso").derive(
+    "grbl",
     title="Grbl 1.1",
-    grammar="iso.lark",
     suffixes=(".grbl",),
     line_limit=80,
 )

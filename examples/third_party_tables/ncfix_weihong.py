@@ -1,13 +1,19 @@
 import numpy as np
 
-from ncfix.hookspecs import hookimpl
-from ncfix.tables.axis_tables import positioning
-from ncfix.tables.compensation import Compensation, Term
-from ncfix.tables.control import Control, Properties, Written
-from ncfix.tables.forms import BY_NAME, read
-from ncfix.tables.grid import Grid
+from ncfix.plugin import (
+    Compensation,
+    Control,
+    Grid,
+    Properties,
+    Term,
+    Written,
+    form_named,
+    hookimpl,
+    positioning,
+    read_form,
+)
 
-FILE, FORM = "axeserr.dat", BY_NAME["weihong"]
+FILE, FORM = "axeserr.dat", form_named("weihong")
 
 
 class Weihong(Control):
@@ -25,14 +31,14 @@ class Weihong(Control):
 
     def read(self, files):
         terms = []
-        for axis, rows in read(FORM, FILE, files[FILE])[0].sections("axis").items():
+        for axis, rows in read_form(FORM, FILE, files[FILE])[0].sections("axis").items():
             place, *errors = np.array(rows).T
             grids = [Grid((axis,), (place,), (axis,), -error[:, None]) for error in errors]
             terms += [Term((grid,), (axis, way)) for grid, way in zip(grids, (1, -1), strict=True)]
         return Compensation(tuple(terms))
 
     def lint(self, files):
-        return read(FORM, FILE, files[FILE])[1].messages
+        return read_form(FORM, FILE, files[FILE])[1].messages
 
 
 @hookimpl

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ncfix.hookspecs import Register, hookimpl
-from ncfix.text.dialect import FOREIGN, TURNING, Dialect
+from ncfix.plugin import FOREIGN, TURNING, Dialect, Register, hookimpl
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ncfix.tables.control import Control
+    from ncfix.plugin import Control
 
 VERICUT = ("the subroutine language of VERICUT", rb"(?im)^[ \t]*CGTECH_MACRO\b")
 O_WORDS = (
@@ -99,9 +97,30 @@ def register_dialects(register: Register[Dialect]) -> None:
         register(dialect)
 
 
+def make_fanuc() -> Control:
+    """The control `fanuc`."""
+    from ncfix_fanuc.control import Fanuc
+
+    return Fanuc()
+
+
+def make_fanuc_rotary() -> Control:
+    """The control `fanuc-rotary`."""
+    from ncfix_fanuc.rotary import FanucRotary
+
+    return FanucRotary()
+
+
+def make_fanuc_pitch() -> Control:
+    """The control `fanuc-pitch`."""
+    from ncfix_fanuc.pitch import FanucPitch
+
+    return FanucPitch()
+
+
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the controls `fanuc` and `fanuc-rotary`, grids in space, and `fanuc-pitch`, stored pitch errors."""
-    register(lambda: import_module("ncfix_fanuc.control").Fanuc(), name="fanuc")
-    register(lambda: import_module("ncfix_fanuc.rotary").FanucRotary(), name="fanuc-rotary")
-    register(lambda: import_module("ncfix_fanuc.pitch").FanucPitch(), name="fanuc-pitch")
+    register(make_fanuc, name="fanuc")
+    register(make_fanuc_rotary, name="fanuc-rotary")
+    register(make_fanuc_pitch, name="fanuc-pitch")

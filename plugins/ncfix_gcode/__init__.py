@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ncfix.hookspecs import Register, hookimpl
+from ncfix.plugin import Register, hookimpl
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ncfix.tables.control import Control
+    from ncfix.plugin import Control
+
+
+def make_gcode() -> Control:
+    """The control `gcode`."""
+    from ncfix_gcode.control import Gcode
+
+    return Gcode()
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `gcode`: programs that are rewritten."""
-    register(lambda: import_module("ncfix_gcode.control").Gcode(), name="gcode")
+    register(make_gcode, name="gcode")

@@ -14,13 +14,25 @@ from typing import ClassVar
 import numpy as np
 
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
-from ncfix.diagnostics import Message, NcfixError, UsageError
-from ncfix.machine import Machine, State, dumps, loads
-from ncfix.tables.compensation import Tables
-from ncfix.tables.control import Control, Files, Option, Properties, Request, Written
-from ncfix.tables.correction import exact_correction
-from ncfix.tables.grid import Array, Grid
-from ncfix.tables.table_files import Remarks
+from ncfix.machine import dumps, loads
+from ncfix.plugin import (
+    Array,
+    Control,
+    Files,
+    Grid,
+    Machine,
+    Message,
+    NcfixError,
+    Option,
+    Properties,
+    Remarks,
+    Request,
+    State,
+    Tables,
+    UsageError,
+    Written,
+    exact_correction,
+)
 
 MACHINE, HOW = "machine.toml", "fix.toml"
 

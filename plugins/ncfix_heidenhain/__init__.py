@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ncfix.hookspecs import Register, hookimpl
-from ncfix.text.dialect import Dialect
+from ncfix.plugin import Dialect, Register, hookimpl
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from ncfix.diagnostics import Code
-    from ncfix.tables.control import Control
+    from ncfix.plugin import Code, Control
 
 BEGIN_PGM = rb"(?im)^[ \t]*(?:/?[ \t]*\d+[ \t]*)?BEGIN[ \t]+PGM\b"
 """The first block of every Klartext program."""
@@ -65,14 +62,35 @@ def register_dialects(register: Register[Dialect]) -> None:
     register(HEIDENHAIN)
 
 
+def klartext_codes() -> Mapping[str, Code]:
+    """What the messages about Klartext programs mean."""
+    from ncfix_heidenhain.klartext.message_codes import KLARTEXT_CODES
+
+    return KLARTEXT_CODES
+
+
+def make_heidenhain() -> Control:
+    """The control `heidenhain`."""
+    from ncfix_heidenhain.control import Heidenhain
+
+    return Heidenhain()
+
+
+def make_kinematics_comp() -> Control:
+    """The control `heidenhain-kinematics`."""
+    from ncfix_heidenhain.kinematics import KinematicsComp
+
+    return KinematicsComp()
+
+
 @hookimpl
 def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
     """Bring what the messages about Klartext programs mean."""
-    register(lambda: import_module("ncfix_heidenhain.klartext.message_codes").KLARTEXT_CODES, name="klartext")
+    register(klartext_codes, name="klartext")
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the controls `heidenhain`, axis tables, and `heidenhain-kinematics`, KinematicsComp."""
-    register(lambda: import_module("ncfix_heidenhain.control").Heidenhain(), name="heidenhain")
-    register(lambda: import_module("ncfix_heidenhain.kinematics").KinematicsComp(), name="heidenhain-kinematics")
+    register(make_heidenhain, name="heidenhain")
+    register(make_kinematics_comp, name="heidenhain-kinematics")

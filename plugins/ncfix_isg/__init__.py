@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ncfix.hookspecs import Register, hookimpl
+from ncfix.plugin import Register, hookimpl
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ncfix.tables.control import Control
+    from ncfix.plugin import Control
+
+
+def make_isg() -> Control:
+    """The control `isg`."""
+    from ncfix_isg.control import Isg
+
+    return Isg()
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `isg`: VOLCOMP configuration and grid."""
-    register(lambda: import_module("ncfix_isg.control").Isg(), name="isg")
+    register(make_isg, name="isg")

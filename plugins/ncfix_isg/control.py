@@ -13,25 +13,32 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from ncfix.diagnostics import Message, RefusedError
-from ncfix.tables.axis_tables import Reversal, reversal_note, reversals
-from ncfix.tables.compensation import Compensation, Term
-from ncfix.tables.control import (
+from ncfix.plugin import (
     Assumption,
+    Compensation,
     Control,
     Files,
+    Grid,
+    Message,
     Option,
     Properties,
+    RefusedError,
+    Remarks,
     Request,
-    SettingForm,
+    Reversal,
+    Term,
     Written,
+    check_all,
+    in_order,
+    messages_of,
     one_of,
+    reversal_note,
+    reversals,
     whole,
     wrong_setting,
 )
-from ncfix.tables.grid import Grid
+from ncfix.tables.control import SettingForm
 from ncfix.tables.grid_sums import faces, searched
-from ncfix.tables.table_files import Remarks, check_all, in_order, messages_of
 from ncfix.tables.volume import AIM, Volume, inputs_that_matter, search
 from ncfix_isg.volcomp_files import (
     LETTERS,

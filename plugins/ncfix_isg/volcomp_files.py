@@ -19,11 +19,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ncfix.tables.axis_tables import Reversal
-from ncfix.tables.compensation import Term, own_terms
-from ncfix.tables.control import Files
-from ncfix.tables.grid import Array, Grid, full_grid
-from ncfix.tables.table_files import Remarks, as_number, unit_of
+from ncfix.plugin import Array, Files, Grid, Remarks, Reversal, Term, as_number, full_grid, own_terms, unit_of
 
 LETTERS = tuple("XYZABC")
 HEAD = {"workpiece_axes": "0"}

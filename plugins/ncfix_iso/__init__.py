@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ncfix.hookspecs import Register, hookimpl
-from ncfix.text.dialect import FOREIGN, TURNING, Dialect
+from ncfix.plugin import FOREIGN, TURNING, Dialect, Register, hookimpl
 
 ISO = Dialect(
     name="iso",
@@ -21,6 +20,8 @@ ISO = Dialect(
         "G41 G42: the programmed contour is corrected, the control offsets it",
     ),
     passes=("G53, G28, G30, G31, dwell, G5.1, G8, G61, tool change and other M codes",),
+    language="ncfix_iso.rs274.language:RS274",
+    semantics="iso",
     refuses=(
         "G16, G51, G51.1, G12.1, G68.2 while in force, threads, incremental canned cycles without --flatten",
         "everything after a G code that is not known, or a G10 that sets other things on other controls (L10, L20)",

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ncfix.hookspecs import Register, hookimpl
-from ncfix.text.dialect import FOREIGN, Dialect
+from ncfix.plugin import FOREIGN, Dialect, Register, hookimpl
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ncfix.tables.control import Control
+    from ncfix.plugin import Control
 
 LINUXCNC = Dialect(
     name="linuxcnc",
@@ -24,6 +22,7 @@ LINUXCNC = Dialect(
     ),
     line_limit=252,
     foreign=FOREIGN,
+    language="ncfix_iso.rs274.language:RS274",
     semantics="linuxcnc",
     understands=(
         "G0 G1 G2 G3 with centre or radius, helices, full circles, G17 G18 G19",
@@ -48,7 +47,14 @@ def register_dialects(register: Register[Dialect]) -> None:
     register(LINUXCNC)
 
 
+def make_linuxcnc() -> Control:
+    """The control `linuxcnc`."""
+    from ncfix_linuxcnc.control import LinuxCnc
+
+    return LinuxCnc()
+
+
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `linuxcnc`: `.comp` files."""
-    register(lambda: import_module("ncfix_linuxcnc.control").LinuxCnc(), name="linuxcnc")
+    register(make_linuxcnc, name="linuxcnc")

@@ -15,24 +15,31 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnostics import Message
-from ncfix.tables.axis_tables import positioning
-from ncfix.tables.compensation import Compensation, Term, own_terms
-from ncfix.tables.control import (
+from ncfix.plugin import (
+    Array,
     Assumption,
+    Compensation,
     Control,
     Files,
+    Message,
     Option,
     Properties,
+    Remarks,
     Request,
+    Term,
     Written,
+    check_all,
+    in_order,
+    least_of_own_axis,
+    messages_of,
     one_of,
+    own_terms,
+    positioning,
+    unit_of,
     whole,
     wrong_setting,
 )
-from ncfix.tables.grid import Array
-from ncfix.tables.lower_bounds import least_of_own_axis
-from ncfix.tables.table_files import ALONE, DEGREE, ORDER, TURNING, Remarks, check_all, in_order, messages_of, unit_of
+from ncfix.tables.table_files import ALONE, DEGREE, ORDER, TURNING
 
 MOST = 256
 """EMCMOT_COMP_SIZE of LinuxCNC."""

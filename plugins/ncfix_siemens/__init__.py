@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ncfix.hookspecs import Register, hookimpl
-from ncfix.text.dialect import FOREIGN, Dialect
+from ncfix.plugin import FOREIGN, Dialect, Register, hookimpl
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from ncfix.diagnostics import Code
-    from ncfix.tables.control import Control
+    from ncfix.plugin import Code, Control
 
 SIEMENS = Dialect(
     name="siemens",
@@ -67,13 +64,27 @@ def register_dialects(register: Register[Dialect]) -> None:
     register(SIEMENS)
 
 
+def sinumerik_codes() -> Mapping[str, Code]:
+    """What the messages about SINUMERIK programs mean."""
+    from ncfix_siemens.sinumerik.message_codes import SINUMERIK_CODES
+
+    return SINUMERIK_CODES
+
+
+def make_siemens() -> Control:
+    """The control `siemens`."""
+    from ncfix_siemens.control import Siemens
+
+    return Siemens()
+
+
 @hookimpl
 def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
     """Bring what the messages about SINUMERIK programs mean."""
-    register(lambda: import_module("ncfix_siemens.sinumerik.message_codes").SINUMERIK_CODES, name="sinumerik")
+    register(sinumerik_codes, name="sinumerik")
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `siemens`: CEC and EEC tables."""
-    register(lambda: import_module("ncfix_siemens.control").Siemens(), name="siemens")
+    register(make_siemens, name="siemens")

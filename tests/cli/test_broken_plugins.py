@@ -18,16 +18,13 @@ from ncfix import hookspecs, plugins
 from ncfix.diagnostics import ExitCode
 
 HEAD = """
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import click
 import numpy as np
 
-from ncfix.hookspecs import hookimpl
-from ncfix.machine.basis import Basis
-from ncfix.text.dialect import Dialect
-from ncfix.tables.control import Control, Properties, Written
+from ncfix.plugin import Basis, Control, Properties, Written, family, hookimpl
 
 
 class Mine(Control):
@@ -89,7 +86,7 @@ class Case(NamedTuple):
 FIX = ("fix", "{program}", "-m", "{machine}", "-o", "{out}")
 EXPORT = ("export", "mine", "-m", "{machine}", "-o", "{out}")
 CALIBRATE = ("calibrate", "{data}", "-m", "{machine}", "-o", "{out}")
-ODD = 'register(Dialect("odd", "Odd", {0}, (".odd",){1}))'
+ODD = 'register(replace(family("iso"), name="odd", title="Odd", grammar={0}, suffixes=(".odd",){1}))'
 CASES = {
     "reader raises": Case("readers", "def read(text, path):\n    return {}[path]\n", "register(read, 'r')", CALIBRATE,
                           "failed as the reader 'r': KeyError"),

@@ -16,7 +16,7 @@ from ncfix.machine import Effect, loads
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.tables.control import Control, Request, get_control
 from ncfix.tables.correction import ranges_of
-from ncfix.tables.forms import FORMS, read
+from ncfix.tables.forms import FORMS, read_form
 
 SETTINGS: dict[str, dict[str, str]] = {
     "fanuc": {"sign": "error", "template": "N{no}A1P{dx}A2P{dy}A3P{dz};"},
@@ -171,5 +171,5 @@ def test_anything_is_read_or_remarked_on(form: object) -> None:
     chance = random.Random(11)
     for _ in range(200):
         content = bytes(chance.choice(b"0123456789.,-+eEXYZ=[]#;/ \t\r\n\x85\xff") for _ in range(chance.randrange(80)))
-        document, remarks = read(form, "x", content)  # type: ignore[arg-type]
+        document, remarks = read_form(form, "x", content)  # type: ignore[arg-type]
         assert remarks.wrong or document.content() == content or b"\r" in content

@@ -44,6 +44,6 @@ def test_a_shipped_machine(weihong: Control, root: Path) -> None:
 
 def test_it_is_short_and_what_the_document_shows(source: Path, root: Path) -> None:
     text = source.read_text()
-    assert 15 <= len(text.splitlines()) <= 40
+    assert 15 <= len(text.splitlines()) <= 50
     shown = re.findall(r"```py\n(.*?)```", (root / "docs/plugins.md").read_text(), re.DOTALL)
     assert shown == [text]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from ncfix.text.dialect import Dialect
 from ncfix.text.dialects import check_content, detect, get, names
 from ncfix.text.grammar import find_grammar, parser
 from ncfix.text.reader import read
@@ -86,7 +86,7 @@ def test_a_long_line_of_cycles_is_searched_for_signs_of_a_lathe_in_no_time() -> 
 def test_a_plugin_may_bring_a_grammar_of_its_own(tmp_path: Path) -> None:
     grammar = tmp_path / "upper.lark"
     grammar.write_text("%import common (word, ADDRESS)\nblock: word*\n%override ADDRESS: /[XY]/\n", encoding="utf-8")
-    program = read(b"X1 Y-2.5\n", dialect=Dialect("upper", "Upper", str(grammar), (".up",)))
+    program = read(b"X1 Y-2.5\n", dialect=replace(get("iso"), name="upper", grammar=str(grammar)))
     assert_read_right(program)
     assert [item.address for item in program.items_of(0) if isinstance(item, Word)] == ["X", "Y"]
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ncfix.tables.forms import BY_NAME, read, recognised
+from ncfix.tables.forms import BY_NAME, read_form, recognised
 
 SAMPLES = {
     "beckhoff_isg/crosscomp.lis": ("isg-list", 7),
@@ -86,7 +86,7 @@ def test_samples_are_read_and_written_again_identically(shared: Callable[[str], 
     assert document is not None
     assert (document.form, sum(len(line.numbers) for line in document.lines)) == SAMPLES[name]
     assert document.content() == content
-    assert read(BY_NAME[document.form], name, content.replace(b"\n", b"\r\n"))[0].content().count(b"\r\n") > 0
+    assert read_form(BY_NAME[document.form], name, content.replace(b"\n", b"\r\n"))[0].content().count(b"\r\n") > 0
 
 
 def test_no_sample_is_forgotten(shared: Callable[[str], Path]) -> None:
@@ -104,13 +104,13 @@ def test_numbers_can_be_changed_and_the_rest_stays() -> None:
 
 
 def test_a_sound_elmo_table() -> None:
-    assert not read(BY_NAME["elmo"], "x", ELMO)[1].messages
+    assert not read_form(BY_NAME["elmo"], "x", ELMO)[1].messages
 
 
 @pytest.mark.parametrize("form", BROKEN)
 def test_broken_files(form: str) -> None:
     content, expected = BROKEN[form]
-    _, remarks = read(BY_NAME[form.strip()], "x", content)
+    _, remarks = read_form(BY_NAME[form.strip()], "x", content)
     assert any(expected in message.text for message in remarks.messages), remarks.messages
 
 
@@ -118,7 +118,7 @@ def test_broken_files(form: str) -> None:
 def test_any_numbers_come_back_as_they_were(numbers: list[Decimal], eol: str) -> None:
     rows = [f"{place}, {numbers[1]}, {numbers[2]}" for place in (numbers[0], numbers[0] + 1)]
     content = eol.join(["unit = mm", "[X]", *rows, ""]).encode()
-    document, remarks = read(BY_NAME["weihong"], "x", content)
+    document, remarks = read_form(BY_NAME["weihong"], "x", content)
     assert not remarks.wrong
     assert document.content() == content
 
@@ -144,7 +144,7 @@ VARIED = {
 @pytest.mark.parametrize("form", VARIED)
 def test_what_a_form_allows_is_kept(form: str) -> None:
     content = VARIED[form]
-    document, remarks = read(BY_NAME[form.strip()], "x", content)
+    document, remarks = read_form(BY_NAME[form.strip()], "x", content)
     assert not remarks.wrong, remarks.wrong
     assert document.content() == content
 

@@ -24,19 +24,23 @@ def cycle(control: Control, block: Block, code: int) -> None:
     control.settle(tuple(control.unknown))
     program = control.program_position()
     initial = program[across] if modal.cycle.initial is None else modal.cycle.initial
-    take_levels(control, block, initial)
+    take_levels(control, block, initial, control.rules.level_of(code))
     modal.cycle.initial, modal.cycle.level, modal.motion = initial, modal.cycle.r, code
     if modal.cycle.r < modal.cycle.depth and code != BACK_BORING:
         levels = f"{modal.cycle.r:g} and {modal.cycle.depth:g} mm"
         raise Fault(BAD_CYCLE, f"R is below the bottom of the hole ({levels})")
-    clear = modal.cycle.r if modal.retract_to_r else max(initial, modal.cycle.r)
-    for _ in range(repeats(control, block)):
+    at_level = control.rules.ends_at_level(code, modal.retract_to_r)
+    clear = modal.cycle.r if at_level else max(initial, modal.cycle.r)
+    for _ in range(repeats(control, block, code)):
         place_hole(control, block, program)
         drill(control, block, code, program, modal.cycle.depth, modal.cycle.r, clear)
 
 
-def take_levels(control: Control, block: Block, initial: float) -> None:
-    """R and the depth of the block as levels in the program's frame, mm; those not named stay in force."""
+def take_levels(control: Control, block: Block, initial: float, letter: str = "R") -> None:
+    """R and the depth of the block as levels in the program's frame, mm; those not named stay in force.
+
+    letter  the address of R
+    """
     modal, across = control.modal, control.modal.plane.across
     sticky, depth = modal.cycle, LETTERS[across]
     in_force = sticky.initial is not None
@@ -44,10 +48,10 @@ def take_levels(control: Control, block: Block, initial: float) -> None:
         sticky.runtime = False
         if depth not in block.values:
             raise Fault(BAD_CYCLE, f"{depth} is missing: a canned cycle cannot begin without it")
-        if "R" not in block.values:
+        if letter not in block.values:
             sticky.r = initial
-    if "R" in block.values:
-        sticky.r = modal.unit * block.values["R"] + (initial if modal.incremental else 0.0)
+    if letter in block.values:
+        sticky.r = modal.unit * block.values[letter] + (initial if modal.incremental else 0.0)
     if depth in block.values:
         sticky.depth = control.scale[across] * block.values[depth] + (sticky.r if modal.incremental else 0.0)
-    sticky.runtime |= bool(block.runtime & {"R", depth})
+    sticky.runtime |= bool(block.runtime & {letter, depth})

@@ -196,7 +196,7 @@ class MacroInterpreter(RS274Interpreter):
         """Numbers without a decimal point count increments, or as the setup says."""
         for letter in plan.pointless:
             if is_scaled(self.control, plan, letter):
-                self.span = next(word.span for word in plan.template.words if word.address == letter)
+                self.span = plan.span_of(letter)
                 angle = is_angle(self.control, plan, letter)
                 block.values[letter] = self.control.without_point(letter, block.values[letter], angle=angle)
         self.span = None

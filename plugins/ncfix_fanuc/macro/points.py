@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS
-from ncfix_fanuc.macro.rules import ALL_CYCLES
 from ncfix_iso.rs274.groups import NON_MODAL, ROTATION
 from ncfix_iso.rs274.order import DWELL
 
@@ -28,13 +27,16 @@ ANGLES = frozenset("IJKR")
 def is_scaled(control: MacroControl, plan: Plan, letter: str) -> bool:
     """Whether the number of a word counts least increments when it has no point."""
     codes = plan.codes
+    motion = control.modal.motion if codes is None else motion_in_force(control, codes)
+    if motion in control.rules.tables and letter == control.rules.level_of(motion):
+        return True
     if letter not in SCALED or (letter == "R" and is_level(control, plan)):
         return False
     if codes is None:
         return letter not in DRILLING
     if codes.g.get(NON_MODAL) == DWELL:
         return False
-    cycle = motion_in_force(control, codes) in ALL_CYCLES
+    cycle = motion_in_force(control, codes) in control.rules.cycles
     return letter not in DRILLING or (letter == "K" and not cycle) or (letter == "Q" and cycle)
 
 
@@ -42,7 +44,7 @@ def is_level(control: MacroControl, plan: Plan) -> bool:
     """Whether R of a block is no length: no axis, cycle, plane or setting takes it (G5.1 Q1 R3, G332 R1)."""
     if plan.axes or plan.codes is None or not plan.codes.g.keys().isdisjoint((NON_MODAL, ROTATION)):
         return False
-    return motion_in_force(control, plan.codes) not in ALL_CYCLES
+    return motion_in_force(control, plan.codes) not in control.rules.cycles
 
 
 def is_angle(control: MacroControl, plan: Plan, letter: str) -> bool:

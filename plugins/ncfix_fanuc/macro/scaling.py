@@ -81,10 +81,11 @@ def scaled(control: MacroControl, block: Block, codes: Codes) -> Block:
         control.refusal = control.refusal or TOGETHER.format(f"G{foreign[0] / 10:g}")
         control.unwritten = control.unwritten or TOGETHER.format(f"G{foreign[0] / 10:g}")
         return block
-    drills = (control.modal.motion if codes.motion is None else codes.motion) in control.rules.cycles
+    motion = control.modal.motion if codes.motion is None else codes.motion
+    drills, level = motion in control.rules.cycles, control.rules.level_of(motion)
     across = control.modal.plane.across
     for letter, value in block.values.items():
-        if letter in "XYZ" or (drills and letter == "R"):
+        if letter in "XYZ" or (drills and letter == level):
             index = INDEX.get(letter, across)
             centre = 0.0 if control.modal.incremental else scaling.centre[index] / control.scale[index]
             block.values[letter] = centre + scaling.factor * (value - centre)

@@ -25,7 +25,8 @@ def motion_of(control: Control, plan: Plan, codes: Codes) -> int | None:
         return without_code(control)
     if has_axes:
         return modal
-    if not control.rules.strict and "R" in plan.letters and control.modal.cycle.initial is not None:
+    level = control.rules.level_of(modal)
+    if not control.rules.strict and level in plan.letters and control.modal.cycle.initial is not None:
         return modal if modal in control.rules.cycles else None
     return modal if plan.letters & {"I", "J", "K"} and modal in ARCS else None
 

@@ -13,6 +13,7 @@ from ncfix.control.turns import watch
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_iso.rs274.groups import RULES, Rules
+from ncfix_iso.rs274.own_codes import with_own_codes
 from ncfix_iso.rs274.parameters import Parameters, Store
 
 RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
@@ -72,7 +73,7 @@ class Control(shared.Control):
 
     def __init__(self, run: Run, dialect: Dialect, rules: Rules | None = None) -> None:
         super().__init__(run, dialect)
-        self.rules: Rules = rules or RULES[dialect.semantics]
+        self.rules: Rules = with_own_codes(rules or RULES[dialect.semantics], dialect)
         self.needs_feed = self.modal.retract_to_r = self.rules.strict
         self.parameters = Parameters()
         self.saved: list[Saved | None] = [None]
@@ -109,7 +110,7 @@ class Control(shared.Control):
         if self.modal.motion in ARCS:
             leading |= {*"IJKR"}
         elif self.modal.motion in self.rules.cycles:
-            leading.add("R")
+            leading.add(self.rules.level_of(self.modal.motion))
         return min(leading.intersection(words), default="")
 
     @property

@@ -36,8 +36,8 @@ def cycle(control: Control, block: Block, code: int) -> None:
     initial = program[plane.across] if modal.cycle.initial is None else modal.cycle.initial
     r, depth = levels(control, initial)
     modal.cycle.initial, modal.cycle.level, modal.motion = initial, r, code
-    clear = r if modal.retract_to_r else max(initial, r)
-    for _ in range(repeats(control, block)):
+    clear = r if control.rules.ends_at_level(code, modal.retract_to_r) else max(initial, r)
+    for _ in range(repeats(control, block, code)):
         place_hole(control, block, program)
         drill(control, block, code, program, depth, r, clear)
 
@@ -66,16 +66,17 @@ def take_words(control: Control, block: Block, code: int, plane: Plane) -> None:
     sticky = control.modal.cycle
     in_force = control.modal.motion == code or (not control.rules.strict and sticky.initial is not None)
     depth_letter = LETTERS[plane.across]
-    for letter in ("R", depth_letter):
+    level_letter = control.rules.level_of(code)
+    for letter in (level_letter, depth_letter):
         if letter not in block.values and not in_force:
             raise Fault(BAD_CYCLE, f"{letter} is missing: a canned cycle cannot begin without it")
     if not in_force:
         sticky.runtime = False
-    if "R" in block.values:
-        sticky.r = block.values["R"]
+    if level_letter in block.values:
+        sticky.r = block.values[level_letter]
     if depth_letter in block.values:
         sticky.depth = block.values[depth_letter]
-    sticky.runtime |= bool(block.runtime & {"R", depth_letter})
+    sticky.runtime |= bool(block.runtime & {level_letter, depth_letter})
 
 
 def levels(control: Control, initial: float) -> tuple[float, float]:
@@ -90,9 +91,9 @@ def levels(control: Control, initial: float) -> tuple[float, float]:
     return r, depth
 
 
-def repeats(control: Control, block: Block) -> int:
+def repeats(control: Control, block: Block, code: int) -> int:
     """How many times the block drills: L, or K of most ISO controls."""
-    letter = next((each for each in control.rules.repeats if each in block.values), "L")
+    letter = next((each for each in control.rules.repeats_of(code) if each in block.values), "L")
     count = whole(block.get(letter, 1.0), letter)
     control.budget.spend(max(count, 0))
     if count < 1 and control.rules.strict:
@@ -137,11 +138,12 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
     if control.rules.strict:
         control.builder.rests(mask_of(control.turning))
     control.make(Motion(Kind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, settles=settles))
-    if not control.modal.retract_to_r:
+    at_level = control.rules.ends_at_level(code, control.modal.retract_to_r)
+    if not at_level:
         control.places.lose(adrift & 1 << across)
     program[across] = clear
     control.position = command(control, block, program)
-    if height is not None and not control.modal.retract_to_r:
+    if height is not None and not at_level:
         control.unknown = lost_of_axes(control, {**unknown, across: height})
 
 

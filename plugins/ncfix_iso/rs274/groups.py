@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ncfix.control.expressions import Evaluate
+from ncfix.control.operations import CycleTable, Like, Operation
 from ncfix.text.tree import Expression
 from ncfix_iso.rs274.expressions import compiled
 
@@ -39,6 +40,9 @@ COOLANT = "coolant"
 OVERRIDE = "override"
 USER = "user-defined"
 CALL = "subprogram"
+
+OWN = "code of the dialect's own "
+"""What the group of a code that a dialect adds begins with: each has a group of its own."""
 
 CYCLES = (730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890)
 DYNAMIC_OFFSETS = (431, 432)
@@ -119,6 +123,9 @@ class Rules:
     system      whether a numbered parameter is one of the control's own, so that setting it does something
     lasting     whether a numbered parameter keeps its value when the program is over
     compiled    (expression, the address it stands behind) -> the function that computes it
+    aliases     G or M and code -> the code of the family that a code of the dialect's own stands for
+    operations  G or M and code -> what a code of the dialect's own does
+    tables      G code -> the drilling cycle that a code of the dialect's own is
     """
 
     strict: bool
@@ -135,6 +142,21 @@ class Rules:
     system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
     lasting: Callable[[int], bool] = lambda number: False
     compiled: Callable[[Expression, str], Evaluate] = compiled
+    aliases: Mapping[tuple[str, int], Like] = field(default_factory=dict)
+    operations: Mapping[tuple[str, int], tuple[Operation, ...]] = field(default_factory=dict)
+    tables: Mapping[int, CycleTable] = field(default_factory=dict)
+
+    def level_of(self, code: int) -> str:
+        """The address of the level of a canned cycle."""
+        return self.tables[code].level if code in self.tables else "R"
+
+    def ends_at_level(self, code: int, mode: bool) -> bool:
+        """Whether a canned cycle ends at its level; `mode`: G99 is in force."""
+        return self.tables[code].ends_at_level(mode) if code in self.tables else mode
+
+    def repeats_of(self, code: int) -> str:
+        """The addresses that say how often a canned cycle drills."""
+        return (self.tables[code].repeats if code in self.tables else "") or self.repeats
 
 
 LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")

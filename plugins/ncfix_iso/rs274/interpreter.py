@@ -16,6 +16,7 @@ from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
 from ncfix_iso.rs274.choice import motion_of
 from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, Control
+from ncfix_iso.rs274.cycles import BAD_CYCLE
 from ncfix_iso.rs274.expressions import number_of, whole
 from ncfix_iso.rs274.flow import OWords
 from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS, LENGTH, NON_MODAL
@@ -26,14 +27,18 @@ from ncfix_iso.rs274.settings import unknown_code
 from ncfix_iso.rs274.wordcheck import check_words
 
 if TYPE_CHECKING:
+    from ncfix.control.operations import CycleTable
     from ncfix_iso.rs274.flatten import RS274Flattener
 
 CALL, RETURN = 980, 990
+DRILLING = 810
+"""G81, as which drilling cycles of a dialect's own are followed."""
 PROGRAM_ENDS = (20, 300)
 LAST_PROGRAM = 9999
 """Greater P words of M98 on ISO controls hold the number of repeats before the four digits of the program."""
 
 POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
+COMPUTED_ALIAS = "the code {} is computed, and takes words under other addresses than the code it stands for"
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 UNREADABLE = "NCF236"
 DWELL_TIME = "PUX"
@@ -190,6 +195,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         control = self.control
         numbers, first = control.numbers, control.first
         values = {letter: numbers[first + slot] for letter, slot in plan.literals}
+        values |= plan.fixed
         runtime = []
         for letter, function, span in plan.computed:
             self.span = span
@@ -225,6 +231,9 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             if abs(tenths - round(tenths)) > 0.001:
                 raise Fault(BAD_MOTION, f"{word.address}{tenths / 10:g} is not a code", span=word.span)
             pairs.append((word, round(tenths)))
+            like = self.control.rules.aliases.get((word.address, round(tenths)))
+            if like is not None and like.words:
+                self.control.refusal = self.control.refusal or COMPUTED_ALIAS.format(f"{word.address}{tenths / 10:g}")
         if at_runtime:
             self.control.refusal = self.control.refusal or "a G or M code is known only at run time"
         return grouped_codes(pairs, plan.letters, self.control.rules)
@@ -244,7 +253,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         control = self.control
         for index in range(N_LETTERS):
             if plan.axes >> index & 1 and index not in control.machine and LETTERS[index] not in control.foreign:
-                self.span = next(word.span for word in plan.template.words if word.address == LETTERS[index])
+                self.span = plan.span_of(LETTERS[index])
                 control.note_foreign(LETTERS[index], INCREMENTS if may_increment(control, LETTERS[index]) else "")
         self.span = None
 
@@ -269,11 +278,23 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         if MACHINE in codes.g.values():
             in_machine_coordinates(self.control, block, motion)
         else:
-            step = self.control.rules.steps.get(motion) or MOTIONS[motion]
+            table, before = self.control.rules.tables.get(motion), self.control.modal.motion
+            self.check_needs(table, block, codes)
+            code = motion if table is None else DRILLING
+            step = self.control.rules.steps.get(code) or MOTIONS[code]
             with self.polar_words(block):
                 step(self.control, block, motion)
+            if table is not None and not table.modal:
+                self.control.modal.motion, self.control.modal.cycle.initial = before, None
         if motion not in self.control.rules.cycles:
             self.control.modal.cycle.initial = None
+
+    def check_needs(self, table: CycleTable | None, block: Block, codes: Codes) -> None:
+        """Raise `Fault` where a cycle of the dialect's own begins without a word that it needs."""
+        missing = [] if table is None or codes.motion is None else [x for x in table.needs if x not in block.values]
+        if missing:
+            code = f"G{(codes.motion or 0) / 10:g}"
+            raise Fault(BAD_CYCLE, f"{missing[0]} is missing: {code} cannot begin without it")
 
     def after(self, codes: Codes, block: Block) -> bool:
         """What a block does last: M2, M30, M98, M99. True if the program ends."""

@@ -68,4 +68,5 @@ RS274 = Language(
     arc_pieces=True,
     bulk=in_bulk,
     semantics=frozenset(RULES),
+    own_codes=True,
 )

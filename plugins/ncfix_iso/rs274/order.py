@@ -5,13 +5,16 @@ Source: LinuxCNC documentation, "G-code overview", "Order of execution".
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
+from ncfix.control.operations import Operation
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.arc_motion import arc
 from ncfix_iso.rs274.control import Block, Control
 from ncfix_iso.rs274.cycles import cycle
 from ncfix_iso.rs274.feeds import feed, feed_mode, speed
+from ncfix_iso.rs274.groups import Rules
 from ncfix_iso.rs274.lengths import change_tool, select_tool, set_data, tool_offset
 from ncfix_iso.rs274.motion import (
     NO_CODE,
@@ -41,6 +44,7 @@ from ncfix_iso.rs274.settings import (
 )
 from ncfix_iso.rs274.shifts import rotate_system, shift_system
 from ncfix_iso.rs274.systems import select_system
+from ncfix_iso.rs274.targets import destination
 
 Step = Callable[[Control, Block, int], None]
 
@@ -118,13 +122,18 @@ MOTIONS: Mapping[int, Step] = {
 Steps = tuple[tuple[Step, int], ...]
 
 
-def steps_of(
-    g_codes: Mapping[str, int], m_codes: Mapping[str, int], letters: frozenset[str], own: Mapping[int, Step]
-) -> Steps:
+def carry_out(operations: Sequence[Operation], control: Control, block: Block, code: int) -> None:
+    """A code of the dialect's own."""
+    for operation in operations:
+        operation.carry_out(control, block, partial(destination, control, block))
+
+
+def steps_of(g_codes: Mapping[str, int], m_codes: Mapping[str, int], letters: frozenset[str], rules: Rules) -> Steps:
     """What a block does before its motion, in order: steps with their codes.
 
-    `g_codes` and `m_codes` by group; `letters` the addresses of the block's words; `own` the dialect's own steps.
+    `g_codes` and `m_codes` by group; `letters` the addresses of the block's words.
     """
+    own = rules.steps
     steps = [(step, g_codes[group]) for group, step in FIRST if group in g_codes]
     steps += [(step, 0) for letter, step in WORDS if letter in letters]
     steps += [(step, m_codes[group]) for group, step in M_STEPS if group in m_codes]
@@ -134,4 +143,8 @@ def steps_of(
     steps += [(own.get(g_codes[group], step), g_codes[group]) for group, step in G_STEPS if group in g_codes]
     if single in NON_MODAL or (single in own and single != DWELL):
         steps.append((own.get(single) or NON_MODAL[single], single))
+    written = [*(("M", code) for code in m_codes.values()), *(("G", code) for code in g_codes.values())]
+    for letter, code in written:
+        if operations := rules.operations.get((letter, code)):
+            steps.append((partial(carry_out, operations), code))
     return tuple(steps)

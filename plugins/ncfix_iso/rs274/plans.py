@@ -5,7 +5,7 @@ Everything that does not depend on numbers is settled once per shape, so that a 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -100,6 +100,7 @@ class Plan:
     """What is done with every block of a shape.
 
     literals     (address, slot) of words with a plain number
+    fixed        addresses whose value does not come from a word of the block, see `Like`
     pointless    addresses of words with a plain number without a decimal point, where the dialect tells them apart
     computed     words with an expression
     assignments  parameters that are set
@@ -117,6 +118,7 @@ class Plan:
 
     template: Template
     literals: tuple[tuple[str, int], ...] = ()
+    fixed: dict[str, float] = field(default_factory=dict)
     pointless: tuple[str, ...] = ()
     computed: tuple[tuple[str, Evaluate, Span], ...] = ()
     assignments: tuple[tuple[int | str | Evaluate, Evaluate, Span], ...] = ()
@@ -132,6 +134,10 @@ class Plan:
     fault: Fault | None = None
     lane: Lane | None = None
     checked: set[int | None] = field(default_factory=set)
+
+    def span_of(self, address: str) -> Span | None:
+        """Where the word of an address stands; None of one that is written otherwise, see `Like`."""
+        return next((word.span for word in self.template.words if word.address == address), None)
 
 
 class RS274Unit(TextUnit[Plan]):
@@ -187,9 +193,28 @@ def take_values(plan: Plan, rules: Rules) -> None:
     plan.pointless = tuple(address for address, value in plain if value.pointless)
     plan.computed = tuple((w.address, rules.compiled(w.value, w.address), w.span) for w in computed)
     plan.letters = frozenset(word.address for word in values)
+    if rules.aliases:
+        take_aliases(plan, rules)
     plan.axes = sum(1 << INDEX[letter] for letter in plan.letters if letter in INDEX)
     if plan.letters & POLAR:
         plan.axes |= 1 << INDEX["X"] | 1 << INDEX["Y"]
+
+
+def take_aliases(plan: Plan, rules: Rules) -> None:
+    """Words that a code of the dialect's own gives to the code of the family that it stands for."""
+    codes = [(w.address, round(10 * w.value.value)) for w in plan.template.words if isinstance(w.value, Constant)]
+    for code in codes:
+        given = dict(rules.aliases[code].words) if code in rules.aliases else {}
+        family = {own: address for address, own in given.items() if isinstance(own, str)}
+        kept = plan.letters - family.keys()
+        if kept & given.keys():
+            plan.fault = Fault(CONFLICT, f"{min(kept & given.keys())} is no word of {code[0]}{code[1] / 10:g}")
+            return
+        plan.literals = tuple((family.get(address, address), slot) for address, slot in plan.literals)
+        plan.pointless = tuple(family.get(address, address) for address in plan.pointless)
+        plan.computed = tuple((family.get(each[0], each[0]), *each[1:]) for each in plan.computed)
+        plan.fixed |= {address: own for address, own in given.items() if not isinstance(own, str)}
+        plan.letters = kept | {family[own] for own in plan.letters & family.keys()} | plan.fixed.keys()
 
 
 def take_statements(plan: Plan, rules: Rules) -> None:
@@ -240,6 +265,9 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
     m: dict[str, int] = {}
     unknown, named = [], False
     for word, code in pairs:
+        if (word.address, code) in rules.aliases:
+            like = rules.aliases[word.address, code].code
+            code = round(10 * float(like[1:]))
         if word.address == "G":
             named |= code == SMOOTHING and "Q" in letters
             if code in rules.harmless_g and not (code in groups.SPLINES and is_spline(letters)):
@@ -253,18 +281,30 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
     if rules.strict and sum(word.address == "M" for word, _ in pairs) > MAX_M_CODES:
         raise Fault(CONFLICT, f"more than {MAX_M_CODES} M codes in a block", span=pairs[-1][0].span)
     if not rules.strict and g.get(groups.SYSTEM) == FIRST_SYSTEM and "P" in letters:
-        free = P_USERS.isdisjoint((*g.values(), *m.values()))
+        free = P_USERS.isdisjoint((*g.values(), *m.values())) and not has_own(g, m, rules)
         g[groups.SYSTEM] = EXTENDED_SYSTEM if free else FIRST_SYSTEM
     return Codes(
         g,
         m,
-        steps_of(g, m, letters, rules.steps),
+        steps_of(g, m, letters, rules),
         g.get(groups.MOTION),
         m.get(groups.STOP),
         m.get(groups.CALL),
-        named or bool((AXES_TAKEN | rules.takes) & set(g.values())),
+        named or any(takes_axes(code, rules) for code in g.values()),
         tuple(unknown),
     )
+
+
+def has_own(g: Mapping[str, int], m: Mapping[str, int], rules: Rules) -> bool:
+    """Whether a block has codes of the dialect's own, which may have a use for any word."""
+    written = {*(("G", code) for code in g.values()), *(("M", code) for code in m.values())}
+    return not rules.operations.keys().isdisjoint(written) or not rules.tables.keys().isdisjoint(g.values())
+
+
+def takes_axes(code: int, rules: Rules) -> bool:
+    """Whether a G code takes the axis words of its block for itself."""
+    own = ("G", code) in rules.operations or code in rules.tables
+    return code in rules.takes or (code in AXES_TAKEN and not own)
 
 
 def is_spline(letters: frozenset[str]) -> bool:

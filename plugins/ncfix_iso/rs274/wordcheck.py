@@ -62,13 +62,19 @@ def unused_word(letters: Set[str], motion: int | None, g_codes: Set[int], m_code
     return None
 
 
+def has_own_codes(control: Control, codes: Codes, motion: int | None) -> bool:
+    """Whether codes of the dialect's own may use words of a block."""
+    operations = control.rules.operations
+    own = any(("G", code) in operations for code in codes.g.values())
+    return own or any(("M", code) in operations for code in codes.m.values()) or motion in control.rules.tables
+
+
 def check_words(control: Control, plan: Plan, codes: Codes, motion: int | None) -> None:
     """Raise `Fault` for a word that no code uses, where the control does."""
-    if not control.rules.strict or motion in plan.checked:
+    if not control.rules.strict or motion in plan.checked or has_own_codes(control, codes, motion):
         return
     letter = unused_word(plan.letters, motion, frozenset(codes.g.values()), frozenset(codes.m.values()))
     if letter is not None:
-        span = next(word.span for word in plan.template.words if word.address == letter)
-        raise Fault(UNUSED, f"no code of the block uses the word {letter}", span=span)
+        raise Fault(UNUSED, f"no code of the block uses the word {letter}", span=plan.span_of(letter))
     if plan.codes is not None:
         plan.checked.add(motion)

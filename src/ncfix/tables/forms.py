@@ -99,7 +99,7 @@ class FileForm:
     needs: tuple[str, ...] = ()
 
 
-def read(form: FileForm, path: str, content: bytes) -> tuple[TableFile, Remarks]:
+def read_form(form: FileForm, path: str, content: bytes) -> tuple[TableFile, Remarks]:
     """A file of a form, with remarks on lines that the form does not have."""
     remarks = Remarks.of(path, content)
     eol = "\r\n" if b"\r\n" in content else "\n"
@@ -348,10 +348,15 @@ FORMS = (
 BY_NAME = {form.name: form for form in FORMS}
 
 
+def form_named(name: str) -> FileForm:
+    """The form of that name; raises KeyError."""
+    return BY_NAME[name]
+
+
 def recognised(path: str, content: bytes) -> TableFile | None:
     """The file as the first form that has all of its lines; None if there is none."""
     for form in FORMS:
-        document, remarks = read(form, path, content)
+        document, remarks = read_form(form, path, content)
         if not remarks.wrong:
             return document
     return None

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ncfix.control.operations import CycleTable, Operation
 
 FOREIGN: tuple[tuple[str, bytes], ...] = (
     ("Heidenhain Klartext", rb"(?im)^[ \t]*(?:\d+[ \t]*)?BEGIN[ \t]+PGM\b"),
@@ -31,6 +37,11 @@ TURNING: tuple[tuple[str, bytes], ...] = (
 )
 """What shows that a text of the Fanuc family is for a lathe: the spindle's limit (G50 S), turning cycles that name the
 blocks of a contour (P and Q), or constant surface speed (G96) in a text that names no Y."""
+
+CODE = re.compile(r"[GM]\d{1,4}(\.\d)?")
+"""How a code of a dialect's own is written."""
+FIXED = frozenset({"G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G53", "G80", "G90", "G91"})
+"""Codes whose meaning the reader and the writer rely on: no dialect may give them another."""
 
 HINTS = {LATHE: "lathe programs are followed where they say what X is: LinuxCNC (G7, G8), Siemens (DIAMON, DIAMOF)"}
 """What helps with a language that is refused by name, where it is another thing than to name the dialect."""
@@ -62,9 +73,9 @@ class Dialect:
     passes              what is left as it is, by rule
     refuses             what cannot be corrected, and is named with its line
     language            where its `Language` is: the functions that read, follow and write it, as "module:NAME"
-    semantics           which of its language's rule sets holds; of RS274: "linuxcnc" (what its interpreter refuses
-                        is an error) or "iso" (codes that cannot move anything are passed over); of Fanuc: "fanuc",
-                        "haas" or "mitsubishi". Another name is an error (NCF508) when the language is needed
+    semantics           which of its language's rule sets holds, where there are several. A name that the language does
+                        not know is an error (NCF508) when the language is needed
+    codes, cycles       what it adds to the codes of its language, see `derive`
     """
 
     name: str
@@ -84,5 +95,49 @@ class Dialect:
     understands: tuple[str, ...] = ()
     passes: tuple[str, ...] = ()
     refuses: tuple[str, ...] = ()
-    language: str = "ncfix_iso.rs274.language:RS274"
-    semantics: str = "iso"
+    semantics: str = ""
+    codes: tuple[tuple[str, tuple[Operation, ...]], ...] = ()
+    cycles: tuple[tuple[str, CycleTable], ...] = ()
+    language: str = field(kw_only=True)
+
+    def level_of(self, code: int) -> str:
+        """The address of the level of a drilling cycle; `code` in tenths."""
+        return next((table.level for name, table in self.cycles if round(10 * float(name[1:])) == code), "R")
+
+    def derive(
+        self,
+        name: str,
+        *,
+        title: str,
+        codes: Mapping[str, Sequence[Operation]] | None = None,
+        cycles: Mapping[str, CycleTable] | None = None,
+        **changes: Any,
+    ) -> Dialect:
+        """A dialect of a control that is a relative of this one: all as here, but for what is given.
+
+        codes    "G100", "M180", "G54.4" -> what it does, operations of `ncfix.control.operations` in order; none: it
+                 moves nothing and changes no coordinates
+        cycles   "G177" -> the drilling cycle that it is
+        changes  of any other field. Without them its suffixes and signatures are none, so that programs are only read
+                 as this if the machine file or --dialect says so
+
+        Raises ValueError for a code that is none, or whose meaning the reader and the writer rely on.
+        """
+        own = {code: tuple(operations) for code, operations in (codes or {}).items()}
+        drills = dict(cycles or {})
+        for code in (*own, *drills):
+            cannot = code in drills or any(operation.takes for operation in own[code])
+            if not CODE.fullmatch(code) or code in FIXED or (code.startswith("M") and cannot):
+                raise ValueError(f"{name}: {code!r} cannot be a code of a dialect's own")
+        if both := own.keys() & drills.keys():
+            raise ValueError(f"{name}: {min(both)} cannot be a code and a cycle")
+        before = {code: operations for code, operations in self.codes if code not in drills}
+        tables = {code: table for code, table in self.cycles if code not in own}
+        return replace(
+            self,
+            name=name,
+            title=title,
+            codes=tuple((before | own).items()),
+            cycles=tuple((tables | drills).items()),
+            **{"suffixes": (), "signature": (), "variant_of": self.variant_of or self.name, **changes},
+        )

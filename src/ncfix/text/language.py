@@ -133,6 +133,7 @@ class Language:
               None if the language cannot write them
     straight  a program with blocks of this shape may come in parts: they have nothing to do with others elsewhere
     semantics  the rule sets that the family has, by the names that `Dialect.semantics` may give
+    own_codes  it takes the codes and cycles that a dialect adds (`Dialect.codes`, `Dialect.cycles`)
     """
 
     split: Callable[[bytes], NDArray[np.int64]]
@@ -151,7 +152,8 @@ class Language:
     renumber: Callable[[bytes], bytes] | None = None
     unroll: Callable[[Any, Mapping[str, float], int], Sequence[FlatLine]] | None = None
     straight: Callable[[Template], bool] = runs_straight_on
-    semantics: frozenset[str] = frozenset({"iso"})
+    semantics: frozenset[str] = frozenset({""})
+    own_codes: bool = False
 
 
 @lru_cache(maxsize=32)
@@ -165,4 +167,7 @@ def language_of(dialect: Dialect) -> Language:
     if dialect.semantics not in language.semantics:
         text = f"the dialect {dialect.name!r} has the semantics {dialect.semantics!r}, which its language does not know"
         raise useless("dialects", dialect.name, text, nearest(dialect.semantics, language.semantics))
+    if (dialect.codes or dialect.cycles) and not language.own_codes:
+        text = f"the dialect {dialect.name!r} has codes of its own, and its language takes none"
+        raise useless("dialects", dialect.name, text, "languages of the RS274 and Fanuc families take them")
     return language

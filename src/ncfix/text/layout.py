@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.tree import Anchor, Constant, Flow, Literal, Opaque, Program, Skip, Span, Tape, Word
@@ -35,6 +35,7 @@ class Layout:
     code_at   where a missing motion code goes: before the first axis word
     blank     what separates words in this block
     prefix    the span of the block skip, which further pieces repeat
+    levels    words that may give the level of a canned cycle, by their address
     allowed   axes that may get a word where they have none; None: all
     """
 
@@ -50,6 +51,7 @@ class Layout:
     code_at: Anchor
     blank: str
     prefix: Span | None
+    levels: dict[str, Word] = field(default_factory=dict)
     allowed: frozenset[str] | None = None
 
 
@@ -118,6 +120,7 @@ def layout_of(program: Program, block: int) -> Layout:
         code_at=code_at,
         blank=blank,
         prefix=words.skip,
+        levels=words.some(("R", *(table.level for _, table in program.dialect.cycles))),
     )
 
 

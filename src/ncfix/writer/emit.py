@@ -361,7 +361,9 @@ class _Emitter:
             call=moves.call_of(row),
             measured=() if moves.measured is None else tuple(moves.measured[row].tolist()),
             spelled=() if moves.spelled is None else tuple(moves.spelled[row].tolist()),
-            level=self.levels.wanted(row, rows.start, at, frame, as_programmed, self.position),
+            level=self.levels.wanted(
+                row, rows.start, at, frame, as_programmed, self.position, self.program.dialect.level_of(modal)
+            ),
         )
 
     def _turn_minutes(self, row: int) -> float:

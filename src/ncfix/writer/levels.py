@@ -36,9 +36,19 @@ class LevelBook:
         self.in_force = self.approach = None
 
     def wanted(
-        self, row: int, piece: int, number: int, frame: FrameMap, as_programmed: FrameMap, here: FloatArray
+        self,
+        row: int,
+        piece: int,
+        number: int,
+        frame: FrameMap,
+        as_programmed: FrameMap,
+        here: FloatArray,
+        address: str,
     ) -> Level | None:
-        """What R shall be in the numbers of `frame` (its `number`), while the axes stand `here`; None of no cycle."""
+        """What R shall be in the numbers of `frame` (its `number`), while the axes stand `here`; None of no cycle.
+
+        address  what stands for R
+        """
         moves, approach = self.moves, self.pieces.approach
         if approach is None or moves.approach is None or not np.isfinite(approach[piece]).all():
             return None
@@ -52,6 +62,7 @@ class LevelBook:
             nominal=float(nominal[across]),
             before=level if in_frame == number else math.nan,
             least=float(frame.program(here.copy())[across]) if stands and not self.comes_back(row) else math.nan,
+            address=address,
         )
 
     def comes_back(self, row: int) -> bool:

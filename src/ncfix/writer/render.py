@@ -146,9 +146,10 @@ class BlockRenderer(TurnWriter):
 
     def _level(self) -> None:
         """The level R of a canned cycle: its word, or one more where another level is in force."""
-        level, word = self.target.level, self.layout.radius
+        level = self.target.level
         if level is None:
             return
+        word = self.layout.levels.get(level.address)
         decimals, half, wanted = int(self.target.decimals[level.across]), self.half[level.across], level.wanted
         if wanted < level.least:
             wanted = float(np.ceil(level.least / (2 * half) - GRAIN) * 2 * half)
@@ -159,7 +160,7 @@ class BlockRenderer(TurnWriter):
             self.out.level = self._rewrite(word, wanted, decimals)
         else:
             text = f"{wanted:.{decimals}f}"
-            self._add("R", text)
+            self._add(level.address, text)
             self.out.level = float(text)
 
     # -- arcs ---------------------------------------------------------------------------------------------------------

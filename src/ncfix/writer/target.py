@@ -29,6 +29,7 @@ class Level:
     nominal  what it was as programmed
     before   what is in force before the block, NaN where that is not known
     least    R must not be lower; NaN: it may
+    address  what stands for R
     """
 
     across: int
@@ -36,6 +37,7 @@ class Level:
     nominal: float
     before: float
     least: float
+    address: str = "R"
 
 
 @dataclass(frozen=True, slots=True)

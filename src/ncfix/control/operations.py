@@ -1,0 +1,193 @@
+"""What codes and drilling cycles do that a dialect adds to those of its family, as data.
+
+`Dialect.derive` takes them; the interpreter of the family carries them out, so that modes, frames, unknown positions
+and the account of path words hold for them as for any other code. A code is a few operations, in order:
+
+    codes={
+        "G100": [SetTool("T"), Rapid()],                       # change the tool, then go to the words in rapid
+        "G168": [like("G68.2", I="A", J="B", K="C", P=0)],     # a tilted plane by other addresses
+        "G120": [Suspend("scaling of the fixture (G120)")],    # a mode that is not followed ...
+        "G121": [Resume("scaling of the fixture (G120)")],     # ... and its end
+        "M180": [],                                            # moves nothing, and changes no coordinates
+    },
+    cycles={"G177": CycleTable(needs="Q", returns="level")}
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Set
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+
+from ncfix.control.coordinates import INDEX, Vector, mask_of
+from ncfix.control.motion import Motion, UnknownAxes
+from ncfix.control.moves import Kind
+
+if TYPE_CHECKING:
+    from ncfix.control.control import Control
+
+LEVELS = "DEHIJKLPQR"
+LOST = "where the axis {{}} stands after {} is not known"
+NOT_FOLLOWED = "{} is in force, which ncfix does not follow"
+AFTER = "where the axis {{}} stands after {} is not followed"
+
+
+Destination = Callable[[], tuple[Vector, UnknownAxes]]
+"""Gives the command to which the axis words of a block lead, and what of it is not known."""
+
+
+class BlockValues(Protocol):
+    """The words of a block that is executed, see `Operation.carry_out`."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Address -> value, in program units."""
+
+    @property
+    def runtime(self) -> Set[str]:
+        """The addresses whose value is known only at run time."""
+
+    @property
+    def axes(self) -> int:
+        """The axis words, as a bit mask of their letters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Operation(ABC):
+    """Something that a code does before the motion of its block."""
+
+    takes: ClassVar[bool] = False
+    """It takes the axis words of its block, so that these make no other motion."""
+
+    @abstractmethod
+    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+        """Do it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Like(Operation):
+    """It does what a code of the family does. See `like`.
+
+    words  the family's address -> the own address whose word it gets, or a fixed number
+    """
+
+    code: str
+    words: tuple[tuple[str, str | float], ...] = ()
+
+    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+        """The family's code stands in its place wherever blocks are read: there is nothing left to do."""
+
+
+def like(code: str, **words: str | float) -> Like:
+    """Do what the family's `code` does. `I="A"`: its I is the word A; `P=0`: its P is 0; other words stay."""
+    return Like(code, tuple(sorted(words.items())))
+
+
+@dataclass(frozen=True, slots=True)
+class SetTool(Operation):
+    """The tool that a word names is put into the spindle; the machine may go anywhere to change it."""
+
+    address: str = "T"
+
+    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+        """See `Operation`."""
+        if self.address in block.values:
+            control.tools.selected = round(block.values[self.address])
+        control.tools.spindle = control.tools.selected
+        control.places.lose(mask_of(control.machine))
+
+
+@dataclass(frozen=True, slots=True)
+class Lose(Operation):
+    """Axes go where the program does not say: nothing is known of them until the program names them again.
+
+    axes   letters
+    after  after what, for messages: "the tool change (G100)"
+    """
+
+    axes: str
+    after: str
+
+    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+        """See `Operation`."""
+        indices = [INDEX[letter] for letter in self.axes if INDEX[letter] in control.machine]
+        control.lose(indices, LOST.format(self.after))
+        control.places.lose(mask_of(indices))
+
+
+@dataclass(frozen=True, slots=True)
+class Rapid(Operation):
+    """The axes go to the words of the block in rapid, whatever motion code is in force."""
+
+    takes: ClassVar[bool] = True
+
+    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+        """See `Operation`."""
+        if block.axes:
+            target, unknown = destination()
+            whole, control.whole = control.whole, True
+            control.make(Motion(Kind.RAPID, block.axes, target, unknown, 0))
+            control.whole = whole
+
+
+@dataclass(frozen=True, slots=True)
+class Suspend(Operation):
+    """A mode begins that ncfix does not follow: motions are refused until `Resume` of the same mode."""
+
+    mode: str
+
+    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+        """See `Operation`."""
+        control.suspended[self.mode] = NOT_FOLLOWED.format(self.mode)
+
+
+@dataclass(frozen=True, slots=True)
+class Resume(Operation):
+    """The mode ends; where it has led the axes is not known."""
+
+    mode: str
+
+    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+        """See `Operation`."""
+        if control.suspended.pop(self.mode, None):
+            control.lose(control.machine, AFTER.format(self.mode))
+
+
+@dataclass(frozen=True, slots=True)
+class Refuse(Operation):
+    """Every motion from here on is refused; `why` is told for each."""
+
+    why: str
+
+    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+        """See `Operation`."""
+        control.refusal = control.refusal or self.why
+
+
+@dataclass(frozen=True, slots=True)
+class CycleTable:
+    """A drilling cycle: from the level to the depth and back, at each hole that the words of the plane name.
+
+    The depth is the word of the axis across the plane. It and the level count as in the family's cycles (G90, G91).
+
+    level    the address of the level from which it feeds
+    needs    addresses without which the control does not begin it
+    repeats  addresses that say how often it drills; empty: those of the family
+    returns  where it ends: "mode" (as G98 and G99 say), "level", or "initial" (where the series of holes began)
+    modal    it stays in force until G80 or another motion code
+    """
+
+    level: str = "R"
+    needs: str = ""
+    repeats: str = ""
+    returns: Literal["mode", "level", "initial"] = "mode"
+    modal: bool = True
+
+    def __post_init__(self) -> None:
+        if len(self.level) != 1 or self.level not in LEVELS:
+            raise ValueError(f"{self.level!r} cannot be the address of the level of a cycle: one of {LEVELS}")
+
+    def ends_at_level(self, mode: bool) -> bool:
+        """Whether it ends at the level; `mode`: G99 is in force."""
+        return mode if self.returns == "mode" else self.returns == "level"

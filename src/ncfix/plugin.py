@@ -1,0 +1,152 @@
+"""What a plugin imports: all that a maker's language and tables need, in one module.
+
+    from ncfix.plugin import CycleTable, Rapid, SetTool, family, hookimpl
+
+    BROTHER = family("fanuc").derive("brother", title="Brother", codes={"G100": [SetTool("T"), Rapid()]})
+
+    @hookimpl
+    def register_dialects(register):
+        register(BROTHER)
+
+Names are looked up when they are asked for: what is light (dialects, operations, hooks) costs nothing, what needs numpy
+(tables, machines) is imported with the first of them. So a plugin's first module asks for light names only, and has its
+tables in a module of its own. docs/plugins.md goes through it step by step; `ncfix.testing` judges the result.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from ncfix.hookspecs import GROUP
+from ncfix.hookspecs import Register as Register
+from ncfix.hookspecs import hookimpl as hookimpl
+from ncfix.plugins import nearest
+from ncfix.text.dialect import FOREIGN as FOREIGN
+from ncfix.text.dialect import TURNING as TURNING
+from ncfix.text.dialect import Dialect as Dialect
+
+if TYPE_CHECKING:
+    from ncfix.control.operations import CycleTable as CycleTable
+    from ncfix.control.operations import Like as Like
+    from ncfix.control.operations import Lose as Lose
+    from ncfix.control.operations import Operation as Operation
+    from ncfix.control.operations import Rapid as Rapid
+    from ncfix.control.operations import Refuse as Refuse
+    from ncfix.control.operations import Resume as Resume
+    from ncfix.control.operations import SetTool as SetTool
+    from ncfix.control.operations import Suspend as Suspend
+    from ncfix.control.operations import like as like
+    from ncfix.diagnostics import Code as Code
+    from ncfix.diagnostics import ConfigError as ConfigError
+    from ncfix.diagnostics import Message as Message
+    from ncfix.diagnostics import NcfixError as NcfixError
+    from ncfix.diagnostics import Place as Place
+    from ncfix.diagnostics import RefusedError as RefusedError
+    from ncfix.diagnostics import SourceError as SourceError
+    from ncfix.diagnostics import UsageError as UsageError
+    from ncfix.machine import Effect as Effect
+    from ncfix.machine import Machine as Machine
+    from ncfix.machine import State as State
+    from ncfix.machine.basis import Basis as Basis
+    from ncfix.measure.measurement import Measurement as Measurement
+    from ncfix.report.document import Document as Document
+    from ncfix.tables.axis_tables import Reversal as Reversal
+    from ncfix.tables.axis_tables import positioning as positioning
+    from ncfix.tables.axis_tables import reversal_note as reversal_note
+    from ncfix.tables.axis_tables import reversals as reversals
+    from ncfix.tables.compensation import Compensation as Compensation
+    from ncfix.tables.compensation import Tables as Tables
+    from ncfix.tables.compensation import Term as Term
+    from ncfix.tables.compensation import own_terms as own_terms
+    from ncfix.tables.control import Assumption as Assumption
+    from ncfix.tables.control import Control as Control
+    from ncfix.tables.control import Files as Files
+    from ncfix.tables.control import Option as Option
+    from ncfix.tables.control import Properties as Properties
+    from ncfix.tables.control import Request as Request
+    from ncfix.tables.control import Written as Written
+    from ncfix.tables.control import number as number
+    from ncfix.tables.control import one_of as one_of
+    from ncfix.tables.control import whole as whole
+    from ncfix.tables.control import wrong_setting as wrong_setting
+    from ncfix.tables.correction import exact_correction as exact_correction
+    from ncfix.tables.forms import FileForm as FileForm
+    from ncfix.tables.forms import TableFile as TableFile
+    from ncfix.tables.forms import form_named as form_named
+    from ncfix.tables.forms import read_form as read_form
+    from ncfix.tables.grid import Array as Array
+    from ncfix.tables.grid import Grid as Grid
+    from ncfix.tables.grid import full_grid as full_grid
+    from ncfix.tables.lower_bounds import least_of_own_axis as least_of_own_axis
+    from ncfix.tables.table_files import Remarks as Remarks
+    from ncfix.tables.table_files import as_number as as_number
+    from ncfix.tables.table_files import check_all as check_all
+    from ncfix.tables.table_files import in_order as in_order
+    from ncfix.tables.table_files import messages_of as messages_of
+    from ncfix.tables.table_files import unit_of as unit_of
+
+HERE = ("FOREIGN", "TURNING", "Dialect", "Register", "family", "hookimpl")
+ELSEWHERE = {
+    "ncfix.control.operations": (
+        *("CycleTable", "Like", "Lose", "Operation", "Rapid", "Refuse", "Resume", "SetTool", "Suspend", "like"),
+    ),
+    "ncfix.diagnostics": (
+        *("Code", "ConfigError", "Message", "NcfixError", "Place", "RefusedError", "SourceError", "UsageError"),
+    ),
+    "ncfix.machine": ("Effect", "Machine", "State"),
+    "ncfix.machine.basis": ("Basis",),
+    "ncfix.measure.measurement": ("Measurement",),
+    "ncfix.report.document": ("Document",),
+    "ncfix.tables.axis_tables": ("Reversal", "positioning", "reversal_note", "reversals"),
+    "ncfix.tables.compensation": ("Compensation", "Tables", "Term", "own_terms"),
+    "ncfix.tables.control": (
+        *("Assumption", "Control", "Files", "Option", "Properties", "Request", "Written"),
+        *("number", "one_of", "whole", "wrong_setting"),
+    ),
+    "ncfix.tables.correction": ("exact_correction",),
+    "ncfix.tables.forms": ("FileForm", "TableFile", "form_named", "read_form"),
+    "ncfix.tables.grid": ("Array", "Grid", "full_grid"),
+    "ncfix.tables.lower_bounds": ("least_of_own_axis",),
+    "ncfix.tables.table_files": ("Remarks", "as_number", "check_all", "in_order", "messages_of", "unit_of"),
+}
+"""Module -> the names that are imported from it when they are asked for."""
+
+MODULES = {name: module for module, names in ELSEWHERE.items() for name in names}
+
+
+def __dir__() -> list[str]:
+    return sorted((*HERE, *MODULES))
+
+
+def __getattr__(name: str) -> Any:
+    """A name of another module."""
+    if name not in MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(MODULES[name]), name)
+    return found
+
+
+@cache
+def family(name: str) -> Dialect:
+    """The dialect of that name of an installed plugin, to derive another from it.
+
+    Raises LookupError where there is none.
+    """
+    from importlib.metadata import entry_points
+
+    found: dict[str, Dialect] = {}
+
+    def register(dialect: Dialect, name: str | None = None) -> None:
+        found.setdefault(name or dialect.name, dialect)
+
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name != name):
+        own = point.dist is not None and point.dist.metadata["Name"] == "ncfix"
+        if own or point.name == name:
+            hook = getattr(point.load(), "register_dialects", None)
+            if hook is not None:
+                hook(register)
+        if name in found:
+            return found[name]
+    raise LookupError(f"no dialect {name!r} to derive from: {nearest(name, found)}")

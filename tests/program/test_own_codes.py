@@ -1,0 +1,142 @@
+"""Codes and cycles that a dialect adds to its family: they do what the family's own codes would."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_program
+from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.operations import CycleTable, Lose, Rapid, Refuse, Resume, SetTool, Suspend, like
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
+from ncfix.diagnostics import PluginError, SourceError
+from ncfix.machine import Machine, load
+from ncfix.plugin import family
+from ncfix.text.dialect import Dialect
+from ncfix.text.reader import read
+
+FIXTURE = "the fixture's frame (G120)"
+CODES = {
+    "G100": [SetTool("T"), Rapid()],
+    "G168": [like("G68.2", I="A", J="B", K="C", P=0)],
+    "G120": [Suspend(FIXTURE)],
+    "G121": [Resume(FIXTURE)],
+    "G130": [Lose("Z", "the retraction (G130)")],
+    "G131": [Refuse("the turret turns (G131)")],
+    "G187": [],
+    "M180": [],
+    "M160": [SetTool("T")],
+}
+CYCLES = {
+    "G177": CycleTable(level="E", needs="Q", returns="level"),
+    "G178": CycleTable(returns="initial", modal=False),
+}
+OWN = family("fanuc").derive("own", title="Own", codes=CODES, cycles=CYCLES)
+SETUP = Setup(assume_zero=True)
+
+
+@pytest.fixture(scope="module")
+def dmu50(root: Path) -> Machine:
+    return load(root / "examples/machines/dmu50.toml")
+
+
+def moves_of(text: str, machine: Machine, dialect: Dialect = OWN) -> Moves:
+    program = read(text.encode(), "part.nc", dialect=dialect)
+    return trace(program, SETUP, machine.axis_names, frozenset("ABC") & {*machine.axis_names}).moves
+
+
+def fixed(text: str, machine: Machine, dialect: Dialect = OWN) -> Fixed:
+    options = FixOptions(allow_refused=True)
+    return fix_program(read(text.encode(), "part.nc", dialect=dialect), machine, SETUP, options)
+
+
+def numbers(program: bytes) -> list[str]:
+    """What stands behind the axis letters of a program, the level as R; without its stamp."""
+    code = re.sub(rb"\(.*?\)", b"", program).replace(b"E", b"R")
+    return [word.decode() for word in re.findall(rb"[XYZRBC]-?[\d.]+", code)]
+
+
+HEAD = "G21 G17 G90 G54\nT2 M6\nG0 X10. Y20. Z100.\nG43 H2 Z50.\nS1000 M3\n"
+FAMILY = HEAD + (
+    "G99 G83 X30. Y30. Z-10. R2. Q3. F100.\nX40. Y35.\nR3. X50.\nG80\nG1 X0. Y0. Z10. F500.\n"
+    "G68.2 X10. Y0. Z0. I0. J30. K0.\nG53.1\nG1 X5. Y5. Z0. F300.\nG69\nM30\n"
+)
+
+
+def test_own_codes_are_corrected_as_those_of_the_family(dmu50: Machine) -> None:
+    own = HEAD + (
+        "G177 X30. Y30. Z-10. E2. Q3. F100.\nX40. Y35.\nE3. X50.\nG80\nG187 P1\nG1 X0. Y0. Z10. F500.\nM180\n"
+        "G168 X10. Y0. Z0. A0. B30. C0.\nG53.1\nG1 X5. Y5. Z0. F300.\nG69\nM30\n"
+    )
+    meant, found = fixed(FAMILY, dmu50, family("fanuc")), fixed(own, dmu50)
+    assert not found.report.refused
+    assert [w for w in numbers(found.text) if w not in ("B30.", "C0.")] == numbers(meant.text)
+    assert b"G168 X10. Y0. Z0. A0. B30. C0." in found.text
+
+
+def test_a_tool_change_leads_to_its_words_in_rapid(dmu50: Machine) -> None:
+    text = "G90 G54 G1 F100. X0. Y0. Z10.\nG100 T3 X10. Y20. Z100.\nX11.\nM30\n"
+    moves = moves_of(text, dmu50)
+    assert [Kind(kind) for kind in moves.kind] == [Kind.FEED, Kind.RAPID, Kind.FEED]
+    assert (moves.rule == Rule.CORRECT).all()
+    again = fixed(text, dmu50).text
+    assert re.search(rb"\nG100 T3 X[\d.]+ Y[\d.]+ Z[\d.]+\n", again)
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("G120\nG1 X5.", FIXTURE),
+        ("G130\nG1 X5.", "the retraction (G130)"),
+        ("G131\nG1 X5.", "the turret turns (G131)"),
+    ],
+)
+def test_what_is_not_followed_is_refused_with_its_reason(dmu50: Machine, line: str, reason: str) -> None:
+    text = f"G90 G54 G0 X0. Y0. Z10. B0. C0.\nF100.\n{line}\nM30\n"
+    moves = moves_of(text, dmu50)
+    assert moves.rule[-1] == Rule.REFUSE
+    assert reason in moves.reasons[moves.reason[-1]]
+
+
+def test_a_mode_ends(dmu50: Machine) -> None:
+    moves = moves_of("G90 G54 G0 X0. Y0. Z10. B0. C0.\nG120\nX5.\nG121\nX6. Y0. Z9. B0. C0.\nG1 F10. X7.\n", dmu50)
+    assert [Rule(rule) for rule in moves.rule] == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+
+
+def test_a_cycle_that_is_not_modal(dmu50: Machine) -> None:
+    moves = moves_of("G90 G54 G0 X0. Y0. Z10. B0. C0.\nF100.\nG178 X1. Y1. Z-5. R1.\nX9.\nM30\n", dmu50)
+    assert [Kind(kind) for kind in moves.kind] == [Kind.RAPID, Kind.CYCLE, Kind.RAPID]
+    assert np.isclose(moves.start[2][dmu50.axis_names.index("Z")], 10.0)
+
+
+def test_a_cycle_lacks_a_word(dmu50: Machine) -> None:
+    with pytest.raises(SourceError, match="Q is missing: G177 cannot begin without it"):
+        moves_of("G90 G54 G0 X0. Y0. Z10.\nG177 X1. Y1. Z-5. E1. F10.\n", dmu50)
+
+
+def test_a_word_in_the_place_of_a_renamed_one(dmu50: Machine) -> None:
+    with pytest.raises(SourceError, match="I is no word of G168"):
+        moves_of("G90 G54 G0 X0. Y0. Z10.\nG168 X1. Y1. I5. A0. B1. C0.\n", dmu50)
+
+
+@pytest.mark.parametrize("code", ["G1", "G90", "H5", "G100.25", "g100"])
+def test_codes_that_no_dialect_can_have(code: str) -> None:
+    with pytest.raises(ValueError, match="cannot be a code of a dialect's own"):
+        OWN.derive("x", title="X", codes={code: []})
+
+
+def test_codes_in_a_language_that_takes_none() -> None:
+    with pytest.raises(PluginError, match="takes none"):
+        read(b"G0 X0\n", dialect=family("siemens").derive("x", title="X", codes={"G150": []}))
+
+
+def test_dialects_of_a_derived_one() -> None:
+    again = OWN.derive("again", title="Again", codes={"G187": [Refuse("no")]}, cycles={"G121": CycleTable()})
+    assert dict(again.codes)["G187"] == (Refuse("no"),)
+    assert "G121" not in dict(again.codes)
+    assert again.variant_of == "fanuc"
