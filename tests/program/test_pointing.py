@@ -10,7 +10,8 @@ import pytest
 
 from ncfix.compensate.following import kinematics_of
 from ncfix.control.moves import TcpState
-from ncfix.control.pointing import Pointing, led, nearest, within
+from ncfix.control.pointing import Pointing, led, nearest
+from ncfix.control.posture import within
 from ncfix.machine import Machine, load
 
 MACHINES = ("wCAYFXZSt", "wCBXFZYSt", "dmu50", "angle_head")

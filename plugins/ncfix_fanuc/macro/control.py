@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable
 
 from ncfix.control.coordinates import INDEX
+from ncfix.control.posture import stands_square
 from ncfix.control.setup import POINTLESS
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
@@ -12,7 +13,6 @@ from ncfix.text.language import Run
 from ncfix.text.tree import Template
 from ncfix_fanuc.macro.rules import RULES
 from ncfix_fanuc.macro.scaling import Scaling
-from ncfix_fanuc.macro.squaring import stands_square
 from ncfix_fanuc.macro.variables import Variables
 from ncfix_fanuc.macro.vectors import COMPONENTS
 from ncfix_iso.rs274.control import Block, Control
@@ -66,7 +66,7 @@ class MacroControl(Control):
 
     def stands_square(self) -> bool:
         """Whether the tool is known to lie along Z of a tilted plane that is in force."""
-        return self.tilted and stands_square(self)
+        return self.tilted and bool(stands_square(self, self.rotation))
 
     def refresh(self) -> None:
         """Compose the offsets; a number without a point counts increments of the unit in force."""

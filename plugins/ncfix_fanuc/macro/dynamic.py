@@ -9,10 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ncfix.control.coordinates import Rotation, X, Y, Z, as_rotation
-from ncfix.control.moves import TcpState
+from ncfix.control.posture import machine_directions
 from ncfix_fanuc.macro import tilt
 from ncfix_iso.rs274.control import Block
 
@@ -20,9 +17,6 @@ if TYPE_CHECKING:
     from ncfix_fanuc.macro.control import MacroControl
 
 ON, OFF = 2540, 2550
-PROBE = 128.0
-"""mm; a power of two, so that dividing by it rounds nothing."""
-
 KEY = "dynamic work offset"
 NOT_SOLVED = "how the tables stand where G254 comes into force, or what is in force besides it, is not followed"
 MOVED = "a rotary axis moves while G254 is in force, which counts from where the tables stood"
@@ -35,30 +29,16 @@ def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
         control.dynamic = False
         tilt.end(control)
         return
-    rotation = None if control.mirrored or control.is_rotated else axes_in_workpiece(control)
-    if rotation is None:
+    machine = None
+    if not (control.mirrored or control.is_rotated):
+        control.settle(control.turning)
+        known = not control.unknown.keys() & {*control.turning}
+        machine = machine_directions(control, control.position) if known else None
+    if machine is None:
         control.suspended[KEY] = NOT_SOLVED
         return
     control.dynamic = True
-    tilt.begin(control, rotation, Block(block.index, {}, frozenset(), 0))
-
-
-def axes_in_workpiece(control: MacroControl) -> Rotation | None:
-    """The directions of the machine's X, Y and Z in the workpiece, as columns; None if they are not known."""
-    machine, kinematics = control.machine, control.kinematics
-    control.settle(control.turning)
-    if kinematics is None or not {X, Y, Z} <= {*machine} or control.unknown.keys() & {*control.turning}:
-        return None
-    at_tip = TcpState(False, 0.0), TcpState(True, 0.0)
-    still = [control.position[index] if control.rotary[index] else 0.0 for index in machine]
-    places = [machine.index(index) for index in (X, Y, Z)]
-    origin = np.array(kinematics(still, *at_tip))[places]
-    columns = []
-    for place in places:
-        moved = still[:]
-        moved[place] = PROBE
-        columns.append((np.array(kinematics(moved, *at_tip))[places] - origin) / PROBE)
-    return as_rotation(np.stack(columns, axis=-1).tolist())
+    tilt.begin(control, machine.axes, Block(block.index, {}, frozenset(), 0))
 
 
 def turned(control: MacroControl, block: Block) -> bool:

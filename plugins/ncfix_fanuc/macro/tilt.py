@@ -7,25 +7,18 @@ Source: Fanuc 30i operator's manual (machining centre), "Tilted working plane in
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ncfix.control.coordinates import (
-    IDENTITY,
-    LETTERS,
-    Rotation,
-    X,
-    Y,
-    Z,
-    zeros,
-)
+from ncfix.control.coordinates import IDENTITY, LETTERS, Rotation, Vector, X, Y, Z, angles_in_words, zeros
 from ncfix.control.motion import Motion
-from ncfix.control.moves import Kind
+from ncfix.control.moves import Kind, TcpState
 from ncfix.control.passing import Pass, Passing
+from ncfix.control.posture import normal_of, postures
 from ncfix.control.tcp import switch
 from ncfix_fanuc.macro.planes import are_square, by_axes, by_points, euler, in_order
-from ncfix_fanuc.macro.squaring import SQUARED, Squared, turned_square
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.settings import unfollowed
 from ncfix_iso.rs274.shifts import rotate_system
@@ -46,6 +39,7 @@ LAST = {POINTS: 3, VECTORS: 2}
 DEFINING = "a tilted plane (G68.2) is begun, and the blocks that say how it lies are not all there"
 NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane is not known"
 TURNED_TO = "NCF243"
+SQUARED = "the control's parameters decide; state the rotary axes in the program if they are others"
 ALIGNMENTS = {
     code: Passing(Pass.ALIGNMENT, f"tool axis alignment ({name})") for code, name in ((531, "G53.1"), (536, "G53.6"))
 }
@@ -155,27 +149,37 @@ def align(control: MacroControl, block: Block, code: int) -> None:
 
     In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece.
     """
-    turning = control.turning
-    control.settle(turning)
+    control.settle(control.turning)
+    found = postures(control, normal_of(control.rotation))
     target, lost = control.position[:], set[int]()
-    found = turned_square(control) if turning else None
-    if found is not None:
-        target = found.about_tip if code == ABOUT_TIP else found.position
-        if found.several:
-            note_choice(control, found, code)
-    elif turning:
-        lost |= {*turning, X, Y, Z}
-    hidden = found is not None and not control.unknown.keys().isdisjoint((X, Y, Z))
+    if found is not None and found.ways:
+        target = turned(control, found.chosen, about_tip=code == ABOUT_TIP)
+        if len(found.ways) > 1:
+            angles = angles_in_words(control.turning, [target[index] for index in control.turning])
+            name = f"G{code / 10:g}"
+            control.warn(TURNED_TO, f"{name} is taken to turn to {angles}, the nearest of several ways", SQUARED)
+        hidden = not control.unknown.keys().isdisjoint((X, Y, Z))
+    else:
+        hidden = bool(control.turning)
+        lost |= {*control.turning}
     if hidden or (code == ABOUT_TIP and is_moved_otherwise(control, block)):
         lost |= {X, Y, Z}
     unknown = control.unknown | dict.fromkeys(lost.intersection(control.machine), NOT_SOLVED)
     control.make(Motion(Kind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENTS[code]))
 
 
-def note_choice(control: MacroControl, squared: Squared, code: int) -> None:
-    """Say to which angles the rotary axes are taken to turn."""
-    angles = " ".join(f"{LETTERS[index]}{squared.degrees[index]:.3f}" for index in control.turning)
-    control.warn(TURNED_TO, f"G{code / 10:g} is taken to turn to {angles}, the nearest of several ways", SQUARED)
+def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: bool) -> Vector:
+    """The command with the rotary axes at some angles: the tip stays where it is, or X Y Z of the machine do."""
+    if about_tip:
+        return [angles.get(index, value) for index, value in enumerate(control.position)]
+    assert control.kinematics is not None, "they have shown how the tool is pointed"
+    on, off = TcpState(True, control.offsets.tool[Z]), TcpState(False, control.offsets.tool[Z])
+    still = control.kinematics([control.position[index] for index in control.machine], on, off)
+    command = [angles.get(index, value) for index, value in zip(control.machine, still, strict=True)]
+    target = control.position[:]
+    for index, value in zip(control.machine, control.kinematics(command, off, on), strict=True):
+        target[index] = value
+    return target
 
 
 def is_moved_otherwise(control: MacroControl, block: Block) -> bool:

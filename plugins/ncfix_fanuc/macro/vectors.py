@@ -8,15 +8,13 @@ Source: Fanuc, "Tool center point control for 5-axis machining" (A-79348E), type
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ncfix.control.coordinates import DEGREE, LETTERS, angles_in_words, dot
+from ncfix.control.coordinates import DEGREE, LETTERS, dot
 from ncfix.control.faults import Fault
-from ncfix.control.pointing import Pointing, within
+from ncfix.control.posture import Postures, WayRules, postures
 
 if TYPE_CHECKING:
     from ncfix_fanuc.macro.control import MacroControl
@@ -35,10 +33,6 @@ FROM_UNKNOWN = "where the rotary axes stand before the tool is turned (I J K) is
 AFTER_VECTOR = "where the axis {} stands after a direction of the tool that is not followed is not known"
 CHOICE = "state the direction in smaller steps, or use G43.4, if the control turns the other way"
 
-FAR = math.radians(0.1)
-"""rad. Between two vectors a control may turn the tool in their plane, or its rotary axes evenly: parameters say which.
-The tip is not concerned; where the two differ by more, pieces of the motion would point the tool elsewhere."""
-
 
 def directed(control: MacroControl, block: Block, motion: int) -> str:
     """Give a block the rotary words that its vector amounts to; why its motion is refused, if it is."""
@@ -52,44 +46,37 @@ def directed(control: MacroControl, block: Block, motion: int) -> str:
         return ""
     if block.runtime & set(COMPONENTS):
         return AT_RUNTIME
-    pointing = control.pointing
-    if pointing is None or control.kinematics is None:
+    if control.pointing is None:
         return NO_KINEMATICS
     control.settle(axes)
     if control.unknown.keys() & set(axes):
         return FROM_UNKNOWN
-    columns = [control.machine[column] for column in pointing.columns]
-    here = control.position[columns[0]], control.position[columns[1]]
-    travel = [control.kinematics.travel[column] for column in pointing.columns]
-    ways = within(pointing.angles(wanted(control, block), here), travel, here)
-    if not ways:
+    found = postures(control, wanted(control, block), WayRules(in_travel=True))
+    if found is None or not found.ways:
         raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction (I J K)")
-    note_choice(control, pointing, here, ways)
-    for index, angle in zip(columns, ways[0], strict=True):
+    note_choice(control, found)
+    for index, angle in found.chosen.items():
         block.values[LETTERS[index]] = (angle - control.offset[index]) / DEGREE
         block.axes |= 1 << index
     control.points = True
-    control.whole |= motion != 0 and pointing.stray(here, ways[0]) > FAR
+    control.whole |= motion != 0 and found.strays
     return ""
 
 
-def wanted(control: MacroControl, block: Block) -> NDArray[np.float64]:
+def wanted(control: MacroControl, block: Block) -> list[float]:
     """The vector of a block as a unit vector in the workpiece; raises `Fault` if it has no length."""
     turned = np.array([dot(row, [block.get(letter) for letter in COMPONENTS]) for row in control.rotation])
     size = float(np.linalg.norm(turned))
     if size == 0.0:
         raise Fault(BAD_VECTOR, "the direction of the tool (I J K) has no length")
-    return turned / size
+    return [float(part) for part in turned / size]
 
 
-def note_choice(
-    control: MacroControl, pointing: Pointing, here: tuple[float, float], ways: list[tuple[float, float]]
-) -> None:
+def note_choice(control: MacroControl, found: Postures) -> None:
     """Say which way was taken where another would do as well, or where a control may find another one nearer."""
-    if len(ways) < 2 or pointing.at_pole(pointing.at(*ways[0])):
+    if len(found.ways) < 2 or found.at_pole:
         return
-    at_pole = pointing.at_pole(pointing.at(*here))
-    by_one_axis = any(abs(ways[1][k] - here[k]) < abs(ways[0][k] - here[k]) for k in (0, 1))
-    if at_pole or by_one_axis:
-        angles = angles_in_words([control.machine[column] for column in pointing.columns], ways[0])
-        control.warn(TURNED_TO, f"G43.5 is taken to turn to {angles}, the nearest of several ways", CHOICE)
+    here, (first, second) = found.here, found.ways
+    by_one_axis = any(abs(second[k] - here[k]) < abs(first[k] - here[k]) for k in (0, 1))
+    if found.leaves_pole or by_one_axis:
+        control.warn(TURNED_TO, f"G43.5 is taken to turn to {found}, the nearest of several ways", CHOICE)

@@ -105,7 +105,6 @@ class Control(base.Control):
         self.unit = 1.0
         self.m128 = run.setup.tcp
         self.shortest = False
-        self.stood: tuple[Vector, object] | None = None
         self.auto_feed = math.nan
         self.preset = ""
         self.preset_checked = False

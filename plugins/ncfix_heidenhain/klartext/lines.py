@@ -10,9 +10,9 @@ from ncfix.control.coordinates import LETTERS, Vector, dot, mask_of
 from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
+from ncfix.control.posture import WayRules, postures
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import DEPARTED, Control
-from ncfix_heidenhain.klartext.posture import angles_for
 from ncfix_heidenhain.klartext.step import Step, refuse, with_increments
 from ncfix_heidenhain.klartext.targets import (
     Words,
@@ -38,6 +38,7 @@ MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
 FAR_INCREMENT = "an increment of more than half a turn under M126: whether it goes the shorter way is not sure"
 OFF = Passing(Pass.LED, "a rapid from where the control itself has led the tool")
 DEPARTURE = Passing(Pass.DEPARTURE, "departure from the contour (DEP)")
+IN_TRAVEL = WayRules(in_travel=True)
 FLAT = 1e-9
 IN_SPACE = 0b111
 """The bits of X, Y and Z."""
@@ -69,9 +70,8 @@ def pointed(control: Control, words: Words) -> dict[int, float] | None:
     vector = unit((words.values.get("TX", 0.0), words.values.get("TY", 0.0), words.values.get("TZ", 0.0)))
     if vector is None or not control.m128:
         return None
-    x, y, z = (dot(row, vector) for row in control.rotation)
-    ways = angles_for(control, (x, y, z))
-    return ways[0] if ways else None
+    found = postures(control, [dot(row, vector) for row in control.rotation], IN_TRAVEL)
+    return found.chosen if found is not None and found.ways else None
 
 
 def straight_polar(control: Control, step: Step) -> None:

@@ -6,18 +6,17 @@ axes follows from the machine's kinematics; MOVE also moves the linear axes, whi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
-from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, Rotation, angles_in_words, product
+from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
 from ncfix.control.faults import Fault
 from ncfix.control.motion import AT_START, Motion
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
+from ncfix.control.posture import WayRules, machine_directions, normal_of, postures, stands_square
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import MOVED_ALONG, TILTED, Control
-from ncfix_heidenhain.klartext.posture import NOT_NORMAL, angles_for, apart, normal_of, posture, stands_normal
 from ncfix_heidenhain.klartext.targets import Words
 from ncfix_heidenhain.klartext.transformations import euler, from_points, from_vectors, projected, spatial
 
@@ -29,6 +28,7 @@ NONE = 1e-9
 """rad; an axis that is said to stand at zero."""
 
 POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
+NOT_NORMAL = "the tool does not stand normal to the tilted plane, by the axis positions of the program"
 TURNED = Passing(Pass.ALIGNMENT, "the control positions the rotary axes (PLANE)")
 WAY = "NCF279"
 WAY_HINT = "say SEQ+ or SEQ- in the program, or state the rotary axes"
@@ -114,8 +114,8 @@ def by_axes(control: Control, values: Values, flags: frozenset[str]) -> None:
     for letter in "ABC":
         if letter in values:
             turned[INDEX[letter]] = values[letter] * DEGREE
-    found = posture(control, turned)
-    if found is None or apart(found.tool, normal_of(found.axes)) > 1e-6:
+    found = machine_directions(control, turned)
+    if found is None or math.dist(found.tool, normal_of(found.axes)) > 1e-6:
         tilt_to(control, control.transformations.tilt, flags, NO_KINEMATICS)
         return
     tilt_to(control, found.axes, flags)
@@ -147,23 +147,23 @@ def chosen_way(control: Control, tilt: Rotation | None, flags: frozenset[str]) -
 
     SEQ (or SYM) says which of the two ways is taken by the sign of the master axis, the one that tilts the tool when
     all rotary axes stand at zero. Without it the nearest is.
+
+    Where the tool is square to the plane wherever the axis next to the workpiece stands, that axis is free: by COORD
+    ROT, which counts where nothing is said, some controls turn it to zero, others leave it; by TABLE ROT it takes over
+    the rotation of the plane. Only where it stands at zero already, all is one.
     """
+    signs = (-1 if flag.endswith("-") else 1 for flag in flags if flag[:3] in ("seq", "sym"))
     normal = normal_of(IDENTITY if tilt is None else tilt)
-    ways = angles_for(control, normal)
-    sign = next((flag[-1] for flag in flags if flag[:3] in ("seq", "sym")), "")
-    pointing = control.pointing
-    if not ways or pointing is None:
+    found = postures(control, normal, WayRules(in_travel=True, sign=next(signs, 0)))
+    if found is None or not found.ways:
         return None
-    if sign:
-        master = control.machine[pointing.columns[1]]
-        ways = [way for way in ways if abs(way[master]) < 1e-9 or (way[master] < 0) == (sign == "-")]
-    if pointing.at_pole(np.array(normal)):
+    if found.at_pole:
         turned = "table rot" in flags and tilt is not None and tilt != IDENTITY
-        return None if turned else way_at_pole(control, ways[0])
-    if len(ways) > 1:
-        angles = angles_in_words(ways[0].keys(), ways[0].values())
-        control.warn(WAY, f"the rotary axes are taken to turn to {angles}, the nearest of several ways", WAY_HINT)
-    return ways[0] if ways else None
+        at_zero = abs(found.ways[0][0]) < NONE
+        return found.chosen if at_zero and not turned else None
+    if len(found.ways) > 1:
+        control.warn(WAY, f"the rotary axes are taken to turn to {found}, the nearest of several ways", WAY_HINT)
+    return found.chosen
 
 
 def way_home(control: Control) -> dict[int, float] | None:
@@ -173,17 +173,6 @@ def way_home(control: Control) -> dict[int, float] | None:
     if any(index in control.unknown or abs(control.position[index]) > NONE for index in control.turning):
         control.warn(WAY, HOME, "state the rotary axes in the next block")
     return dict.fromkeys(control.turning, 0.0)
-
-
-def way_at_pole(control: Control, way: dict[int, float]) -> dict[int, float] | None:
-    """The way to a plane to which the tool is square wherever the axis next to the workpiece stands.
-
-    That axis is free: by COORD ROT, which counts where nothing is said, some controls turn it to zero, others leave it;
-    by TABLE ROT it takes over the rotation of the plane. Only where it stands at zero already, all is one.
-    """
-    assert control.pointing is not None
-    free = control.machine[control.pointing.columns[0]]
-    return way if abs(way[free]) < NONE else None
 
 
 def turn_axes(control: Control, way: dict[int, float] | None) -> None:
@@ -227,7 +216,7 @@ def cycle_19(control: Control, words: Words) -> None:
         and abs(control.position[INDEX[letter]] - value * DEGREE) < 1e-6
         for letter, value in values.items()
     )
-    if stands_normal(control, meant) is False and standing:
+    if stands_square(control, meant) is False and standing:
         by_axes(control, values, frozenset())
         return
     tilt_to(control, meant, frozenset())
@@ -238,4 +227,4 @@ def check_normal(control: Control) -> str:
     trans = control.transformations
     if not trans.tilted or control.m128 or TILTED in control.suspended:
         return ""
-    return NOT_NORMAL if stands_normal(control, trans.tilt) is False else ""
+    return NOT_NORMAL if stands_square(control, trans.tilt) is False else ""

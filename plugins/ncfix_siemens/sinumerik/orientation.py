@@ -9,26 +9,23 @@ Source: Siemens, "SINUMERIK 840D sl, NC programming, job planning": orientation 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import reduce
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ncfix.control.coordinates import DEGREE, LETTERS, angles_in_words, product
+from ncfix.control.coordinates import DEGREE, LETTERS, mask_of, product
 from ncfix.control.expressions import number
 from ncfix.control.faults import Fault
-from ncfix.control.pointing import Pointing, Triple, dot
+from ncfix.control.pointing import Triple, dot
+from ncfix.control.posture import postures
 from ncfix_siemens.sinumerik.affine import turned
 from ncfix_siemens.sinumerik.destination import Words
 from ncfix_siemens.sinumerik.directions import NO_LENGTH
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ANGLES, NORMALS, OTHERS, VECTOR
 
-FloatArray = NDArray[np.float64]
-
 BAD_VECTOR = "NCF254"
 WAY = "NCF253"
+OTHERWISE = "state the rotary axes in the program if the control turns them otherwise"
+FROM_UNKNOWN = "where the axis {} stands before the tool is turned is not known"
 AT_RUNTIME = "the direction of the tool is known only at run time"
 NO_KINEMATICS = "the direction of the tool needs the kinematics of a machine with two rotary axes"
 NOT_ON = "a direction of the tool is given while TRAORI is not on"
@@ -45,10 +42,6 @@ BY_AXES = "oriaxes"
 BY_PATH = "oripath"
 ON_CURVES = ("oricon", "oricurve", "oripath")
 BY_CURVE = "the tool turns on a cone, or after a curve ({})"
-
-FAR = math.radians(0.1)
-"""rad. The tool that turns in a plane (ORIVECT) strays from where rotary axes of even speed would point it. The tip is
-not concerned, but pieces of a motion that strays by more would point it elsewhere than the whole: it is not split."""
 
 
 def oriented(control: Sinumerik, words: Words) -> None:
@@ -81,29 +74,27 @@ def by_direction(control: Sinumerik, words: Words) -> str:
         return IN_MACHINE
     if control.modes.orientation.startswith(ON_CURVES):
         return BY_CURVE.format(control.modes.orientation.upper())
-    pointing = control.pointing
-    if pointing is None:
+    if control.pointing is None:
         return NO_KINEMATICS
     wanted = by_angles(control, words) if any(address in words.values for address in ANGLES) else by_vector(words)
     if wanted is None:
         return WHICH_ANGLES
     control.settle_all()
-    columns = [control.machine[column] for column in pointing.columns]
-    if any(index in control.unknown for index in columns):
-        return f"where the axis {LETTERS[columns[0]]} stands before the tool is turned is not known"
-    here = control.position[columns[0]], control.position[columns[1]]
-    ways = pointing.angles(direction_of(control, wanted), here)
-    if not ways:
+    if control.unknown.keys() & {*control.turning}:
+        return FROM_UNKNOWN.format(LETTERS[control.machine[control.pointing.columns[0]]])
+    found = postures(control, direction_of(control, wanted))
+    if found is None or not found.ways:
         raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction")
-    note_choice(control, pointing, here, ways)
-    for index, angle in zip(columns, ways[0], strict=True):
+    if found.leaves_pole:
+        control.warn(WAY, f"the tool is taken to turn to {found}, the nearest of several ways", OTHERWISE)
+    for index, angle in found.chosen.items():
         words.values[LETTERS[index]] = (angle - control.offset[index]) / DEGREE
         words.forms[LETTERS[index]] = "ac"
         words.axes |= 1 << index
     control.points = True
-    control.builder.says_the_way(sum(1 << index for index in columns))
+    control.builder.says_the_way(mask_of(found.letters))
     even = control.modes.orientation == BY_AXES or control.modal.motion == 0
-    words.whole |= not even and pointing.stray(here, ways[0]) > FAR
+    words.whole |= not even and found.strays
     return ""
 
 
@@ -133,28 +124,9 @@ TURNS = {
 """About which axis, as the turns before have left it, and by which word."""
 
 
-def direction_of(control: Sinumerik, vector: Triple) -> FloatArray:
+def direction_of(control: Sinumerik, vector: Triple) -> list[float]:
     """A vector of the program as a unit vector in the workpiece."""
     size = math.hypot(*vector)
     if size < NO_LENGTH:
         raise Fault(BAD_VECTOR, "the direction of the tool (A3 B3 C3) has no length")
-    return np.array([dot(row, vector) / size for row in control.rotation])
-
-
-def is_choice(pointing: Pointing, here: tuple[float, float], ways: Sequence[tuple[float, float]]) -> bool:
-    """Whether the tool stands along the outer axis and is to leave it, so that either way would be as near."""
-    return len({*ways}) > 1 and pointing.at_pole(pointing.at(*here)) and not pointing.at_pole(pointing.at(*ways[0]))
-
-
-def note_choice(
-    control: Sinumerik, pointing: Pointing, here: tuple[float, float], ways: list[tuple[float, float]]
-) -> None:
-    """Say which way was taken where either would have been as near."""
-    if not is_choice(pointing, here, ways):
-        return
-    angles = angles_in_words([control.machine[column] for column in pointing.columns], ways[0])
-    control.warn(
-        WAY,
-        f"the tool is taken to turn to {angles}, the nearest of several ways",
-        "state the rotary axes in the program if the control turns them otherwise",
-    )
+    return [dot(row, vector) / size for row in control.rotation]

@@ -13,10 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ncfix.control.coordinates import X, Y, Z, angles_in_words, as_rotation, mask_of
+from ncfix.control.coordinates import X, Y, Z, as_rotation, mask_of
 from ncfix.control.expressions import number
 from ncfix.control.moves import Kind
 from ncfix.control.passing import Pass, Passing
+from ncfix.control.posture import WayRules, normal_of, postures
 from ncfix.control.tcp import rotary_at_zero
 from ncfix.text.tree import Text
 from ncfix_siemens.sinumerik.affine import WORLD, Affine, shifted, turned
@@ -65,7 +66,7 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
     if any(value is None and part is not None and not isinstance(part, Text) for value, part in written):
         control.refusal = control.refusal or "a tilted plane (CYCLE800) is known only at run time"
         return
-    plane = Plane.of([value or 0.0 for value in values] + [0.0] * 16)
+    plane = SwivelPlane.of([value or 0.0 for value in values] + [0.0] * 16)
     if plane.fault:
         control.suspended["tilt"] = UNFOLLOWED.format(plane.fault)
         control.lose_all(AFTER_SWIVEL)
@@ -76,7 +77,7 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
         level(control, plane)
 
 
-class Plane:
+class SwivelPlane:
     """The arguments of CYCLE800.
 
     frame      of the plane
@@ -94,7 +95,7 @@ class Plane:
         self.fault = fault
 
     @classmethod
-    def of(cls, values: list[float]) -> Plane:
+    def of(cls, values: list[float]) -> SwivelPlane:
         """From the numbers of the call."""
         mode, table = round(values[PLACES["mode"]]), round(values[PLACES["st"]])
         direction = round(values[PLACES["dir"]])
@@ -149,7 +150,7 @@ def untilted(control: Sinumerik) -> None:
     control.switch_tcp()
 
 
-def tilted(control: Sinumerik, block: int, plane: Plane) -> None:
+def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
     """Into a tilted plane: the frame, then the turn of the rotary axes."""
     control.frames.swivel = control.frames.swivel.then(plane.frame) if plane.adds else plane.frame
     control.frames.program = WORLD
@@ -168,7 +169,7 @@ def tilted(control: Sinumerik, block: int, plane: Plane) -> None:
     control.go(Leg(Kind.RAPID, Words(block, {}, {}, mask), end, control.modal.motion, passing=SWIVEL))
 
 
-def level(control: Sinumerik, plane: Plane) -> None:
+def level(control: Sinumerik, plane: SwivelPlane) -> None:
     """A plane that is not turned, while the rotary axes stand still: as they stand, the tool has to be square to it."""
     control.settle(control.turning)
     whole = control.frames.swivel.then(plane.frame) if plane.adds else plane.frame
@@ -183,20 +184,17 @@ def level(control: Sinumerik, plane: Plane) -> None:
         control.lose_axes(GEOMETRY, AFTER_SWIVEL)
 
 
-def turn_square(control: Sinumerik, plane: Plane) -> dict[int, float]:
-    """Where the rotary axes stand when the tool is square to the plane; empty if that cannot be known."""
-    pointing = control.pointing
-    if pointing is None:
+def turn_square(control: Sinumerik, plane: SwivelPlane) -> dict[int, float]:
+    """Where the rotary axes stand when the tool is square to the plane; empty if that cannot be known.
+
+    An axis of which it is not known where it stands counts as standing at zero.
+    """
+    if control.pointing is None:
         return {}
-    columns = [control.machine[column] for column in pointing.columns]
-    here = [0.0 if index in control.unknown else control.position[index] for index in columns]
-    normal = np.array([row[2] for row in control.rotation])
-    ways = pointing.angles(normal, (here[0], here[1]))
-    if not ways:
+    outer, inner = (control.machine[column] for column in control.pointing.columns)
+    here = [0.0 if index in control.unknown else control.position[index] for index in (outer, inner)]
+    found = postures(control, normal_of(control.rotation), WayRules(sense=plane.direction), (here[0], here[1]))
+    if found is None or not found.ways:
         return {}
-    chosen = max(ways, key=lambda way: plane.direction * way[1]) if len(ways) > 1 else ways[0]
-    if pointing.at_pole(normal):
-        chosen = ways[0]
-    angles = angles_in_words(columns, chosen)
-    control.warn(WAY, f"CYCLE800 is taken to turn to {angles}", "check it on the control: its swivel data decide")
-    return dict(zip(columns, chosen, strict=True))
+    control.warn(WAY, f"CYCLE800 is taken to turn to {found}", "check it on the control: its swivel data decide")
+    return found.chosen

@@ -16,8 +16,9 @@ from ncfix.control.coordinates import DEGREE
 from ncfix.control.lane import SHORTEST, before_placing, is_open, take
 from ncfix.control.moves import FeedMode
 from ncfix.control.pointing import Pointing, Ways, nearest
+from ncfix.control.posture import FAR
 from ncfix.control.stage import IntArray, Stage, stage_of
-from ncfix_siemens.sinumerik.orientation import BY_AXES, FAR, ON_CURVES, is_choice
+from ncfix_siemens.sinumerik.orientation import BY_AXES, ON_CURVES
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
 
@@ -72,7 +73,7 @@ def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Seque
     at_will = True
     for both, is_even in zip(ways, even, strict=True):
         led = nearest(both, here)
-        if (at_will and is_choice(pointing, here, led)) or not (is_even or pointing.stray(here, led[0]) <= FAR):
+        if (at_will and pointing.leaves_pole(here, led)) or not (is_even or pointing.stray(here, led[0]) <= FAR):
             break
         outer, inner = led[0]
         here = (

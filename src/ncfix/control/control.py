@@ -17,8 +17,9 @@ from ncfix.control.motion import AT_START, Motion, UnknownAxes, blanked, first_r
 from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.control.passing import Pass, Passing, may_pass
 from ncfix.control.pointing import Pointing
+from ncfix.control.posture import MachineDirections, pointing_of
 from ncfix.control.standing import Standing
-from ncfix.control.tcp import along_frame, lost_in_frame, pointing_of
+from ncfix.control.tcp import along_frame, lost_in_frame
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
@@ -56,6 +57,7 @@ class Control(Standing):
     whole      the motions of the block must not be split, as under cutter compensation
     at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `arcs`
     handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
+    directions where the axes point in the workpiece, and for which positions that has been asked of the kinematics
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
     block_words  the addresses of the block that is executed, as long as it has made no motion and no setting took them
     """
@@ -76,6 +78,7 @@ class Control(Standing):
         self.points = False
         self.whole = self.at_corner = False
         self.beside = 0
+        self.directions: tuple[Vector, MachineDirections] | None = None
         self.block_words: Collection[str] = ()
         self.handedness = 1.0
 

@@ -13,7 +13,7 @@ otherwise.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -35,14 +35,6 @@ PROBES = (0.0, 0.7, 1.3, -0.9)
 
 LEAST = 1e-3
 """A smaller circle, relative to the tool's length, says nothing about its axis."""
-
-SQUARE = 2e-4
-"""A tool closer to a direction than this, rad, is taken to lie along it: rotary words have three decimals of a degree,
-9e-6 rad each."""
-
-TURNS = 2
-AT_END = 1e-6
-"""rad; so far past its travel an axis is still at the end of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,31 +92,16 @@ class Pointing:
         """Whether a tool along the unit vector `direction` (3,) would stand along the line of the outer axis."""
         return math.hypot(*cross(self.lines[0], _triple(direction))) < POLE
 
+    def leaves_pole(self, here: Pair, ways: Sequence[Pair]) -> bool:
+        """Whether the tool stands along the outer axis and is to leave it, so that either way would be as near."""
+        return len({*ways}) > 1 and self.at_pole(self.at(*here)) and not self.at_pole(self.at(*ways[0]))
+
     def stray(self, start: tuple[float, float], stop: tuple[float, float]) -> float:
         """How far half-way the plane between two directions is from the direction at the mean angles, rad."""
         middle = self.at((start[0] + stop[0]) / 2, (start[1] + stop[1]) / 2)
         half = self.at(*start) + self.at(*stop)
         size = float(np.linalg.norm(half))
         return math.pi if size < SAME else float(np.linalg.norm(middle - half / size))
-
-
-def within(
-    ways: Iterable[tuple[float, float]], travel: Sequence[tuple[float, float]], near: tuple[float, float]
-) -> list[tuple[float, float]]:
-    """The ways that two axes can go within their travels, whole turns away if need be; the nearest first."""
-    found = []
-    for way in ways:
-        places = [_in_travel(angle, *span, to) for angle, span, to in zip(way, travel, near, strict=True)]
-        if places[0] is not None and places[1] is not None:
-            found.append((places[0], places[1]))
-    return sorted(found, key=lambda way: abs(way[0] - near[0]) + abs(way[1] - near[1]))
-
-
-def _in_travel(angle: float, low: float, high: float, near: float) -> float | None:
-    """An angle, or whole turns away from it, within a travel and nearest to another; None if none is."""
-    turns = (angle + 2 * math.pi * count for count in range(-TURNS, TURNS + 1))
-    possible = [each for each in turns if low - AT_END <= each <= high + AT_END]
-    return min(possible, key=lambda each: abs(each - near), default=None)
 
 
 def _swapped(directions: Directions) -> Directions:

@@ -18,15 +18,11 @@ from numpy.typing import NDArray
 
 from ncfix.control.coordinates import Rotation, Vector, X, Y, Z
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState
-from ncfix.control.pointing import Pointing
 
 if TYPE_CHECKING:
     from ncfix.control.control import Control
     from ncfix.control.motion import UnknownAxes
 
-
-PROBE = 128.0
-"""mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""
 
 TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
 
@@ -96,26 +92,6 @@ def switch(control: Control, tool: Vector, on: bool) -> None:
         control.lose((X, Y, Z), TURNED)
         control.said = lost
     control.tcp = on
-
-
-def pointing_of(control: Control) -> Pointing | None:
-    """How the machine's two rotary axes point the tool: the tips of two tool lengths say which way it points.
-
-    None if it has others, if it lacks X, Y or Z, or if nobody knows its kinematics.
-    """
-    machine, kinematics = control.machine, control.kinematics
-    turning = [machine.index(index) for index in control.turning]
-    if kinematics is None or len(turning) != 2 or not {X, Y, Z} <= set(machine):
-        return None
-    places = [machine.index(index) for index in (X, Y, Z)]
-
-    def directions(first: float, second: float) -> NDArray[np.float64]:
-        command = [0.0] * len(machine)
-        command[turning[0]], command[turning[1]] = first, second
-        tips = [kinematics(command, TcpState(False, long), TcpState(True, long)) for long in (PROBE, 0.0)]
-        return np.array([(tips[1][place] - tips[0][place]) / PROBE for place in places])
-
-    return Pointing.of((turning[0], turning[1]), directions)
 
 
 FloatArray = NDArray[np.float64]

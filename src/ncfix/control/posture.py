@@ -1,0 +1,223 @@
+"""The posture of a machine: where tool and axes point in the workpiece, and to which rotary positions a control goes
+for a direction of the tool (PLANE, CYCLE800, G53.1, vectors under TRAORI, M128 and G43.5).
+
+The machine's own kinematics tell all of it. They say where the tip of a tool of any length is in the workpiece: the tip
+of a longer tool less that of a shorter one is the direction of the tool, the tip with an axis moved less the tip
+without is the direction of that axis.
+
+Mostly there are two ways to point the tool. By which rules a control takes one of them is data (`WayRules`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ncfix.control.coordinates import Rotation, Vector, X, Y, Z, angles_in_words, as_rotation
+from ncfix.control.moves import TcpState
+from ncfix.control.pointing import FloatArray, Pair, Pointing, Triple
+
+if TYPE_CHECKING:
+    from ncfix.control.control import Control
+
+PROBE = 128.0
+"""mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""
+
+SQUARE = 2e-4
+"""A tool closer to a direction than this, rad, is taken to lie along it: rotary words have three decimals of a degree,
+9e-6 rad each."""
+
+FAR = math.radians(0.1)
+"""rad. Between two directions a control may turn the tool in their plane, or its rotary axes evenly. The tip is not
+concerned; where the two differ by more, pieces of the motion would point the tool elsewhere than the whole."""
+
+AT_END = 1e-6
+"""rad; so far past its travel an axis is still at the end of it."""
+
+AT_ZERO = 1e-9
+"""rad; an axis that is nearer to zero stands on neither side of it."""
+
+TURNS = 2
+
+
+class WayRules(NamedTuple):
+    """By what a control chooses among the ways to point its tool; the nearest where nothing else is said.
+
+    in_travel  only ways within the travels of both axes, whole turns away if need be
+    sign       the inner axis, which tilts the tool, stands at or above zero (1), or at or below (-1): SEQ+, SEQ-
+    sense      the way with the greater (1) or the lesser (-1) angle of the inner axis: _DIR
+    """
+
+    in_travel: bool = False
+    sign: int = 0
+    sense: int = 0
+
+
+NEAREST = WayRules()
+
+
+@dataclass(frozen=True, slots=True)
+class Postures:
+    """The ways of two rotary axes to point the tool along a direction.
+
+    letters  letter indices of the outer axis and of the inner one
+    here     where they stand, rad
+    ways     where they may go, rad, that which the control takes first; empty if it cannot point the tool there
+    at_pole  the tool lies along the outer axis then, which may stand anywhere
+    """
+
+    pointing: Pointing
+    letters: tuple[int, int]
+    here: Pair
+    ways: Sequence[Pair]
+    at_pole: bool
+
+    @property
+    def chosen(self) -> dict[int, float]:
+        """Letter index -> where the axis goes, rad; empty if the tool cannot point there."""
+        return dict(zip(self.letters, self.ways[0], strict=True)) if self.ways else {}
+
+    @property
+    def leaves_pole(self) -> bool:
+        """Whether the tool stands along the outer axis and is to leave it, so that either way would be as near."""
+        return self.pointing.leaves_pole(self.here, self.ways)
+
+    @property
+    def strays(self) -> bool:
+        """Whether the tool, if its axes turn evenly, leaves the plane between the two directions."""
+        return self.pointing.stray(self.here, self.ways[0]) > FAR
+
+    def __str__(self) -> str:
+        """Where the axes go, as people write it: `B30.000 C120.000`."""
+        return angles_in_words(self.letters, self.ways[0])
+
+
+def postures(
+    control: Control, direction: Sequence[float], rules: WayRules = NEAREST, here: Pair | None = None
+) -> Postures | None:
+    """The ways to point the tool along a unit vector in the workpiece.
+
+    None where the kinematics are not known, or those of two rotary axes, or where these stand. `here` says so where the
+    control does not ask.
+    """
+    pointing = control.pointing
+    if pointing is None:
+        return None
+    outer, inner = pointing.columns
+    letters = control.machine[outer], control.machine[inner]
+    if here is None:
+        control.settle(letters)
+        if control.unknown.keys() & {*letters}:
+            return None
+        here = control.position[letters[0]], control.position[letters[1]]
+    wanted = np.array(direction)
+    ways, at_pole = pointing.angles(wanted, here), pointing.at_pole(wanted)
+    if rules.in_travel:
+        assert control.kinematics is not None, "they have shown how the tool is pointed"
+        ways = within(ways, [control.kinematics.travel[column] for column in pointing.columns], here)
+    if rules.sign:
+        ways = [way for way in ways if abs(way[1]) < AT_ZERO or (way[1] > 0) == (rules.sign > 0)]
+    if rules.sense and not at_pole:
+        ways.sort(key=lambda way: -rules.sense * way[1])
+    return Postures(pointing, letters, here, ways, at_pole)
+
+
+def within(ways: Iterable[Pair], travel: Sequence[Pair], near: Pair) -> list[Pair]:
+    """The ways that two axes can go within their travels, whole turns away if need be; the nearest first."""
+    found = []
+    for way in ways:
+        places = [_in_travel(angle, *span, to) for angle, span, to in zip(way, travel, near, strict=True)]
+        if places[0] is not None and places[1] is not None:
+            found.append((places[0], places[1]))
+    return sorted(found, key=lambda way: abs(way[0] - near[0]) + abs(way[1] - near[1]))
+
+
+def _in_travel(angle: float, low: float, high: float, near: float) -> float | None:
+    """An angle, or whole turns away from it, within a travel and nearest to another; None if none is."""
+    turns = (angle + 2 * math.pi * count for count in range(-TURNS, TURNS + 1))
+    possible = [each for each in turns if low - AT_END <= each <= high + AT_END]
+    return min(possible, key=lambda each: abs(each - near), default=None)
+
+
+# -- what the kinematics say ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class MachineDirections:
+    """Directions in the workpiece, with the rotary axes at some positions.
+
+    tool  unit vector from the tip to the spindle
+    axes  of the machine's X, Y and Z, as columns of a rotation
+    """
+
+    tool: Triple
+    axes: Rotation
+
+
+def machine_directions(control: Control, position: Vector) -> MachineDirections | None:
+    """How the machine stands with its rotary axes at these positions; None if nobody knows its kinematics."""
+    if control.kinematics is None or not {X, Y, Z} <= {*control.machine}:
+        return None
+    still = [value if control.rotary[index] else 0.0 for index, value in enumerate(position)]
+    if control.directions is None or control.directions[0] != still:
+        origin = _tip(control, still, 0.0)
+        columns = []
+        for index in (X, Y, Z):
+            moved = still[:]
+            moved[index] = PROBE
+            columns.append(_unit(_tip(control, moved, 0.0) - origin))
+        tool = _unit(origin - _tip(control, still, PROBE))
+        found = MachineDirections((tool[0], tool[1], tool[2]), as_rotation(list(zip(*columns, strict=True))))
+        control.directions = still, found
+    return control.directions[1]
+
+
+def stands_square(control: Control, frame: Rotation) -> bool | None:
+    """Whether the tool lies along Z of a frame in the workpiece; None if that is not known."""
+    if control.unknown.keys() & {*control.turning}:
+        return None
+    found = machine_directions(control, control.position)
+    return None if found is None else math.dist(found.tool, normal_of(frame)) < SQUARE
+
+
+def normal_of(frame: Rotation) -> Triple:
+    """The Z axis of a frame."""
+    return frame[0][2], frame[1][2], frame[2][2]
+
+
+def pointing_of(control: Control) -> Pointing | None:
+    """How the machine's two rotary axes point the tool: the tips of two tool lengths say which way it points.
+
+    None if it has others, if it lacks X, Y or Z, or if nobody knows its kinematics.
+    """
+    turning = control.turning
+    if control.kinematics is None or len(turning) != 2 or not {X, Y, Z} <= {*control.machine}:
+        return None
+
+    def directions(first: float, second: float) -> FloatArray:
+        position = [0.0] * len(control.position)
+        position[turning[0]], position[turning[1]] = first, second
+        found: FloatArray = (_tip(control, position, 0.0) - _tip(control, position, PROBE)) / PROBE
+        return found
+
+    columns = [control.machine.index(index) for index in turning]
+    return Pointing.of((columns[0], columns[1]), directions)
+
+
+def _tip(control: Control, position: Vector, length: float) -> FloatArray:
+    """The tip (3,) of a tool of some length in the workpiece, mm."""
+    assert control.kinematics is not None
+    command = [position[index] for index in control.machine]
+    found = control.kinematics(command, TcpState(False, length), TcpState(True, length))
+    return np.array([found[control.machine.index(index)] for index in (X, Y, Z)])
+
+
+def _unit(vector: FloatArray) -> list[float]:
+    """A vector as one of length one."""
+    parts: list[float] = vector.tolist()
+    size = math.hypot(*parts)
+    return [part / size for part in parts]
