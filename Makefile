@@ -23,7 +23,7 @@ format:
 accuracy:        ## work out docs/accuracy.md (an hour), or STUDIES="plans ..." of it
 	OMP_NUM_THREADS=1 $(PYTHON) tests/validation/accuracy.py $(STUDIES)
 
-bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md; SIZES="100000 1000000" RUNS=5 LONG=10000000 OTHERS=200000
+bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md; SIZES="1000000" RUNS=5 LONG=10000000 OTHERS=200000
 	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/run.py $(if $(filter-out undefined,$(origin SIZES)),--sizes $(SIZES)) $(if $(RUNS),--runs $(RUNS)) $(if $(LONG),--long $(LONG)) $(if $(OTHERS),--others $(OTHERS))
 
 same-bytes:      ## correct programs in all ways, compare, into docs/performance.md (an hour; MOST=20000 ten minutes)

@@ -155,16 +155,20 @@ def digest(path: Path) -> bytes:
         return file_digest(file, "sha256").digest()
 
 
+HEAD = (
+    "| blocks | words | | CPU s | wall s | blocks/s CPU | times rs274 | peak MB |",
+    "|---|---|---|---|---|---|---|---|",
+)
+
+
 def table(blocks: int, style: str, results: dict[str, Run]) -> list[str]:
-    """The figures of one file."""
-    reference = results.get("rs274")
-    rows = [f"### {spaced(blocks)} blocks, {style}", ""]
-    rows += ["| | CPU s | wall s | blocks/s CPU | times rs274 | peak MB |", "|---|---|---|---|---|---|"]
+    """The rows of one file."""
+    reference, rows = results.get("rs274"), []
     for name, run in results.items():
         ratio = f"{reference.cpu / run.cpu:.2f}" if reference else ""
         times, speed = f"{run.cpu:.2f} | {run.wall:.2f}", f"{blocks / run.cpu / 1000:.0f} k"
-        rows.append(f"| {name} | {times} | {speed} | {ratio} | {run.memory:.0f} |")
-    return [*rows, ""]
+        rows.append(f"| {spaced(blocks)} | {style} | {name} | {times} | {speed} | {ratio} | {run.memory:.0f} |")
+    return rows
 
 
 def spaced(number: int) -> str:
@@ -175,7 +179,7 @@ def spaced(number: int) -> str:
 def main() -> None:
     """Run all, and put the figures into the page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sizes", type=int, nargs="*", default=[100_000, 1_000_000])
+    parser.add_argument("--sizes", type=int, nargs="*", default=[1_000_000])
     parser.add_argument("--styles", nargs="*", default=["full", "mixed"], choices=programs.STYLES)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--long", type=int, default=0)
@@ -185,7 +189,7 @@ def main() -> None:
         other_controls(given.others)
     if not given.sizes:
         return
-    text = [*conditions(given.runs), ""]
+    text = [*conditions(given.runs), "", *HEAD]
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for blocks in given.sizes:
@@ -193,6 +197,7 @@ def main() -> None:
                 path = folder / f"{style}.nc"
                 programs.write(path, blocks, style)
                 text += table(blocks, style, timed(path, folder, blocks, given.runs))
+        text.append("")
         if given.long:
             text += long_file(given.long, folder)
         text += stages(folder)
@@ -260,11 +265,8 @@ def stages(folder: Path) -> list[str]:
     found = subprocess.run(
         command, capture_output=True, text=True, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}
     )
-    head = ["### Share of time of each stage, 200 000 blocks, full words", ""]
-    head += [
-        "Without the start of the process, imports and compiling. `without it`: how much faster the whole would be"
-    ]
-    head += ["if the stage took no time at all: the most that work on it can buy.", ""]
+    said = "Without the start of the process, imports and compiling. `without it`: how much faster the whole would be if the"
+    head = ["### Share of time of each stage, 200 000 blocks, full words", "", said, "stage took no time at all.", ""]
     return [*head, *found.stdout.splitlines(), ""]
 
 

@@ -1,4 +1,7 @@
-"""Where the time of `fix` goes on one long program, from inside: `FILE`. Prints tables for docs/performance.md."""
+"""Where the time of `fix` goes on one long program, from inside. Prints tables for docs/performance.md.
+
+Called with the program's name; with `--profile` behind it the functions that take most are shown, too.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,7 @@ STAGES: tuple[tuple[str, Any, str], ...] = (
 
 
 def main() -> None:
-    """Time each stage in both ways, and show the functions that take most."""
+    """Time each stage in both ways; with `--profile` show the functions that take most."""
     source = Path(sys.argv[1]).read_bytes()
     blocks = source.count(b"\n")
     ways = {}
@@ -51,7 +54,8 @@ def main() -> None:
         corrected(source[:WARM])
         ways[name] = timed(source)
     print("\n".join(table(ways, blocks)))
-    print("\n".join(["", "### Functions that take most, `fast`", "", *profile(source)]))
+    if "--profile" in sys.argv:
+        print("\n".join(["", "### Functions that take most, `fast`", "", *profile(source)]))
 
 
 def corrected(source: bytes) -> None:
