@@ -15,7 +15,7 @@ import numpy as np
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.compensate.following import follow
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Machine
 from ncfix.text.reader import read
@@ -78,7 +78,7 @@ def refused(path: Path, dialect: str, machine: Machine, setup: Setup) -> list[in
 def lines_left_out(moves: Moves, lines: Lines, text: str) -> list[str]:
     """Lines with a motion of which no comment says what becomes of it."""
     known = marks(text)
-    moving = {int(line) for line, kind in zip(lines, moves.kind, strict=True) if kind != Kind.DWELL}
+    moving = {int(line) for line, kind in zip(lines, moves.kind, strict=True) if kind != MotionKind.DWELL}
     return [f"{line}: a motion, and no comment" for line in sorted(moving - known.keys())]
 
 

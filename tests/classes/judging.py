@@ -13,7 +13,7 @@ import numpy as np
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Fixed, fix_flat, fix_program
 from ncfix.compensate.following import kinematics_of
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
@@ -92,7 +92,7 @@ def followed(source: bytes, known: Machine, dialect: str) -> Moves:
 
 def by_motion(before: Moves, after: Moves) -> dict[int, str]:
     """Motion by motion, where the lines are others: all of them or none."""
-    rows, flat = (np.flatnonzero(moves.kind != Kind.DWELL) for moves in (before, after))
+    rows, flat = (np.flatnonzero(moves.kind != MotionKind.DWELL) for moves in (before, after))
     if len(rows) != len(flat):
         return {0: f"{len(rows)} motions became {len(flat)}"}
     off = after.end[flat] - before.end[rows] - np.array(list(SHIFT.values()))
@@ -111,7 +111,7 @@ def by_line(case: Case, fixed: Fixed, before: Moves, after: Moves, refused: set[
     ends = [{int(block): moves.end[row] for row, block in enumerate(moves.block)} for moves in (before, after)]
     for row, block in enumerate(before.block.tolist()):
         line = block + 1
-        if before.kind[row] == Kind.DWELL:
+        if before.kind[row] == MotionKind.DWELL:
             continue
         shifted = ends[1].get(block + (1 if fixed.changed and block >= stamp else 0))
         off = np.inf if shifted is None else shifted - ends[0][block] - np.array(list(SHIFT.values()))

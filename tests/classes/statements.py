@@ -17,7 +17,7 @@ from classes.judging import SETUP, machine
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import kinematics_of
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
 from ncfix.text.reader import read
@@ -117,11 +117,13 @@ def outcome(case: Case) -> Outcome:
     refused = frozenset(each.line for each in fixed.report.refused)
     rows = [row for row, block in enumerate(moves.block.tolist()) if block + 1 == case.line]
     passed = frozenset(
-        int(moves.block[row]) + 1 for row in range(len(moves)) if moves.rule[row] == 1 and moves.kind[row] != Kind.DWELL
+        int(moves.block[row]) + 1
+        for row in range(len(moves))
+        if moves.rule[row] == 1 and moves.kind[row] != MotionKind.DWELL
     )
     if case.line in refused:
         return Outcome("named", fixed.text.decode(), refused | passed)
-    motions = [row for row in rows if moves.kind[row] != Kind.DWELL]
+    motions = [row for row in rows if moves.kind[row] != MotionKind.DWELL]
     return Outcome("motion" if motions else "nothing", fixed.text.decode(), refused | passed)
 
 

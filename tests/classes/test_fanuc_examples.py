@@ -9,7 +9,7 @@ import pytest
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import load
 from ncfix.text.dialects import detect
@@ -37,7 +37,7 @@ def test_in_the_tilted_plane_the_drill_stands_on_its_holes(root: Path) -> None:
     setup = load_setup(str(root / "examples/programs/fanuc.setup.toml"))
     program = read((root / "examples/programs/fanuc_tilted.nc").read_bytes(), "fanuc_tilted.nc", "fanuc")
     moves = follow(program, machine, setup).trace.moves
-    hole = moves.end[moves.kind == Kind.CYCLE][0]
+    hole = moves.end[moves.kind == MotionKind.CYCLE][0]
     xyz = hole[[moves.axes.index(letter) for letter in "XYZ"]]
     assert xyz == pytest.approx([30.0, -30 + 10 * 3**0.5 / 2 + 6, 60 + 5 - 12 * 3**0.5 / 2])
     assert hole[moves.axes.index("A")] == pytest.approx(30 * 3.141592653589793 / 180)

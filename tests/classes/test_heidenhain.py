@@ -8,7 +8,7 @@ import pytest
 from classes.judging import SHIFT, Case, followed, judged, machine
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.setup import Setup, Tool
 from ncfix.text.reader import read
 
@@ -145,7 +145,11 @@ def test_a_full_circle_needs_no_end_point(circle: str) -> None:
     fixed = fix_program(read(text, "c.h"), known, setup, FixOptions(tolerance_um=50.0, verify=False))
     before, after = followed(text, known, "heidenhain"), followed(fixed.text, known, "heidenhain")
     assert fixed.report.refused == ()
-    assert before.kind.tolist() == after.kind.tolist() == [Kind.RAPID, Kind.ARC, Kind.FEED, Kind.ARC]
+    assert (
+        before.kind.tolist()
+        == after.kind.tolist()
+        == [MotionKind.RAPID, MotionKind.ARC, MotionKind.FEED, MotionKind.ARC]
+    )
     assert np.abs(after.end - before.end - list(SHIFT.values())).max() < 1e-3
     arcs = [1, 3]
     assert np.abs((after.centre - before.centre)[arcs][:, :2] - [SHIFT["X"], SHIFT["Y"]]).max() < 1.5e-3

@@ -12,7 +12,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow, placed
 from ncfix.compensate.plan.kinematics import joints_from_commands
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import State, load
 from ncfix.text.dialects import detect
@@ -55,7 +55,7 @@ def xyz(moves: Moves) -> np.ndarray:
 def test_in_the_tilted_plane_the_drill_stands_on_its_holes(root: Path) -> None:
     """A hole 15 mm from the datum at 45 degrees, 12 mm deep, in a plane tilted by 30 degrees about X."""
     moves = moves_of(root, (root / "examples/programs/klartext_tilted.h").read_text())
-    hole = xyz(moves)[moves.kind == Kind.CYCLE][0]
+    hole = xyz(moves)[moves.kind == MotionKind.CYCLE][0]
     side, cosine, sine = 15 * math.sqrt(0.5), math.sqrt(0.75), 0.5
     assert hole == pytest.approx([side, side * cosine + 12 * sine, 120 + side * sine - 12 * cosine])
 
@@ -165,7 +165,7 @@ def test_the_holes_of_the_shipped_program_are_right_down_to_their_bottom(root: P
 
     def bottoms(text: bytes) -> tuple[np.ndarray, np.ndarray]:
         moves = follow(read(text, "k.h"), machine, setup).trace.moves
-        holes = moves.kind == Kind.CYCLE
+        holes = moves.kind == MotionKind.CYCLE
         lengths = moves.tool_length[holes]
         return joints_from_commands(placed(machine, setup), moves.end[holes], moves.tcp[holes], lengths), lengths
 

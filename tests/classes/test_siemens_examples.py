@@ -10,7 +10,7 @@ import pytest
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import load
 from ncfix.text.dialects import detect
@@ -52,6 +52,6 @@ def test_in_the_tilted_plane_the_drill_stands_on_its_holes(root: Path) -> None:
     setup = load_setup(str(root / "examples/programs/siemens.setup.toml"))
     program = read((root / "examples/programs/siemens_swivel.mpf").read_bytes(), "siemens_swivel.mpf", "siemens")
     moves = follow(program, machine, setup).trace.moves
-    holes = np.flatnonzero(moves.kind == Kind.CYCLE)
+    holes = np.flatnonzero(moves.kind == MotionKind.CYCLE)
     hole = moves.end[holes[0]][[moves.axes.index(letter) for letter in "XYZ"]]
     assert hole == pytest.approx([30.0, -30 + 10 * 3**0.5 / 2 + 6, 60 + 5 + 5 - 12 * 3**0.5 / 2])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.machine import Axis, Effect, Machine, Tool
+from ncfix.machine import Axis, Effect, GaugeLine, Machine
 from ncfix.machine.basis import Backlash, ConstantBasis, Fourier, Periodic, Polynomial
 from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 
@@ -25,7 +25,7 @@ def perfect(topology: str, swivel: tuple[float, float, float] | None = None) -> 
     left, right = topology.split("F")
     axes = [_axis(name, True, swivel) for name in left.split()[1:]]
     axes += [_axis(name, False, swivel) for name in right.split() if name not in "St"]
-    return Machine("random", topology, tuple(axes), Tool((0.0, 0.0, 1.0), (0.0, 0.0, 100.0)))
+    return Machine("random", topology, tuple(axes), GaugeLine((0.0, 0.0, 1.0), (0.0, 0.0, 100.0)))
 
 
 def _axis(name: str, workpiece_side: bool, swivel: tuple[float, float, float] | None) -> Axis:

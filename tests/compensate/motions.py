@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix.compensate.plan.path import Plan
-from ncfix.control.moves import FeedMode, Frame, Kind, Moves, Rule
+from ncfix.control.moves import FeedMode, Frame, MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
 
 
@@ -27,7 +27,7 @@ def motions(
     machine: Machine,
     start: Sequence[float],
     steps: Sequence[Sequence[float] | Arc],
-    kinds: Sequence[Kind] | Kind = Kind.FEED,
+    kinds: Sequence[MotionKind] | MotionKind = MotionKind.FEED,
     tcp: bool = False,
     tool_length: float = 100.0,
 ) -> Moves:
@@ -36,12 +36,12 @@ def motions(
     xyz = [machine.axis_names.index(name) for name in "XYZ"]
     starts, ends = np.empty((n, width)), np.empty((n, width))
     centre, normal, sweep = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan)
-    kind = np.array([kinds] * n if isinstance(kinds, Kind) else list(kinds), dtype=np.int8)
+    kind = np.array([kinds] * n if isinstance(kinds, MotionKind) else list(kinds), dtype=np.int8)
     here = np.asarray(start, dtype=float)
     for row, step in enumerate(steps):
         starts[row] = here
         if isinstance(step, Arc):
-            kind[row], sweep[row] = Kind.ARC, step.sweep
+            kind[row], sweep[row] = MotionKind.ARC, step.sweep
             centre[row] = step.centre
             normal[row] = np.asarray(step.normal) / np.linalg.norm(step.normal)
             here = _end_of(step, here, xyz, normal[row], machine.rotary)
@@ -159,7 +159,7 @@ def dense_errors(machine: Machine, moves: Moves, plan: Plan, count: int = 200, w
             here, before = plan.start[row], 0.0
         span[k] = pieces.fraction[k] - before
         arc = {"normal": moves.normal[row], "centre": moves.centre[row], "sweep": float(moves.sweep[row])}
-        programmed = arc if moves.kind[row] == Kind.ARC else None
+        programmed = arc if moves.kind[row] == MotionKind.ARC else None
         meant[k] = interpolated(moves.start[row], moves.end[row], xyz, programmed, before + span[k] * steps)
         if pieces.arc[k]:
             arc["centre"] = pieces.centre[k]
@@ -174,7 +174,7 @@ def dense_errors(machine: Machine, moves: Moves, plan: Plan, count: int = 200, w
     ways = _ways(meant.reshape(len(pieces), count + 1, width), span) if with_play else np.zeros(width)
     gap = machine.actual(done, State(length, ways))[:, :3, 3] - machine.nominal(meant, length)[:, :3, 3]
     errors = np.linalg.norm(gap, axis=1).reshape(len(pieces), count + 1)[:, 1:]
-    cut = (moves.kind[pieces.move] == Kind.FEED) | (moves.kind[pieces.move] == Kind.ARC)
+    cut = (moves.kind[pieces.move] == MotionKind.FEED) | (moves.kind[pieces.move] == MotionKind.ARC)
     errors[~cut | (span <= 1e-6)] = np.nan
     return errors
 

@@ -12,7 +12,7 @@ from compensate.side import compared
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Machine, load
 from ncfix.text.reader import read
@@ -49,7 +49,7 @@ def heights_off(before: Moves, after: Moves, machine: Machine) -> np.ndarray:
     """How far the tip is from where it should be at R of each hole, along Z, mm."""
     assert before.approach is not None
     assert after.approach is not None
-    meant, done = (moves.approach[moves.kind == Kind.CYCLE] for moves in (before, after))
+    meant, done = (moves.approach[moves.kind == MotionKind.CYCLE] for moves in (before, after))
     return machine.actual_tip(done)[:, 2] - machine.tip(meant, 0.0)[:, 2]
 
 
@@ -97,6 +97,6 @@ def test_the_level_in_a_tilted_plane(root: Path) -> None:
     _, before, after = fixed(f"{text}G0 X5. Y5.\n{holes}M2\n", machine, "fanuc")
     assert before.approach is not None
     assert after.approach is not None
-    shift = (after.approach - before.approach)[before.kind == Kind.CYCLE]
+    shift = (after.approach - before.approach)[before.kind == MotionKind.CYCLE]
     assert (np.abs(shift) > 0.0005).any()
     assert (np.abs(shift) < 0.1).all()

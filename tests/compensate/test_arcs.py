@@ -10,7 +10,7 @@ from compensate.motions import Arc, changed, dense_errors, motions, sweep_of
 from ncfix.compensate.plan.arcs import Closure, turns_begun
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Polynomial
 
@@ -187,7 +187,7 @@ def test_under_cutter_compensation_an_arc_stays_one_or_is_kept_and_named() -> No
     first = result.findings[0]
     assert (first.code, first.moves.tolist()) == ("NCF415", [1])
     assert result.pieces.arc[2]
-    assert moves.kind[2] == Kind.ARC
+    assert moves.kind[2] == MotionKind.ARC
 
 
 @pytest.mark.parametrize(("rise", "kept"), [(2.0, False), (60.0, True)])

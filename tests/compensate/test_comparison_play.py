@@ -18,7 +18,7 @@ from compensate.test_comparison import fixed, moves_of
 from ncfix.compensate.figures.backlash import Bodies
 from ncfix.compensate.figures.curve import Stretches
 from ncfix.compensate.plan.intent import Intent
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine, State, load
 from ncfix.machine.axes import Effect
 from ncfix.machine.basis import Backlash
@@ -70,7 +70,7 @@ def made(machine: Machine, moves: Moves) -> Dense:
     places, cut, segments = [moves.end[:1]], [False], Intent(machine, moves, State()).segments
     for row in range(1, len(moves)):
         length = np.abs(moves.end[row] - moves.start[row]).max()
-        if moves.kind[row] == Kind.ARC:
+        if moves.kind[row] == MotionKind.ARC:
             share = np.linspace(0, 1, int(abs(moves.sweep[row]) * LARGEST / CLOSE / 20) + 20)
         else:
             close = np.arange(0, min(length, 10 * CLOSE), CLOSE) / max(length, CLOSE)

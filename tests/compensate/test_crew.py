@@ -21,7 +21,7 @@ from ncfix.cli.batch import FixJob
 from ncfix.cli.streams import Outlet, Source
 from ncfix.cli.targets import OutputTarget
 from ncfix.compensate import driver, workers
-from ncfix.compensate.driver import Done, PartCorrector, Stream
+from ncfix.compensate.driver import PartCorrector, ProvedPart, Stream
 from ncfix.compensate.following import Task
 from ncfix.compensate.parts import PartProof
 from ncfix.compensate.workers import GoneError, Post, lines_between
@@ -97,7 +97,7 @@ def test_a_process_that_is_gone(
 
 
 def test_what_cannot_be_told(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    in_another_process(monkeypatch, PartCorrector, "_corrected", lambda *_: Done(b"", lambda: None, 1))  # type: ignore[arg-type]
+    in_another_process(monkeypatch, PartCorrector, "_corrected", lambda *_: ProvedPart(b"", lambda: None, 1))  # type: ignore[arg-type]
     with pytest.raises(Exception, match="pickle"):
         streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
 

@@ -18,7 +18,7 @@ from compensate.cycles_at_random import LANGUAGES
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import load
@@ -51,7 +51,7 @@ def test_every_hole_is_corrected_or_refused(
             stopped[f"{error.messages[0].code} {error.messages[0].text}"] += 1
             continue
         moves = follow(program, machine, SETUP).trace.moves
-        holes = moves.kind == Kind.CYCLE
+        holes = moves.kind == MotionKind.CYCLE
         assert not (moves.rule[holes] == Rule.PASS).any(), text
         lines = program.lines(moves.block[holes])
         refused = {each.line: each.reason for each in fixed.report.refused}

@@ -12,16 +12,16 @@ import pytest
 from compensate.motions import motions
 from compensate.test_stream import OPTIONS, program, whole
 from ncfix import fast
-from ncfix.compensate.figures.curve import Curve, Samples, arc_lengths
+from ncfix.compensate.figures.curve import Curve, CurvePoints, arc_lengths
 from ncfix.compensate.figures.nearest import Search
 from ncfix.compensate.plan.deviation import bounds, deviations_seen, path_error, samples, uneasy_starts
 from ncfix.compensate.plan.ends import corrected
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.segments import Segments
-from ncfix.compensate.plan.splitting import STRETCH, Grid, fewest
+from ncfix.compensate.plan.splitting import STRETCH, PathNodes, fewest
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.plan.written import Known, Written
+from ncfix.compensate.plan.written import Known, WrittenPieces
 from ncfix.machine import Machine, State, load
 from ncfix.machine.se3 import Array
 
@@ -35,7 +35,7 @@ def _plain_again(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     fast.disengage()
 
 
-def grid(rng: np.random.Generator, motions: int, most: int = 200) -> Grid:
+def grid(rng: np.random.Generator, motions: int, most: int = 200) -> PathNodes:
     """Motions that bow to and fro, from 1 um to 0.1 mm."""
     counts = rng.integers(2, most, motions)
     fraction = np.concatenate([np.linspace(0, 1, count) for count in counts])
@@ -44,7 +44,7 @@ def grid(rng: np.random.Generator, motions: int, most: int = 200) -> Grid:
     command = np.stack([size * np.sin(6 * k * fraction + phase) for k in range(1, 6)], axis=1)
     follow = np.zeros((len(fraction), 3, 5))
     follow[:, :, 2:] = np.linalg.qr(rng.normal(size=(len(fraction), 3, 3)))[0]
-    return Grid(counts.astype(np.intp), fraction, command, follow)
+    return PathNodes(counts.astype(np.intp), fraction, command, follow)
 
 
 @pytest.mark.parametrize("most", [200, 5 * STRETCH])
@@ -79,7 +79,7 @@ def test_nearest_points(seed: int, near: float) -> None:
     pytest.importorskip("numba", reason="the `fast` extra is not installed")
     rng = np.random.default_rng(seed)
     curve, other = wandering(rng, 500, 0.0), wandering(rng, 500, 10.0 ** -rng.integers(1, 6))
-    at = Samples.of(other)
+    at = CurvePoints.of(other)
     expected = other.way(at.piece, at.share)
     plain = Search(curve, near).around(at.points, expected)
     assert fast.engage()
@@ -133,7 +133,7 @@ def test_no_look_at_a_led_tip_finds_more_than_the_bound(root: Path, name: str, s
     assert found.max() > 1e-8
 
 
-def largest_on_each(written: Written, known: Known | None) -> Array:
+def largest_on_each(written: WrittenPieces, known: Known | None) -> Array:
     """The largest tip error on each motion (2, n), mm, of the program and corrected."""
     found = np.zeros((2, len(written.intent.moves)))
     for part in samples(written, np.flatnonzero(~written.pieces.kept), tilts=False, known=known):
@@ -158,7 +158,7 @@ def test_figures_from_what_is_known(root: Path, name: str, led: bool) -> None:
     assert known.before.max == pytest.approx(looked.before.max, abs=10 * PM)
     assert known.after.max == pytest.approx(looked.after.max, abs=10 * PM)
     assert known.after.rms == pytest.approx(looked.after.rms, abs=10 * PM)
-    written = Written(intent, pieces, planned.start)
+    written = WrittenPieces(intent, pieces, planned.start)
     on_each = [largest_on_each(written, known=each) for each in (None, planned.known)]
     np.testing.assert_allclose(on_each[0], on_each[1], rtol=0, atol=10 * PM)
     assert known.samples == looked.samples

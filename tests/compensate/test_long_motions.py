@@ -12,7 +12,7 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.limits import findings
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.sampling import MOST_SHOWN
-from ncfix.compensate.plan.splitting import STRETCH, Grid, fewest
+from ncfix.compensate.plan.splitting import STRETCH, PathNodes, fewest
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Moves
 from ncfix.machine import Effect, Machine, State
@@ -81,7 +81,7 @@ def test_motions_with_many_nodes_are_cut_in_stretches(nodes: int) -> None:
     fraction = np.linspace(0, 1, nodes)
     command = np.stack([1000 * fraction, 0.2 * np.sin(300 * fraction)], axis=1)
     follow = np.broadcast_to(np.eye(3)[:, :2], (nodes, 3, 2)).copy()
-    grid = Grid(np.array([nodes]), fraction, command, follow)
+    grid = PathNodes(np.array([nodes]), fraction, command, follow)
     ends, worst = fewest(grid, TOLERANCE)
     stretches = max((nodes - 1) // STRETCH, 1)
     assert ends[[*range(STRETCH, stretches * STRETCH, STRETCH), nodes - 1]].all()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
-from ncfix.compensate.plan.strategies import Full, Path, damped
+from ncfix.compensate.plan.strategies import Full, PoseSequence, damped
 from ncfix.machine import Effect, Machine, State
 
 NANOMETRE = 1e-6
@@ -130,7 +130,7 @@ def test_the_correction_changes_no_faster_along_a_path_than_allowed() -> None:
     strategy = Full(per_mm=0.0, per_rad=1e-4)
     way = np.concatenate([[0.0], np.abs(np.diff(b))])
     none = np.zeros(len(b), dtype=bool)
-    path = Path(np.zeros(len(b)), way, none, none, np.zeros((len(b), 2)))
+    path = PoseSequence(np.zeros(len(b)), way, none, none, np.zeros((len(b), 2)))
     free, held = (strategy.solve(machine, q, state, given) for given in (None, path))
     rate = np.abs(np.diff((held.q - q)[:, :2], axis=0)).max(axis=1) / way[1:]
     assert np.abs(np.diff((free.q - q)[:, :2], axis=0)).max() / way[1] > 1e-2

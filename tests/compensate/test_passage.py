@@ -14,7 +14,7 @@ from compensate.test_stream import OPTIONS, SETUP, program, streamed
 from ncfix.compensate.driver import PartCorrector
 from ncfix.compensate.following import Task
 from ncfix.compensate.parts import Part, Units
-from ncfix.compensate.workers import Ahead, Passage, Share
+from ncfix.compensate.workers import Passage, ReadAhead, Share
 from ncfix.control.moves import Moves
 from ncfix.control.parts import TABLES
 from ncfix.diagnostics import NcfixError
@@ -60,7 +60,7 @@ class Hearing(Share):
 
 def gone_through(source: bytes, machine: Machine, dialect: str, share: Share) -> tuple[Units, list[Part]]:
     task = Task(machine, SETUP, OPTIONS, None, "p.nc", get(dialect), SIZE)
-    units = PartCorrector(task, Ahead(io.BytesIO(source).read)).units
+    units = PartCorrector(task, ReadAhead(io.BytesIO(source).read)).units
     units.share = share
     return units, [unit.part for unit in units]
 

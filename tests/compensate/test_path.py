@@ -9,7 +9,7 @@ from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_ma
 from compensate.motions import Arc, changed, dense_errors, motions
 from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Polynomial
 
@@ -98,7 +98,7 @@ def test_a_perfect_machine_changes_nothing_not_even_the_last_bit() -> None:
 
 def test_rapids_are_corrected_at_their_ends_and_split_only_if_asked() -> None:
     machine = bent()
-    moves = motions(machine, (-200, 0, 0), [(-200, 0, 0), (200, 100, 50)], Kind.RAPID)
+    moves = motions(machine, (-200, 0, 0), [(-200, 0, 0), (200, 100, 50)], MotionKind.RAPID)
     strategy = get_strategy("position")
     whole, split = (plan(machine, moves, strategy, TOLERANCE, split_rapids=asked) for asked in (False, True))
     assert len(whole.pieces) == 2

@@ -17,10 +17,10 @@ from compensate import test_stream_others as others
 from compensate.test_stream import OPTIONS, streamed
 from ncfix import fast
 from ncfix.compensate import FixOptions, driver, plain
-from ncfix.compensate.parts import Unit
-from ncfix.compensate.plain import Course, Planner
+from ncfix.compensate.parts import ProgramPart
+from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.solve import SelfCheckError
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.parts import NotInPartsError
 from ncfix.machine import Machine, load
 from ncfix.text.writer import Splices, spliced
@@ -75,7 +75,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Whether each part, in turn, was planned as one of plain motions."""
     plan, found = Planner.plan, []
 
-    def watched(self: Planner, unit: Unit) -> Course | None:
+    def watched(self: Planner, unit: ProgramPart) -> PlainPlan | None:
         course = plan(self, unit)
         found.append(course is not None)
         return course
@@ -121,7 +121,7 @@ def test_arcs_are_planned_with_plain_motions(machine: Machine, monkeypatch: pyte
     source = winding(2, 600, 0.03, AMONG[2:4])
     plan, begun = Planner.plan, []
 
-    def watched(self: Planner, unit: Unit) -> Course | None:
+    def watched(self: Planner, unit: ProgramPart) -> PlainPlan | None:
         course = plan(self, unit)
         begun.append((course is not None, int(unit.part.moves.kind[0])))
         return course
@@ -131,7 +131,7 @@ def test_arcs_are_planned_with_plain_motions(machine: Machine, monkeypatch: pyte
         patched.setattr(Planner, "plan", watched)
         found = streamed(source, machine, 8220)
     assert all(planned for planned, _ in begun[1:])
-    assert (True, Kind.ARC) in begun
+    assert (True, MotionKind.ARC) in begun
     assert_as_by_the_long_way(found, source, machine, 8220, OPTIONS, monkeypatch)
 
 
@@ -257,11 +257,11 @@ def test_compiled_as_by_columns(seed: int, machine: Machine, monkeypatch: pytest
         fast.disengage()
 
 
-def course_of(source: bytes, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> Course:
+def course_of(source: bytes, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> PlainPlan:
     """The plan of the longest part of a program."""
     plan, courses = Planner.plan, []
 
-    def watched(self: Planner, unit: Unit) -> Course | None:
+    def watched(self: Planner, unit: ProgramPart) -> PlainPlan | None:
         courses.append(plan(self, unit))
         return courses[-1]
 

@@ -6,20 +6,22 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ncfix.compensate.plan.strategies import Path, limited
+from ncfix.compensate.plan.strategies import PoseSequence, limited
 
 RATE = 0.01
 FUZZ = 1e-12
 wanted = st.lists(st.floats(-1e-3, 1e-3, allow_nan=False), min_size=1, max_size=40)
 
 
-def path(n: int, step: float = 0.01, begins: list[int] | None = None, pins: dict[int, float] | None = None) -> Path:
+def path(
+    n: int, step: float = 0.01, begins: list[int] | None = None, pins: dict[int, float] | None = None
+) -> PoseSequence:
     """Poses at equal steps of rotary travel."""
     start, pinned, decided = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), np.zeros((n, 1))
     start[begins or []] = True
     for row, value in (pins or {}).items():
         pinned[row], decided[row] = True, value
-    return Path(np.zeros(n), np.full(n, step), start, pinned, decided)
+    return PoseSequence(np.zeros(n), np.full(n, step), start, pinned, decided)
 
 
 @settings(max_examples=200, deadline=None)
@@ -56,5 +58,5 @@ def test_decided_values_are_met_and_the_rate_kept_towards_them() -> None:
 def test_the_way_of_the_tip_allows_a_change_too() -> None:
     values = np.array([0.0, 1e-3])[:, None]
     still = np.zeros(2, dtype=bool)
-    moving = Path(np.array([0.0, 20.0]), np.zeros(2), still, still, np.zeros((2, 1)))
+    moving = PoseSequence(np.array([0.0, 20.0]), np.zeros(2), still, still, np.zeros((2, 1)))
     assert abs(np.diff(limited(values, moving, 2e-5, 0.0)[:, 0])[0] - 20 * 2e-5) < FUZZ

@@ -10,7 +10,7 @@ import pytest
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
 from ncfix.text.reader import read
@@ -32,7 +32,7 @@ def loop_to(end: float, step: float, machine: Machine) -> tuple[dict[int, str], 
     program = read(text.encode(), "part.ngc", "linuxcnc")
     fixed = fix_program(program, machine, SETUP, FixOptions(tolerance_um=50.0, verify=False))
     moves = follow(read(fixed.text, "part.ngc", "linuxcnc"), machine, SETUP).trace.moves
-    return {each.line: each.reason for each in fixed.report.refused}, moves.end[moves.kind != Kind.DWELL]
+    return {each.line: each.reason for each in fixed.report.refused}, moves.end[moves.kind != MotionKind.DWELL]
 
 
 def test_a_refused_increment_begins_where_the_corrected_program_has_led(machine: Machine) -> None:

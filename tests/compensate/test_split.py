@@ -10,7 +10,7 @@ import pytest
 from compensate.machines_at_random import perfect
 from compensate.motions import Arc, changed, dense_errors, motions
 from ncfix.compensate.plan.path import plan
-from ncfix.compensate.plan.splitting import Grid, fewest
+from ncfix.compensate.plan.splitting import PathNodes, fewest
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash, Polynomial
@@ -100,13 +100,13 @@ def test_reversing_a_path_takes_as_many_pieces() -> None:
 # -- the search itself ------------------------------------------------------------------------------------------------
 
 
-def grid_of(curves: list[np.ndarray]) -> Grid:
+def grid_of(curves: list[np.ndarray]) -> PathNodes:
     """One-axis motions with these exact corrections at even nodes."""
     counts = np.array([len(curve) for curve in curves], dtype=np.intp)
     fraction = np.concatenate([np.linspace(0, 1, n) for n in counts])
     follow = np.zeros((len(fraction), 3, 1))
     follow[:, 0, 0] = 1.0
-    return Grid(counts, fraction, np.concatenate(curves)[:, None], follow)
+    return PathNodes(counts, fraction, np.concatenate(curves)[:, None], follow)
 
 
 def exhaustive(curve: np.ndarray, tolerance: float) -> int:

@@ -6,16 +6,16 @@ import numpy as np
 
 from compensate.machines_at_random import TOPOLOGIES, perfect
 from compensate.motions import changed, motions
-from ncfix.compensate.plan.ends import Standing, standing
+from ncfix.compensate.plan.ends import EndCommands, standing
 from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
 
 MACHINE = perfect("w F X Y Z t")
 SHIFT = np.array([0.01, -0.02, 0.03])
 
 
-def stand(moves: Moves, kept: list[bool], machine: Machine = MACHINE, shift: np.ndarray = SHIFT) -> Standing:
+def stand(moves: Moves, kept: list[bool], machine: Machine = MACHINE, shift: np.ndarray = SHIFT) -> EndCommands:
     return standing(machine, moves, moves.end + shift, np.array(kept))
 
 
@@ -44,7 +44,9 @@ def test_a_kept_increment_starts_from_where_the_machine_stands() -> None:
 
 
 def test_a_dwell_changes_nothing() -> None:
-    moves = motions(MACHINE, (0, 0, 0), [(1, 0, 0), (1, 0, 0), (2, 0, 0)], [Kind.FEED, Kind.DWELL, Kind.FEED])
+    moves = motions(
+        MACHINE, (0, 0, 0), [(1, 0, 0), (1, 0, 0), (2, 0, 0)], [MotionKind.FEED, MotionKind.DWELL, MotionKind.FEED]
+    )
     moves.programmed[1] = False
     where = stand(moves, [False, True, False])
     np.testing.assert_allclose(where.start[2], moves.end[0] + SHIFT)
@@ -59,7 +61,12 @@ def test_where_the_control_has_gone_elsewhere_its_word_is_taken() -> None:
 
 def test_after_a_canned_cycle_the_machine_is_back_where_the_cycle_began() -> None:
     """The tracer's next motion starts at the height at which the cycle started."""
-    moves = motions(MACHINE, (0, 0, 0), [(1, 0, 5), (4, 0, -10), (9, 0, -10)], [Kind.RAPID, Kind.CYCLE, Kind.CYCLE])
+    moves = motions(
+        MACHINE,
+        (0, 0, 0),
+        [(1, 0, 5), (4, 0, -10), (9, 0, -10)],
+        [MotionKind.RAPID, MotionKind.CYCLE, MotionKind.CYCLE],
+    )
     moves.start[2, 2] = 5.0
     where = stand(moves, [False, False, False])
     np.testing.assert_allclose(where.start[2], [4 + SHIFT[0], SHIFT[1], 5 + SHIFT[2]])

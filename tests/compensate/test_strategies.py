@@ -11,7 +11,7 @@ from ncfix.compensate.plan import ends
 from ncfix.compensate.plan.findings import PoseError
 from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.strategies import RotaryThenLinear, Strategy, get_strategy, parted, strategies
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.piecewise import PiecewiseConstant
@@ -149,7 +149,7 @@ def test_a_plan_of_very_many_points_is_that_of_the_points(monkeypatch: pytest.Mo
     """Ends are corrected in batches, which must not show: not even where the thesis leaves its first point alone."""
     machine = random_machine(np.random.default_rng(9), "w C B F X Y Z t", ("polynomial",))
     q = np.random.default_rng(10).uniform(-0.5, 0.5, (50, 5)) * np.where(machine.rotary, 1.0, 200.0)
-    moves = motions(machine, q[0], q, Kind.RAPID)
+    moves = motions(machine, q[0], q, MotionKind.RAPID)
     for name, strategy in strategies().items():
         whole = plan(machine, moves, strategy, 1e-3).pieces.end
         with monkeypatch.context() as patch:

@@ -10,10 +10,10 @@ import pytest
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions
 from ncfix.compensate.driver import fix_program
-from ncfix.compensate.plan.deviation import FigureTally, Samples, path_error
+from ncfix.compensate.plan.deviation import FigureTally, PathSamples, path_error
 from ncfix.compensate.plan.path import plan, untouched
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import Polynomial
@@ -58,7 +58,7 @@ def test_figures_of_a_case_that_can_be_worked_out_by_hand() -> None:
 def test_the_start_of_a_cut_behind_a_rapid_is_looked_at() -> None:
     """An error of `size` u^2 from -250 to 250: the largest is where the rapid ends."""
     machine, size = bow(), 0.05
-    moves = motions(machine, (0, 0, 0), [(250, 0, 0), (0, 0, 0)], [Kind.RAPID, Kind.FEED])
+    moves = motions(machine, (0, 0, 0), [(250, 0, 0), (0, 0, 0)], [MotionKind.RAPID, MotionKind.FEED])
     pieces = untouched(moves, np.zeros(2, dtype=bool)).pieces
     error = path_error(machine, moves, pieces, rows=np.array([False, True]))
     assert error.before.max == pytest.approx(size, rel=1e-4)
@@ -93,7 +93,7 @@ def test_it_says_where() -> None:
 def test_rapids_cycles_and_kept_motions() -> None:
     """Rapids and cycles count where they end, kept motions not at all unless asked for, dwells never."""
     machine = bow()
-    kinds = [Kind.RAPID, Kind.FEED, Kind.CYCLE, Kind.DWELL]
+    kinds = [MotionKind.RAPID, MotionKind.FEED, MotionKind.CYCLE, MotionKind.DWELL]
     moves = motions(machine, (-200, 0, 0), [(100, 0, 0), (200, 0, 0), (0, 0, 0), (0, 0, 0)], kinds)
     moves = changed(moves, rule=np.array([Rule.CORRECT, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT], dtype=np.int8))
     result = plan(machine, moves, get_strategy("position"), TOLERANCE)
@@ -179,6 +179,6 @@ def test_of_equal_errors_the_first_on_the_path_is_named() -> None:
     """In whatever order they come: of a part of plain motions those at ends come before those along the way."""
     tally, one = FigureTally(), np.ones(1)
     for move in (3, 2, 4):
-        tally.add(Samples(np.array([move]), one, one, one, one, 0.0, 0.0))
+        tally.add(PathSamples(np.array([move]), one, one, one, one, 0.0, 0.0))
     found = tally.result()
     assert (found.before.move, found.after.move) == (2, 2)

@@ -15,7 +15,7 @@ from differential import klartext, product
 from differential.canon import ARC, Canon
 from differential.errors import Machine
 from differential.judge import Terms, judge
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.text.reader import read
@@ -43,7 +43,7 @@ def test_path_functions_mean_what_the_interpreter_says(
         moves = trace(read(text.encode(), "g.h"), KNOWN, ("X", "Y", "Z"), frozenset()).moves
         assert len(moves) == len(judged)
         assert moves.rule.tolist() == [0] * len(moves)
-        arcs = moves.kind == Kind.ARC
+        arcs = moves.kind == MotionKind.ARC
         assert arcs.tolist() == (judged.kind == ARC).tolist()
         along = np.einsum("ij,ij->i", moves.normal[arcs], judged.normal[arcs]) * np.sign(moves.sweep[arcs])
         assert (np.sign(judged.turns[arcs]) == np.sign(along)).all()

@@ -30,7 +30,7 @@ from differential.tnc_swivel import Swivel
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.compensate.following import follow
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.passing import Pass
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
@@ -316,7 +316,7 @@ class Claims:
     @classmethod
     def of(cls, program: Program, machine: Machine, setup: Setup, fixed: Fixed) -> Claims:
         report, moves = fixed.report, follow(program, machine, setup).trace.moves
-        lines, passed = program.lines(moves.block), (moves.rule == Rule.PASS) & (moves.kind != Kind.DWELL)
+        lines, passed = program.lines(moves.block), (moves.rule == Rule.PASS) & (moves.kind != MotionKind.DWELL)
         left: dict[int, float] = {}
         for axis in report.left:
             for first, last in axis.stretches:
@@ -326,7 +326,7 @@ class Claims:
             for note in report.warnings
             if note.place and (note.code == "NCF416" or "must not be split" in note.text)
         )
-        cuts = passed & (moves.kind != Kind.RAPID)
+        cuts = passed & (moves.kind != MotionKind.RAPID)
         lawful = np.zeros(len(moves), dtype=bool) if moves.passing is None else np.isin(moves.passing, list(LAWFUL))
         return cls(
             frozenset(refusal.line for refusal in report.refused),

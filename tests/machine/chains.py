@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from machine import oracle
-from ncfix.machine import Axis, Effect, Machine, Tool, se3
+from ncfix.machine import Axis, Effect, GaugeLine, Machine, se3
 from ncfix.machine.axes import Triad
 from ncfix.machine.basis import Polynomial
 
@@ -41,7 +41,7 @@ def random_chain(rng: Rng, joints: int) -> Machine:
     )
     names = [axis.name for axis in axes]
     topology = " ".join(["w", *names[:on_workpiece], "F", *names[on_workpiece:], "t"])
-    tool = Tool(unit_vector(rng), point(rng))
+    tool = GaugeLine(unit_vector(rng), point(rng))
     return Machine("random", topology, axes, tool, workpiece_offset=point(rng))
 
 
@@ -130,4 +130,4 @@ def _built(topology: str, axis: dict[str, Axis]) -> Machine:
         given = axis[letter]
         carries_work = letters.index(letter) < split
         axes.append(Axis(letter, given.rotary, carries_work, given.direction, given.point, given.range))
-    return Machine(topology, topology, tuple(axes), Tool((0.0, 0.0, 1.0), (0.0, 0.0, 80.0)))
+    return Machine(topology, topology, tuple(axes), GaugeLine((0.0, 0.0, 1.0), (0.0, 0.0, 80.0)))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from machine import chains
-from ncfix.machine import Axis, Effect, Machine, State, Tool, load
+from ncfix.machine import Axis, Effect, GaugeLine, Machine, State, load
 from ncfix.machine.basis import Backlash, Basis, ConstantBasis, Fourier, Periodic, Polynomial
 from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline, Truncated
 
@@ -102,7 +102,7 @@ def test_the_machine_of_the_benchmarks_is_bounded(root: Path) -> None:
 def test_without_ranges_or_with_products_no_bound_is_known(root: Path) -> None:
     """Without ranges polynomials have no bounds, and neither have products of signals."""
     axes = (Axis("X", False, False, (1.0, 0.0, 0.0)),)
-    machine = Machine("one", "w F X t", axes, Tool(), (Effect("EXX", (1e-3,), Polynomial((1,))),))
+    machine = Machine("one", "w F X t", axes, GaugeLine(), (Effect("EXX", (1e-3,), Polynomial((1,))),))
     assert machine.bow is None
     ranged = machine.replace(axes=(Axis("X", False, False, (1.0, 0.0, 0.0), range=(0.0, 100.0)),))
     assert ranged.bow is not None

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from machine import chains
 from machine.files import GOOD, changed
-from ncfix.machine import Axis, Effect, Machine, Tool, dumps, loads
+from ncfix.machine import Axis, Effect, GaugeLine, Machine, dumps, loads
 from ncfix.machine.basis import Backlash, Fourier, Periodic, Polynomial
 from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 
@@ -36,7 +36,7 @@ def test_what_a_file_means() -> None:
     assert x.pitch == 10.0
     assert b.moving_frame
     np.testing.assert_allclose(b.error_axes @ np.transpose(b.error_axes), np.eye(3), atol=1e-15)
-    assert machine.tool == Tool((0.0, 0.0, 1.0), (0.0, 0.0, 120.0))
+    assert machine.tool == GaugeLine((0.0, 0.0, 1.0), (0.0, 0.0, 120.0))
     positioning, square, growth = machine.effects
     assert positioning.basis == Polynomial((1, 2, 3))
     assert positioning.reference == (0.0, 0.0, -275.86)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine import chains, oracle
-from ncfix.machine import Axis, Effect, Machine, State, Tool, se3
+from ncfix.machine import Axis, Effect, GaugeLine, Machine, State, se3
 from ncfix.machine.state import CHUNK
 
 UM, URAD = 1e-3, 1e-6
@@ -107,10 +107,10 @@ def test_without_errors_actual_is_nominal_to_the_last_bit() -> None:
 
 # -- signs ------------------------------------------------------------------------------------------------------------
 
-TOOL_SIDE = Machine("", "w F X t", (Axis("X", False, False, (1.0, 0.0, 0.0)),), Tool(point=(0.0, 0.0, 0.0)))
-TABLE = Machine("", "w X F t", (Axis("X", False, True, (-1.0, 0.0, 0.0)),), Tool(point=(0.0, 0.0, 0.0)))
-HEAD = Machine("", "w F C t", (Axis("C", True, False, (0.0, 0.0, 1.0)),), Tool(point=(100.0, 20.0, 0.0)))
-ROUND_TABLE = Machine("", "w C F t", (Axis("C", True, True, (0.0, 0.0, -1.0)),), Tool(point=(100.0, 20.0, 0.0)))
+TOOL_SIDE = Machine("", "w F X t", (Axis("X", False, False, (1.0, 0.0, 0.0)),), GaugeLine(point=(0.0, 0.0, 0.0)))
+TABLE = Machine("", "w X F t", (Axis("X", False, True, (-1.0, 0.0, 0.0)),), GaugeLine(point=(0.0, 0.0, 0.0)))
+HEAD = Machine("", "w F C t", (Axis("C", True, False, (0.0, 0.0, 1.0)),), GaugeLine(point=(100.0, 20.0, 0.0)))
+ROUND_TABLE = Machine("", "w C F t", (Axis("C", True, True, (0.0, 0.0, -1.0)),), GaugeLine(point=(100.0, 20.0, 0.0)))
 
 
 @pytest.mark.parametrize("component", "XYZABC")
@@ -119,7 +119,7 @@ def test_the_sign_of_every_component_on_both_branches(machine: Machine, sign: in
     """A body that errs by +e moves the tool by +e if it carries the tool, by -e if it carries the workpiece."""
     axis = machine.axes[0]
     tip = np.array([40.0, 30.0, -25.0])
-    machine = machine.replace(tool=Tool(point=tuple(tip.tolist())))
+    machine = machine.replace(tool=GaugeLine(point=tuple(tip.tolist())))
     size = 1e-6
     error = machine.replace(effects=(Effect(f"E{component}{axis.name}", (size,)),)).error(np.zeros(1))
     expected = np.zeros(6)
@@ -225,7 +225,7 @@ def test_rotations_leave_the_reference_point_where_it_is() -> None:
     effect = Effect("EBX", (1e-4,), reference=place)
     q = np.array([[0.0], [200.0]])
     for height, shift in ((-275.86, 0.0), (-175.86, 100.0)):
-        machine = TOOL_SIDE.replace(tool=Tool(point=(0.0, 0.0, height)), effects=(effect,))
+        machine = TOOL_SIDE.replace(tool=GaugeLine(point=(0.0, 0.0, height)), effects=(effect,))
         np.testing.assert_allclose(machine.error(q)[:, 0], np.sin(1e-4) * shift, atol=1e-12)
 
 

@@ -18,7 +18,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import kinematics_of, placed, rotary_names
 from ncfix.compensate.plan.kinematics import joints_from_commands
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.machine import Machine
@@ -108,7 +108,7 @@ def corrected(text: str, dialect: str, machine: Machine) -> Moves:
 
 def ends(moves: Moves, machine: Machine) -> NDArray[np.float64]:
     """Axis positions at the ends of the motions, mm and degrees."""
-    rows = np.flatnonzero(moves.kind != Kind.DWELL)
+    rows = np.flatnonzero(moves.kind != MotionKind.DWELL)
     lengths = np.nan_to_num(moves.tool_length[rows])
     q = joints_from_commands(placed(machine, SETUP), moves.end[rows], moves.tcp[rows], lengths)
     return np.where(machine.rotary, np.degrees(q), q)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ncfix.diagnostics import ConfigError, RefusedError
-from ncfix.machine import Effect, Tool, loads
+from ncfix.machine import Effect, GaugeLine, loads
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import ranges_of, residual
 from ncfix.tables.export import export
@@ -46,7 +46,7 @@ def test_one_grid_holds_for_tools_of_any_length(length: float) -> None:
 
 
 def test_a_tool_that_is_not_along_z_is_refused() -> None:
-    machine = single_error("EXX").replace(tool=Tool((1.0, 0.0, 0.0)))
+    machine = single_error("EXX").replace(tool=GaugeLine((1.0, 0.0, 0.0)))
     with pytest.raises(RefusedError, match="not along Z"):
         CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS))
 

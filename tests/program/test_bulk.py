@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ncfix import fast
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError
@@ -46,15 +46,15 @@ def moved(moves: Moves, seed: int, size: float) -> Pieces:
     shift[:, moves.rotary] *= rng.integers(0, 2) / 100
     kept = (moves.rule != Rule.CORRECT) | (rng.random(len(moves)) < 0.01)
     shift[kept] = 0.0
-    dwells = np.flatnonzero(moves.kind[1:] == Kind.DWELL) + 1
+    dwells = np.flatnonzero(moves.kind[1:] == MotionKind.DWELL) + 1
     for row in dwells.tolist():
         shift[row] = shift[row - 1]
-    counts = np.where((rng.random(len(moves)) < 0.02) & ~kept & (moves.kind != Kind.CYCLE), 2, 1)
+    counts = np.where((rng.random(len(moves)) < 0.02) & ~kept & (moves.kind != MotionKind.CYCLE), 2, 1)
     move = np.repeat(np.arange(len(moves)), counts)
     last = np.append(np.diff(move) != 0, True)
     end = (moves.end + shift)[move]
     end[~last] = ((moves.start + moves.end) / 2 + shift)[move[~last]]
-    arc = (moves.kind == Kind.ARC)[move] & (counts[move] == 1)
+    arc = (moves.kind == MotionKind.ARC)[move] & (counts[move] == 1)
     return Pieces(move, np.where(last, 1.0, 0.5), end, arc, moves.centre[move].copy(), kept[move])
 
 
@@ -203,7 +203,7 @@ def test_straight_motions_with_a_direction_of_the_tool_go_one_by_one() -> None:
     pieces, first, rule = moved(moves, 1, 0.01), np.arange(len(moves) + 1), language_of(program.dialect).one_by_one
     assert rule is not None
     assert not rule(program, moves, pieces, first).any()
-    straight = replace(moves, kind=np.full_like(moves.kind, Kind.FEED))
+    straight = replace(moves, kind=np.full_like(moves.kind, MotionKind.FEED))
     assert rule(program, straight, pieces, first).tolist() == [False, True, False, True]
 
 
@@ -225,8 +225,8 @@ def test_arcs_and_dwells_do_not_part_a_stretch() -> None:
     line = [f"X{n / 7:.3f} Z{n / 9:.3f} B{n / 5:.3f}" for n in range(1, 41)]
     lines = [*line, "G4 P1.", "X9. Y1. Z4.", "G2 X11. Y3. I2. J0.", "G3 X9. Y1. Z3. I-2. J0.", "G1 X9. Z4.", *line]
     program, moves = followed("\n".join(["G90 G21 G94 G17", "G0 X0 Y0 Z0 B0 C0 F1000", *lines, "M2\n"]).encode())
-    rows, kept = np.arange(len(moves)), moves.kind == Kind.DWELL
-    shifted = moves.end + 0.0123, moves.kind == Kind.ARC, moves.centre + 0.0123
+    rows, kept = np.arange(len(moves)), moves.kind == MotionKind.DWELL
+    shifted = moves.end + 0.0123, moves.kind == MotionKind.ARC, moves.centre + 0.0123
     pieces = Pieces(rows, np.ones(len(rows)), *shifted, kept)
     with mock.patch.object(bulk.Bulk, "take", autospec=True, side_effect=bulk.Bulk.take) as taken:
         emit(program, moves, pieces, STEPS)
@@ -265,7 +265,7 @@ def test_times_and_motions_with_letters_of_axes_in_dwells(dialect: str, dwell: s
         *line,
     ]
     program, moves = followed("\n".join([*lines, "M2\n"]).encode(), dialect)
-    assert (moves.kind == Kind.DWELL).any()
+    assert (moves.kind == MotionKind.DWELL).any()
     assert_same(program, moves, moved(moves, 2, 0.01))
 
 
@@ -288,7 +288,7 @@ def test_arcs_written_by_themselves_in_another_order_than_they_stand_in() -> Non
     lines = ["o1 sub", *arcs, "o1 endsub", "G90 G21 G94 G17", "G1 X0 Y0 Z0 B0 C0 F1000", *arcs, "o1 call", "M2\n"]
     program, moves = followed("\n".join(lines).encode())
     assert (np.diff(moves.block) < 0).any()
-    rows, arc = np.arange(len(moves)), moves.kind == Kind.ARC
+    rows, arc = np.arange(len(moves)), moves.kind == MotionKind.ARC
     shifted = moves.end + 0.0123, arc, moves.centre + 0.0123
     assert_same(program, moves, Pieces(rows, np.ones(len(rows)), *shifted, np.zeros_like(arc)))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.text.reader import read
@@ -24,7 +24,7 @@ def traced(text: str) -> tuple:
 
 def whole(moves: Moves, shift=(0.0, 0.0, 0.0), kept: np.ndarray | None = None) -> Pieces:
     """One piece per motion, all ends and centres shifted alike."""
-    arc = moves.kind == Kind.ARC
+    arc = moves.kind == MotionKind.ARC
     n = len(moves)
     keep = np.zeros(n, dtype=bool) if kept is None else kept
     return Pieces(np.arange(n), np.ones(n), moves.end + np.array(shift), arc, moves.centre + np.array(shift), keep)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from conftest import missing
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.trace import trace
 from ncfix.text.reader import read
 from program import interpreter
@@ -72,7 +72,7 @@ def test_the_interpreter_moves_where_the_trace_does(seed: int) -> None:
     code, stops = interpreter.run(text)
     assert code == 0, text
     moves = trace(read(text.encode(), "part", "fanuc"), KNOWN, AXES, frozenset("ABC")).moves
-    ends = (moves.end * np.where(moves.rotary, 180 / np.pi, 1.0))[moves.kind != Kind.DWELL]
+    ends = (moves.end * np.where(moves.rotary, 180 / np.pi, 1.0))[moves.kind != MotionKind.DWELL]
     at = 0
     for end in ends:
         away = [float(np.abs(np.array(stop.end) - end).max()) for stop in stops[at:]]

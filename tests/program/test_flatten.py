@@ -14,7 +14,7 @@ from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError, RefusedError
 from ncfix.machine import load
 from ncfix.text.reader import read
-from ncfix.text.tree import Assignment, Constant, Flow, Literal
+from ncfix.text.tree import Assignment, Constant, Literal, OWordLine
 from program.generated import Generator
 from program.tracing import KNOWN
 
@@ -27,7 +27,7 @@ def flat(text: str, dialect: str, **options: object) -> str:
     found = flatten(program, setup, ("X", "Y", "Z"), frozenset(), STEPS, **options)  # type: ignore[arg-type]
     for template in found.program.templates:
         assert not any(isinstance(item, Assignment) for item in template.items)
-        assert not any(isinstance(item, Flow) and item.keyword != "program" for item in template.items)
+        assert not any(isinstance(item, OWordLine) and item.keyword != "program" for item in template.items)
         assert all(isinstance(word.value, Literal | Constant) for word in template.words)
     assert len(found.lines) == len(found.program)
     return found.program.source.decode()

@@ -10,7 +10,7 @@ import pytest
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Fixed, fix_program
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.operations import CycleTable, Lose, Rapid, Refuse, Resume, SetTool, Suspend, like
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
@@ -82,7 +82,7 @@ def test_own_codes_are_corrected_as_those_of_the_family(dmu50: Machine) -> None:
 def test_a_tool_change_leads_to_its_words_in_rapid(dmu50: Machine) -> None:
     text = "G90 G54 G1 F100. X0. Y0. Z10.\nG100 T3 X10. Y20. Z100.\nX11.\nM30\n"
     moves = moves_of(text, dmu50)
-    assert [Kind(kind) for kind in moves.kind] == [Kind.FEED, Kind.RAPID, Kind.FEED]
+    assert [MotionKind(kind) for kind in moves.kind] == [MotionKind.FEED, MotionKind.RAPID, MotionKind.FEED]
     assert (moves.rule == Rule.CORRECT).all()
     again = fixed(text, dmu50).text
     assert re.search(rb"\nG100 T3 X[\d.]+ Y[\d.]+ Z[\d.]+\n", again)
@@ -110,7 +110,7 @@ def test_a_mode_ends(dmu50: Machine) -> None:
 
 def test_a_cycle_that_is_not_modal(dmu50: Machine) -> None:
     moves = moves_of("G90 G54 G0 X0. Y0. Z10. B0. C0.\nF100.\nG178 X1. Y1. Z-5. R1.\nX9.\nM30\n", dmu50)
-    assert [Kind(kind) for kind in moves.kind] == [Kind.RAPID, Kind.CYCLE, Kind.RAPID]
+    assert [MotionKind(kind) for kind in moves.kind] == [MotionKind.RAPID, MotionKind.CYCLE, MotionKind.RAPID]
     assert np.isclose(moves.start[2][dmu50.axis_names.index("Z")], 10.0)
 
 

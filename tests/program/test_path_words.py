@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ncfix.control.control import Control
+from ncfix.control.control import ProgramControl
 from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Rule
 from program.tracing import follow
@@ -83,14 +83,14 @@ def test_where_the_axes_stand_behind_it_is_not_known(language: str, monkeypatch:
         "siemens": f"{HEADS['siemens']}X5\nG91 X1\nM30\n",
         "heidenhain": "BEGIN PGM T MM\nTOOL CALL 0 Z S1000\nL X+0 Y+0 Z+9 R0 FMAX\nL X+5 F100\nL IX+1\nEND PGM T MM\n",
     }
-    make = Control.make
+    make = ProgramControl.make
     monkeypatch.setattr(Interpreter, "take_stretch", lambda self, plan: False)
 
-    def forgetful(control: Control, motion: object) -> None:
+    def forgetful(control: ProgramControl, motion: object) -> None:
         if control.row_block != FORGOTTEN[language] or not control.block_words:
             make(control, motion)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Control, "make", forgetful)
+    monkeypatch.setattr(ProgramControl, "make", forgetful)
     moves = follow(lines[language], dialect=language, no_point="calculator", assume_zero=True).moves
     ends = [(int(moves.block[row]), int(moves.rule[row])) for row in range(len(moves))]
     assert ends[-2:] == [(FORGOTTEN[language], Rule.REFUSE), (FORGOTTEN[language] + 1, Rule.REFUSE)]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.text.reader import read
@@ -29,7 +29,7 @@ def pinned(text: str, refused: int, dialect: str = "linuxcnc") -> list[int]:
     closure = closure_of_refusals(moves, kept)
     found, added = closure.kept, closure.added
     assert sorted(np.flatnonzero(found & ~kept).tolist()) == sorted(added)
-    arcs = [row for row in np.flatnonzero(found).tolist() if row == refused or moves.kind[row] == Kind.ARC]
+    arcs = [row for row in np.flatnonzero(found).tolist() if row == refused or moves.kind[row] == MotionKind.ARC]
     assert all(cause == next(row for row in arcs if row > each) for each, cause in added.items())
     return sorted(added)
 
@@ -120,7 +120,7 @@ def test_refused_arcs_close_whatever_is_before_them(lines: list[str], refused: i
     found = closure_of_refusals(moves, kept).kept
     off = np.zeros(3, dtype=bool)
     for row in range(len(moves)):
-        own = moves.programmed[row].any() and not moves.incremental[row] and moves.kind[row] == Kind.ARC
+        own = moves.programmed[row].any() and not moves.incremental[row] and moves.kind[row] == MotionKind.ARC
         if found[row] and own:
             assert not off[:2].any()
         if found[row] and not moves.incremental[row]:

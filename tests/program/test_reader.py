@@ -14,12 +14,12 @@ from ncfix.text.tree import (
     Constant,
     Exists,
     Expression,
-    Flow,
     Item,
     Literal,
     NamedParameter,
+    NumberedParameter,
     Opaque,
-    Parameter,
+    OWordLine,
     Program,
     Skip,
     Tape,
@@ -90,11 +90,11 @@ def test_a_column_of_words() -> None:
     ("text", "expected"),
     [
         (b"X1", Literal(0)),
-        (b"X#1", Parameter(Literal(0))),
-        (b"X##1", Parameter(Parameter(Literal(0)))),
-        (b"X#[1+2]", Parameter(Binary("+", Literal(0), Literal(1)))),
+        (b"X#1", NumberedParameter(Literal(0))),
+        (b"X##1", NumberedParameter(NumberedParameter(Literal(0)))),
+        (b"X#[1+2]", NumberedParameter(Binary("+", Literal(0), Literal(1)))),
         (b"X# < Depth Of Cut >", NamedParameter("depthofcut")),
-        (b"X-#1", Unary("-", Parameter(Literal(0)))),
+        (b"X-#1", Unary("-", NumberedParameter(Literal(0)))),
         (b"X+[1]", Unary("+", Literal(0))),
         (b"X[-1]", Unary("+", Literal(0))),
         (b"XSIN[30]", Unary("sin", Literal(0))),
@@ -102,7 +102,7 @@ def test_a_column_of_words() -> None:
         (b"Xatan[1]/[2]", Binary("atan", Literal(0), Literal(1))),
         (b"X[atan[1]/[2]/3]", Binary("/", Binary("atan", Literal(0), Literal(1)), Literal(2))),
         (b"XEXISTS[#<a>]", Exists(NamedParameter("a"))),
-        (b"XEXISTS[#5]", Exists(Parameter(Literal(0)))),
+        (b"XEXISTS[#5]", Exists(NumberedParameter(Literal(0)))),
     ],
 )
 def test_values(text: bytes, expected: Expression) -> None:
@@ -138,7 +138,7 @@ def test_assignments() -> None:
     assert isinstance(first, Assignment)
     assert isinstance(second, Assignment)
     assert (first.target, first.value) == (NamedParameter("speed"), Binary("*", Literal(0), Literal(1)))
-    assert (second.target, second.value) == (Parameter(Literal(2)), Literal(3))
+    assert (second.target, second.value) == (NumberedParameter(Literal(2)), Literal(3))
     assert isinstance(word, Word)
 
 
@@ -148,7 +148,7 @@ def test_assignments() -> None:
         (b"o100 sub", "100", "sub", 0),
         (b"O0100 ENDSUB [#1]", "100", "endsub", 1),
         (b"o<Side> call [1] [2+3]", "side", "call", 2),
-        (b"o[#1] call", Parameter(Literal(0)), "call", 0),
+        (b"o[#1] call", NumberedParameter(Literal(0)), "call", 0),
         (b"o#<which> call [1]", NamedParameter("which"), "call", 1),
         (b"o1 if [#1 GT 2]", "1", "if", 1),
         (b"o1 else if [1]", "1", "elseif", 1),
@@ -167,13 +167,13 @@ def test_assignments() -> None:
 )
 def test_flow_control(text: bytes, label: str | Expression, keyword: str, arguments: int) -> None:
     flow = items(text)[0]
-    assert isinstance(flow, Flow)
+    assert isinstance(flow, OWordLine)
     assert (flow.label, flow.keyword, len(flow.arguments)) == (label, keyword, arguments)
 
 
 def test_block_skip_line_number_and_comments_around_an_o_word() -> None:
     kinds = [type(item) for item in items(b"/ N5 o1 if [1] (yes) ; or no (\n")]
-    assert kinds == [Skip, Word, Flow, Comment, Comment]
+    assert kinds == [Skip, Word, OWordLine, Comment, Comment]
 
 
 @pytest.mark.parametrize("text", [b"G1 X 1 2.5 Y- 3 Z+ .5", b"G 1X12.5Y-3Z.5", b"\tg\t1 x12.5\t y - 3z0.50"])
@@ -273,10 +273,10 @@ def test_parts_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("text", "kinds"),
     [
-        (b"O1234 (PART)", [Flow, Comment]),
-        (b":1234", [Flow]),
+        (b"O1234 (PART)", [OWordLine, Comment]),
+        (b":1234", [OWordLine]),
         (b"<PART-1>", [Opaque]),
-        (b"O1<PART>", [Flow, Opaque]),
+        (b"O1<PART>", [OWordLine, Opaque]),
         (b"%PART-1", [Tape]),
         (b"/2 N10 G0 X1;", [Skip, Word, Word, Word, Comment]),
         (b"N10 /3 G0", [Word, Skip, Word]),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.control.moves import Kind, Rule, Trace
+from ncfix.control.moves import MotionKind, Rule, Trace
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.text.reader import read
@@ -60,9 +60,9 @@ def test_what_may_be_corrected_is_known(traces: dict[str, Trace]) -> None:
         moves = one.moves
         free = moves.rule == Rule.CORRECT
         assert not np.isnan(moves.end[free]).any(), name
-        cut = free & ((moves.kind == Kind.FEED) | (moves.kind == Kind.ARC))
+        cut = free & ((moves.kind == MotionKind.FEED) | (moves.kind == MotionKind.ARC))
         assert not np.isnan(moves.start[cut]).any(), name
-        arcs = moves.kind == Kind.ARC
+        arcs = moves.kind == MotionKind.ARC
         assert not np.isnan(moves.centre[arcs]).any(), name
         assert np.isnan(moves.centre[~arcs]).all(), name
         assert (moves.reason[free] == 0).all(), name
@@ -73,7 +73,7 @@ def test_arcs_lead_from_start_to_end(traces: dict[str, Trace]) -> None:
     """The sweep about the centre leads from start to end, to the closure that a control allows (0.1 mm in inches)."""
     for name, one in traces.items():
         moves = one.moves
-        arcs = np.flatnonzero(moves.kind == Kind.ARC)
+        arcs = np.flatnonzero(moves.kind == MotionKind.ARC)
         arm, goal = (moves.start[arcs, :3] - moves.centre[arcs]), (moves.end[arcs, :3] - moves.centre[arcs])
         normal, angle = moves.normal[arcs], moves.sweep[arcs, None]
         height = np.sum(normal * arm, axis=1, keepdims=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.diagnostics import SourceError
 from program.tracing import ends, follow, last
 
@@ -14,7 +14,7 @@ def holes(text: str, **given: object) -> list[list[float]]:
     """The bottoms of the holes."""
     followed = follow(f"F100 G0 Z10\n{text}", **given)  # type: ignore[arg-type]
     rows = zip(followed.moves.kind, ends(followed), strict=True)
-    return [end for kind, end in rows if kind == Kind.CYCLE]
+    return [end for kind, end in rows if kind == MotionKind.CYCLE]
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_g80_ends_the_cycle() -> None:
 
 def test_on_iso_controls_the_code_before_the_cycle_comes_back() -> None:
     moves = follow("F100 G0 Z10\nG81 X1 Z-1 R1\nG80\nX5", dialect="iso").moves
-    assert moves.kind[-1] == Kind.RAPID
+    assert moves.kind[-1] == MotionKind.RAPID
 
 
 @pytest.mark.parametrize(

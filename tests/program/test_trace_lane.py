@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from ncfix import fast
 from ncfix.control import lane
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix_iso.rs274 import arc_motion
@@ -282,5 +282,5 @@ def test_the_lane_takes_arcs(dialect: str) -> None:
     body = [f"G{2 + i % 2} X{i}. I.25\nX{i + 0.5} R.25" for i in range(1, 100)]
     with mock.patch.object(arc_motion, "circle", side_effect=arc_motion.circle) as one_by_one:
         moves = follow("\n".join(["G0 X0. Y0. Z0. B0. C0. F100\nG3 X.5 R.25", *body]), "XYZBC", dialect=dialect).moves
-    assert np.count_nonzero(moves.kind == Kind.ARC) == 199
+    assert np.count_nonzero(moves.kind == MotionKind.ARC) == 199
     assert not one_by_one.called

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from program.tracing import ends, follow, last, reasons
 
 
@@ -35,7 +35,7 @@ def test_every_motion_starts_where_the_one_before_ended() -> None:
 
 def test_kinds_codes_and_programmed_axes() -> None:
     moves = follow("G0 X1 Y1\nG1 Z-1 F100\nG3 X0 Y2 I-1 J0\nX0 Y0 R5").moves
-    assert moves.kind.tolist() == [Kind.RAPID, Kind.FEED, Kind.ARC, Kind.ARC]
+    assert moves.kind.tolist() == [MotionKind.RAPID, MotionKind.FEED, MotionKind.ARC, MotionKind.ARC]
     assert moves.modal.tolist() == [0, 10, 30, 30]
     assert moves.programmed.tolist() == [
         [True, True, False],
@@ -82,7 +82,7 @@ def test_reference_points_can_be_set() -> None:
 
 def test_dwell_moves_nothing() -> None:
     followed = follow("G0 X1\nG4 P2.5\nX2")
-    assert followed.moves.kind.tolist() == [Kind.RAPID, Kind.DWELL, Kind.RAPID]
+    assert followed.moves.kind.tolist() == [MotionKind.RAPID, MotionKind.DWELL, MotionKind.RAPID]
     assert followed.moves.rule[1] == Rule.PASS
     assert np.array_equal(followed.moves.start[1], followed.moves.end[1])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.control.moves import FeedMode, Kind
+from ncfix.control.moves import FeedMode, MotionKind
 from program.tracing import ends, follow, last
 
 
@@ -29,7 +29,7 @@ def test_tool_change_comes_before_length_offset() -> None:
 
 def test_dwell_comes_before_motion() -> None:
     moves = follow("G0 X0\nG4 P1 G0 X5").moves
-    assert [int(kind) for kind in moves.kind] == [Kind.RAPID, Kind.DWELL, Kind.RAPID]
+    assert [int(kind) for kind in moves.kind] == [MotionKind.RAPID, MotionKind.DWELL, MotionKind.RAPID]
     assert moves.end[1, 0] == 0.0
     assert moves.end[2, 0] == 5.0
 

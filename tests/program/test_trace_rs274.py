@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from conftest import missing
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
 from ncfix.text.reader import read
@@ -39,11 +39,11 @@ def followed(text: str) -> Moves | None:
         return None
 
 
-def positions(moves: Moves) -> list[tuple[Kind, np.ndarray, np.ndarray]]:
+def positions(moves: Moves) -> list[tuple[MotionKind, np.ndarray, np.ndarray]]:
     """Kind, end in mm and degrees, and centre of the motions, those without a length left out."""
     ends = moves.end * np.where(moves.rotary, 180 / np.pi, 1.0)
-    rows = zip(map(Kind, moves.kind.tolist()), ends, moves.centre, strict=True)
-    return [row for row in rows if row[0] != Kind.DWELL]
+    rows = zip(map(MotionKind, moves.kind.tolist()), ends, moves.centre, strict=True)
+    return [row for row in rows if row[0] != MotionKind.DWELL]
 
 
 def assert_agrees(text: str) -> None:
@@ -55,20 +55,22 @@ def assert_agrees(text: str) -> None:
     at = 0
     before = np.zeros(len(AXES))
     for kind, end, centre in positions(moves):
-        if kind != Kind.ARC and np.abs(end - before).max() < BLUR:
+        if kind != MotionKind.ARC and np.abs(end - before).max() < BLUR:
             continue
         here = next(i for i in itertools.count(at) if i >= len(stops) or matches(stops[i], kind, end))
         assert here < len(stops), f"nothing leads to {end}:\n{text}"
-        if kind != Kind.CYCLE and Kind.CYCLE not in moves.kind:
+        if kind != MotionKind.CYCLE and MotionKind.CYCLE not in moves.kind:
             assert all(np.abs(np.array(stop.end) - before).max() < BLUR for stop in stops[at:here]), text
-        if kind == Kind.ARC and not any(frame.rotation[0, 1] for frame in moves.frames):
+        if kind == MotionKind.ARC and not any(frame.rotation[0, 1] for frame in moves.frames):
             assert np.sort(np.abs(np.array(stops[here].centre) - centre))[1] < 10 * BLUR, text
         at, before = here + 1, end
 
 
-def matches(stop: interpreter.Stop, kind: Kind, end: np.ndarray) -> bool:
+def matches(stop: interpreter.Stop, kind: MotionKind, end: np.ndarray) -> bool:
     """Whether a motion of the interpreter is this one."""
-    return (kind == Kind.ARC) == (stop.centre is not None) and float(np.abs(np.array(stop.end) - end).max()) < BLUR
+    return (kind == MotionKind.ARC) == (stop.centre is not None) and float(
+        np.abs(np.array(stop.end) - end).max()
+    ) < BLUR
 
 
 ROUNDING = 42

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from ncfix.control.moves import FeedMode, Kind, Moves
+from ncfix.control.moves import FeedMode, MotionKind, Moves
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.control.turns import UNTIMED
@@ -47,7 +47,7 @@ def corrected(text: str, dialect: str, pieces: int = 1, shift: float = 0.02) -> 
 def minutes(text: str, dialect: str) -> float:
     """The time of the motions at feed, by LinuxCNC's rule: F is the speed of X Y Z where they move, else of A."""
     _, moves = traced(text.removesuffix("M2\n"), dialect)
-    rows = np.flatnonzero(moves.kind == Kind.FEED)
+    rows = np.flatnonzero(moves.kind == MotionKind.FEED)
     way = moves.end[rows] - moves.start[rows]
     linear, turn = np.linalg.norm(way[:, :3], axis=1), np.abs(np.rad2deg(way[:, 3]))
     inverse = moves.feed_mode[rows] == FeedMode.INVERSE_TIME

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ncfix.machine import Axis, Effect, Machine, State, Tool
+from ncfix.machine import Axis, Effect, GaugeLine, Machine, State
 from ncfix.machine.basis import Polynomial
 from ncfix.tables.correction import exact_correction, rotary_correction
 from ncfix.tables.scheme import Limits, SchemeTask
@@ -48,7 +48,7 @@ HURON = Machine(
         Axis("X", False, False, X, range=(-325.0, 325.0)),
         Axis("Z", False, False, Z, range=(-50.0, 400.0)),
     ),
-    Tool(Z),
+    GaugeLine(Z),
 )  # fmt: skip
 """A lies at 45 degrees between X and Z. Her tool frame has y along -z of the base and z along y."""
 

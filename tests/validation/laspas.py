@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.machine import Axis, Effect, Machine, State, Tool
+from ncfix.machine import Axis, Effect, GaugeLine, Machine, State
 from ncfix.machine.piecewise import PiecewiseLinear
 
 PLACES = {"X": np.arange(-800.0, -49.0, 50), "Y": np.arange(-400.0, -24.0, 25), "Z": np.arange(-300.0, -24.0, 25)}
@@ -30,7 +30,7 @@ HOME = Machine(
         Axis("Y", False, False, (0.0, 1.0, 0.0), range=(-500.0, 0.0)),
         Axis("Z", False, False, (0.0, 0.0, 1.0), range=(-460.0, 0.0)),
     ),
-    Tool((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)),
+    GaugeLine((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)),
 )
 
 

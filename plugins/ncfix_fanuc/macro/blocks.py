@@ -8,10 +8,10 @@ from lark import Token, UnexpectedInput
 
 from ncfix.text.build import (
     Branch,
-    Builder,
     Node,
     Parsed,
     TooDeepError,
+    TreeBuilder,
     build,
     check_exponents,
     check_numbers,
@@ -21,7 +21,7 @@ from ncfix.text.build import (
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, explain
 from ncfix.text.grammar import Squeezed, parse
-from ncfix.text.tree import Binary, Expression, Flow, Item, Literal
+from ncfix.text.tree import Binary, Expression, Item, Literal, OWordLine
 from ncfix_iso.rs274.blocks import check_repeats
 
 PIECE = re.compile(r"\([^()]*(?:\([^()]*\)[^()]*)*\)|;.*|[^ \t]", re.DOTALL)
@@ -55,7 +55,7 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
     return parsed
 
 
-class MacroBuilder(Builder):
+class MacroBuilder(TreeBuilder):
     """Makes items of the trees of Macro B, too. Every number remembers whether it has a point."""
 
     def literal(self, token: Token) -> Literal:
@@ -68,14 +68,14 @@ class MacroBuilder(Builder):
             return super().item(node)
         return self.statement(node, STATEMENTS[kind(node)])
 
-    def statement(self, tree: Branch, keyword: str) -> Flow:
+    def statement(self, tree: Branch, keyword: str) -> OWordLine:
         """A control statement: what it tests, and where it leads."""
         branches = [node for node in tree.children if not isinstance(node, Token)]
         label: str | Expression = next((str(int(str(n))) for n in tree.children if is_label(n)), "")
         tests = branches[:1] if keyword in ("if goto", "if then", "do") else []
         if not label and len(branches) > len(tests):
             label = self.expression(branches[-1])
-        return Flow(label, keyword, tuple(map(self.expression, tests)), self.span(tree))
+        return OWordLine(label, keyword, tuple(map(self.expression, tests)), self.span(tree))
 
     def compound(self, tree: Branch, depth: int) -> Expression:
         """The expression that a tree stands for."""

@@ -11,7 +11,7 @@ import math
 
 from ncfix.control.coordinates import mask_of
 from ncfix.control.modal import NO_MOTION
-from ncfix_iso.rs274.control import Control
+from ncfix_iso.rs274.control import RS274Control
 
 LOCKED = range(8000, 10000)
 NOT_AT_HAND = "NCF246"
@@ -24,7 +24,7 @@ def is_builders(label: str) -> bool:
     return label.isdigit() and int(label) in LOCKED
 
 
-def ran(control: Control, label: str) -> None:
+def ran(control: RS274Control, label: str) -> None:
     """Such a program has run."""
     control.warn(
         NOT_AT_HAND,

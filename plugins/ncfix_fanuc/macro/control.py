@@ -13,9 +13,9 @@ from ncfix.text.language import Run
 from ncfix.text.tree import Template
 from ncfix_fanuc.macro.rules import RULES
 from ncfix_fanuc.macro.scaling import Scaling
-from ncfix_fanuc.macro.variables import Variables
+from ncfix_fanuc.macro.variables import MacroVariables
 from ncfix_fanuc.macro.vectors import COMPONENTS
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 
 NO_POINT = "NCF240"
 DEFAULT_SYSTEM = "IS-B"
@@ -23,8 +23,8 @@ ANGLE = ",A"
 """The address of the angle by which a line is given."""
 
 
-class MacroControl(Control):
-    """`Control` with the decimal-point rule, polar coordinates and the variables of Macro B.
+class MacroControl(RS274Control):
+    """`RS274Control` with the decimal-point rule, polar coordinates and the variables of Macro B.
 
     polar   radius and angle last commanded while G16 is in force, program units and degrees; None otherwise
     scaling        what G51 does to words; None without it
@@ -39,7 +39,7 @@ class MacroControl(Control):
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
         super().__init__(run, dialect, RULES[dialect.semantics])
-        self.parameters: Variables = Variables()
+        self.parameters: MacroVariables = MacroVariables()
         self.polar: tuple[float, float] | None = None
         self.scaling: Scaling | None = None
         self.mirrored: dict[int, float] = {}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.faults import Fault
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE, drill, place_hole, repeats
 from ncfix_iso.rs274.systems import check_system
 
@@ -16,7 +16,7 @@ BACK_BORING = 870
 """G87 goes in to R, below, and cuts upwards to its depth."""
 
 
-def cycle(control: Control, block: Block, code: int) -> None:
+def cycle(control: RS274Control, block: Block, code: int) -> None:
     """Drill the holes of one block."""
     modal, across = control.modal, control.modal.plane.across
     if not modal.incremental and not control.offset_checked:
@@ -36,7 +36,7 @@ def cycle(control: Control, block: Block, code: int) -> None:
         drill(control, block, code, program, modal.cycle.depth, modal.cycle.r, clear)
 
 
-def take_levels(control: Control, block: Block, initial: float, letter: str = "R") -> None:
+def take_levels(control: RS274Control, block: Block, initial: float, letter: str = "R") -> None:
     """R and the depth of the block as levels in the program's frame, mm; those not named stay in force.
 
     letter  the address of R

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of
 from ncfix.control.motion import Motion
-from ncfix.control.moves import Kind
-from ncfix_iso.rs274.control import Block, Control
+from ncfix.control.moves import MotionKind
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.settings import AFTER_UNFOLLOWED
 from ncfix_iso.rs274.systems import (
@@ -50,13 +50,13 @@ HARMLESS = frozenset({3, 12, 13})
 """Tool life, and tool radii, which only the control's cutter compensation uses."""
 
 
-def extended(control: Control, block: Block, code: int) -> None:
+def extended(control: RS274Control, block: Block, code: int) -> None:
     """G154 Pn of Haas, and G110 (P1) to G129 (P20): an additional work offset."""
     number = (code - FIRST_EXTENDED) / 10 + 1 if code < ALL_EXTENDED else block.get("P", 1.0)
     extended_system(control, Block(block.index, {"P": number}, block.runtime, block.axes))
 
 
-def setting_error(control: Control, block: Block, code: int) -> None:
+def setting_error(control: RS274Control, block: Block, code: int) -> None:
     """G54.2 Pn and G54.4 Pn: offsets that turn with the tables; P0 ends them."""
     if block.get("P") or block.runtime:
         control.suspended[SETTING_ERRORS[code]] = SETTING_ERRORS[code]
@@ -64,14 +64,14 @@ def setting_error(control: Control, block: Block, code: int) -> None:
         control.lose(control.machine, AFTER_UNFOLLOWED)
 
 
-def made(control: Control, block: Block, code: int) -> None:
+def made(control: RS274Control, block: Block, code: int) -> None:
     """A text or a pocket that the control mills by itself, and the way back from a reference point."""
     gone = {index for index in control.machine if block.axes >> index & 1 or index in (X, Y, Z)}
     unknown = control.unknown | dict.fromkeys(sorted(gone), AFTER_MADE)
-    control.make(Motion(Kind.FEED, block.axes, control.position[:], unknown, 0, refusal=MADE[code]))
+    control.make(Motion(MotionKind.FEED, block.axes, control.position[:], unknown, 0, refusal=MADE[code]))
 
 
-def set_data(control: Control, block: Block, code: int) -> None:
+def set_data(control: RS274Control, block: Block, code: int) -> None:
     """G10; a block without L takes tool lengths on old controls."""
     kind = whole(block.get("L", 10.0 if "P" in block.values else -1.0), "L of G10")
     if kind == 2:
@@ -85,7 +85,7 @@ def set_data(control: Control, block: Block, code: int) -> None:
         control.refusal = control.refusal or f"the program sets {what}, which ncfix does not follow"
 
 
-def set_offset(control: Control, block: Block) -> None:
+def set_offset(control: RS274Control, block: Block) -> None:
     """L2 Pn: the words are the offset of G54 (P1) to G59 (P6), or are added to it in G91."""
     system = whole(block.get("P"), "P of G10")
     if not 1 <= system <= WORK_OFFSETS:
@@ -105,7 +105,7 @@ def set_offset(control: Control, block: Block) -> None:
         control.places.shift(mask_of(words_of(block)))
 
 
-def set_extended(control: Control, block: Block) -> None:
+def set_extended(control: RS274Control, block: Block) -> None:
     """L20 Pn: the words are the offset of G54.1 Pn, or are added to it in G91."""
     name = f"G54.1P{whole(block.get('P'), 'P of G10')}"
     given = dict(control.setup.work_offsets.get(name, {}))
@@ -124,7 +124,7 @@ def set_extended(control: Control, block: Block) -> None:
         control.places.shift(mask_of(words_of(block)))
 
 
-def set_length(control: Control, block: Block) -> None:
+def set_length(control: RS274Control, block: Block) -> None:
     """L10 Pn R: the length of tool offset n; in G91 it is added."""
     number = whole(block.get("P"), "P of G10")
     if "R" not in block.values:
@@ -136,7 +136,7 @@ def set_length(control: Control, block: Block) -> None:
     keep_length(control, number, length, runtime="R" in block.runtime)
 
 
-def keep_length(control: Control, number: int, length: float, *, runtime: bool) -> None:
+def keep_length(control: RS274Control, number: int, length: float, *, runtime: bool) -> None:
     """The program sets the length of a tool, mm; `runtime`: it is known at run time only."""
     if control.tools.offset == number and (runtime or length != control.offsets.tool[Z]):
         control.suspended[CHANGED] = CHANGED

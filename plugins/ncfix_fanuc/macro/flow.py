@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from ncfix.control.expressions import Unknown
 from ncfix.control.faults import Fault
-from ncfix.control.flow import NO_SUBPROGRAM, Call, Flow, Jump, Let, OpenCall, Operation, Return
+from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow, Return
 from ncfix.control.parts import NotInPartsError
 from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
-from ncfix.text.tree import Flow as FlowItem
+from ncfix.text.tree import OWordLine as FlowItem
 from ncfix_fanuc.macro import builder
 from ncfix_fanuc.macro.expressions import number
-from ncfix_iso.rs274.control import Control
+from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.parameters import Store
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit, has_words
 
@@ -131,7 +131,7 @@ class Outline:
         return int(later[0] if len(later) else found[0])
 
 
-class MacroFlow(Flow[RS274Unit]):
+class MacroFlow(ProgramFlow[RS274Unit]):
     """Where execution stands.
 
     find         gives the text of a file by the number or name of its program
@@ -144,7 +144,7 @@ class MacroFlow(Flow[RS274Unit]):
     """Ten of subprograms, five of macros."""
 
     def __init__(
-        self, control: Control, main: RS274Unit, find: Callable[[str], RS274Unit | None], *, in_parts: bool = False
+        self, control: RS274Control, main: RS274Unit, find: Callable[[str], RS274Unit | None], *, in_parts: bool = False
     ) -> None:
         super().__init__(main, control.budget)
         self.control, self.main, self.find = control, main, find

@@ -27,7 +27,7 @@ from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, RS274Interpreter
 from ncfix_iso.rs274.order import MACHINE
 from ncfix_iso.rs274.parameters import Store
-from ncfix_iso.rs274.plans import Codes, Plan, plan_of
+from ncfix_iso.rs274.plans import Codes, RS274Plan, plan_of
 
 G20, G21, G90, G91 = 200, 210, 900, 910
 G65, G66_1, G67 = 650, 661, 670
@@ -65,7 +65,7 @@ class MacroInterpreter(RS274Interpreter):
     def __init__(self, control: MacroControl, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
         self.modal_calls: list[ModalCall] = []
-        self.reduced: dict[tuple[int, frozenset[Span]], Plan] = {}
+        self.reduced: dict[tuple[int, frozenset[Span]], RS274Plan] = {}
         self.moved = False
         self.cornered = False
         self.unit_said = False
@@ -101,7 +101,7 @@ class MacroInterpreter(RS274Interpreter):
         if unit is self.main and not self.last:
             raise NotInPartsError("what follows a tool length is in the next part")
 
-    def lane_is_open(self, plan: Plan) -> bool:
+    def lane_is_open(self, plan: RS274Plan) -> bool:
         """Not while a macro is called after every motion, words are polar or directions, or a corner is put in."""
         control = self.control
         special = control.polar is not None or control.scaling is not None or control.vectors
@@ -119,13 +119,13 @@ class MacroInterpreter(RS274Interpreter):
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
-    def beside_statement(self, plan: Plan, index: int) -> bool:
+    def beside_statement(self, plan: RS274Plan, index: int) -> bool:
         """Execute the words that stand beside a statement: behind THEN, or the number of a program."""
         if plan.flow is not None and plan.flow.keyword == "if then":
             return self.execute_words(plan, index)
         return super().beside_statement(plan, index)
 
-    def execute_words(self, plan: Plan, index: int) -> bool:
+    def execute_words(self, plan: RS274Plan, index: int) -> bool:
         """Execute a block of words and assignments."""
         self.moved = False
         self.note_command(plan)
@@ -147,13 +147,13 @@ class MacroInterpreter(RS274Interpreter):
             self.note_angle(plan)
         return ended
 
-    def note_angle(self, plan: Plan) -> None:
+    def note_angle(self, plan: RS274Plan) -> None:
         """A line given by its angle (,A): the coordinate that its block leaves out is not followed."""
         plane = self.control.modal.plane
         missing = [index for index in (plane.first, plane.second) if LETTERS[index] not in plan.letters]
         self.control.lose(missing, AFTER_ANGLE)
 
-    def note_command(self, plan: Plan) -> None:
+    def note_command(self, plan: RS274Plan) -> None:
         """A command of a machine's own: nobody knows what it does."""
         for item in plan.template.items:
             if isinstance(item, Opaque) and item.kind == "unknown command" and not self.control.refusal:
@@ -161,7 +161,7 @@ class MacroInterpreter(RS274Interpreter):
                 self.control.refusal = COMMAND_NOT_KNOWN.format(text.split()[0][:30])
                 self.control.warn("NCF228", self.control.refusal, "all motions after it are refused")
 
-    def without_vacant(self, plan: Plan) -> Plan:
+    def without_vacant(self, plan: RS274Plan) -> RS274Plan:
         """The plan without the words whose value is a vacant variable: they count as not written."""
         if not plan.computed and not plan.code_words:
             return plan
@@ -176,7 +176,7 @@ class MacroInterpreter(RS274Interpreter):
             self.reduced[key] = plan_of(Template(kept, plan.template.n_numbers), self.control.rules)
         return self.reduced[key]
 
-    def evaluate(self, plan: Plan, index: int) -> Block:
+    def evaluate(self, plan: RS274Plan, index: int) -> Block:
         """The values of a block, by the decimal-point rule, polar coordinates made Cartesian."""
         block = super().evaluate(plan, index)
         if plan.assignments:
@@ -192,7 +192,7 @@ class MacroInterpreter(RS274Interpreter):
             block.runtime |= {"P"}  # thousandths or hundred-thousandths, as a parameter says
         return block if plan.codes is None else scaling.scaled(self.control, block, plan.codes)
 
-    def take_points(self, plan: Plan, block: Block) -> None:
+    def take_points(self, plan: RS274Plan, block: Block) -> None:
         """Numbers without a decimal point count increments, or as the setup says."""
         for letter in plan.pointless:
             if is_scaled(self.control, plan, letter):
@@ -224,7 +224,7 @@ class MacroInterpreter(RS274Interpreter):
         if changed and self.control.modal.incremental and "Z" in block.values:
             self.control.lose((Z,), LENGTH_IN_STEPS)
 
-    def assign(self, plan: Plan) -> None:
+    def assign(self, plan: RS274Plan) -> None:
         """Set the variables that a block sets, one after the other."""
         parameters = self.control.parameters
         for target, function, span in plan.assignments:
@@ -238,7 +238,7 @@ class MacroInterpreter(RS274Interpreter):
             if is_system(number):
                 system.was_set(self.control, number, value, runtime)
 
-    def motion_of(self, plan: Plan, codes: Codes) -> int | None:
+    def motion_of(self, plan: RS274Plan, codes: Codes) -> int | None:
         """The motion code that a block executes; a direction of the tool (G43.5) is a motion, too."""
         found = super().motion_of(plan, codes)
         vector = self.control.vectors and not plan.letters.isdisjoint(vectors.COMPONENTS)
@@ -326,7 +326,7 @@ class MacroInterpreter(RS274Interpreter):
 
     # -- macros -------------------------------------------------------------------------------------------------------
 
-    def macro(self, plan: Plan, codes: Codes) -> None:
+    def macro(self, plan: RS274Plan, codes: Codes) -> None:
         """G65 calls a macro once, G66 after every motion that follows, G67 ends that."""
         code = codes.g[MACRO]
         if code == G67:
@@ -345,7 +345,7 @@ class MacroInterpreter(RS274Interpreter):
             self.control.refusal = self.control.refusal or "a macro is called by every block (G66.1)"
         self.modal_calls.append(ModalCall(label, times, store, len(self.flow.calls)))
 
-    def arguments(self, plan: Plan) -> Iterator[tuple[str, float, bool]]:
+    def arguments(self, plan: RS274Plan) -> Iterator[tuple[str, float, bool]]:
         """The arguments of a macro call in the order written; vacant ones are not passed."""
         for word in plan.template.words:
             if word.address not in "GMNPL":

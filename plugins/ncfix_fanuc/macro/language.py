@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import CENTRE_LETTERS, Layout
 from ncfix.text.shapes import Scan, scan
-from ncfix.text.tree import Flow, Literal, Program, Template
+from ncfix.text.tree import Literal, OWordLine, Program, Template
 from ncfix.writer.pieces import Pieces
 from ncfix_fanuc.macro.blocks import parse_block
 from ncfix_fanuc.macro.control import MacroControl
@@ -32,7 +32,7 @@ ELSEWHERE = frozenset({970, 990})
 
 def runs_straight_on(template: Template) -> bool:
     """Whether a block of this shape has nothing to do with others elsewhere in the text, as jumps and corners have."""
-    flows = [item.keyword for item in template.items if isinstance(item, Flow)]
+    flows = [item.keyword for item in template.items if isinstance(item, OWordLine)]
     free = ELSEWHERE.isdisjoint(template.m_codes) and CORNER.isdisjoint(letters_of(template))
     return free and all(keyword == "program" for keyword in flows)
 
@@ -55,7 +55,7 @@ def one_by_one(program: Program, moves: Moves, _pieces: Pieces, _first_piece: ND
     """(n,) straight motions with I J K: there these give the direction of the tool (G43.5)."""
     shapes = [any(word.address in CENTRE_LETTERS for word in template.words) for template in program.templates]
     pointed: NDArray[np.bool_] = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
-    pointed &= moves.kind != Kind.ARC
+    pointed &= moves.kind != MotionKind.ARC
     return pointed
 
 

@@ -13,7 +13,7 @@ from ncfix_iso.rs274.order import DWELL
 
 if TYPE_CHECKING:
     from ncfix_fanuc.macro.control import MacroControl
-    from ncfix_iso.rs274.plans import Codes, Plan
+    from ncfix_iso.rs274.plans import Codes, RS274Plan
 
 G15, G16 = 150, 160
 SCALED = frozenset("XYZABCUVWIJKRQ")
@@ -24,7 +24,7 @@ ANGLES = frozenset("IJKR")
 """Of a rotation (G68, G68.2)."""
 
 
-def is_scaled(control: MacroControl, plan: Plan, letter: str) -> bool:
+def is_scaled(control: MacroControl, plan: RS274Plan, letter: str) -> bool:
     """Whether the number of a word counts least increments when it has no point."""
     codes = plan.codes
     motion = control.modal.motion if codes is None else motion_in_force(control, codes)
@@ -40,14 +40,14 @@ def is_scaled(control: MacroControl, plan: Plan, letter: str) -> bool:
     return letter not in DRILLING or (letter == "K" and not cycle) or (letter == "Q" and cycle)
 
 
-def is_level(control: MacroControl, plan: Plan) -> bool:
+def is_level(control: MacroControl, plan: RS274Plan) -> bool:
     """Whether R of a block is no length: no axis, cycle, plane or setting takes it (G5.1 Q1 R3, G332 R1)."""
     if plan.axes or plan.codes is None or not plan.codes.g.keys().isdisjoint((NON_MODAL, ROTATION)):
         return False
     return motion_in_force(control, plan.codes) not in control.rules.cycles
 
 
-def is_angle(control: MacroControl, plan: Plan, letter: str) -> bool:
+def is_angle(control: MacroControl, plan: RS274Plan, letter: str) -> bool:
     """Whether the number of a word counts degrees though its address is none of a rotary axis."""
     groups = {} if plan.codes is None else plan.codes.g
     if ROTATION in groups:

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ncfix.control.motion import Motion
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.lengths import tool_offset
 from ncfix_iso.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, go_to_reference
@@ -26,21 +26,21 @@ SECOND = 2
 NO_LENGTH = 490
 
 
-def check(control: Control, block: Block, code: int) -> None:
+def check(control: RS274Control, block: Block, code: int) -> None:
     """G27: to the words, which should be a reference point."""
     if block.axes:
         target, unknown = destination(control, block)
-        control.make(Motion(Kind.RAPID, block.axes, target, unknown, control.modal.motion, passing=CHECKED))
+        control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, control.modal.motion, passing=CHECKED))
 
 
-def named(control: Control, block: Block, code: int) -> None:
+def named(control: RS274Control, block: Block, code: int) -> None:
     """G28: the axes that are named go; whether all go where none is named, differs."""
     if block.axes:
         go_to_reference(control, block, code)
         return
     unknown = control.unknown | dict.fromkeys(control.machine, AFTER_ALL)
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format("G28"))
-    control.make(Motion(Kind.RAPID, 0, control.position[:], unknown, control.modal.motion, passing=passing))
+    control.make(Motion(MotionKind.RAPID, 0, control.position[:], unknown, control.modal.motion, passing=passing))
 
 
 def cancelling(control: MacroControl, block: Block, code: int) -> None:
@@ -51,7 +51,7 @@ def cancelling(control: MacroControl, block: Block, code: int) -> None:
         tool_offset(control, Block(block.index, {}, frozenset(), 0), NO_LENGTH)
 
 
-def further(control: Control, block: Block, code: int) -> None:
+def further(control: RS274Control, block: Block, code: int) -> None:
     """G30 Pn: by way of the words; where the third and fourth reference points are is not given."""
     number = whole(block.get("P", SECOND), "P of G30")
     if number == SECOND:
@@ -60,7 +60,9 @@ def further(control: Control, block: Block, code: int) -> None:
     way, unknown = destination(control, block)
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(f"G30 P{number}"))
     if way != control.position or (block.axes and not control.modal.incremental):
-        control.make(Motion(Kind.RAPID, block.axes, way, unknown, control.modal.motion, passing=passing))
+        control.make(Motion(MotionKind.RAPID, block.axes, way, unknown, control.modal.motion, passing=passing))
     taken = [index for index in control.machine if block.axes >> index & 1 or not block.axes]
     unknown = control.unknown | dict.fromkeys(taken, AFTER_REFERENCE)
-    control.make(Motion(Kind.RAPID, block.axes, control.position[:], unknown, control.modal.motion, passing=passing))
+    control.make(
+        Motion(MotionKind.RAPID, block.axes, control.position[:], unknown, control.modal.motion, passing=passing)
+    )

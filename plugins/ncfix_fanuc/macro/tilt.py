@@ -14,7 +14,7 @@ import numpy as np
 
 from ncfix.control.coordinates import IDENTITY, LETTERS, Rotation, Vector, X, Y, Z, angles_in_words, zeros
 from ncfix.control.motion import Motion
-from ncfix.control.moves import Kind, TcpState
+from ncfix.control.moves import MotionKind, TcpState
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.posture import normal_of, postures
 from ncfix.control.tcp import switch
@@ -165,7 +165,7 @@ def align(control: MacroControl, block: Block, code: int) -> None:
     if hidden or (code == ABOUT_TIP and is_moved_otherwise(control, block)):
         lost |= {X, Y, Z}
     unknown = control.unknown | dict.fromkeys(lost.intersection(control.machine), NOT_SOLVED)
-    control.make(Motion(Kind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENTS[code]))
+    control.make(Motion(MotionKind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENTS[code]))
 
 
 def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: bool) -> Vector:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from ncfix.control.expressions import Unknown, Value, nominal
 from ncfix.control.faults import Fault
 from ncfix_fanuc.macro.expressions import VACANT
-from ncfix_iso.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, Parameters, Store
+from ncfix_iso.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, NumberedParameters, Store
 
 LOCAL = range(1, 34)
 """#1 to #33 belong to the call level."""
@@ -32,7 +32,7 @@ POSITION_READ = "NCF241"
 
 
 @dataclass(slots=True)
-class Variables(Parameters):
+class MacroVariables(NumberedParameters):
     """All variables.
 
     scopes    the local variables of each call level, the main program's first

@@ -17,7 +17,7 @@ from ncfix.control.coordinates import DEGREE, IDENTITY, PLANES, X, Y, Z
 from ncfix.control.faults import Fault
 from ncfix.control.stage import words
 from ncfix_heidenhain.klartext.arcs import BAD_ARC, FLAT
-from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.targets import arm, pole_frame
 from ncfix_heidenhain.klartext.units import KlartextUnit
 
@@ -28,7 +28,7 @@ PLANE = PLANES[170]
 ODD = "of this arc the interpreter has more to say"
 
 
-class Arc(NamedTuple):
+class ArcBlock(NamedTuple):
     """What the block of an arc says: its name, R or IPA, sense, X and Y (NaN without), and the pole in force."""
 
     name: str
@@ -38,7 +38,9 @@ class Arc(NamedTuple):
     pole: Point | None
 
 
-def turned(control: Control, unit: KlartextUnit, start: int, path: FloatArray, motion: IntArray) -> tuple[Circles, int]:
+def turned(
+    control: KlartextControl, unit: KlartextUnit, start: int, path: FloatArray, motion: IntArray
+) -> tuple[Circles, int]:
     """The circles of the arcs of a stretch that begins with a block, and how many blocks run before one it cannot take.
 
     path    (n + 1, 9) commands before the first block and at the end of each; put right behind a CP, which says by an
@@ -65,8 +67,13 @@ def turned(control: Control, unit: KlartextUnit, start: int, path: FloatArray, m
 
 
 def arcs_of(
-    control: Control, unit: KlartextUnit, start: int, shapes: NDArray[np.int32], rows: IntArray, motion: IntArray
-) -> list[Arc]:
+    control: KlartextControl,
+    unit: KlartextUnit,
+    start: int,
+    shapes: NDArray[np.int32],
+    rows: IntArray,
+    motion: IntArray,
+) -> list[ArcBlock]:
     """What the blocks of arcs `rows` (k,) say."""
     program, lanes, first = unit.program, unit.lanes, unit.program.first_number[start + rows]
     own = shapes[rows]
@@ -75,7 +82,7 @@ def arcs_of(
     poles = [pole_before(control), *zip(pole_x.tolist(), pole_y.tolist(), strict=True)]
     return list(
         map(
-            Arc,
+            ArcBlock,
             lanes.arc[own].tolist(),
             words(program.numbers, first, lanes.value[own]).tolist(),
             (motion[rows] == CLOCKWISE).tolist(),
@@ -86,7 +93,7 @@ def arcs_of(
 
 
 def poles_of(
-    control: Control, unit: KlartextUnit, start: int, shapes: NDArray[np.int32]
+    control: KlartextControl, unit: KlartextUnit, start: int, shapes: NDArray[np.int32]
 ) -> tuple[IntArray, tuple[FloatArray, FloatArray]]:
     """Which blocks of a stretch set a pole (CC), and where: mm along X and Y of the program's frame."""
     slots = unit.lanes.pole[shapes]
@@ -96,13 +103,13 @@ def poles_of(
     return places, (x, y)
 
 
-def pole_before(control: Control) -> Point | None:
+def pole_before(control: KlartextControl) -> Point | None:
     """The pole in force, if an arc in the plane of X and Y may turn about it."""
     path = control.path
     return path.pole if path.plane == PLANE and path.pole_in == pole_frame(control) else None
 
 
-def end_of(control: Control, arc: Arc, begin: Point) -> Point:
+def end_of(control: KlartextControl, arc: ArcBlock, begin: Point) -> Point:
     """Where an arc ends, along the axes of the program's frame."""
     if arc.name != "cp":
         x, y = arc.end
@@ -114,7 +121,7 @@ def end_of(control: Control, arc: Arc, begin: Point) -> Point:
     return arc.pole[0] + radius * math.cos(angle), arc.pole[1] + radius * math.sin(angle)
 
 
-def circle(control: Control, arc: Arc, begin: Point, end: Point) -> tuple[Point, float]:
+def circle(control: KlartextControl, arc: ArcBlock, begin: Point, end: Point) -> tuple[Point, float]:
     """The centre of an arc from its start, and its sweep; raises `Fault` where the interpreter has more to say."""
     away, clockwise = (end[0] - begin[0], end[1] - begin[1]), arc.clockwise
     if arc.name == "cr":
@@ -150,7 +157,7 @@ class Swung:
             self.path[row + 1 : stop + 1, axis] = end[axis]
 
 
-def keep_pole(control: Control, unit: KlartextUnit, start: int, shapes: NDArray[np.int32]) -> None:
+def keep_pole(control: KlartextControl, unit: KlartextUnit, start: int, shapes: NDArray[np.int32]) -> None:
     """The last pole that a stretch from block `start` on sets is in force behind it."""
     _, (x, y) = poles_of(control, unit, start, shapes)
     if len(x):

@@ -12,14 +12,14 @@ from ncfix.control.builder import Arc
 from ncfix.control.coordinates import IDENTITY, Plane, Vector, dot, rotated
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion
-from ncfix.control.moves import Kind
-from ncfix_heidenhain.klartext.control import Control
+from ncfix.control.moves import MotionKind
+from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.step import Step, somewhere, with_increments
 from ncfix_heidenhain.klartext.targets import (
     BAD_POLE,
     PLANE_OF,
+    MotionWords,
     Where,
-    Words,
     command_of,
     derived,
     here,
@@ -39,7 +39,7 @@ FLAT = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class PlaneArc:
     """An arc in its plane: centre and end from its start, mm along the plane's axes; signed sweep, rad."""
 
     plane: Plane
@@ -47,7 +47,7 @@ class Circle:
     sweep: float
 
 
-def circular(control: Control, step: Step) -> None:
+def circular(control: KlartextControl, step: Step) -> None:
     """C: about the pole to an end point."""
     pole = known_pole(control)
     plane, turning = control.path.plane, sense(step)
@@ -66,10 +66,10 @@ def circular(control: Control, step: Step) -> None:
     except Fault as fault:
         do_without(control, step, where, fault.text)
         return
-    swing(control, step, where, Circle(plane, centre, sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)))
+    swing(control, step, where, PlaneArc(plane, centre, sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)))
 
 
-def circular_by_radius(control: Control, step: Step) -> None:
+def circular_by_radius(control: KlartextControl, step: Step) -> None:
     """CR."""
     turning = sense(step)
     control.use()
@@ -87,16 +87,16 @@ def circular_by_radius(control: Control, step: Step) -> None:
     except Fault as fault:
         do_without(control, step, where, fault.text)
         return
-    swing(control, step, where, Circle(plane, centre, sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)))
+    swing(control, step, where, PlaneArc(plane, centre, sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)))
 
 
-def circular_polar(control: Control, step: Step) -> None:
+def circular_polar(control: KlartextControl, step: Step) -> None:
     """CP: about the pole to a polar angle; several turns, and a height, make a helix."""
     pole = known_pole(control)
     plane, turning = control.path.plane, sense(step)
     control.use()
     where, angle = polar(
-        control, Words({k: v for k, v in step.words.values.items() if k not in ("PR", "IPR")}, step.words.runtime)
+        control, MotionWords({k: v for k, v in step.words.values.items() if k not in ("PR", "IPR")}, step.words.runtime)
     )
     if give_up(control, step, where):
         return
@@ -112,10 +112,10 @@ def circular_polar(control: Control, step: Step) -> None:
         angle = sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)
     elif (angle < 0) != (turning == CLOCKWISE) and angle:
         raise Fault(BAD_ARC, "the sign of IPA and DR contradict each other")
-    swing(control, step, where, Circle(plane, centre, angle))
+    swing(control, step, where, PlaneArc(plane, centre, angle))
 
 
-def tangential(control: Control, step: Step) -> None:
+def tangential(control: KlartextControl, step: Step) -> None:
     """CT and CTP: an arc that goes on in the direction of the element before."""
     control.use()
     where = polar(control, step.words)[0] if step.name == "ctp" else led(control, step.words)
@@ -136,10 +136,10 @@ def tangential(control: Control, step: Step) -> None:
         return
     radius = (away[0] ** 2 + away[1] ** 2) * size / (2 * side)
     centre = radius * left[0] / size, radius * left[1] / size
-    swing(control, step, where, Circle(plane, centre, sweep_angle(centre, away, 1, clockwise=radius < 0)))
+    swing(control, step, where, PlaneArc(plane, centre, sweep_angle(centre, away, 1, clockwise=radius < 0)))
 
 
-def swing(control: Control, step: Step, where: Where, circle: Circle) -> None:
+def swing(control: KlartextControl, step: Step, where: Where, circle: PlaneArc) -> None:
     """The arc itself."""
     plane = circle.plane
     axes = step.words.axes | 1 << plane.first | 1 << plane.second
@@ -155,7 +155,7 @@ def swing(control: Control, step: Step, where: Where, circle: Circle) -> None:
     with_increments(control, relative)
     arc = Arc(centre, normal, sweep, fixed=step.name == "c")  # type: ignore[arg-type]
     code, why = CLOCKWISE if circle.sweep < 0 else COUNTER, derived(control, step.words, axes)
-    control.make(Motion(Kind.ARC, axes, target, unknown, code, refusal=why, arc=arc))
+    control.make(Motion(MotionKind.ARC, axes, target, unknown, code, refusal=why, arc=arc))
     with_increments(control, False)
     control.path.tangent = direction_at_end(control.position, arc)
 
@@ -170,7 +170,7 @@ def direction_at_end(end: Vector, arc: Arc) -> tuple[float, float, float]:
     return way[0] / length, way[1] / length, way[2] / length
 
 
-def mirrored(control: Control) -> float:
+def mirrored(control: KlartextControl) -> float:
     """-1 where the frame is mirrored: what turns left in the program turns right in the workpiece."""
     return -1.0 if len(control.transformations.mirror) % 2 else 1.0
 
@@ -184,26 +184,26 @@ def sense(step: Step) -> int:
     raise Fault(BAD_ARC, f"{step.name.upper()} needs DR+ or DR-, the sense of rotation")
 
 
-def known_pole(control: Control) -> tuple[float, float]:
+def known_pole(control: KlartextControl) -> tuple[float, float]:
     """The pole."""
     if control.path.pole is None:
         raise Fault(BAD_POLE, "an arc about the pole, and no pole (CC) is known")
     return control.path.pole
 
 
-def plane_of(control: Control, words: Words) -> Plane:
+def plane_of(control: KlartextControl, words: MotionWords) -> Plane:
     """The plane of an arc that has no pole: that of its words, else the working plane."""
     named = frozenset(i for i in range(3) if words.axes >> i & 1)
     return PLANE_OF.get(named, PLANE_OF[frozenset((0, 1))])
 
 
-def points(control: Control, where: Where, plane: Plane) -> tuple[tuple[float, float], tuple[float, float]]:
+def points(control: KlartextControl, where: Where, plane: Plane) -> tuple[tuple[float, float], tuple[float, float]]:
     """Start and end of a motion along the axes of a plane."""
     start, end = here(control).inner, where.inner
     return (start[plane.first], start[plane.second]), (end[plane.first], end[plane.second])
 
 
-def give_up(control: Control, step: Step, where: Where) -> bool:
+def give_up(control: KlartextControl, step: Step, where: Where) -> bool:
     """Refuse an arc of which an end is not known; True if that is so."""
     if not starts_unknown(control) and not where.unknown and not step.words.runtime:
         return False
@@ -216,7 +216,7 @@ def give_up(control: Control, step: Step, where: Where) -> bool:
     return True
 
 
-def do_without(control: Control, step: Step, where: Where, reason: str) -> None:
+def do_without(control: KlartextControl, step: Step, where: Where, reason: str) -> None:
     """An arc that is not followed but for its end: one that the control would not accept either, or one not known."""
     about_pole = step.name in ("cp", "ctp")
     axes = polar_axes(control, step.words) if about_pole else step.words.axes or 3
@@ -224,5 +224,5 @@ def do_without(control: Control, step: Step, where: Where, reason: str) -> None:
     if about_pole or (step.words.runtime and not step.words.incremental):
         somewhere(control, axes, target, unknown, reason)
         return
-    control.make(Motion(Kind.FEED, axes, target, unknown, 10, refusal=reason))
+    control.make(Motion(MotionKind.FEED, axes, target, unknown, 10, refusal=reason))
     control.path.tangent = None

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from lark import Token, UnexpectedInput
 
-from ncfix.text.build import MAX_DEPTH, Branch, Builder, Node, Parsed, TooDeepError, edges, kind, tokens_of
+from ncfix.text.build import MAX_DEPTH, Branch, Node, Parsed, TooDeepError, TreeBuilder, edges, kind, tokens_of
 from ncfix.text.dialect import Dialect
 from ncfix.text.grammar import Squeezed, parse
 from ncfix.text.reach import UNREAD
@@ -21,20 +21,20 @@ from ncfix.text.tree import (
     Anchor,
     Assignment,
     Binary,
-    Call,
     Command,
     Comment,
     Constant,
     Expression,
-    Flow,
+    FunctionCall,
     Item,
     Literal,
     NamedParameter,
     Opaque,
+    OWordLine,
     Skip,
     Span,
+    StringLiteral,
     Template,
-    Text,
     Unary,
     Word,
 )
@@ -79,7 +79,7 @@ def remark_block(text: str, match: re.Match[str]) -> Parsed:
     number = re.search(r"\d+", match["number"] or "")
     if number is not None:
         spans, values = ((number.span(),), (float(number[0]),))
-    builder = Builder(text, identity(text), {}, tuple(stop for _, stop in spans))
+    builder = TreeBuilder(text, identity(text), {}, tuple(stop for _, stop in spans))
     items: tuple[Item, ...] = ()
     comment = -1
     if match["number"] and "/" in match["number"]:
@@ -105,7 +105,7 @@ def built(tree: Branch, text: str) -> Parsed:
     tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
     spans = tuple(edges(token) for token in tokens)
     slots = {span: slot for slot, span in enumerate(spans)}
-    maker = Maker(Builder(text, identity(text), slots, tuple(stop for _, stop in spans)))
+    maker = Maker(TreeBuilder(text, identity(text), slots, tuple(stop for _, stop in spans)))
     items = list(maker.items(tree))
     if is_twice(items):
         return unread_block()
@@ -136,7 +136,7 @@ def place_of(anchor: Anchor, spans: tuple[tuple[int, int], ...]) -> int:
 class Maker:
     """Makes items of the rules of the Klartext grammar."""
 
-    def __init__(self, builder: Builder) -> None:
+    def __init__(self, builder: TreeBuilder) -> None:
         self.builder = builder
 
     def note(self, start: int, stop: int) -> Span:
@@ -201,15 +201,15 @@ class Maker:
                 return Assignment(NamedParameter(str(target).upper()), self.expression(value), span)
             case "text_assignment":
                 target, value = tree.children
-                return Assignment(NamedParameter(str(target).upper()), Text(str(value).strip('"')), span)
+                return Assignment(NamedParameter(str(target).upper()), StringLiteral(str(value).strip('"')), span)
             case "tool_name":
                 return Word("TOOL", self.name(first), span, span)
             case "label" | "call":
-                return Flow(label_of(tree.children[1]), kind(tree), self.times(tree.children[2:]), span)
+                return OWordLine(label_of(tree.children[1]), kind(tree), self.times(tree.children[2:]), span)
             case "condition":
                 _, _, left, relation, right, _, label = tree.children
                 compared = Binary(str(relation).lower(), self.expression(left), self.expression(right))
-                return Flow(label_of(label), "if", (compared,), span)
+                return OWordLine(label_of(label), "if", (compared,), span)
         raise AssertionError(f"the grammar has a rule {tree.data!r} that nobody builds")
 
     def code(self, node: Node) -> Word:
@@ -225,7 +225,7 @@ class Maker:
     def name(self, node: Node) -> Expression:
         """The number or name of a tool."""
         if isinstance(node, Token):
-            return Text(str(node).strip('"')) if kind(node) == "STRING" else Constant(value_of(str(node)))
+            return StringLiteral(str(node).strip('"')) if kind(node) == "STRING" else Constant(value_of(str(node)))
         return self.expression(node)
 
     # -- expressions --------------------------------------------------------------------------------------------------
@@ -251,7 +251,7 @@ class Maker:
                 operands = self.expression(left, depth + 1), self.expression(right, depth + 1)
                 return Binary(str(operator).lower(), *operands)
             case "pi":
-                return Call("pi", ())
+                return FunctionCall("pi", ())
         raise AssertionError(f"the grammar has an expression {node.data!r} that nobody builds")
 
 

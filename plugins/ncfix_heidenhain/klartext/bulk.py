@@ -12,17 +12,17 @@ from ncfix.text.tree import (
     Anchor,
     Assignment,
     Command,
-    Flow,
     Item,
     Literal,
     Opaque,
+    OWordLine,
     Program,
     Skip,
     Template,
     Word,
 )
 from ncfix.writer.pieces import Pieces
-from ncfix_heidenhain.klartext.layout import CORNERS, Layout, is_between, layout_of
+from ncfix_heidenhain.klartext.layout import CORNERS, KlartextLayout, is_between, layout_of
 from ncfix_heidenhain.klartext.turns import FULL
 
 Mask = NDArray[np.bool_]
@@ -36,7 +36,7 @@ FEW = 1e-6
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
     items = program.items_of(block)
-    if any(isinstance(item, Skip | Opaque | Flow | Assignment) for item in items):
+    if any(isinstance(item, Skip | Opaque | OWordLine | Assignment) for item in items):
         return None
     layout = layout_of(program, block)
     if layout is None or layout.polar or layout.vector or len(layout.blank) != 1:
@@ -62,7 +62,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     )
 
 
-def lead_of(program: Program, block: int, layout: Layout) -> Anchor:
+def lead_of(program: Program, block: int, layout: KlartextLayout) -> Anchor:
     """Up to where lines of further pieces repeat the beginning of the block: its number, unless they get none."""
     numbers = [item for item in program.items_of(block) if isinstance(item, Word) and item.address == "N"]
     if program.dialect.block_numbers != "none" or not numbers:
@@ -97,7 +97,7 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDAr
 
 
 def beside_corners(program: Program) -> Mask:
-    """(n,) blocks next to RND or CHF, remarks and poles left out: as `Layout.corner`."""
+    """(n,) blocks next to RND or CHF, remarks and poles left out: as `KlartextLayout.corner`."""
     found = np.zeros(len(program), dtype=np.bool_)
     corner = np.array([is_corner(each) for each in program.templates], dtype=np.bool_)
     if corner.any():

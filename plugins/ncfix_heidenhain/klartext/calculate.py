@@ -17,7 +17,7 @@ EQUAL = 1e-9
 
 
 @dataclass(slots=True)
-class Parameters:
+class QParameters:
     """The Q parameters; QL parameters belong to one program, the others to all.
 
     values   those that the program has set, or the setup gives
@@ -49,12 +49,12 @@ class Parameters:
 
 
 @dataclass(slots=True)
-class Scope:
+class FormulaScope:
     """What a formula may refer to: the numbers of the program, where those of the block begin, and the parameters."""
 
     numbers: Sequence[float] = ()
     first: int = 0
-    parameters: Parameters = field(default_factory=Parameters)
+    parameters: QParameters = field(default_factory=QParameters)
 
     def value_of(self, function: Evaluate) -> tuple[float, bool]:
         """The value of a formula, nominal where it is known only at run time, and whether it is; raises `Fault`."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 
 from ncfix.control.passing import Pass, Passing
-from ncfix_heidenhain.klartext.control import RETRACTED, Control
+from ncfix_heidenhain.klartext.control import RETRACTED, KlartextControl
 from ncfix_heidenhain.klartext.step import Step
-from ncfix_heidenhain.klartext.targets import Words
+from ncfix_heidenhain.klartext.targets import MotionWords
 
 SUSPENDING = {
     104: "M104: the datum that was set last comes back into force",
@@ -26,7 +26,7 @@ FULL = 2 * math.pi
 COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}
 
 
-def before_motion(control: Control, step: Step) -> None:
+def before_motion(control: KlartextControl, step: Step) -> None:
     """What acts from the start of the block."""
     for flag, side in COMPENSATION.items():
         if flag in step.flags:
@@ -53,7 +53,7 @@ def before_motion(control: Control, step: Step) -> None:
         choose_axes(control, step.flags)
 
 
-def end_of_short_ways(control: Control, on: bool) -> None:
+def end_of_short_ways(control: KlartextControl, on: bool) -> None:
     """M127 after M126: an axis that went past a turn may count from there, or from the angle below a turn.
 
     M126 means nothing to an axis that cannot go round, as the one that tilts the tool: it may stand below zero.
@@ -67,7 +67,7 @@ def end_of_short_ways(control: Control, on: bool) -> None:
     control.shortest = not on
 
 
-def choose_axes(control: Control, flags: frozenset[str]) -> None:
+def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
     """M138: the rotary axes that tilted planes and control of the tip take into account, those of the machine again."""
     control.suspended.pop("M138", None)
     turning = {"XYZABCUVW"[index].lower() for index in control.turning}
@@ -75,7 +75,7 @@ def choose_axes(control: Control, flags: frozenset[str]) -> None:
         control.suspended["M138"] = CHOSEN
 
 
-def reduce_turns(control: Control, flags: frozenset[str]) -> None:
+def reduce_turns(control: KlartextControl, flags: frozenset[str]) -> None:
     """M94: rotary axes, those that are named if any is, are said by an angle below a turn from here on."""
     named = flags & set("abc")
     for index in control.turning:
@@ -83,13 +83,13 @@ def reduce_turns(control: Control, flags: frozenset[str]) -> None:
             control.position[index] %= 2 * math.pi
 
 
-def tip_control(control: Control, *, on: bool) -> None:
+def tip_control(control: KlartextControl, *, on: bool) -> None:
     """M128 and M129, FUNCTION TCPM."""
     control.m128 = on
     control.switch_tip()
 
 
-def after_motion(control: Control, code: int, own: Words, flags: frozenset[str]) -> None:
+def after_motion(control: KlartextControl, code: int, own: MotionWords, flags: frozenset[str]) -> None:
     """What acts at the end of the block."""
     if code == 129:
         tip_control(control, on=False)

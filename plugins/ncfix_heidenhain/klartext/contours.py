@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator, Mapping
 from ncfix.control.coordinates import PLANES, X, Y, dot, rotated
 from ncfix.control.expressions import Unknown, Value, nominal, signed
 from ncfix.text.spelling import value_of
-from ncfix_heidenhain.klartext.control import FREELY, Control
-from ncfix_heidenhain.klartext.free import Element, Leg, solved
+from ncfix_heidenhain.klartext.control import FREELY, KlartextControl
+from ncfix_heidenhain.klartext.free import ContourElement, Element, solved
 from ncfix_heidenhain.klartext.step import IN_PLANE, somewhere
 from ncfix_heidenhain.klartext.targets import command_of, here, pole_frame
 from ncfix_heidenhain.klartext.units import KlartextUnit
@@ -38,7 +38,7 @@ OF_LINES, OF_ARCS = frozenset({"X", "Y", "AN", "LEN"}), frozenset({"X", "Y", "CC
 CORNERS = frozenset({"rnd", "chf"})
 
 
-def leg_of(control: Control, unit: KlartextUnit, block: int) -> Leg | None:
+def leg_of(control: KlartextControl, unit: KlartextUnit, block: int) -> ContourElement | None:
     """The element of a block, worked out from where the control stands; None if its contour is not certain."""
     known = control.path.free
     if (unit.external, block) not in known:
@@ -47,7 +47,7 @@ def leg_of(control: Control, unit: KlartextUnit, block: int) -> Leg | None:
     return known[unit.external, block]
 
 
-def follow_free(control: Control, unit: KlartextUnit, block: int) -> None:
+def follow_free(control: KlartextControl, unit: KlartextUnit, block: int) -> None:
     """An element of a free contour, which is refused: as for an arc, it matters where the motion before it ends.
 
     It lies in the working plane: only X and Y of the frame are not known after one that is not certain.
@@ -68,7 +68,9 @@ def follow_free(control: Control, unit: KlartextUnit, block: int) -> None:
 # -- from blocks to elements ------------------------------------------------------------------------------------------
 
 
-def worked_out(control: Control, unit: KlartextUnit, first: int) -> dict[tuple[str, int], Leg | None]:
+def worked_out(
+    control: KlartextControl, unit: KlartextUnit, first: int
+) -> dict[tuple[str, int], ContourElement | None]:
     """The contour that begins with a block."""
     blocks = list(blocks_of_contour(unit, first))
     keys = [(unit.external, block) for block in blocks]
@@ -101,13 +103,13 @@ def statement_text(unit: KlartextUnit, block: int) -> str:
     return LEFT_OUT.sub(" ", unit.program.slice(block, statement[1])).strip()
 
 
-def changes_pole(control: Control) -> bool:
+def changes_pole(control: KlartextControl) -> bool:
     """Whether the pole in force could not be put back after arcs that are written about poles of their own."""
     path = control.path
     return path.pole is not None and (path.plane != PLANES[170] or path.pole_in != pole_frame(control))
 
 
-def heading_of(control: Control) -> complex | None:
+def heading_of(control: KlartextControl) -> complex | None:
     """The direction in which the element before ends, in the working plane."""
     tangent = control.path.tangent
     if tangent is None:
@@ -116,7 +118,7 @@ def heading_of(control: Control) -> complex | None:
     return ahead / abs(ahead) if abs(ahead) > math.sqrt(0.5) else None
 
 
-def element_of(control: Control, text: str) -> Element | None:
+def element_of(control: KlartextControl, text: str) -> Element | None:
     """What a block says of its element; None if something in it is not understood, or known only at run time."""
     found = FUNCTION.match(text)
     if found is None:
@@ -148,7 +150,7 @@ def element_of(control: Control, text: str) -> Element | None:
     )
 
 
-def number(control: Control, text: str) -> Value:
+def number(control: KlartextControl, text: str) -> Value:
     """The value of a number or a Q parameter."""
     bare = "".join(text.split()).lstrip("+-")
     value = control.scope.parameters.get(bare.upper()) if bare[0] in "Qq" else value_of(bare)
@@ -168,7 +170,7 @@ def others_of(text: str) -> str:
 # -- written out ------------------------------------------------------------------------------------------------------
 
 
-def written_out(control: Control, unit: KlartextUnit, block: int, place: Callable[[complex], str]) -> list[str]:
+def written_out(control: KlartextControl, unit: KlartextUnit, block: int, place: Callable[[complex], str]) -> list[str]:
     """An element as plain blocks, which leave the pole as it was; none where it is not certain.
 
     place  a point as words

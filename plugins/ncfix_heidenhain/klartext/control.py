@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 from ncfix.control import control as base
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, mask_of, rotated, zeros
 from ncfix.control.motion import AT_START, Motion, UnknownAxes, first_reason
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.setup import WORK_OFFSET, Setup, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
-from ncfix_heidenhain.klartext.calculate import Parameters, Scope
-from ncfix_heidenhain.klartext.free import Leg
-from ncfix_heidenhain.klartext.patterns import Place
+from ncfix_heidenhain.klartext.calculate import FormulaScope, QParameters
+from ncfix_heidenhain.klartext.free import ContourElement
+from ncfix_heidenhain.klartext.patterns import HolePosition
 from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING
 from ncfix_heidenhain.klartext.transformations import Transformations
 
@@ -49,7 +49,7 @@ next block that names the axis is corrected."""
 
 
 @dataclass(slots=True)
-class Path:
+class PathFunctionState:
     """What the next path function may need of the ones before.
 
     pole     the pole, mm along the axes of its plane in the program's frame; None where not known
@@ -73,7 +73,7 @@ class Path:
     by_vector: bool = False
     spatial: bool = False
     said: object = None
-    free: dict[tuple[str, int], Leg | None] = field(default_factory=dict)
+    free: dict[tuple[str, int], ContourElement | None] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -89,18 +89,18 @@ class CycleInForce:
     number: int = 0
     steps: dict[str, float] = field(default_factory=dict)
     modal: bool = False
-    places: tuple[Place, ...] | None = None
+    places: tuple[HolePosition, ...] | None = None
 
 
-class Control(base.Control):
+class KlartextControl(base.ProgramControl):
     """A TNC: its transformations, Q parameters, path functions and cycles."""
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
         super().__init__(run, dialect)
         self.transformations = Transformations()
         self.functions: frozenset[str] = frozenset()
-        self.scope = Scope(parameters=Parameters(dict(q_parameters(run.setup))))
-        self.path = Path()
+        self.scope = FormulaScope(parameters=QParameters(dict(q_parameters(run.setup))))
+        self.path = PathFunctionState()
         self.cycle = CycleInForce()
         self.unit = 1.0
         self.m128 = run.setup.tcp
@@ -202,7 +202,7 @@ class Control(base.Control):
         (PATHCTRL VECTOR), which in pieces would be turns of axes, and increments of an axis whose datum is not known,
         which further pieces would have to name.
         """
-        if motion.kind == Kind.RAPID and not motion.refusal and AT_START in motion.unknown.values():
+        if motion.kind == MotionKind.RAPID and not motion.refusal and AT_START in motion.unknown.values():
             motion = motion._replace(passing=motion.passing or Passing(Pass.UNSAID, first_reason(motion.unknown)))
         whole = self.whole
         self.tilted = self.transformations.tilted and not self.m128
@@ -242,7 +242,7 @@ class Control(base.Control):
         """A motion of the control's own; these axes are not known afterwards."""
         unknown = dict(self.unknown)
         unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.machine}
-        super().make(Motion(Kind.RAPID, 0, self.position[:], unknown, 0, passing=passing))
+        super().make(Motion(MotionKind.RAPID, 0, self.position[:], unknown, 0, passing=passing))
         self.path.tangent = None
 
 

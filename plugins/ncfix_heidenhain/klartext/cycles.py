@@ -13,12 +13,12 @@ from ncfix.control.coordinates import X, Y, Z, mask_of
 from ncfix.control.expressions import numbers
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix_heidenhain.klartext import trans_cycles
-from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, Control
-from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
+from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, KlartextControl
+from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, HolePosition, pattern_of_cycle
 from ncfix_heidenhain.klartext.step import Step, refuse
-from ncfix_heidenhain.klartext.targets import Where, Words, command_of, led, polar, polar_axes
+from ncfix_heidenhain.klartext.targets import MotionWords, Where, command_of, led, polar, polar_axes
 
 NO_CYCLE = "NCF272"
 DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
@@ -59,7 +59,7 @@ FROM_INCREMENT = "an old cycle is called from a height in increments (IZ)"
 # -- definition -------------------------------------------------------------------------------------------------------
 
 
-def define(control: Control, name: str, words: Words, text: str) -> None:
+def define(control: KlartextControl, name: str, words: MotionWords, text: str) -> None:
     """A CYCL DEF block: `name` is `200`, or `7.1`."""
     number, _, part = name.partition(".")
     cycle = int(number)
@@ -88,7 +88,7 @@ def define(control: Control, name: str, words: Words, text: str) -> None:
 # -- execution --------------------------------------------------------------------------------------------------------
 
 
-def executes(control: Control, step: Step) -> bool:
+def executes(control: KlartextControl, step: Step) -> bool:
     """Whether a positioning block executes the cycle in force: M99, or M89 before or in it. M99 ends M89."""
     if 89 in step.codes:
         control.cycle.modal = True
@@ -98,7 +98,7 @@ def executes(control: Control, step: Step) -> bool:
     return once or modal
 
 
-def call(control: Control, step: Step) -> None:
+def call(control: KlartextControl, step: Step) -> None:
     """Execute the cycle in force at the position of a block, or where the axes stand."""
     cycle = control.cycle
     if cycle.number == 0:
@@ -127,7 +127,7 @@ def call(control: Control, step: Step) -> None:
     drill(control, where, axes, (bottom, clear, refusal))
 
 
-def pattern(control: Control, places: tuple[Place, ...] | None, name: str) -> None:
+def pattern(control: KlartextControl, places: tuple[HolePosition, ...] | None, name: str) -> None:
     """The cycle in force at places that the control works out."""
     control.use()
     if control.cycle.number == 0:
@@ -139,13 +139,13 @@ def pattern(control: Control, places: tuple[Place, ...] | None, name: str) -> No
     control.settle(tuple(control.unknown))
     control.budget.spend(len(places))
     for place in places:
-        where = led(control, Words({"X": place.x, "Y": place.y}, frozenset()))
+        where = led(control, MotionWords({"X": place.x, "Y": place.y}, frozenset()))
         bottom, clear, refusal = levels(control, where.inner[Z])
         height = control.scale[Z] * place.height
         drill(control, where, IN_PLANE, (bottom + height, clear + height, refusal or PATTERN.format(name)))
 
 
-def drill(control: Control, where: Where, axes: int, heights: tuple[float, float, str]) -> None:
+def drill(control: KlartextControl, where: Where, axes: int, heights: tuple[float, float, str]) -> None:
     """One hole."""
     bottom, clear, refusal = heights
     over = Where(where.inner[:], dict(where.unknown))
@@ -155,7 +155,7 @@ def drill(control: Control, where: Where, axes: int, heights: tuple[float, float
     target, unknown = command_of(control, where, axes | 1 << Z)
     programmed = axes & ~(1 << Z)
     code = FROM_START if control.cycle.number in OLD_DRILLING else BY_DEPTH
-    control.make(Motion(Kind.CYCLE, programmed, target, unknown, code, refusal=refusal))
+    control.make(Motion(MotionKind.CYCLE, programmed, target, unknown, code, refusal=refusal))
     over.inner[Z] = clear
     over.unknown.pop(Z, None)
     if refusal == DEPTH_AT_RUN_TIME:
@@ -168,7 +168,7 @@ def drill(control: Control, where: Where, axes: int, heights: tuple[float, float
     control.path.tangent = None
 
 
-def levels(control: Control, height: float) -> tuple[float, float, str]:
+def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
     """Bottom and clearance of the cycle in force along the tool axis of the frame, mm; and why they are not known."""
     cycle, unit = control.cycle, control.modal.unit
     if cycle.number in OLD_DRILLING:
@@ -192,7 +192,7 @@ def said(steps: Mapping[str, float], names: frozenset[str]) -> float | None:
     return next((value for key, value in steps.items() if "".join(key.partition(":")[2].split()) in names), None)
 
 
-def own_path(control: Control, step: Step) -> None:
+def own_path(control: KlartextControl, step: Step) -> None:
     """A cycle that is not followed: after it X, Y and Z stand nowhere known, and of most cycles the other axes do."""
     position, unknown = control.position[:], dict(control.unknown)
     refuse(control, OWN_PATH.format(control.cycle.number))

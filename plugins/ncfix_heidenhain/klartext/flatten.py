@@ -12,15 +12,15 @@ from dataclasses import replace
 from ncfix.control.expressions import nominal
 from ncfix.control.flatten import Change, FlatLine, Flattener
 from ncfix.text.spelling import Spelling, decimals_for
-from ncfix.text.tree import Assignment, Constant, Expression, Literal, Opaque, Span, Text, Word
+from ncfix.text.tree import Assignment, Constant, Expression, Literal, Opaque, Span, StringLiteral, Word
 from ncfix_heidenhain.klartext.calculate import compiled
 from ncfix_heidenhain.klartext.contours import written_out
-from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import uses_comma
-from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
-from ncfix_heidenhain.klartext.plans import Plan
+from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, HolePosition, pattern_of_cycle
+from ncfix_heidenhain.klartext.plans import KlartextPlan
 from ncfix_heidenhain.klartext.units import KlartextUnit
 
 LEAST = 4
@@ -42,7 +42,7 @@ NOT_WRITTEN = ("CALL PGM", "SEL PGM", "CALL SELECTED", "FN 14")
 class KlartextFlattener(Flattener):
     """See `Flattener`; `style`: how numbers are written."""
 
-    def __init__(self, control: Control, steps: Mapping[str, float], limit: int, style: Spelling) -> None:
+    def __init__(self, control: KlartextControl, steps: Mapping[str, float], limit: int, style: Spelling) -> None:
         super().__init__(steps, limit)
         self.control, self.style = control, style
 
@@ -57,7 +57,7 @@ class KlartextFlattener(Flattener):
         for offset, part in enumerate(text.splitlines()):
             self.write(part.rstrip(), offset if not unit.external and not holes else 0)
 
-    def holes(self, plan: Plan, control: Control) -> list[str]:
+    def holes(self, plan: KlartextPlan, control: KlartextControl) -> list[str]:
         """The holes of a pattern one by one; empty for other blocks, and where they are not known."""
         if plan.name == "cycl call pat" and control.cycle.places is not None:
             rate = "FMAX" if "fmax" in plan.flags else ""
@@ -82,7 +82,7 @@ class KlartextFlattener(Flattener):
         """A point of the working plane as words."""
         return f"X{self.written(place.real, 'X')} Y{self.written(place.imag, 'Y')}"
 
-    def place(self, place: Place) -> str:
+    def place(self, place: HolePosition) -> str:
         """Where a hole is, as words."""
         return self.point(complex(place.x, place.y))
 
@@ -99,7 +99,7 @@ class KlartextFlattener(Flattener):
         """Numbers for formulas; the block's own number falls away."""
         if word.address == "N":
             return self.dropped(word)
-        if isinstance(word.value, (Literal, Constant, Text)):
+        if isinstance(word.value, (Literal, Constant, StringLiteral)):
             return None
         text = self.number(word.value, self.digits(word.address))
         if text is None:
@@ -108,7 +108,7 @@ class KlartextFlattener(Flattener):
 
     def assignment(self, item: Assignment) -> Change | None:
         """The value for the formula."""
-        text = None if isinstance(item.value, (Literal, Text)) else self.number(item.value, OTHERS)
+        text = None if isinstance(item.value, (Literal, StringLiteral)) else self.number(item.value, OTHERS)
         name = self.unit.program.slice(self.block, item.span).split("=")[0].strip()
         return None if text is None else self.replaced(item.span, f"{name} = {text}")
 

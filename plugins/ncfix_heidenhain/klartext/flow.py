@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ncfix.control.faults import Fault
-from ncfix.control.flow import NO_SUBPROGRAM, Call, Flow, Jump, OpenCall, Operation, Repeat, Return
+from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, OpenCall, Operation, ProgramFlow, Repeat, Return
 from ncfix.text.tree import Constant
-from ncfix_heidenhain.klartext.control import Control
-from ncfix_heidenhain.klartext.plans import Plan
+from ncfix_heidenhain.klartext.control import KlartextControl
+from ncfix_heidenhain.klartext.plans import KlartextPlan
 from ncfix_heidenhain.klartext.units import KlartextUnit
 
 NO_LABEL = "NCF276"
@@ -20,7 +20,7 @@ PROGRAM = "program"
 """The kind of calls of other programs."""
 
 
-class KlartextFlow(Flow[KlartextUnit]):
+class KlartextFlow(ProgramFlow[KlartextUnit]):
     """Where the control is in the program.
 
     find      gives a program by its name
@@ -30,13 +30,15 @@ class KlartextFlow(Flow[KlartextUnit]):
     most_calls = 64
     too_deep = f"more than {most_calls} calls are open"
 
-    def __init__(self, control: Control, main: KlartextUnit, find: Callable[[str], KlartextUnit | None]) -> None:
+    def __init__(
+        self, control: KlartextControl, main: KlartextUnit, find: Callable[[str], KlartextUnit | None]
+    ) -> None:
         super().__init__(main, control.budget)
         self.parameters = control.scope.parameters
         self.find = find
         self.selected = ""
 
-    def operations(self, plan: Plan, holds: Callable[[], bool]) -> tuple[Operation, ...]:
+    def operations(self, plan: KlartextPlan, holds: Callable[[], bool]) -> tuple[Operation, ...]:
         """What a label, a call or a condition comes down to; `holds`: the condition is met."""
         assert plan.flow is not None
         label, unit = str(plan.flow.label), self.unit

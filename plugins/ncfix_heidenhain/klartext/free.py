@@ -53,15 +53,15 @@ class Element:
         return None if self.x is None or self.y is None else complex(self.x, self.y)
 
     @property
-    def circle(self) -> Circle | None:
+    def circle(self) -> DirectedCircle | None:
         """Its circle, if all of it is said."""
         if self.centre is None or self.radius is None or not self.sense:
             return None
-        return Circle(self.centre, self.radius, self.sense)
+        return DirectedCircle(self.centre, self.radius, self.sense)
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class DirectedCircle:
     """A circle with the sense in which it is gone round."""
 
     centre: complex
@@ -79,19 +79,21 @@ class Circle:
 
 
 @dataclass(frozen=True, slots=True)
-class Leg:
+class ContourElement:
     """An element that is worked out: its end, the direction there, and its circle if it is an arc."""
 
     end: complex
     heading: complex
-    circle: Circle | None = None
+    circle: DirectedCircle | None = None
 
 
 class NoSolutionError(Exception):
     """There is none, or more than one."""
 
 
-def solved(elements: Sequence[Element], start: complex, heading: complex | None, near: float) -> list[Leg] | None:
+def solved(
+    elements: Sequence[Element], start: complex, heading: complex | None, near: float
+) -> list[ContourElement] | None:
     """The legs of a contour from where it starts; None if they are not all certain.
 
     heading  the direction in which the element before ends, if there is one
@@ -113,8 +115,8 @@ class _Chain:
         self.at = start
         self.heading = heading
         self.near = near
-        self.legs: list[Leg] = []
-        self.open: Circle | None = None
+        self.legs: list[ContourElement] = []
+        self.open: DirectedCircle | None = None
         self.home: complex | None = None
 
     def add(self, element: Element, following: Element | None) -> None:
@@ -150,7 +152,7 @@ class _Chain:
             self._agree(abs(end - self.at), element.length)
         if direction is not None:
             self._agree(end, self.at + abs(end - self.at) * direction)
-        self._append(Leg(end, (end - self.at) / abs(end - self.at)))
+        self._append(ContourElement(end, (end - self.at) / abs(end - self.at)))
 
     def _direction(self, element: Element) -> complex | None:
         """In which direction a line goes, if that is said."""
@@ -175,12 +177,12 @@ class _Chain:
                 return self.at + (value - begin) / part * direction
         return None
 
-    def _towards(self, target: Circle) -> complex:
+    def _towards(self, target: DirectedCircle) -> complex:
         """Where a line from here touches a circle that is gone round next."""
         direction = touching(target.centre - self.at, target.sense * target.radius)
         return target.touched(direction)
 
-    def _leave(self, circle: Circle, element: Element, target: Circle | None) -> complex | None:
+    def _leave(self, circle: DirectedCircle, element: Element, target: DirectedCircle | None) -> complex | None:
         """End an arc where a line leaves it: of a known direction, to a known end, or to the next circle.
 
         Returns where the line touches that.
@@ -223,22 +225,24 @@ class _Chain:
         self._agree(abs(end - circle.centre), circle.radius)
         if abs(end - self.at) < self.near:
             raise NoSolutionError
-        self._append(Leg(end, circle.heading(end), circle))
+        self._append(ContourElement(end, circle.heading(end), circle))
 
-    def _circle(self, element: Element) -> Circle:
+    def _circle(self, element: Element) -> DirectedCircle:
         """The circle of an arc that begins here."""
         if element.centre is not None and element.sense:
             size = abs(self.at - element.centre) if element.radius is None else element.radius
-            return Circle(element.centre, size, element.sense)
+            return DirectedCircle(element.centre, size, element.sense)
         if self.heading is None or not element.tangential or element.centre is not None:
             raise NoSolutionError
         if element.end is not None:
             return self._through(element, element.end, self.heading)
         if element.radius is None or not element.sense:
             raise NoSolutionError
-        return Circle(self.at + element.sense * 1j * element.radius * self.heading, element.radius, element.sense)
+        return DirectedCircle(
+            self.at + element.sense * 1j * element.radius * self.heading, element.radius, element.sense
+        )
 
-    def _through(self, element: Element, end: complex, heading: complex) -> Circle:
+    def _through(self, element: Element, end: complex, heading: complex) -> DirectedCircle:
         """The circle that goes on in a direction and leads to an end."""
         side = ((end - self.at) * heading.conjugate()).imag
         if abs(side) < self.near:
@@ -249,9 +253,9 @@ class _Chain:
             raise NoSolutionError
         if element.radius is not None:
             self._agree(abs(radius), element.radius)
-        return Circle(self.at + 1j * radius * heading, abs(radius), sense)
+        return DirectedCircle(self.at + 1j * radius * heading, abs(radius), sense)
 
-    def _touch(self, circle: Circle, element: Element) -> None:
+    def _touch(self, circle: DirectedCircle, element: Element) -> None:
         """End an arc where the next one, of a known circle, touches its own."""
         other = element.circle
         if other is None or not element.tangential:
@@ -266,13 +270,13 @@ class _Chain:
 
     # -- what is worked out -------------------------------------------------------------------------------------------
 
-    def _end_arc(self, circle: Circle, end: complex) -> None:
+    def _end_arc(self, circle: DirectedCircle, end: complex) -> None:
         if abs(end - self.at) < self.near:
             raise NoSolutionError
         self.open = None
-        self._append(Leg(end, circle.heading(end), circle))
+        self._append(ContourElement(end, circle.heading(end), circle))
 
-    def _append(self, leg: Leg) -> None:
+    def _append(self, leg: ContourElement) -> None:
         self.legs.append(leg)
         self.at, self.heading = leg.end, leg.heading
 

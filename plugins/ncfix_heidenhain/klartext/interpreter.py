@@ -23,16 +23,16 @@ from ncfix.text.reach import UNREAD
 from ncfix.text.tree import Command, Opaque, Program, Template
 from ncfix_heidenhain.klartext import cycles, lines, tilting, trans_cycles
 from ncfix_heidenhain.klartext.codes import after_motion, before_motion
-from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.flow import PROGRAM, KlartextFlow
 from ncfix_heidenhain.klartext.lane import run_lane
 from ncfix_heidenhain.klartext.layout import CORNERS, axis_numbers, poles_move
 from ncfix_heidenhain.klartext.paths import PATHS, astray
-from ncfix_heidenhain.klartext.plans import Plan
+from ncfix_heidenhain.klartext.plans import KlartextPlan
 from ncfix_heidenhain.klartext.poles import relies_at_once
 from ncfix_heidenhain.klartext.statements import statement
 from ncfix_heidenhain.klartext.step import Step, refuse
-from ncfix_heidenhain.klartext.targets import Words, axis_letters, set_pole
+from ncfix_heidenhain.klartext.targets import MotionWords, axis_letters, set_pole
 from ncfix_heidenhain.klartext.tools import call_tool, define_tool
 from ncfix_heidenhain.klartext.turns import FULL
 from ncfix_heidenhain.klartext.units import KlartextUnit
@@ -70,11 +70,11 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     polar   those of them that have to do with poles
     """
 
-    control: Control
+    control: KlartextControl
     flow: KlartextFlow
     watcher: KlartextFlattener | None
 
-    def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
+    def __init__(self, control: KlartextControl, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
         self.axes = mask_of(control.machine)
         self.comma: bool | None = None
@@ -110,19 +110,19 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         self.control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
         return False
 
-    def take_stretch(self, plan: Plan) -> bool:
+    def take_stretch(self, plan: KlartextPlan) -> bool:
         """See `Interpreter`; blocks that do nothing are passed over, too."""
         if super().take_stretch(plan):
             return True
         self.flow.block += plan.empty
         return plan.empty
 
-    def lane_is_open(self, plan: Plan) -> bool:
+    def lane_is_open(self, plan: KlartextPlan) -> bool:
         """See `Interpreter`."""
         unit, closed = self.no_lane
         return self.watcher is None and not (unit is self.flow.unit and self.flow.block in closed)
 
-    def run_lane(self, unit: KlartextUnit, block: int, plan: Plan) -> int:
+    def run_lane(self, unit: KlartextUnit, block: int, plan: KlartextPlan) -> int:
         """See `Interpreter`."""
         done, worth = run_lane(self.control, unit, block)
         self.no_lane = unit, range(block + done, worth)
@@ -130,7 +130,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
-    def execute(self, plan: Plan, unit: KlartextUnit, block: int) -> bool:
+    def execute(self, plan: KlartextPlan, unit: KlartextUnit, block: int) -> bool:
         """Execute a block; True if the program ends there."""
         control, flow = self.control, self.flow
         control.scope.numbers, control.scope.first = unit.numbers, unit.first[block]
@@ -159,7 +159,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             return self.motion(plan, words, flow)
         return False
 
-    def state(self, plan: Plan, flow: KlartextFlow) -> bool:
+    def state(self, plan: KlartextPlan, flow: KlartextFlow) -> bool:
         """A statement that is not taken apart."""
         assert plan.statement is not None
         kind, span = plan.statement
@@ -174,7 +174,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             statement(self.control, flow, text)
         return flow.ended
 
-    def holds(self, plan: Plan) -> bool:
+    def holds(self, plan: KlartextPlan) -> bool:
         """Whether a condition is met; raises `Fault` if that is known only at run time."""
         assert plan.test is not None
         value = plan.test(self.control.scope)
@@ -185,35 +185,35 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             raise Fault(code, text, f'variables."{lacking}" in the setup file gives it a value')
         return value != 0.0
 
-    def assign(self, plan: Plan) -> None:
+    def assign(self, plan: KlartextPlan) -> None:
         """Set Q parameters."""
         scope = self.control.scope
         for name, value in plan.assignments:
             scope.parameters.assign(name, *scope.value_of(value))
 
-    def evaluated(self, words: Mapping[str, Evaluate]) -> Words:
+    def evaluated(self, words: Mapping[str, Evaluate]) -> MotionWords:
         """The words of a block as numbers."""
         scope, values, runtime = self.control.scope, {}, []
         for address, value in words.items():
             values[address], at_runtime = scope.value_of(value)
             if at_runtime:
                 runtime.append(address)
-        return Words(values, frozenset(runtime))
+        return MotionWords(values, frozenset(runtime))
 
-    def tool_of(self, plan: Plan) -> str | float | None:
+    def tool_of(self, plan: KlartextPlan) -> str | float | None:
         """The number or name of a tool; a name for a number that is known only at run time."""
         if plan.tool is None or isinstance(plan.tool, str):
             return plan.tool
         number = plan.tool(self.control.scope)
         return number.why if isinstance(number, Unknown) else number
 
-    def names(self, plan: Plan, flow: KlartextFlow) -> str:
+    def names(self, plan: KlartextPlan, flow: KlartextFlow) -> str:
         """The words of a cycle definition that have no value."""
         program, block = flow.unit.program, flow.block - 1
         items = program.items_of(block)
         return " ".join(program.slice(block, item.span) for item in items if isinstance(item, Opaque))
 
-    def shift_datum(self, name: str, words: Words) -> None:
+    def shift_datum(self, name: str, words: MotionWords) -> None:
         """TRANS DATUM."""
         if name.endswith("reset"):
             self.control.transformations.reset_shift()
@@ -223,14 +223,14 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
-    def motion(self, plan: Plan, words: Words, flow: KlartextFlow) -> bool:
+    def motion(self, plan: KlartextPlan, words: MotionWords, flow: KlartextFlow) -> bool:
         """A block of path words and M codes; True if it ends the program."""
         control = self.control
         codes = frozenset(code for code, _ in plan.codes)
         control.enter_block((*words.values, plan.name))
         self.feed(words, plan)
         values = {address: value for address, value in words.values.items() if address not in NOT_OF_MOTION}
-        step = Step(plan.name, Words(values, words.runtime & values.keys()), plan.flags, codes)
+        step = Step(plan.name, MotionWords(values, words.runtime & values.keys()), plan.flags, codes)
         self.note_foreign(plan, step)
         before_motion(control, step)
         control.path.ahead = self.corner_ahead(flow)
@@ -241,7 +241,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             control.refusal = control.refusal or ENDS_INSIDE
         return bool(codes & {2, 30}) and not control.external
 
-    def note_foreign(self, plan: Plan, step: Step) -> None:
+    def note_foreign(self, plan: KlartextPlan, step: Step) -> None:
         """Note axes that the program moves and the machine lacks."""
         control = self.control
         for letter in axis_letters(step.words):
@@ -252,7 +252,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
                 control.note_foreign(letter)
                 self.span = None
 
-    def feed(self, words: Words, plan: Plan) -> None:
+    def feed(self, words: MotionWords, plan: KlartextPlan) -> None:
         """F, in mm or inches per minute; FU per revolution; FAUTO as TOOL CALL has it."""
         modal = self.control.modal
         for address, mode in (("F", 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
@@ -268,7 +268,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         following = flow.unit.next_plan(flow.block)
         return following is not None and following.name in CORNERS
 
-    def move(self, plan: Plan, step: Step) -> None:
+    def move(self, plan: KlartextPlan, step: Step) -> None:
         """What moves in a block, if anything does."""
         control = self.control
         if step.name == "cc":

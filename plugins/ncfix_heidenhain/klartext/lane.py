@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from ncfix import fast
 from ncfix.control.arcs import CLOCKWISE, COUNTER, plane_of, resting_of_many
-from ncfix.control.builder import Arc, Circles, Stretch
+from ncfix.control.builder import Arc, Circles, MotionColumns
 from ncfix.control.lane import SHORTEST, before_placing
-from ncfix.control.moves import FeedMode, Kind
+from ncfix.control.moves import FeedMode, MotionKind
 from ncfix.control.stage import LONGEST, filled, followed, followed_compiled
 from ncfix_heidenhain.klartext.arc_lane import keep_pole, turned
 from ncfix_heidenhain.klartext.arcs import direction_at_end
-from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.lane_tables import FEED, RAPID
 from ncfix_heidenhain.klartext.layout import CORNERS
 from ncfix_heidenhain.klartext.lines import FLAT
@@ -30,11 +30,11 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-KINDS = {RAPID: Kind.RAPID, FEED: Kind.FEED, CLOCKWISE: Kind.ARC, COUNTER: Kind.ARC}
+KINDS = {RAPID: MotionKind.RAPID, FEED: MotionKind.FEED, CLOCKWISE: MotionKind.ARC, COUNTER: MotionKind.ARC}
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class KlartextBlockRows:
     """A stretch as the control takes it, one row per block.
 
     path    (n + 1, 9) the command before the first block, and at the end of each
@@ -50,16 +50,16 @@ class Stage:
     side: IntArray
     mask: IntArray
 
-    def head(self, count: int) -> Stage:
+    def head(self, count: int) -> KlartextBlockRows:
         """The first blocks of it."""
         if count == len(self.feed):
             return self
-        return Stage(
+        return KlartextBlockRows(
             self.path[: count + 1], self.feed[:count], self.motion[:count], self.side[:count], self.mask[:count]
         )
 
 
-def run_lane(control: Control, unit: KlartextUnit, block: int) -> tuple[int, int]:
+def run_lane(control: KlartextControl, unit: KlartextUnit, block: int) -> tuple[int, int]:
     """Take the stretch that begins with a block.
 
     Returns how many blocks are taken, 0 for none, and the first block at which it is worth while to try again.
@@ -90,7 +90,7 @@ def before_corner(unit: KlartextUnit, block: int, stop: int) -> int:
     return block + int(busy[-1]) if len(busy) else stop
 
 
-def is_open(control: Control) -> bool:
+def is_open(control: KlartextControl) -> bool:
     """Whether the state allows the fast lane at all."""
     modal, path = control.modal, control.path
     known = not (control.unknown or control.shaky) and control.preset_checked and control.tool_called
@@ -100,7 +100,7 @@ def is_open(control: Control) -> bool:
     return known and plain and not (turned or special)
 
 
-def stage_of(control: Control, unit: KlartextUnit, start: int, stop: int) -> Stage:
+def stage_of(control: KlartextControl, unit: KlartextUnit, start: int, stop: int) -> KlartextBlockRows:
     """What the blocks of a stretch say, and where they lead."""
     program, tables = unit.program, unit.lanes
     shapes, first = program.template[start:stop], program.first_number[start:stop]
@@ -108,10 +108,10 @@ def stage_of(control: Control, unit: KlartextUnit, start: int, stop: int) -> Sta
     found = follow(control, program.numbers, first, shapes, tables.words, (control.unit, control.modal.feed, RAPID))
     own = tables.side[shapes]
     side = filled(own.astype(np.float64), own >= 0, control.modal.compensated).astype(np.int64)
-    return Stage(found.path, found.feed, tables.words.motion[shapes], side, found.mask)
+    return KlartextBlockRows(found.path, found.feed, tables.words.motion[shapes], side, found.mask)
 
 
-def count_on_one_turn(control: Control, stage: Stage) -> int:
+def count_on_one_turn(control: KlartextControl, stage: KlartextBlockRows) -> int:
     """How many blocks run before one in which a rotary axis takes the shorter way round past a turn (M126)."""
     if not control.shortest:
         return len(stage.feed)
@@ -122,7 +122,7 @@ def count_on_one_turn(control: Control, stage: Stage) -> int:
     return int(np.argmax(turns)) if turns.any() else len(turns)
 
 
-def count_beside(control: Control, stage: Stage) -> int:
+def count_beside(control: KlartextControl, stage: KlartextBlockRows) -> int:
     """How many blocks run before one that ends radius compensation (R0), or an arc with it.
 
     From there on it matters what is named.
@@ -132,7 +132,7 @@ def count_beside(control: Control, stage: Stage) -> int:
     return int(np.argmax(ends)) if ends.any() else len(ends)
 
 
-def take(control: Control, stage: Stage, unit: KlartextUnit, block: int, circles: Circles) -> None:
+def take(control: KlartextControl, stage: KlartextBlockRows, unit: KlartextUnit, block: int, circles: Circles) -> None:
     """Add the motions of a stretch, `circles` those of its arcs, and leave the control as they leave it."""
     shapes = unit.program.template[block : block + len(stage.feed)]
     control.suspended.pop("M130", None)
@@ -151,7 +151,7 @@ def take(control: Control, stage: Stage, unit: KlartextUnit, block: int, circles
         plane = plane_of(control)
         adrift = control.places.adrift | np.where(sided & (mask & plane == 0), plane, 0)
         control.builder.circles(circles._replace(row=np.searchsorted(moving, circles.row)))
-        control.builder.extend(Stretch(blocks, mask, styles, stage.feed[moving], starts, ends, adrift))
+        control.builder.extend(MotionColumns(blocks, mask, styles, stage.feed[moving], starts, ends, adrift))
         control.position = ends[-1].tolist()
         keep_tangent(control, stage.path, circles)
     keep_pole(control, unit, block, shapes)
@@ -159,7 +159,7 @@ def take(control: Control, stage: Stage, unit: KlartextUnit, block: int, circles
     control.modal.compensated = int(stage.side[-1])
 
 
-def styles_of(control: Control, motion: IntArray, side: IntArray, relative: Mask) -> IntArray:
+def styles_of(control: KlartextControl, motion: IntArray, side: IntArray, relative: Mask) -> IntArray:
     """The styles of motions whose start and end are known; `relative`: they count from where they start."""
     styles = np.empty(len(motion), dtype=np.int64)
     keys = (side << 6 | motion) << 1 | relative
@@ -171,7 +171,7 @@ def styles_of(control: Control, motion: IntArray, side: IntArray, relative: Mask
     return styles
 
 
-def keep_tangent(control: Control, path: FloatArray, circles: Circles) -> None:
+def keep_tangent(control: KlartextControl, path: FloatArray, circles: Circles) -> None:
     """Note in which direction the last motion went that had a way."""
     ways = np.diff(path[:, :3], axis=0)
     arc = int(circles.row[-1]) if len(circles.row) else -1

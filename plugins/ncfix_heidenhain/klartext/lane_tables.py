@@ -13,7 +13,7 @@ from ncfix.control.arcs import CLOCKWISE, COUNTER
 from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.lane_tables import Lane
 from ncfix.text.tree import Constant, Literal, Template
-from ncfix_heidenhain.klartext.plans import LETTERS, Plan
+from ncfix_heidenhain.klartext.plans import LETTERS, KlartextPlan
 from ncfix_heidenhain.klartext.step import IN_PLANE
 
 STRAIGHT = frozenset({"", "l", "ln"})
@@ -36,7 +36,7 @@ RAPID, FEED = 0, 10
 
 
 @dataclass(frozen=True, slots=True)
-class LaneTables:
+class KlartextLaneTables:
     """The shapes of a program as columns.
 
     open   (s,) blocks of the shape may go through the fast lane
@@ -57,7 +57,7 @@ class LaneTables:
     pole: NDArray[np.int64]
 
     @classmethod
-    def of(cls, templates: Sequence[Template], plans: Sequence[Plan], axes: int) -> LaneTables:
+    def of(cls, templates: Sequence[Template], plans: Sequence[KlartextPlan], axes: int) -> KlartextLaneTables:
         """The tables of some shapes; `axes`: bit mask of the letters that the machine has."""
         slots = [slots_of(template, plan) for template, plan in zip(templates, plans, strict=True)]
         lanes = [lane_of(plan, own, axes) for plan, own in zip(plans, slots, strict=True)]
@@ -81,14 +81,14 @@ class LaneTables:
         return tables
 
 
-def slots_of(template: Template, plan: Plan) -> Mapping[str, int] | None:
+def slots_of(template: Template, plan: KlartextPlan) -> Mapping[str, int] | None:
     """Address -> slot of the words of a motion; None if some are more than plain numbers."""
     values = {word.address: word.value for word in template.words if not isinstance(word.value, Constant)}
     slots = {address: value.slot for address, value in values.items() if isinstance(value, Literal) and address != "N"}
     return slots if slots.keys() == plan.words.keys() else None
 
 
-def lane_of(plan: Plan, slots: Mapping[str, int] | None, axes: int) -> Lane | None:
+def lane_of(plan: KlartextPlan, slots: Mapping[str, int] | None, axes: int) -> Lane | None:
     """The fast lane's view of a shape; None if its blocks are more than a motion with plain numbers, or a pole."""
     if plan.empty:
         return NOTHING
@@ -109,7 +109,7 @@ def lane_of(plan: Plan, slots: Mapping[str, int] | None, axes: int) -> Lane | No
     return Lane(words, slots.get("F", -1), RAPID if "fmax" in plan.flags else FEED)
 
 
-def arc_of(plan: Plan, slots: Mapping[str, int]) -> Lane | None:
+def arc_of(plan: KlartextPlan, slots: Mapping[str, int]) -> Lane | None:
     """The same of an arc; None if it is not in the plane of X and Y, or lacks what it needs."""
     own, named = ARCS[plan.name], slots.keys() & LETTERS
     senses = plan.flags & SENSES.keys()
@@ -123,7 +123,7 @@ def arc_of(plan: Plan, slots: Mapping[str, int]) -> Lane | None:
     return Lane(words, slots.get("F", -1), SENSES[next(iter(senses))])
 
 
-def is_plain(plan: Plan) -> bool:
+def is_plain(plan: KlartextPlan) -> bool:
     """Whether a block does nothing but what its words with numbers say, and what is harmless."""
     if plan.skip or plan.flow or plan.assignments or plan.tool is not None or plan.statement:
         return False

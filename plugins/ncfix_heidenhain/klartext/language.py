@@ -6,7 +6,7 @@ from ncfix.text.language import Language
 from ncfix.text.reach import whole_text
 from ncfix_heidenhain.klartext.blocks import parse_block
 from ncfix_heidenhain.klartext.bulk import in_bulk, one_by_one
-from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.flatten import unrolled
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import layout_of
@@ -19,7 +19,7 @@ KLARTEXT = Language(
     end=whole_text,
     scan=scan,
     parse=parse_block,
-    control=Control,
+    control=KlartextControl,
     interpreter=KlartextInterpreter,
     layout=layout_of,
     render=render,

@@ -43,10 +43,10 @@ RELATIVE_POLE = re.compile(rb"(?im)\n[ \t]*/?[ \t]*\d*[ \t]*CC(?![A-Z])(?:[^\r\n
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class KlartextLayout:
     """The writable parts of a motion block.
 
-    name      its path function, as in `Plan.name`
+    name      its path function, as in `KlartextPlan.name`
     function  where that is written, None in a block of words alone
     axes      axis -> its word, absolute or incremental
     polar     PR, PA, IPR, IPA words
@@ -90,7 +90,7 @@ class Layout:
         return math.radians(float(program.values_of(block)[word.value.slot]))
 
 
-def layout_of(program: Program, block: int) -> Layout | None:
+def layout_of(program: Program, block: int) -> KlartextLayout | None:
     """The layout of a block; None for an angle from a Q parameter, or half a direction of the tool."""
     shape = Shape(program.templates[int(program.template[block])])
     found = _of_shape(shape)
@@ -116,14 +116,14 @@ class Shape:
 
 
 @lru_cache(maxsize=4096)
-def _in_place(shape: Shape, blank: str, comma: bool, corner: bool) -> Layout | None:
+def _in_place(shape: Shape, blank: str, comma: bool, corner: bool) -> KlartextLayout | None:
     """The layout of blocks of a shape that have the rest in common, too."""
     found = _of_shape(shape)
     return None if found is None else replace(found[0], blank=blank, comma=comma, corner=corner)
 
 
 @lru_cache(maxsize=4096)
-def _of_shape(shape: Shape) -> tuple[Layout, Word | None] | None:
+def _of_shape(shape: Shape) -> tuple[KlartextLayout, Word | None] | None:
     """What all blocks of a shape have in common of their layout, and the last word that leads somewhere."""
     items = shape.template.items
     words, commands = own_words(items), [item for item in items if isinstance(item, Command)]
@@ -134,7 +134,7 @@ def _of_shape(shape: Shape) -> tuple[Layout, Word | None] | None:
         return None
     last = max([*axes.values(), *polar], key=lambda word: word.span.stop, default=None)
     end = last or function
-    layout = Layout(
+    layout = KlartextLayout(
         name=function.name if function else "",
         function=function.span if function else None,
         axes=axes,

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 
 from ncfix.control.coordinates import LETTERS, Vector, dot, mask_of
 from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.posture import WayRules, postures
 from ncfix.control.tcp import switch
-from ncfix_heidenhain.klartext.control import DEPARTED, Control
+from ncfix_heidenhain.klartext.control import DEPARTED, KlartextControl
 from ncfix_heidenhain.klartext.step import Step, refuse, with_increments
 from ncfix_heidenhain.klartext.targets import (
-    Words,
+    MotionWords,
     command_of,
     derived,
     destination,
@@ -47,7 +47,7 @@ STILL = 1e-9
 """rad; an axis that is told to go where it stands does not turn."""
 
 
-def straight(control: Control, step: Step) -> None:
+def straight(control: KlartextControl, step: Step) -> None:
     """L, LN, and blocks of words alone."""
     control.use()
     target, unknown = destination(control, step.words)
@@ -65,7 +65,7 @@ def straight(control: Control, step: Step) -> None:
     run(control, step, target, unknown, step.words.axes | sum(1 << index for index in way))
 
 
-def pointed(control: Control, words: Words) -> dict[int, float] | None:
+def pointed(control: KlartextControl, words: MotionWords) -> dict[int, float] | None:
     """The rotary positions that point the tool along TX TY TZ, the nearest; None if that is not known."""
     vector = unit((words.values.get("TX", 0.0), words.values.get("TY", 0.0), words.values.get("TZ", 0.0)))
     if vector is None or not control.m128:
@@ -74,7 +74,7 @@ def pointed(control: Control, words: Words) -> dict[int, float] | None:
     return found.chosen if found is not None and found.ways else None
 
 
-def straight_polar(control: Control, step: Step) -> None:
+def straight_polar(control: KlartextControl, step: Step) -> None:
     """LP."""
     control.use()
     where, _ = polar(control, step.words)
@@ -84,14 +84,14 @@ def straight_polar(control: Control, step: Step) -> None:
     name_polar(control, step)
 
 
-def name_polar(control: Control, step: Step) -> None:
+def name_polar(control: KlartextControl, step: Step) -> None:
     """PR and PA say where the axes of the plane are as well as their own words."""
     if {"PR", "PA"} <= step.words.values.keys():
         control.places.settle(mask_of((control.path.plane.first, control.path.plane.second)))
 
 
 def run(
-    control: Control, step: Step, target: Vector, unknown: UnknownAxes, axes: int, *, follows: bool = False
+    control: KlartextControl, step: Step, target: Vector, unknown: UnknownAxes, axes: int, *, follows: bool = False
 ) -> None:
     """A straight motion to a command."""
     turned = [index for index in control.turning if axes >> index & 1]
@@ -101,22 +101,22 @@ def run(
         return
     way = take_short_way(control, step, target, axes) if control.shortest else ""
     before = control.position, control.unknown
-    off = step.kind == Kind.RAPID and control.is_led(unknown)
+    off = step.kind == MotionKind.RAPID and control.is_led(unknown)
     with_increments(control, follows or step.words.incremental)
-    code = 0 if step.kind == Kind.RAPID else 10
+    code = 0 if step.kind == MotionKind.RAPID else 10
     refusal = way or check_normal(control) or derived(control, step.words, axes)
     control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else None))
     with_increments(control, False)
     keep_tangent(control, *before)
 
 
-def turns(control: Control, indices: Sequence[int], target: Vector, unknown: UnknownAxes) -> bool:
+def turns(control: KlartextControl, indices: Sequence[int], target: Vector, unknown: UnknownAxes) -> bool:
     """Whether some of these axes move, or may."""
     lost = control.unknown.keys() | unknown.keys()
     return any(index in lost or abs(target[index] - control.position[index]) > STILL for index in indices)
 
 
-def keep_tangent(control: Control, start: Vector, unknown: UnknownAxes) -> None:
+def keep_tangent(control: KlartextControl, start: Vector, unknown: UnknownAxes) -> None:
     """Note in which direction a straight motion went; one without a way leaves the direction as it was."""
     if any(index in unknown or index in control.unknown for index in range(3) if index in control.machine):
         control.path.tangent = None
@@ -127,7 +127,7 @@ def keep_tangent(control: Control, start: Vector, unknown: UnknownAxes) -> None:
         control.path.tangent = (way[0] / length, way[1] / length, way[2] / length)
 
 
-def take_short_way(control: Control, step: Step, target: Vector, axes: int) -> str:
+def take_short_way(control: KlartextControl, step: Step, target: Vector, axes: int) -> str:
     """M126: rotary axes go the shorter way round; where one stands is said by a number that makes it so.
 
     Returns why the motion is refused: of increments of more than half a turn the manuals do not say what it makes.
@@ -142,7 +142,7 @@ def take_short_way(control: Control, step: Step, target: Vector, axes: int) -> s
     return ""
 
 
-def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: UnknownAxes, axes: int) -> None:
+def turn_under_tilt(control: KlartextControl, step: Step, target: Vector, unknown: UnknownAxes, axes: int) -> None:
     """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
     linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
     switch(control, control.offsets.tool, False)
@@ -152,7 +152,7 @@ def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: Unkno
         if not control.rotary[index]:
             target[index] = control.position[index]
             unknown = {**{k: why for k, why in unknown.items() if k != index}, **own(control.unknown, index)}
-    code = 0 if step.kind == Kind.RAPID else 10
+    code = 0 if step.kind == MotionKind.RAPID else 10
     refusal, passing = (MIXED_UNDER_TILT, None) if linear else ("", TURNS_UNDER_TILT)
     control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=passing))
     if linear:
@@ -166,7 +166,7 @@ def own(unknown: UnknownAxes, index: int) -> UnknownAxes:
     return {index: unknown[index]} if index in unknown else {}
 
 
-def at_machine(control: Control, step: Step) -> None:
+def at_machine(control: KlartextControl, step: Step) -> None:
     """A motion in machine coordinates: M91, or M92."""
     target, unknown = in_machine(control, step.words)
     code = "M91" if 91 in step.codes else "M92"
@@ -189,7 +189,7 @@ def at_machine(control: Control, step: Step) -> None:
 # -- approach and departure -------------------------------------------------------------------------------------------
 
 
-def approach(control: Control, step: Step) -> None:
+def approach(control: KlartextControl, step: Step) -> None:
     """APPR: to the first point of the contour, which its words give; the control makes the way there."""
     control.use()
     where = polar(control, step.words)[0] if " p" in step.name else led(control, step.words)
@@ -197,14 +197,14 @@ def approach(control: Control, step: Step) -> None:
     target, unknown = command_of(control, where, axes)
     control.path.corner = True
     with_increments(control, step.words.incremental or " p" in step.name)
-    control.make(Motion(Kind.FEED, axes, target, unknown, 10, refusal=derived(control, step.words, axes)))
+    control.make(Motion(MotionKind.FEED, axes, target, unknown, 10, refusal=derived(control, step.words, axes)))
     with_increments(control, False)
     if " p" in step.name:
         name_polar(control, step)
     control.path.tangent = None
 
 
-def departure(control: Control, step: Step) -> None:
+def departure(control: KlartextControl, step: Step) -> None:
     """DEP: with an end point of its own (LCT) it is corrected there; else it is what the contour before makes of it.
 
     Beside the contour, with RL or RR, the tool may end by its radius beside the element that it follows (LT).
@@ -223,4 +223,4 @@ def departure(control: Control, step: Step) -> None:
         target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]
         lost = {}
     axes = 1 << plane.first | 1 << plane.second
-    control.make(Motion(Kind.FEED, axes, target, {**control.unknown, **lost}, 10, passing=DEPARTURE))
+    control.make(Motion(MotionKind.FEED, axes, target, {**control.unknown, **lost}, 10, passing=DEPARTURE))

@@ -7,7 +7,7 @@ control would stop at it, or knows a form of the block that is not known here.
 from __future__ import annotations
 
 from ncfix_heidenhain.klartext.arcs import circular, circular_by_radius, circular_polar, tangential
-from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.lines import straight, straight_polar
 from ncfix_heidenhain.klartext.plans import CARTESIAN, MOVING, POLAR, VECTOR
 from ncfix_heidenhain.klartext.step import Step
@@ -50,7 +50,7 @@ NO_HEIGHT = "CYCL CALL POS without Z: the manuals ask for all three axes, and at
 COUNTED_HEIGHT = "CYCL CALL POS with a height in increments (IZ): from where the control counts it is not sure"
 
 
-def astray(control: Control, step: Step, *, called: bool) -> str:
+def astray(control: KlartextControl, step: Step, *, called: bool) -> str:
     """Why a block cannot be followed for the words that it has or lacks; empty if it can.
 
     called  it executes a cycle where it leads

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from ncfix.control.expressions import Value, nominal, numbers, signed
 from ncfix.text.spelling import value_of
-from ncfix_heidenhain.klartext.calculate import Parameters
+from ncfix_heidenhain.klartext.calculate import QParameters
 
 ON_CIRCLE, ON_LINES = 220, 221
 MOST_HOLES = 100_000
@@ -28,7 +28,7 @@ LEFT_OUT = re.compile(r";[^\r\n]*|~(?=[ \t\r]*(?:\n|\Z))")
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class HolePosition:
     """Where a hole is, and by how much its surface is above that of the cycle."""
 
     x: float
@@ -39,10 +39,10 @@ class Place:
 Values = Mapping[str, float]
 
 
-def pattern_of(text: str, parameters: Parameters) -> tuple[Place, ...] | None:
+def pattern_of(text: str, parameters: QParameters) -> tuple[HolePosition, ...] | None:
     """The places of a PATTERN DEF; None if they are known only at run time, or their form is not."""
     code = LEFT_OUT.sub(" ", text)
-    found: list[Place] = []
+    found: list[HolePosition] = []
     certain = True
     for kind, inside in KINDS.findall(code):
         said = {name.upper(): number(sign, value, parameters) for name, sign, value in WORDS.findall(inside)}
@@ -65,7 +65,7 @@ def holes(values: Values) -> float:
     return max(values.get("NUM", 0.0), max(values.get("NUMX", 0.0), 1.0) * max(values.get("NUMY", 0.0), 1.0))
 
 
-def number(sign: str, text: str, parameters: Parameters) -> Value:
+def number(sign: str, text: str, parameters: QParameters) -> Value:
     """The value of a number or a Q parameter."""
     value = parameters.get(text.upper()) if text[0] in "Qq" else value_of(text)
     return signed(-1.0 if sign == "-" else 1.0, value)
@@ -74,36 +74,36 @@ def number(sign: str, text: str, parameters: Parameters) -> Value:
 # -- forms ------------------------------------------------------------------------------------------------------------
 
 
-def position(values: Values, before: list[Place]) -> Iterator[Place]:
+def position(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
     """POS: one hole, perhaps counted from the one before."""
     x, y = (before[-1].x, before[-1].y) if before else (0.0, 0.0)
     x = values["X"] if "X" in values else x + values.get("IX", 0.0)
     y = values["Y"] if "Y" in values else y + values.get("IY", 0.0)
-    yield Place(x, y, values.get("Z", 0.0))
+    yield HolePosition(x, y, values.get("Z", 0.0))
 
 
-def grid(values: Values, steps: Iterator[tuple[float, float]]) -> Iterator[Place]:
+def grid(values: Values, steps: Iterator[tuple[float, float]]) -> Iterator[HolePosition]:
     """Holes so far from the first along its axes."""
     turn = math.radians(values.get("ROT", 0.0))
     for u, v in steps:
         x = values.get("X", 0.0) + u * math.cos(turn) - v * math.sin(turn)
         y = values.get("Y", 0.0) + u * math.sin(turn) + v * math.cos(turn)
-        yield Place(x, y, values.get("Z", 0.0))
+        yield HolePosition(x, y, values.get("Z", 0.0))
 
 
-def row(values: Values, before: list[Place]) -> Iterator[Place]:
+def row(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
     """ROW: holes on a straight line."""
     return grid(values, ((k * values.get("D", 0.0), 0.0) for k in range(int(values.get("NUM", 0)))))
 
 
-def lines(values: Values, before: list[Place]) -> Iterator[Place]:
+def lines(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
     """PAT: lines of holes."""
     across, along = int(values.get("NUMX", 0)), int(values.get("NUMY", 0))
     dx, dy = values.get("DX", 0.0), values.get("DY", 0.0)
     return grid(values, ((i * dx, j * dy) for j in range(along) for i in range(across)))
 
 
-def frame(values: Values, before: list[Place]) -> Iterator[Place]:
+def frame(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
     """FRAME: the outer holes of PAT."""
     across, along = int(values.get("NUMX", 0)), int(values.get("NUMY", 0))
     dx, dy = values.get("DX", 0.0), values.get("DY", 0.0)
@@ -111,7 +111,7 @@ def frame(values: Values, before: list[Place]) -> Iterator[Place]:
     return grid(values, ((i * dx, j * dy) for i, j in outer))
 
 
-def circle(values: Values, before: list[Place]) -> Iterator[Place]:
+def circle(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
     """CIRC, and PITCHCIRC with the angle from hole to hole, or that of the last one."""
     count = int(values.get("NUM", 0))
     start, step = values.get("START", 0.0), values.get("STEP")
@@ -120,10 +120,10 @@ def circle(values: Values, before: list[Place]) -> Iterator[Place]:
     for k in range(count):
         angle, radius = math.radians(start + k * step), values.get("D", 0.0) / 2
         x, y = values.get("X", 0.0) + radius * math.cos(angle), values.get("Y", 0.0) + radius * math.sin(angle)
-        yield Place(x, y, values.get("Z", 0.0))
+        yield HolePosition(x, y, values.get("Z", 0.0))
 
 
-FORMS: Mapping[str, Callable[[Values, list[Place]], Iterator[Place]]] = {
+FORMS: Mapping[str, Callable[[Values, list[HolePosition]], Iterator[HolePosition]]] = {
     "POS": position,
     "ROW": row,
     "PAT": lines,
@@ -136,7 +136,7 @@ FORMS: Mapping[str, Callable[[Values, list[Place]], Iterator[Place]]] = {
 # -- cycles -----------------------------------------------------------------------------------------------------------
 
 
-def pattern_of_cycle(cycle: int, parameters: Parameters) -> tuple[Place, ...] | None:
+def pattern_of_cycle(cycle: int, parameters: QParameters) -> tuple[HolePosition, ...] | None:
     """The places of cycle 220 or 221, from the Q parameters; None if they are known only at run time."""
     names = CIRCLE_WORDS if cycle == ON_CIRCLE else LINE_WORDS
     known = numbers(parameters.get(name) for name in names.values())

@@ -11,13 +11,13 @@ from ncfix.text.tree import (
     Assignment,
     Command,
     Constant,
-    Flow,
     Item,
     NamedParameter,
     Opaque,
+    OWordLine,
     Span,
+    StringLiteral,
     Template,
-    Text,
     Word,
 )
 from ncfix_heidenhain.klartext.calculate import compiled
@@ -40,7 +40,7 @@ OWN_WORDS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class KlartextPlan:
     """One shape.
 
     name         what the block begins with: `l`, `cycl def 200`, `plane spatial`; empty for words alone
@@ -62,7 +62,7 @@ class Plan:
     codes: tuple[tuple[int, Mapping[str, Evaluate]], ...] = ()
     flags: frozenset[str] = frozenset()
     assignments: tuple[tuple[str, Evaluate], ...] = ()
-    flow: Flow | None = None
+    flow: OWordLine | None = None
     test: Evaluate | None = None
     tool: str | Evaluate | None = None
     statement: tuple[str, Span] | None = None
@@ -144,18 +144,18 @@ def tool_of(words: Sequence[Word]) -> str | Evaluate | None:
     value = next((word.value for word in words if word.address == "TOOL"), None)
     if value is None:
         return None
-    return value.value if isinstance(value, Text) else compiled(value)
+    return value.value if isinstance(value, StringLiteral) else compiled(value)
 
 
-def plan_of(template: Template) -> Plan:
+def plan_of(template: Template) -> KlartextPlan:
     """Work out what the blocks of one shape do."""
     items = template.items
     names = [item.name for item in items if isinstance(item, Command)]
     opening = next(filter(opens_block, names), "")
     words = list(filter(is_motion_word, own_words(items)))
-    flow = next((item for item in items if isinstance(item, Flow)), None)
+    flow = next((item for item in items if isinstance(item, OWordLine)), None)
     opaque = (item for item in items if isinstance(item, Opaque) and item.kind in STATEMENTS)
-    plan = Plan(
+    plan = KlartextPlan(
         name=next((word.address.lower() for word in words if word.address in CORNERS), opening),
         words={word.address: compiled(word.value) for word in words},
         codes=codes_of(items),
@@ -169,4 +169,4 @@ def plan_of(template: Template) -> Plan:
         skip=deletable(template, ""),
         moves=any(word.address in MOVING for word in words) or opening in ALWAYS_MOVING,
     )
-    return replace(plan, empty=plan == Plan())
+    return replace(plan, empty=plan == KlartextPlan())

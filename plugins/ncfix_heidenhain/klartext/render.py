@@ -16,7 +16,7 @@ from ncfix.writer.target import Rendered, Target
 from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text
 from ncfix_heidenhain.klartext.control import BY_DEPTH, FROM_START
 from ncfix_heidenhain.klartext.holes_text import HoleWriter
-from ncfix_heidenhain.klartext.layout import Layout, poles_move
+from ncfix_heidenhain.klartext.layout import KlartextLayout, poles_move
 from ncfix_heidenhain.klartext.poles import is_relied_on, pole_in_force
 
 FloatArray = NDArray[np.float64]
@@ -36,7 +36,7 @@ CLOSED, EXACT = 1e-6, 1e-9
 """Program units: an arc whose ends are nearer is a full circle, and positions that are nearer are the same."""
 
 
-def render(program: Program, block: int, layout: Layout, target: Target) -> Rendered:
+def render(program: Program, block: int, layout: KlartextLayout, target: Target) -> Rendered:
     """Write a motion."""
     return Renderer(program, block, layout, target).render()
 

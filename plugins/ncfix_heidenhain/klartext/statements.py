@@ -9,7 +9,7 @@ from ncfix.control.faults import Fault
 from ncfix.control.passing import Pass, Passing
 from ncfix_heidenhain.klartext.codes import tip_control
 from ncfix_heidenhain.klartext.contours import follow_free
-from ncfix_heidenhain.klartext.control import AFTER_PROBING, PRESET, Control
+from ncfix_heidenhain.klartext.control import AFTER_PROBING, PRESET, KlartextControl
 from ncfix_heidenhain.klartext.flow import KlartextFlow
 from ncfix_heidenhain.klartext.patterns import pattern_of
 from ncfix_heidenhain.klartext.trans import transform
@@ -33,7 +33,7 @@ TARGET = re.compile(r"(Q[LRS]?)(\d+)", re.IGNORECASE)
 CIRCLE = re.compile(r"FN\s*2[34]\b", re.IGNORECASE)
 
 
-def statement(control: Control, flow: KlartextFlow, text: str) -> None:
+def statement(control: KlartextControl, flow: KlartextFlow, text: str) -> None:
     """Do what a statement says; one that is not listed moves nothing."""
     for form, do in STATEMENTS:
         if found := form.match(text):
@@ -44,18 +44,18 @@ def statement(control: Control, flow: KlartextFlow, text: str) -> None:
 # -- other programs ---------------------------------------------------------------------------------------------------
 
 
-def call_program(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def call_program(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """CALL PGM."""
     flow.call_program(match["name"].strip())
 
 
-def select_program(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def select_program(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """SEL PGM: the program that CALL SELECTED PGM calls; one whose name is in a parameter is known only at run time."""
     name = match["name"].strip()
     flow.selected = "" if TARGET.fullmatch(name) else name
 
 
-def call_selected(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def call_selected(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """CALL SELECTED PGM."""
     if flow.selected:
         flow.call_program(flow.selected)
@@ -63,7 +63,7 @@ def call_selected(control: Control, flow: KlartextFlow, match: re.Match[str]) ->
         control.refusal = control.refusal or "the program that is called is chosen at run time"
 
 
-def error(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def error(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """FN 14: the program stops with an error of its own."""
     raise Fault(ERROR, f"the program stops with error {match['number']}", "its own checks refuse its parameters")
 
@@ -71,13 +71,13 @@ def error(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
 # -- what is not followed ---------------------------------------------------------------------------------------------
 
 
-def not_followed(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def not_followed(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """What may change coordinates, or what later blocks do."""
     name = " ".join(match[0].partition(":")[0].split()[:3]).upper()
     control.refusal = control.refusal or f"{name} may change coordinates in a way that is not followed"
 
 
-def free_contour(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def free_contour(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """FL, FLT, FC, FCT."""
     follow_free(control, flow.unit, flow.block - 1)
 
@@ -85,7 +85,7 @@ def free_contour(control: Control, flow: KlartextFlow, match: re.Match[str]) -> 
 # -- what is measured and read ----------------------------------------------------------------------------------------
 
 
-def probe(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def probe(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """TCH PROBE: the control moves on its own, and leaves results in Q parameters, or sets a datum by them."""
     number = int(match["number"])
     if number in SETTING:
@@ -96,12 +96,12 @@ def probe(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
     lose_parameters(control, match[0], IN_A_ROW if number < PROBED[0] else 1)
 
 
-def read_values(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def read_values(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """FN 18, 28 and their like put what they read into a Q parameter; FN 23 and 24 into three in a row."""
     lose_parameters(control, match[0].partition("=")[0], 3 if CIRCLE.match(match[0]) else 1)
 
 
-def lose_parameters(control: Control, text: str, in_a_row: int) -> None:
+def lose_parameters(control: KlartextControl, text: str, in_a_row: int) -> None:
     """The Q parameters that a text names, and those behind them, are known only at run time."""
     for letters, number in TARGET.findall(text):
         for offset in range(in_a_row):
@@ -111,17 +111,17 @@ def lose_parameters(control: Control, text: str, in_a_row: int) -> None:
 # -- coordinates ------------------------------------------------------------------------------------------------------
 
 
-def holes(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def holes(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """PATTERN DEF; the holes of SEL PATTERN are in a table that is not read."""
     control.cycle.places = pattern_of(match[0], control.scope.parameters)
 
 
-def change_coordinates(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def change_coordinates(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """TRANS."""
     transform(control, match[0])
 
 
-def select_preset(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def select_preset(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some."""
     trans = control.transformations
     control.suspended.pop(PRESET, None)
@@ -131,7 +131,7 @@ def select_preset(control: Control, flow: KlartextFlow, match: re.Match[str]) ->
     control.load_preset(f"PRESET{int(match['row'])}")
 
 
-def tcpm(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
+def tcpm(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """FUNCTION TCPM and FUNCTION RESET TCPM."""
     control.suspended.pop("tcpm", None)
     words = "" if match["reset"] else " ".join(match["rest"].upper().split())
@@ -143,7 +143,7 @@ def tcpm(control: Control, flow: KlartextFlow, match: re.Match[str]) -> None:
     tip_control(control, on=not match["reset"])
 
 
-Do = Callable[[Control, KlartextFlow, re.Match[str]], None]
+Do = Callable[[KlartextControl, KlartextFlow, re.Match[str]], None]
 
 FORMS: tuple[tuple[str, Do], ...] = (
     (r"CALL\s+PGM\s*(?P<name>.*)", call_program),

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from ncfix.control.builder import Arc
 from ncfix.control.coordinates import Vector, X, Y
 from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import Kind
-from ncfix_heidenhain.klartext.control import Control
-from ncfix_heidenhain.klartext.targets import Words
+from ncfix.control.moves import MotionKind
+from ncfix_heidenhain.klartext.control import KlartextControl
+from ncfix_heidenhain.klartext.targets import MotionWords
 
 IN_PLANE = 1 << X | 1 << Y
 
@@ -25,32 +25,34 @@ class Step:
     """
 
     name: str
-    words: Words
+    words: MotionWords
     flags: frozenset[str]
     codes: frozenset[int]
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> MotionKind:
         """At FMAX a rapid."""
-        return Kind.RAPID if "fmax" in self.flags else Kind.FEED
+        return MotionKind.RAPID if "fmax" in self.flags else MotionKind.FEED
 
 
-def with_increments(control: Control, on: bool) -> None:
+def with_increments(control: KlartextControl, on: bool) -> None:
     """Whether the words of the next motion count from where it begins."""
     control.modal.incremental = on
 
 
-def somewhere(control: Control, axes: int, target: Vector, unknown: UnknownAxes, reason: str) -> None:
+def somewhere(control: KlartextControl, axes: int, target: Vector, unknown: UnknownAxes, reason: str) -> None:
     """A refused curve that ends nobody knows where: the motion before it must still end where it did."""
     normal = control.rotation[0][2], control.rotation[1][2], control.rotation[2][2]
     control.modal.arc_absolute = True
     control.make(
-        Motion(Kind.ARC, axes | IN_PLANE, target, unknown, 10, refusal=reason, arc=Arc((0.0, 0.0, 0.0), normal, 0.0))
+        Motion(
+            MotionKind.ARC, axes | IN_PLANE, target, unknown, 10, refusal=reason, arc=Arc((0.0, 0.0, 0.0), normal, 0.0)
+        )
     )
     control.modal.arc_absolute = False
     control.path.tangent = None
 
 
-def refuse(control: Control, reason: str) -> None:
+def refuse(control: KlartextControl, reason: str) -> None:
     """A motion that is not followed."""
     control.refuse_here(reason)

@@ -16,7 +16,7 @@ from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X,
 from ncfix.control.faults import Fault
 from ncfix.control.motion import AT_START, UnknownAxes
 from ncfix.control.tcp import along_frame, mixed_into
-from ncfix_heidenhain.klartext.control import SPATIAL, Control
+from ncfix_heidenhain.klartext.control import SPATIAL, KlartextControl
 from ncfix_heidenhain.klartext.plans import MOVING
 
 BAD_POLE = "NCF271"
@@ -28,7 +28,7 @@ PLANE_OF = {frozenset((X, Y)): PLANES[170], frozenset((Z, X)): PLANES[180], froz
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
+class MotionWords:
     """The words of one motion as numbers.
 
     values   address -> value, in program units
@@ -49,7 +49,7 @@ class Words:
         return _counts_on(tuple(self.values))
 
 
-def axis_letters(words: Words) -> tuple[str, ...]:
+def axis_letters(words: MotionWords) -> tuple[str, ...]:
     """The axes that have a word."""
     return _letters_of(tuple(words.values))
 
@@ -88,7 +88,7 @@ class Said:
     frame: tuple[object, ...]
 
 
-def here(control: Control) -> Where:
+def here(control: KlartextControl) -> Where:
     """Where the control stands."""
     said = control.path.said
     if isinstance(said, Said) and control.unknown and said.target is control.position and said.frame == frame(control):
@@ -96,22 +96,22 @@ def here(control: Control) -> Where:
     return Where(control.inner(), inner_unknown(control, control.unknown))
 
 
-def frame(control: Control) -> tuple[object, ...]:
+def frame(control: KlartextControl) -> tuple[object, ...]:
     """What the words of a program mean."""
     return control.rotation, tuple(control.offset), control.modal.unit, control.tcp
 
 
-def inner_unknown(control: Control, unknown: UnknownAxes) -> UnknownAxes:
+def inner_unknown(control: KlartextControl, unknown: UnknownAxes) -> UnknownAxes:
     """What is not known along the axes of the frame."""
     return dict(along_frame(control, unknown))
 
 
-def destination(control: Control, words: Words) -> tuple[Vector, UnknownAxes]:
+def destination(control: KlartextControl, words: MotionWords) -> tuple[Vector, UnknownAxes]:
     """The command at which the motion of a block ends, and what is not known of it."""
     return command_of(control, led(control, words), words.axes)
 
 
-def led(control: Control, words: Words) -> Where:
+def led(control: KlartextControl, words: MotionWords) -> Where:
     """The position to which the words of axes lead."""
     if words.incremental:
         settle(control, words)
@@ -133,7 +133,7 @@ def led(control: Control, words: Words) -> Where:
     return where
 
 
-def derived(control: Control, words: Words, axes: int) -> str:
+def derived(control: KlartextControl, words: MotionWords, axes: int) -> str:
     """Why a motion cannot be said anew by words for all of `axes`: where some stand follows from no word.
 
     Directions of the tool say where its axes go. Polar words, and arcs of which an end has one word, count from a place
@@ -150,13 +150,13 @@ def derived(control: Control, words: Words, axes: int) -> str:
     return "" if index is None else ADRIFT.format(LETTERS[index])
 
 
-def by_spatial_angles(control: Control, words: Words, where: Where) -> None:
+def by_spatial_angles(control: KlartextControl, words: MotionWords, where: Where) -> None:
     """A B C as spatial angles (FUNCTION TCPM AXIS SPAT): where the rotary axes go the control works out."""
     if control.path.spatial and {"A", "B", "C"} & {address.removeprefix("I") for address in words.values}:
         where.unknown |= dict.fromkeys(control.turning, SPATIAL)
 
 
-def settle(control: Control, words: Words) -> None:
+def settle(control: KlartextControl, words: MotionWords) -> None:
     """Increments count from where axes stand: start positions that matter are asked for."""
     wanted = [INDEX[address[1:]] for address in words.values if address[0] == "I" and address[1:] in INDEX]
     if control.is_rotated:
@@ -164,7 +164,7 @@ def settle(control: Control, words: Words) -> None:
     control.settle(wanted)
 
 
-def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, UnknownAxes]:
+def command_of(control: KlartextControl, where: Where, axes: int) -> tuple[Vector, UnknownAxes]:
     """A position as a command; axes without a word stay exactly where they are."""
     target = control.outer(where.inner)
     turned = control.is_rotated and axes & 7
@@ -181,7 +181,7 @@ def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unkno
     return target, found
 
 
-def in_machine(control: Control, words: Words) -> tuple[Vector, UnknownAxes]:
+def in_machine(control: KlartextControl, words: MotionWords) -> tuple[Vector, UnknownAxes]:
     """The command of words in machine coordinates (M91); increments count from the last such position, if any."""
     target, unknown = control.position[:], dict(control.unknown)
     for address, value in words.values.items():
@@ -199,7 +199,7 @@ def in_machine(control: Control, words: Words) -> tuple[Vector, UnknownAxes]:
 # -- poles ------------------------------------------------------------------------------------------------------------
 
 
-def set_pole(control: Control, words: Words) -> None:
+def set_pole(control: KlartextControl, words: MotionWords) -> None:
     """CC: the pole, absolute or from where the tool stands; a coordinate that is left out stays, none takes both."""
     path = control.path
     named = frozenset(
@@ -218,13 +218,13 @@ def set_pole(control: Control, words: Words) -> None:
     path.pole_in = pole_frame(control)
 
 
-def pole_frame(control: Control) -> object:
+def pole_frame(control: KlartextControl) -> object:
     """What the numbers of a pole mean: datum along the axes of its plane, rotation, unit."""
     plane = control.path.plane
     return control.offset[plane.first], control.offset[plane.second], control.rotation, control.modal.unit
 
 
-def polar(control: Control, words: Words) -> tuple[Where, float | None]:
+def polar(control: KlartextControl, words: MotionWords) -> tuple[Where, float | None]:
     """The position that polar words lead to, and by which angle it was reached from the present one (IPA), rad."""
     path = control.path
     if path.pole is None:
@@ -260,7 +260,7 @@ def arm(values: Mapping[str, float], away: tuple[float, float], unit: float) -> 
     return radius, angle
 
 
-def doubt(control: Control, words: Words, start: Where) -> str:
+def doubt(control: KlartextControl, words: MotionWords, start: Where) -> str:
     """Why it is not known where polar words lead from a start; empty if it is."""
     plane = control.path.plane
     if not {"PR", "PA"} <= words.values.keys():
@@ -272,12 +272,12 @@ def doubt(control: Control, words: Words, start: Where) -> str:
     return "" if control.path.pole_in == pole_frame(control) else POLE_MOVED
 
 
-def polar_axes(control: Control, words: Words) -> int:
+def polar_axes(control: KlartextControl, words: MotionWords) -> int:
     """The axes that a motion in polar coordinates moves."""
     return words.axes | 1 << control.path.plane.first | 1 << control.path.plane.second
 
 
-def starts_unknown(control: Control) -> bool:
+def starts_unknown(control: KlartextControl) -> bool:
     """Where the motion begins is not known in X Y Z."""
     control.settle([index for index, why in control.unknown.items() if why is AT_START])
     return any(index in control.unknown for index in (X, Y, Z) if index in control.machine)

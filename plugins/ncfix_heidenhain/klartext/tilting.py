@@ -12,12 +12,12 @@ from collections.abc import Callable, Mapping
 from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
 from ncfix.control.faults import Fault
 from ncfix.control.motion import AT_START, Motion
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.posture import WayRules, machine_directions, normal_of, postures, stands_square
 from ncfix.control.tcp import switch
-from ncfix_heidenhain.klartext.control import MOVED_ALONG, TILTED, Control
-from ncfix_heidenhain.klartext.targets import Words
+from ncfix_heidenhain.klartext.control import MOVED_ALONG, TILTED, KlartextControl
+from ncfix_heidenhain.klartext.targets import MotionWords
 from ncfix_heidenhain.klartext.transformations import euler, from_points, from_vectors, projected, spatial
 
 BAD_PLANE = "NCF273"
@@ -69,7 +69,7 @@ FORMS: Mapping[str, Callable[[Values], Rotation | None]] = {
 }
 
 
-def plane(control: Control, form: str, words: Words, flags: frozenset[str]) -> None:
+def plane(control: KlartextControl, form: str, words: MotionWords, flags: frozenset[str]) -> None:
     """A PLANE block."""
     values = words.values
     if "MB" in values:
@@ -94,7 +94,7 @@ def plane(control: Control, form: str, words: Words, flags: frozenset[str]) -> N
         tilt_to(control, found, flags)
 
 
-def is_idle(control: Control, flags: frozenset[str]) -> bool:
+def is_idle(control: KlartextControl, flags: frozenset[str]) -> bool:
     """Whether the end of a tilt changes nothing: none has begun, and where the rotary axes stand is not asked yet.
 
     Many programs begin with it. Then Q120 to Q122 are not known.
@@ -108,7 +108,7 @@ def is_idle(control: Control, flags: frozenset[str]) -> bool:
     return idle
 
 
-def by_axes(control: Control, values: Values, flags: frozenset[str]) -> None:
+def by_axes(control: KlartextControl, values: Values, flags: frozenset[str]) -> None:
     """PLANE AXIAL: the plane to which rotary axes at these positions make the tool normal."""
     turned = control.position[:]
     for letter in "ABC":
@@ -121,7 +121,7 @@ def by_axes(control: Control, values: Values, flags: frozenset[str]) -> None:
     tilt_to(control, found.axes, flags)
 
 
-def tilt_to(control: Control, tilt: Rotation | None, flags: frozenset[str], refusal: str = "") -> None:
+def tilt_to(control: KlartextControl, tilt: Rotation | None, flags: frozenset[str], refusal: str = "") -> None:
     """Make a tilted plane the frame; None: none."""
     control.transformations.tilt_to(tilt)
     control.suspended.pop(TILTED, None)
@@ -142,7 +142,7 @@ def tilt_to(control: Control, tilt: Rotation | None, flags: frozenset[str], refu
     control.path.tangent = None
 
 
-def chosen_way(control: Control, tilt: Rotation | None, flags: frozenset[str]) -> dict[int, float] | None:
+def chosen_way(control: KlartextControl, tilt: Rotation | None, flags: frozenset[str]) -> dict[int, float] | None:
     """The rotary positions that the control works out, by letter; None where that is not known or not sure.
 
     SEQ (or SYM) says which of the two ways is taken by the sign of the master axis, the one that tilts the tool when
@@ -166,7 +166,7 @@ def chosen_way(control: Control, tilt: Rotation | None, flags: frozenset[str]) -
     return found.chosen
 
 
-def way_home(control: Control) -> dict[int, float] | None:
+def way_home(control: KlartextControl) -> dict[int, float] | None:
     """PLANE RESET with TURN or MOVE: the rotary axes go to their basic position, zero; None where zero is shifted."""
     if any(control.offset[index] for index in control.turning):
         return None
@@ -175,7 +175,7 @@ def way_home(control: Control) -> dict[int, float] | None:
     return dict.fromkeys(control.turning, 0.0)
 
 
-def turn_axes(control: Control, way: dict[int, float] | None) -> None:
+def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
     """TURN and MOVE: the control positions the rotary axes."""
     if way is None:
         control.pass_here(TURNED, POSITIONED, rotary_letters(control))
@@ -186,15 +186,15 @@ def turn_axes(control: Control, way: dict[int, float] | None) -> None:
     target, unknown = control.position[:], {k: why for k, why in control.unknown.items() if k not in way}
     for index, angle in way.items():
         target[index] = angle
-    control.make(Motion(Kind.RAPID, 0, target, unknown, 0, passing=TURNED))
+    control.make(Motion(MotionKind.RAPID, 0, target, unknown, 0, passing=TURNED))
 
 
-def rotary_letters(control: Control) -> str:
+def rotary_letters(control: KlartextControl) -> str:
     """The machine's rotary axes."""
     return "".join("XYZABCUVW"[index] for index in control.turning)
 
 
-def cycle_19(control: Control, words: Words) -> None:
+def cycle_19(control: KlartextControl, words: MotionWords) -> None:
     """Cycle 19: spatial angles, or positions of rotary axes, as a machine parameter says; none ends the tilt.
 
     Where the axes stand tells which of the two is meant.
@@ -222,7 +222,7 @@ def cycle_19(control: Control, words: Words) -> None:
     tilt_to(control, meant, frozenset())
 
 
-def check_normal(control: Control) -> str:
+def check_normal(control: KlartextControl) -> str:
     """Why a motion in the tilted plane is refused: the tool does not stand normal to it."""
     trans = control.transformations
     if not trans.tilted or control.m128 or TILTED in control.suspended:

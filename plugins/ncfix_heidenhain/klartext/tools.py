@@ -10,8 +10,8 @@ import math
 from ncfix.control.coordinates import Z, mask_of, zeros
 from ncfix.control.setup import Tool
 from ncfix.control.tcp import switch
-from ncfix_heidenhain.klartext.control import TOOL, Control
-from ncfix_heidenhain.klartext.targets import Words
+from ncfix_heidenhain.klartext.control import TOOL, KlartextControl
+from ncfix_heidenhain.klartext.targets import MotionWords
 
 NAMED = -1
 """The number that stands for a tool that is called by name."""
@@ -20,7 +20,7 @@ OTHER_AXIS = "the tool axis is {}: only tools along Z are followed"
 AT_RUN_TIME = "the length of the tool is known only at run time"
 
 
-def define_tool(control: Control, tool: str | float | None, words: Words, flags: frozenset[str]) -> None:
+def define_tool(control: KlartextControl, tool: str | float | None, words: MotionWords, flags: frozenset[str]) -> None:
     """TOOL DEF: the length of a tool, where the program brings it."""
     if isinstance(tool, float) and "L" in words.values:
         radius = words.values.get("R")
@@ -28,7 +28,7 @@ def define_tool(control: Control, tool: str | float | None, words: Words, flags:
         control.defined_tools[int(tool)] = Tool(length, None if radius is None else radius * control.unit)
 
 
-def call_tool(control: Control, tool: str | float | None, words: Words, flags: frozenset[str]) -> None:
+def call_tool(control: KlartextControl, tool: str | float | None, words: MotionWords, flags: frozenset[str]) -> None:
     """TOOL CALL: without a number only speed, feed or oversizes are new."""
     if "F" in words.values:
         control.auto_feed = words.values["F"] * control.unit
@@ -60,7 +60,7 @@ def call_tool(control: Control, tool: str | float | None, words: Words, flags: f
     set_length(control, length + words.values.get("DL", 0.0) * control.unit)
 
 
-def tell_radius(control: Control, oversize: float) -> None:
+def tell_radius(control: KlartextControl, oversize: float) -> None:
     """Q108 is the radius of the active tool, in the unit of the program; and contours are offset by it."""
     number = int(control.tools.spindle)
     defined = control.defined_tools.get(number, Tool())
@@ -70,7 +70,7 @@ def tell_radius(control: Control, oversize: float) -> None:
     control.scope.parameters.assign("Q108", (radius or 0.0) / control.unit + oversize, runtime=radius is None)
 
 
-def set_length(control: Control, length: float) -> None:
+def set_length(control: KlartextControl, length: float) -> None:
     """The machine stands still when the length of the tool changes; the tip does not."""
     tool = zeros()
     tool[Z] = length
@@ -80,7 +80,7 @@ def set_length(control: Control, length: float) -> None:
     control.refresh()
 
 
-def length_by_name(control: Control, name: str) -> float:
+def length_by_name(control: KlartextControl, name: str) -> float:
     """The length of a tool that is called by its name, mm; zero if it is lacking."""
     named = control.setup.named_tools.get(name.upper())
     if named is not None and named.length is not None:
@@ -89,7 +89,7 @@ def length_by_name(control: Control, name: str) -> float:
     return 0.0
 
 
-def length_of(control: Control, number: int) -> float:
+def length_of(control: KlartextControl, number: int) -> float:
     """The length of a tool, mm: as the setup has it, else as the program defines it; tool 0 has none."""
     known = control.knowledge.known_tool_length(number)
     if known is not None:

@@ -10,7 +10,7 @@ import re
 
 from ncfix.control.coordinates import INDEX
 from ncfix.text.spelling import value_of
-from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.control import KlartextControl
 
 FORM = re.compile(r"TRANS\s+(?P<kind>MIRROR|ROTATION|SCALE|DATUM)\s*(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
 NUMBER = re.compile(r"(?P<word>IROT|ROT|SCL)\s*(?P<value>[+-]?\s*(\d+([.,]\d*)?|[.,]\d+))\Z", re.IGNORECASE)
@@ -20,7 +20,7 @@ NOT_FOLLOWED = "TRANS {} with words that are not followed"
 BOTH = "TRANS {} and a cycle of the same kind at once: how they add up is not sure"
 
 
-def transform(control: Control, text: str) -> None:
+def transform(control: KlartextControl, text: str) -> None:
     """A TRANS function but DATUM AXIS and DATUM RESET."""
     found = FORM.match(text)
     assert found is not None, "the grammar asks for one of these"
@@ -35,7 +35,7 @@ def transform(control: Control, text: str) -> None:
     control.recompose()
 
 
-def note_source(control: Control, kind: str, *, by_function: bool) -> None:
+def note_source(control: KlartextControl, kind: str, *, by_function: bool) -> None:
     """A transformation is about to be set: notice if the one in force came from the other of cycle and function."""
     trans = control.transformations
     in_force = {"MIRROR": bool(trans.mirror), "ROTATION": trans.turn != 0.0, "SCALE": trans.scale != 1.0}[kind]
@@ -44,7 +44,7 @@ def note_source(control: Control, kind: str, *, by_function: bool) -> None:
     control.functions = control.functions | {kind} if by_function else control.functions - {kind}
 
 
-def put_in_force(control: Control, kind: str, rest: str) -> bool:
+def put_in_force(control: KlartextControl, kind: str, rest: str) -> bool:
     """Do what the words of a function say; False if they are not its own."""
     trans = control.transformations
     reset, number = rest.upper() == "RESET", NUMBER.match(rest)

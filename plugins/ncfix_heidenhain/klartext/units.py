@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ncfix.control.faults import Fault
 from ncfix.control.unit import TextUnit
 from ncfix.text.tree import Program
-from ncfix_heidenhain.klartext.lane_tables import LaneTables
-from ncfix_heidenhain.klartext.plans import Plan, plan_of
+from ncfix_heidenhain.klartext.lane_tables import KlartextLaneTables
+from ncfix_heidenhain.klartext.plans import KlartextPlan, plan_of
 
 NO_BEGIN = "NCF275"
 BEGIN = re.compile(r"BEGIN\s+PGM(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
@@ -19,7 +19,7 @@ UNIT = re.compile(r"\b(MM|INCH)\s*\Z", re.IGNORECASE)
 MM_PER_UNIT = {"MM": 1.0, "INCH": 25.4}
 
 
-class KlartextUnit(TextUnit[Plan]):
+class KlartextUnit(TextUnit[KlartextPlan]):
     """One program.
 
     axes     bit mask of the letters that the machine has
@@ -37,16 +37,16 @@ class KlartextUnit(TextUnit[Plan]):
         super().take(program, begin, stop)
         self.labels = self._found_labels()
 
-    def tables(self) -> LaneTables:
+    def tables(self) -> KlartextLaneTables:
         """See `TextUnit.tables`."""
-        return LaneTables.of(self.program.templates, self.all_plans(), self.axes)
+        return KlartextLaneTables.of(self.program.templates, self.all_plans(), self.axes)
 
     def closed(self) -> NDArray[np.bool_]:
         """See `TextUnit.closed`."""
         closed: NDArray[np.bool_] = ~self.lanes.open
         return closed
 
-    def next_plan(self, block: int) -> Plan | None:
+    def next_plan(self, block: int) -> KlartextPlan | None:
         """What the first block from there on does that does anything but set a pole."""
         plans = map(self.plan, range(block, self.stop))
         return next((plan for plan in plans if not plan.empty and plan.name != "cc"), None)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from ncfix.control.faults import Fault
-from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.control import KlartextControl
 
 UNREADABLE = "NCF236"
 NOT_KLARTEXT = "this line is not understood; if it is no Klartext, the control stops at it"
@@ -28,7 +28,7 @@ FRAME = re.compile(
 )
 
 
-def unread_line(control: Control, text: str) -> None:
+def unread_line(control: KlartextControl, text: str) -> None:
     """A line that could not be read is reached; raises `Fault` if the program may go on elsewhere."""
     if FLOW.match(text):
         raise Fault(UNREADABLE, DECIDES, "correct the line")

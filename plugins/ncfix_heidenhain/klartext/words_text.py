@@ -13,7 +13,7 @@ from ncfix.text.spelling import Spelling, value_of
 from ncfix.text.tree import Literal, Program, Span, Word
 from ncfix.writer.block_words import BlockWriter
 from ncfix.writer.target import Target
-from ncfix_heidenhain.klartext.layout import Layout, tilts
+from ncfix_heidenhain.klartext.layout import KlartextLayout, tilts
 from ncfix_heidenhain.klartext.turns import UNCORRECTED, on_its_side
 
 FloatArray = NDArray[np.float64]
@@ -22,10 +22,10 @@ VECTOR_DIGITS = 7
 """Of components of a direction: 1e-7 rad is 6e-6 degrees; the control takes eight."""
 
 
-class WordWriter(BlockWriter[Layout]):
+class WordWriter(BlockWriter[KlartextLayout]):
     """Puts the words of one block right."""
 
-    def __init__(self, program: Program, block: int, layout: Layout, target: Target) -> None:
+    def __init__(self, program: Program, block: int, layout: KlartextLayout, target: Target) -> None:
         super().__init__(program, block, layout, target)
         self.style = Spelling(signed=True, comma=layout.comma)
         self.own_pole = False

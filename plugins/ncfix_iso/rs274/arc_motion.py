@@ -9,8 +9,8 @@ from ncfix.control.builder import Arc
 from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion
-from ncfix.control.moves import Kind
-from ncfix_iso.rs274.control import Block, Control
+from ncfix.control.moves import MotionKind
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.feeds import check_feed
 from ncfix_iso.rs274.targets import destination
@@ -21,7 +21,7 @@ LATHE_PLANE = 180
 SPIRAL = "the arc winds further than its end says (L, P, Q, or a centre word across its plane)"
 
 
-def arc(control: Control, block: Block, code: int) -> None:
+def arc(control: RS274Control, block: Block, code: int) -> None:
     """An arc, helix or full circle."""
     check_feed(control, block)
     control.modal.motion = code
@@ -43,7 +43,15 @@ def arc(control: Control, block: Block, code: int) -> None:
     sweep = control.handedness * sweep_angle(centre, end, turns, clockwise=clockwise)
     refusal = refusal_of(block, plane) or ("" if control.rules.strict else spiral(block, plane))
     control.make(
-        Motion(Kind.ARC, block.axes, target, unknown, code, refusal=refusal, arc=circle(control, plane, centre, sweep))
+        Motion(
+            MotionKind.ARC,
+            block.axes,
+            target,
+            unknown,
+            code,
+            refusal=refusal,
+            arc=circle(control, plane, centre, sweep),
+        )
     )
 
 
@@ -69,7 +77,7 @@ def spiral(block: Block, plane: Plane) -> str:
     return SPIRAL if winds and "R" not in block.values else ""
 
 
-def check_words(control: Control, block: Block, plane: Plane) -> None:
+def check_words(control: RS274Control, block: Block, plane: Plane) -> None:
     """Raise `Fault` unless the block has the words that an arc in its plane needs."""
     if plane.across > 2:
         raise Fault(ARC_FAULT, "there are no arcs in the planes G17.1, G18.1 and G19.1")
@@ -91,7 +99,7 @@ def check_words(control: Control, block: Block, plane: Plane) -> None:
         raise Fault(ARC_FAULT, f"with absolute centres (G90.1) the arc needs {missing[0]}")
 
 
-def centre_of(control: Control, block: Block, plane: Plane, end: Point, *, clockwise: bool) -> Point:
+def centre_of(control: RS274Control, block: Block, plane: Plane, end: Point, *, clockwise: bool) -> Point:
     """The centre relative to the start, mm; raises `Fault` if the control refuses the arc."""
     unit = control.modal.unit
     if "R" in block.values:
@@ -104,7 +112,7 @@ def centre_of(control: Control, block: Block, plane: Plane, end: Point, *, clock
     return first, second
 
 
-def supposed(control: Control, block: Block, plane: Plane, end: Point) -> str:
+def supposed(control: RS274Control, block: Block, plane: Plane, end: Point) -> str:
     """What may have been meant by an arc that is none: another plane, or X as a diameter, as on lathes."""
     letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
     across = CENTRE_LETTERS[plane.across]
@@ -119,7 +127,7 @@ def supposed(control: Control, block: Block, plane: Plane, end: Point) -> str:
     return "with X as a diameter the arc would be one: is the program for a lathe? X is read as a radius"
 
 
-def circle(control: Control, plane: Plane, centre: Point, sweep: float) -> Arc:
+def circle(control: RS274Control, plane: Plane, centre: Point, sweep: float) -> Arc:
     """The circle in commands."""
     local = [0.0, 0.0, 0.0]
     local[plane.first], local[plane.second] = centre

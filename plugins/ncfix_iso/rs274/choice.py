@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from ncfix.control.faults import Fault
 from ncfix.control.modal import NO_MOTION
-from ncfix_iso.rs274.control import ARCS, Control
+from ncfix_iso.rs274.control import ARCS, RS274Control
 from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS, LENGTH, TURNING_CYCLES
 from ncfix_iso.rs274.motion import BAD_MOTION, NO_CODE
-from ncfix_iso.rs274.plans import Codes, Plan
+from ncfix_iso.rs274.plans import Codes, RS274Plan
 
 WITHOUT_AXES = frozenset((0, 10, *ARCS, 52, NO_MOTION, *TURNING_CYCLES))
 """Motion codes that need no axis word."""
 
 
-def motion_of(control: Control, plan: Plan, codes: Codes) -> int | None:
+def motion_of(control: RS274Control, plan: RS274Plan, codes: Codes) -> int | None:
     """The motion code that a block executes; raises `Fault` where its axis words have no code."""
     has_axes = plan.axes != 0
     if codes.motion is not None:
@@ -31,7 +31,7 @@ def motion_of(control: Control, plan: Plan, codes: Codes) -> int | None:
     return modal if plan.letters & {"I", "J", "K"} and modal in ARCS else None
 
 
-def explicit_motion(control: Control, codes: Codes, motion: int, has_axes: bool) -> int | None:
+def explicit_motion(control: RS274Control, codes: Codes, motion: int, has_axes: bool) -> int | None:
     """The motion code that a block names, if it is executed."""
     if codes.takes and motion != NO_MOTION:
         only_modal(control, motion, "two G codes of the block both use its axis words")
@@ -44,14 +44,14 @@ def explicit_motion(control: Control, codes: Codes, motion: int, has_axes: bool)
     return motion
 
 
-def only_modal(control: Control, motion: int, fault: str) -> None:
+def only_modal(control: RS274Control, motion: int, fault: str) -> None:
     """A motion code that comes into force and moves nothing yet; LinuxCNC refuses it."""
     if control.rules.strict:
         raise Fault(BAD_MOTION, fault)
     control.modal.motion = motion
 
 
-def without_code(control: Control) -> int:
+def without_code(control: RS274Control) -> int:
     """Axis words while no motion code is in force."""
     if control.rules.strict:
         raise Fault(BAD_MOTION, "axis words, and no motion code is in force", "G0 or G1 is missing")

@@ -14,7 +14,7 @@ from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_iso.rs274.groups import RULES, Rules
 from ncfix_iso.rs274.own_codes import with_own_codes
-from ncfix_iso.rs274.parameters import Parameters, Store
+from ncfix_iso.rs274.parameters import NumberedParameters, Store
 
 RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
 
@@ -58,7 +58,7 @@ class Block:
         return self.values.get(letter, default)
 
 
-class Control(shared.Control):
+class RS274Control(shared.ProgramControl):
     """Everything that the steps of a block read and change.
 
     rules      what the dialect makes of codes
@@ -75,7 +75,7 @@ class Control(shared.Control):
         super().__init__(run, dialect)
         self.rules: Rules = with_own_codes(rules or RULES[dialect.semantics], dialect)
         self.needs_feed = self.modal.retract_to_r = self.rules.strict
-        self.parameters = Parameters()
+        self.parameters = NumberedParameters()
         self.saved: list[Saved | None] = [None]
         self.extended: dict[str, Mapping[str, float]] = {}
         self.extended_name = ""
@@ -88,7 +88,7 @@ class Control(shared.Control):
         self.refresh()
 
     def lasting(self) -> str | None:
-        """See `Control`."""
+        """See `RS274Control`."""
         modal, parameters, knowledge = self.modal, self.parameters, self.knowledge
         cycle = replace(modal.cycle, initial=None)
         kept = [each for name, each in vars(self).items() if name not in PASSING]
@@ -97,11 +97,11 @@ class Control(shared.Control):
         return repr(kept)
 
     def set_variables(self) -> Store:
-        """See `Control`: the numbered parameters."""
+        """See `RS274Control`: the numbered parameters."""
         return self.parameters.numbers.copy()
 
     def take_variables(self, variables: Store) -> None:
-        """See `Control`."""
+        """See `RS274Control`."""
         self.parameters.numbers = variables.copy()
 
     def path_word(self, words: Collection[str]) -> str:

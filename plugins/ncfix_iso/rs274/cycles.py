@@ -11,9 +11,9 @@ import math
 from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot, mask_of
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import FeedMode, Kind
+from ncfix.control.moves import FeedMode, MotionKind
 from ncfix.control.tcp import lost_in_frame, lost_of_axes
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.systems import check_system, words_of
 from ncfix_iso.rs274.targets import by_radius_and_angle, unknown_after, unnamed
@@ -24,7 +24,7 @@ NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870:
 """Words without which LinuxCNC refuses to begin a cycle."""
 
 
-def cycle(control: Control, block: Block, code: int) -> None:
+def cycle(control: RS274Control, block: Block, code: int) -> None:
     """Drill the holes of one block."""
     modal, plane = control.modal, control.modal.plane
     check_cycle(control, block, code)
@@ -42,7 +42,7 @@ def cycle(control: Control, block: Block, code: int) -> None:
         drill(control, block, code, program, depth, r, clear)
 
 
-def check_cycle(control: Control, block: Block, code: int) -> None:
+def check_cycle(control: RS274Control, block: Block, code: int) -> None:
     """Raise `Fault` where LinuxCNC refuses a cycle."""
     if not control.rules.strict:
         return
@@ -61,7 +61,7 @@ def check_cycle(control: Control, block: Block, code: int) -> None:
         raise Fault(BAD_CYCLE, "Q, the depth of one peck, must be positive")
 
 
-def take_words(control: Control, block: Block, code: int, plane: Plane) -> None:
+def take_words(control: RS274Control, block: Block, code: int, plane: Plane) -> None:
     """Take R and the depth from the block, or keep those in force."""
     sticky = control.modal.cycle
     in_force = control.modal.motion == code or (not control.rules.strict and sticky.initial is not None)
@@ -79,7 +79,7 @@ def take_words(control: Control, block: Block, code: int, plane: Plane) -> None:
     sticky.runtime |= bool(block.runtime & {level_letter, depth_letter})
 
 
-def levels(control: Control, initial: float) -> tuple[float, float]:
+def levels(control: RS274Control, initial: float) -> tuple[float, float]:
     """R and the depth in the program's frame."""
     sticky = control.modal.cycle
     r, depth = control.modal.unit * sticky.r, control.scale[control.modal.plane.across] * sticky.depth
@@ -91,7 +91,7 @@ def levels(control: Control, initial: float) -> tuple[float, float]:
     return r, depth
 
 
-def repeats(control: Control, block: Block, code: int) -> int:
+def repeats(control: RS274Control, block: Block, code: int) -> int:
     """How many times the block drills: L, or K of most ISO controls."""
     letter = next((each for each in control.rules.repeats_of(code) if each in block.values), "L")
     count = whole(block.get(letter, 1.0), letter)
@@ -104,7 +104,7 @@ def repeats(control: Control, block: Block, code: int) -> int:
     return count
 
 
-def place_hole(control: Control, block: Block, program: Vector) -> None:
+def place_hole(control: RS274Control, block: Block, program: Vector) -> None:
     """Move `program` over the next hole."""
     plane, unit = control.modal.plane, control.modal.unit
     given = {plane.across}
@@ -123,7 +123,9 @@ def place_hole(control: Control, block: Block, program: Vector) -> None:
             program[index] = step + control.scale[index] * block.values[letter]
 
 
-def drill(control: Control, block: Block, code: int, program: Vector, depth: float, r: float, clear: float) -> None:
+def drill(
+    control: RS274Control, block: Block, code: int, program: Vector, depth: float, r: float, clear: float
+) -> None:
     """One hole: a motion by way of R to its bottom, after which the control stands at `clear` above it."""
     across = control.modal.plane.across
     unknown = hole_unknown(control, block)
@@ -137,7 +139,7 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
     settles = 0 if control.modal.incremental else block.axes | 1 << across
     if control.rules.strict:
         control.builder.rests(mask_of(control.turning))
-    control.make(Motion(Kind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, settles=settles))
+    control.make(Motion(MotionKind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, settles=settles))
     at_level = control.rules.ends_at_level(code, control.modal.retract_to_r)
     if not at_level:
         control.places.lose(adrift & 1 << across)
@@ -147,7 +149,7 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
         control.unknown = lost_of_axes(control, {**unknown, across: height})
 
 
-def hole_unknown(control: Control, block: Block) -> UnknownAxes:
+def hole_unknown(control: RS274Control, block: Block) -> UnknownAxes:
     """Which axes are not known at the bottom of a hole."""
     modal = control.modal
     unknown = dict(unknown_after(control, block, modal.incremental, lost_in_frame(control)))
@@ -163,7 +165,7 @@ def hole_unknown(control: Control, block: Block) -> UnknownAxes:
     return unknown
 
 
-def command(control: Control, block: Block, program: Vector) -> Vector:
+def command(control: RS274Control, block: Block, program: Vector) -> Vector:
     """The command of a point in the program's frame; axes that the cycle does not move stay exactly where they are."""
     plane = control.modal.plane
     inner = [dot(row, program) for row in control.rotation] + program[3:] if control.is_rotated else program

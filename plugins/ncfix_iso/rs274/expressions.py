@@ -23,7 +23,7 @@ from ncfix.control.expressions import (
     remainder,
 )
 from ncfix.control.faults import Fault
-from ncfix.text.tree import NamedParameter, Parameter
+from ncfix.text.tree import NamedParameter, NumberedParameter
 
 EQUAL = 1e-6
 """Two numbers are equal that differ by less."""
@@ -108,7 +108,7 @@ class ParameterExpressions(Expressions):
         """`#<name>`."""
         return lambda scope: scope.parameters.named(name)
 
-    def existence(self, parameter: Parameter | NamedParameter) -> Evaluate:
+    def existence(self, parameter: NumberedParameter | NamedParameter) -> Evaluate:
         """`EXISTS[...]`: 1 or 0."""
         if isinstance(parameter, NamedParameter):
             name = parameter.name

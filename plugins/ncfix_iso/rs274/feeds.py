@@ -9,12 +9,12 @@ import math
 
 from ncfix.control.faults import Fault
 from ncfix.control.moves import FeedMode
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 
 NO_FEED = "NCF225"
 
 
-def feed_mode(control: Control, block: Block, code: int) -> None:
+def feed_mode(control: RS274Control, block: Block, code: int) -> None:
     """G93, G94, G95. In LinuxCNC a feed per minute or revolution has to be given anew after its code."""
     mode = code // 10
     if mode != control.modal.feed_mode or (control.rules.strict and mode != FeedMode.INVERSE_TIME):
@@ -23,19 +23,19 @@ def feed_mode(control: Control, block: Block, code: int) -> None:
     control.modal.feed_mode = mode
 
 
-def feed(control: Control, block: Block, code: int) -> None:
+def feed(control: RS274Control, block: Block, code: int) -> None:
     """F."""
     unit = 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
     control.modal.feed = math.nan if "F" in block.runtime else unit * block.values["F"]
     control.modal.feed_given = control.modal.feed != 0.0
 
 
-def speed(control: Control, block: Block, code: int) -> None:
+def speed(control: RS274Control, block: Block, code: int) -> None:
     """S."""
     control.modal.speed = block.values["S"]
 
 
-def check_feed(control: Control, block: Block) -> None:
+def check_feed(control: RS274Control, block: Block) -> None:
     """Raise `Fault` where LinuxCNC refuses a motion for want of a feed."""
     if not control.needs_feed:
         return

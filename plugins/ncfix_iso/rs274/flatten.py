@@ -18,10 +18,10 @@ from ncfix.control.flatten import RUNTIME, Change, FlatLine, Flattener
 from ncfix.control.unit import TextUnit
 from ncfix.diagnostics import SourceError
 from ncfix.text.spelling import Spelling, decimals_for
-from ncfix.text.tree import Assignment, Comment, Constant, Literal, Opaque, Parameter, Word
-from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, Control
+from ncfix.text.tree import Assignment, Comment, Constant, Literal, NumberedParameter, Opaque, Word
+from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
 from ncfix_iso.rs274.groups import Rules
-from ncfix_iso.rs274.plans import Codes, Plan
+from ncfix_iso.rs274.plans import Codes, RS274Plan
 
 if TYPE_CHECKING:
     from ncfix_iso.rs274.interpreter import RS274Interpreter
@@ -50,11 +50,11 @@ class RS274Flattener(Flattener):
     """
 
     with_blank = True
-    plan: Plan
+    plan: RS274Plan
     codes: Codes
     values: Block
 
-    def __init__(self, control: Control, steps: Mapping[str, float], limit: int) -> None:
+    def __init__(self, control: RS274Control, steps: Mapping[str, float], limit: int) -> None:
         super().__init__(steps, limit)
         self.control = control
         self.carry: dict[str, float] = {}
@@ -62,18 +62,18 @@ class RS274Flattener(Flattener):
 
     # -- what the interpreter tells -----------------------------------------------------------------------------------
 
-    def whole(self, unit: TextUnit[Plan], block: int) -> None:
+    def whole(self, unit: TextUnit[RS274Plan], block: int) -> None:
         """A block as it stands."""
         self.watch(unit, block)
         self.write(unit.program.text_of(block))
 
-    def head(self, unit: TextUnit[Plan], block: int, keyword: str) -> None:
+    def head(self, unit: TextUnit[RS274Plan], block: int, keyword: str) -> None:
         """The number of the main program; those of others, and all other flow control, fall away."""
         if keyword == "program" and not self.headed and not unit.external:
             self.headed = True
             self.whole(unit, block)
 
-    def stretch(self, unit: TextUnit[Plan], start: int, count: int) -> None:
+    def stretch(self, unit: TextUnit[RS274Plan], start: int, count: int) -> None:
         """Blocks of plain words."""
         for block in range(start, start + count):
             self.watch(unit, block)
@@ -83,7 +83,7 @@ class RS274Flattener(Flattener):
         """The words of the block as they are written."""
         return self.unit.program.templates[self.unit.template[self.block]].words
 
-    def words(self, unit: TextUnit[Plan], index: int, plan: Plan, codes: Codes, block: Block) -> None:
+    def words(self, unit: TextUnit[RS274Plan], index: int, plan: RS274Plan, codes: Codes, block: Block) -> None:
         """A block of words that has been executed."""
         self.watch(unit, index)
         self.plan, self.codes, self.values = plan, codes, block
@@ -145,7 +145,7 @@ class RS274Flattener(Flattener):
     def assignment(self, item: Assignment) -> Change:
         """It falls away, unless the control does something with it (offsets, for one) or keeps it."""
         target, rules = item.target, self.control.rules
-        if isinstance(target, Parameter) and isinstance(target.index, Literal):
+        if isinstance(target, NumberedParameter) and isinstance(target.index, Literal):
             number = round(float(self.unit.program.values_of(self.block)[target.index.slot]))
             if rules.system(number) or rules.lasting(number):
                 return self.replaced(item.span, f"#{number}={self.value_of(number)}")

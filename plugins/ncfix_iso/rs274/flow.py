@@ -15,8 +15,8 @@ from functools import partial
 
 from ncfix.control.expressions import Evaluate
 from ncfix.control.faults import Fault
-from ncfix.control.flow import NO_LABEL, NO_SUBPROGRAM, Call, Flow, Jump, Let, OpenCall, Operation
-from ncfix_iso.rs274.control import Control
+from ncfix.control.flow import NO_LABEL, NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow
+from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit
 from ncfix_iso.rs274.settings import restore
@@ -47,7 +47,7 @@ def oword(name: str) -> str:
     return f"o{label}" if label.isdigit() else f"o<{label}>"
 
 
-class OWords(Flow[RS274Unit]):
+class OWords(ProgramFlow[RS274Unit]):
     """Where execution stands, and where o-words take it.
 
     name             the full name of the label of the o-word that is executed
@@ -64,7 +64,7 @@ class OWords(Flow[RS274Unit]):
     most_calls = MAX_CALLS
     too_deep = f"subprograms are nested more than {MAX_CALLS} deep at {{}}"
 
-    def __init__(self, control: Control, main: RS274Unit, find: Callable[[str], RS274Unit | None]) -> None:
+    def __init__(self, control: RS274Control, main: RS274Unit, find: Callable[[str], RS274Unit | None]) -> None:
         super().__init__(main, control.budget)
         self.control = control
         self.find = find
@@ -142,7 +142,7 @@ class OWords(Flow[RS274Unit]):
     # -- the walk -----------------------------------------------------------------------------------------------------
 
     def arrive(self) -> bool:
-        """See `Flow`; while skipping: go to the next o-word of this text."""
+        """See `ProgramFlow`; while skipping: go to the next o-word of this text."""
         if self.skipping is not None:
             at = bisect_left(self.unit.flows, self.block)
             if at == len(self.unit.flows):
@@ -265,7 +265,7 @@ class OWords(Flow[RS274Unit]):
         self.finish()
 
     def finish(self, kind: str = "", *, again: bool = True) -> None:
-        """See `Flow`."""
+        """See `ProgramFlow`."""
         self.skipping = None
         super().finish(kind, again=again)
 

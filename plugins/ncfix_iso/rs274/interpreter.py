@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 from ncfix.control.coordinates import LETTERS, N_LETTERS, mask_of
 from ncfix.control.expressions import Unknown
 from ncfix.control.faults import Fault
-from ncfix.control.flow import NEVER_ENDS, WAITS, Flow
+from ncfix.control.flow import NEVER_ENDS, WAITS, ProgramFlow
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.text.language import Run
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
 from ncfix_iso.rs274.choice import motion_of
-from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, Control
+from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE
 from ncfix_iso.rs274.expressions import number_of, whole
 from ncfix_iso.rs274.flow import OWords
 from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS, LENGTH, NON_MODAL
 from ncfix_iso.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix_iso.rs274.order import DWELL, MACHINE, MOTIONS
-from ncfix_iso.rs274.plans import Codes, Plan, RS274Unit, grouped_codes, has_words
+from ncfix_iso.rs274.plans import Codes, RS274Plan, RS274Unit, grouped_codes, has_words
 from ncfix_iso.rs274.settings import unknown_code
 from ncfix_iso.rs274.wordcheck import check_words
 
@@ -47,7 +47,7 @@ DWELL_TIME = "PUX"
 INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not followed"
 
 
-def may_increment(control: Control, letter: str) -> bool:
+def may_increment(control: RS274Control, letter: str) -> bool:
     """Whether a letter is an axis to some controls of a family, and an increment of another axis to others."""
     return not control.rules.strict and letter in "UVW"
 
@@ -55,17 +55,17 @@ def may_increment(control: Control, letter: str) -> bool:
 class RS274Interpreter(Interpreter[RS274Unit]):
     """Follows one program."""
 
-    control: Control
+    control: RS274Control
     watcher: RS274Flattener | None
 
-    def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
+    def __init__(self, control: RS274Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
         self.axes = mask_of(control.machine)
         self.main = RS274Unit(program, control.rules, self.axes)
         self.flow = self.prepared()
         systems.load_setup(control)
 
-    def prepared(self) -> Flow[RS274Unit]:
+    def prepared(self) -> ProgramFlow[RS274Unit]:
         """Give the control its own parameters; where execution begins."""
         control = self.control
         flow = OWords(control, self.main, self.find)
@@ -96,7 +96,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         """See `Interpreter`."""
         return WAITS if self.control.refusal == RUNTIME_BRANCH else NEVER_ENDS
 
-    def lane_is_open(self, plan: Plan) -> bool:
+    def lane_is_open(self, plan: RS274Plan) -> bool:
         """See `Interpreter`; not while something is done between motions."""
         return plan.lane is not None and not self.control.unnamed
 
@@ -115,7 +115,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
-    def execute(self, plan: Plan, unit: RS274Unit, block: int) -> bool:
+    def execute(self, plan: RS274Plan, unit: RS274Unit, block: int) -> bool:
         """Execute a block; True if the program ends there."""
         if plan.tape:
             if self.watcher:
@@ -131,7 +131,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             return self.flow.follow(operations) and self.beside_statement(plan, block)
         return self.execute_words(plan, block)
 
-    def beside_statement(self, plan: Plan, index: int) -> bool:
+    def beside_statement(self, plan: RS274Plan, index: int) -> bool:
         """Execute the words that stand beside the number of a program that begins there (not in LinuxCNC)."""
         begins = plan.flow is not None and plan.flow.keyword == "program"
         if self.control.rules.strict or not begins or not has_words(plan):
@@ -150,12 +150,12 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             raise fault
         return True
 
-    def may_lead(self, plan: Plan) -> bool:
+    def may_lead(self, plan: RS274Plan) -> bool:
         """Whether a tape may begin behind a block of this shape."""
         items = plan.template.items
         return not items or (not self.control.rules.strict and all(isinstance(item, Comment) for item in items))
 
-    def execute_words(self, plan: Plan, index: int) -> bool:
+    def execute_words(self, plan: RS274Plan, index: int) -> bool:
         """Execute a block of words and assignments."""
         control = self.control
         if plan.unread:
@@ -181,7 +181,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             self.watcher.words(self.flow.unit, index, plan, codes, block)
         return self.after(codes, block)
 
-    def motion_of(self, plan: Plan, codes: Codes) -> int | None:
+    def motion_of(self, plan: RS274Plan, codes: Codes) -> int | None:
         """The motion code that a block executes."""
         return motion_of(self.control, plan, codes)
 
@@ -190,7 +190,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         for step, code in codes.steps:
             step(self.control, block, code)
 
-    def evaluate(self, plan: Plan, index: int) -> Block:
+    def evaluate(self, plan: RS274Plan, index: int) -> Block:
         """The values of a block; its assignments take effect when all have been read."""
         control = self.control
         numbers, first = control.numbers, control.first
@@ -207,7 +207,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         self.span = None
         return Block(index, values, frozenset(runtime), plan.axes)
 
-    def assign(self, plan: Plan) -> None:
+    def assign(self, plan: RS274Plan) -> None:
         """Set the parameters that a block sets, all at once."""
         parameters = self.control.parameters
         pending = []
@@ -221,7 +221,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         for key, value, runtime in pending:
             parameters.assign(key, value, runtime)
 
-    def computed_codes(self, plan: Plan) -> Codes:
+    def computed_codes(self, plan: RS274Plan) -> Codes:
         """The codes of a block in which some are computed."""
         at_runtime = False
         pairs: list[tuple[Word, int]] = []
@@ -238,7 +238,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             self.control.refusal = self.control.refusal or "a G or M code is known only at run time"
         return grouped_codes(pairs, plan.letters, self.control.rules)
 
-    def unknown_codes(self, plan: Plan, codes: Codes) -> None:
+    def unknown_codes(self, plan: RS274Plan, codes: Codes) -> None:
         """G codes that are not known."""
         spans = {
             w.value.value: w.span for w in plan.template.words if w.address == "G" and isinstance(w.value, Constant)
@@ -248,7 +248,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             unknown_code(self.control, code, moving=bool(plan.axes) or "H" in plan.letters)
         self.span = None
 
-    def note_foreign(self, plan: Plan) -> None:
+    def note_foreign(self, plan: RS274Plan) -> None:
         """Note axes that the program moves and the machine lacks."""
         control = self.control
         for index in range(N_LETTERS):

@@ -14,7 +14,7 @@ from ncfix.text.tree import Program, Word
 from ncfix.writer.render import BlockRenderer
 from ncfix.writer.target import Rendered, Target
 from ncfix_iso.rs274.blocks import parse_block
-from ncfix_iso.rs274.control import Control
+from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.groups import RULES
 from ncfix_iso.rs274.interpreter import RS274Interpreter
 
@@ -58,7 +58,7 @@ RS274 = Language(
     end=tape_end,
     scan=scan,
     parse=parse_block,
-    control=Control,
+    control=RS274Control,
     interpreter=RS274Interpreter,
     layout=writable,
     alike=True,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ncfix.control.coordinates import LETTERS, Vector, X, Y, Z, mask_of, zeros
 from ncfix.control.faults import Fault
 from ncfix.control.tcp import switch
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.systems import BAD_G10, SYSTEM_NAMES, first_parameter, set_system, stored, words_of
 
@@ -23,12 +23,12 @@ DIFFERS = "what G10 L{} sets differs from control to control (--dialect says whi
 # -- tool numbers -----------------------------------------------------------------------------------------------------
 
 
-def select_tool(control: Control, block: Block, code: int) -> None:
+def select_tool(control: RS274Control, block: Block, code: int) -> None:
     """T: the tool that the next M6 puts into the spindle."""
     control.tools.selected = whole(block.values["T"], "T")
 
 
-def change_tool(control: Control, block: Block, code: int) -> None:
+def change_tool(control: RS274Control, block: Block, code: int) -> None:
     """M6, for which machines go where tools are changed, and M61 Qn, which only says what is in the spindle."""
     if code == 610:
         control.tools.selected = whole(block.get("Q", -1.0), "Q of M61")
@@ -42,7 +42,7 @@ def change_tool(control: Control, block: Block, code: int) -> None:
 # -- length offsets ---------------------------------------------------------------------------------------------------
 
 
-def tool_offset(control: Control, block: Block, code: int) -> None:
+def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     """G43, G43.1, G43.2, G43.4, G43.5, G44 and G49.
 
     An offset without any length (H0, G43.1 Z0) is none: how long the tool is, the one in the spindle tells. One that
@@ -64,7 +64,7 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
     control.refresh()
 
 
-def offset_of(control: Control, block: Block, code: int) -> tuple[Vector, int | None, bool]:
+def offset_of(control: RS274Control, block: Block, code: int) -> tuple[Vector, int | None, bool]:
     """What a code sets: the offset, the number of its tool (None without one), and whether its length is lacking."""
     if code == 490:
         return zeros(), None, False
@@ -75,7 +75,7 @@ def offset_of(control: Control, block: Block, code: int) -> tuple[Vector, int | 
     return tool, number, number > 0 and is_lacking(control, number)
 
 
-def offset_by_words(control: Control, block: Block, *, added: bool) -> tuple[Vector, int]:
+def offset_by_words(control: RS274Control, block: Block, *, added: bool) -> tuple[Vector, int]:
     """G43.1: the axis words are the offset; G43.2: they, or the length of tool H, are added to it."""
     tool = control.offsets.tool[:]
     number = control.tools.spindle if control.tools.offset is None else control.tools.offset
@@ -90,7 +90,7 @@ def offset_by_words(control: Control, block: Block, *, added: bool) -> tuple[Vec
     return tool, number
 
 
-def numbered_tool(control: Control, block: Block) -> int:
+def numbered_tool(control: RS274Control, block: Block) -> int:
     """The tool that H names; without H, and with H0 in LinuxCNC, the one in the spindle."""
     if "H" not in block.values:
         return control.tools.spindle
@@ -100,12 +100,12 @@ def numbered_tool(control: Control, block: Block) -> int:
     return control.tools.spindle if number == 0 and control.rules.strict else number
 
 
-def is_lacking(control: Control, number: int) -> bool:
+def is_lacking(control: RS274Control, number: int) -> bool:
     """Whether nobody has said how long a tool is."""
     return number not in control.tools.lengths and control.knowledge.known_tool_length(number) is None
 
 
-def length_of(control: Control, number: int) -> float:
+def length_of(control: RS274Control, number: int) -> float:
     """The length of a tool for an offset, mm."""
     if number in control.tools.measured:
         control.refusal = control.refusal or f"the length of tool {number} is measured at run time"
@@ -119,7 +119,7 @@ def length_of(control: Control, number: int) -> float:
 # -- G10 --------------------------------------------------------------------------------------------------------------
 
 
-def set_data(control: Control, block: Block, code: int) -> None:
+def set_data(control: RS274Control, block: Block, code: int) -> None:
     """G10: L2 and L20 set a coordinate system, L1, L10 and L11 a tool.
 
     Where controls differ: P0 is the system in force or the external one, and in G91 words are set or added.
@@ -136,7 +136,7 @@ def set_data(control: Control, block: Block, code: int) -> None:
         raise Fault(BAD_G10, "G10 needs L1, L2, L10, L11 or L20")
 
 
-def set_tool(control: Control, block: Block, kind: int) -> None:
+def set_tool(control: RS274Control, block: Block, kind: int) -> None:
     """G10 L1: the Z word is the tool's length; L10, L11: it is what Z is to be called with that tool."""
     number = whole(block.get("P", -1.0), "P of G10")
     if number < 1:

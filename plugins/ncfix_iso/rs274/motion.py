@@ -5,10 +5,10 @@ from __future__ import annotations
 from ncfix.control.coordinates import INDEX, N_LETTERS, Vector, mask_of, rotated
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import FeedMode, Kind
+from ncfix.control.moves import FeedMode, MotionKind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.tcp import from_machine
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.feeds import check_feed
 from ncfix_iso.rs274.systems import REFERENCES, is_given, store, stored
 from ncfix_iso.rs274.targets import destination, machine_destination
@@ -38,14 +38,14 @@ REFUSALS = {
 }
 
 
-def straight(control: Control, block: Block, code: int) -> None:
+def straight(control: RS274Control, block: Block, code: int) -> None:
     """G0 and G1; with G53 in machine coordinates."""
     if code:
         check_feed(control, block)
     control.modal.motion = control.modal.straight = code
     if not block.axes:
         return
-    kind = Kind.FEED if code else Kind.RAPID
+    kind = MotionKind.FEED if code else MotionKind.RAPID
     computed = block.runtime & INDEX.keys()
     if computed and control.probes_nominally:
         measured(control, block, computed, kind, code)
@@ -54,7 +54,7 @@ def straight(control: Control, block: Block, code: int) -> None:
     control.make(Motion(kind, block.axes, target, unknown, code))
 
 
-def measured(control: Control, block: Block, computed: frozenset[str], kind: Kind, code: int) -> None:
+def measured(control: RS274Control, block: Block, computed: frozenset[str], kind: MotionKind, code: int) -> None:
     """A straight motion to a place of which some words are computed from what nominal probing has found.
 
     The control goes on computing them. A block put in would have to do so too, and so would a word for such an axis in
@@ -69,7 +69,7 @@ def measured(control: Control, block: Block, computed: frozenset[str], kind: Kin
     control.places.lose(axes)
 
 
-def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
+def in_machine_coordinates(control: RS274Control, block: Block, code: int) -> None:
     """G53 with G0 or G1; where neither is in force, ISO controls go there in rapid."""
     if code not in (0, 10):
         if control.rules.strict:
@@ -84,22 +84,22 @@ def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
     control.modal.motion = modal
     if block.axes:
         target, unknown = machine_destination(control, block)
-        kind = Kind.FEED if code else Kind.RAPID
+        kind = MotionKind.FEED if code else MotionKind.RAPID
         control.make(Motion(kind, block.axes, target, unknown, code, passing=MACHINE_COORDINATES))
         if control.modal.incremental:
             control.lose([index for index in range(N_LETTERS) if block.axes >> index & 1], AFTER_G53)
 
 
-def one_way(control: Control, block: Block, code: int) -> None:
+def one_way(control: RS274Control, block: Block, code: int) -> None:
     """G60: a rapid to the words from one side (ISO controls)."""
     target, unknown = destination(control, block)
-    control.make(Motion(Kind.RAPID, block.axes, target, unknown, 0))
+    control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
 
 
 # -- reference points -------------------------------------------------------------------------------------------------
 
 
-def go_to_reference(control: Control, block: Block, code: int) -> None:
+def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
     """G28 and G30: by way of the words to the reference point, along the axes named, or along all."""
     name = f"G{code // 10}"
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(name))
@@ -108,13 +108,13 @@ def go_to_reference(control: Control, block: Block, code: int) -> None:
     way, unknown = destination(control, block)
     control.offset_checked = checked
     if way != control.position or (block.axes and not control.modal.incremental):
-        control.make(Motion(Kind.RAPID, block.axes, way, unknown, modal, passing=passing))
+        control.make(Motion(MotionKind.RAPID, block.axes, way, unknown, modal, passing=passing))
     axes = block.axes or sum(1 << index for index in control.machine)
     target, unknown = reference_target(control, name, axes)
-    control.make(Motion(Kind.RAPID, block.axes, target, unknown, modal, passing=passing))
+    control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, modal, passing=passing))
 
 
-def reference_target(control: Control, name: str, axes: int) -> tuple[Vector, UnknownAxes]:
+def reference_target(control: RS274Control, name: str, axes: int) -> tuple[Vector, UnknownAxes]:
     """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
     first = REFERENCES[name]
     target, unknown = along(control, stored(control, first), axes), dict(control.unknown)
@@ -129,7 +129,7 @@ def reference_target(control: Control, name: str, axes: int) -> tuple[Vector, Un
     return target, unknown
 
 
-def along(control: Control, point: Vector, axes: int) -> Vector:
+def along(control: RS274Control, point: Vector, axes: int) -> Vector:
     """The position moved to a point along some letters of the program's frame, turned as that is (LinuxCNC)."""
     if not control.is_rotated or axes & 3 in (0, 3):
         return [point[i] if axes >> i & 1 else value for i, value in enumerate(control.position)]
@@ -139,14 +139,14 @@ def along(control: Control, point: Vector, axes: int) -> Vector:
     return [a + b for a, b in zip(rotated(control.rotation, mixed), control.offset, strict=True)]
 
 
-def assumed(control: Control, name: str) -> bool:
+def assumed(control: RS274Control, name: str) -> bool:
     """Whether a reference point that is not given counts as zero."""
     if control.setup.assume_zero:
         control.knowledge.reference_point(name)
     return control.setup.assume_zero
 
 
-def save_reference(control: Control, block: Block, code: int) -> None:
+def save_reference(control: RS274Control, block: Block, code: int) -> None:
     """G28.1 and G30.1: the position becomes the reference point."""
     control.settle(tuple(control.unknown))
     first = REFERENCES[f"G{code // 10}"]
@@ -157,7 +157,7 @@ def save_reference(control: Control, block: Block, code: int) -> None:
 # -- probing ----------------------------------------------------------------------------------------------------------
 
 
-def probe(control: Control, block: Block, code: int) -> None:
+def probe(control: RS274Control, block: Block, code: int) -> None:
     """G38.2 to G38.5, and G31 of ISO controls: towards the words until the probe switches."""
     if control.rules.strict:
         if not control.modal.feed_given:
@@ -176,14 +176,14 @@ def probe(control: Control, block: Block, code: int) -> None:
     led = 7 if control.is_rotated and block.axes & 7 else 0
     named = [index for index in moved if (block.axes | led) >> index & 1]
     ends = unknown | {index: AFTER_PROBING for index in named if index in control.machine}
-    control.make(Motion(Kind.FEED, block.axes, target, ends, code, passing=PROBING))
+    control.make(Motion(MotionKind.FEED, block.axes, target, ends, code, passing=PROBING))
     program = control.program_position()
     for index in range(N_LETTERS):
         control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
     control.parameters.assign(5070, 1.0, runtime=True)
 
 
-def probe_nominally(control: Control, block: Block, target: Vector, unknown: UnknownAxes, code: int) -> None:
+def probe_nominally(control: RS274Control, block: Block, target: Vector, unknown: UnknownAxes, code: int) -> None:
     """Probing that ends where the setup says; what is computed from it is computed anew at run time."""
     control.knowledge.probing()
     touched = {letter: value for letter, value in (control.setup.probed or {}).items() if letter in block.values}
@@ -192,7 +192,7 @@ def probe_nominally(control: Control, block: Block, target: Vector, unknown: Unk
         incremental, control.modal.incremental = control.modal.incremental, False
         target, unknown = destination(control, Block(block.index, values, frozenset(), block.axes))
         control.modal.incremental = incremental
-    control.make(Motion(Kind.FEED, block.axes, target, unknown, code, passing=PROBING))
+    control.make(Motion(MotionKind.FEED, block.axes, target, unknown, code, passing=PROBING))
     program = control.program_position()
     for index in range(N_LETTERS):
         control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
@@ -202,7 +202,7 @@ def probe_nominally(control: Control, block: Block, target: Vector, unknown: Unk
 # -- followed only as far as their end --------------------------------------------------------------------------------
 
 
-def refused(control: Control, block: Block, code: int) -> None:
+def refused(control: RS274Control, block: Block, code: int) -> None:
     """Splines and threads: the end is followed, the path is not."""
     if code in (330, 331, 760):
         control.modal.motion = code
@@ -214,44 +214,44 @@ def refused(control: Control, block: Block, code: int) -> None:
         control.modal.motion = code
     target, unknown = destination(control, block)
     before, known = control.position, control.unknown
-    control.make(Motion(Kind.FEED, block.axes, target, unknown, code, refusal=REFUSALS[code]))
+    control.make(Motion(MotionKind.FEED, block.axes, target, unknown, code, refusal=REFUSALS[code]))
     if code == 331:
         control.position, control.unknown, control.said = before, known, None
 
 
-def end_spline(control: Control, block: Block, code: int) -> None:
+def end_spline(control: RS274Control, block: Block, code: int) -> None:
     """G5.3: the spline that the G5.2 blocks described is done."""
     if control.modal.motion != 52:
         raise Fault(BAD_MOTION, "G5.3 ends a spline, and none was begun with G5.2")
     control.modal.motion = -1
 
 
-def turning_cycle(control: Control, block: Block, code: int) -> None:
+def turning_cycle(control: RS274Control, block: Block, code: int) -> None:
     """G70 to G72 of turning: where it goes is written elsewhere in the program."""
     unknown = dict(control.unknown)
     for letter in "XZ":
         if INDEX[letter] in control.machine:
             unknown[INDEX[letter]] = AFTER_CYCLE
     refusal = f"turning cycle (G{code / 10:g})"
-    control.make(Motion(Kind.FEED, block.axes, control.position[:], unknown, code, refusal=refusal))
+    control.make(Motion(MotionKind.FEED, block.axes, control.position[:], unknown, code, refusal=refusal))
 
 
-def at_power_on(control: Control, block: Block, code: int) -> None:
+def at_power_on(control: RS274Control, block: Block, code: int) -> None:
     """Axis words before the first motion code: a setting of ISO controls says whether G0 or G1 is in force then
     (Fanuc: parameter 3402). Both end at the same place; a block put in would have to name one, so none may be."""
     target, unknown = destination(control, block)
     whole, control.whole = control.whole, True
-    control.make(Motion(Kind.RAPID, block.axes, target, unknown, 0))
+    control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
     control.whole = whole
 
 
-def dwell(control: Control, block: Block, code: int) -> None:
+def dwell(control: RS274Control, block: Block, code: int) -> None:
     """G4."""
     if control.rules.strict and block.get("P", -1.0) == -1.0:
         raise Fault(BAD_MOTION, "G4 needs P, the time in seconds")
-    control.make(Motion(Kind.DWELL, 0, control.position, control.unknown, control.modal.motion, passing=DWELL))
+    control.make(Motion(MotionKind.DWELL, 0, control.position, control.unknown, control.modal.motion, passing=DWELL))
 
 
-def cancel(control: Control, block: Block, code: int) -> None:
+def cancel(control: RS274Control, block: Block, code: int) -> None:
     """G80: no motion code is in force; on ISO controls the one before the cycle is again."""
     control.modal.motion = code if control.rules.strict else control.modal.straight

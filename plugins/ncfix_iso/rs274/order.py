@@ -11,7 +11,7 @@ from functools import partial
 from ncfix.control.operations import Operation
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.arc_motion import arc
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.cycles import cycle
 from ncfix_iso.rs274.feeds import feed, feed_mode, speed
 from ncfix_iso.rs274.groups import Rules
@@ -46,7 +46,7 @@ from ncfix_iso.rs274.shifts import rotate_system, shift_system
 from ncfix_iso.rs274.systems import select_system
 from ncfix_iso.rs274.targets import destination
 
-Step = Callable[[Control, Block, int], None]
+Step = Callable[[RS274Control, Block, int], None]
 
 FIRST: tuple[tuple[str, Step], ...] = ((groups.FEED_MODE, feed_mode),)
 """What comes before the words F, S and T, by G group."""
@@ -58,7 +58,7 @@ INPUTS = 5399
 """The parameter in which M66 leaves what it read."""
 
 
-def read_input(control: Control, block: Block, code: int) -> None:
+def read_input(control: RS274Control, block: Block, code: int) -> None:
     """M66 reads an input: the value is known only at run time."""
     if code == 660:
         control.parameters.assign(INPUTS, 0.0, runtime=True)
@@ -122,7 +122,7 @@ MOTIONS: Mapping[int, Step] = {
 Steps = tuple[tuple[Step, int], ...]
 
 
-def carry_out(operations: Sequence[Operation], control: Control, block: Block, code: int) -> None:
+def carry_out(operations: Sequence[Operation], control: RS274Control, block: Block, code: int) -> None:
     """A code of the dialect's own."""
     for operation in operations:
         operation.carry_out(control, block, partial(destination, control, block))

@@ -36,7 +36,7 @@ Store = dict[Key, Value]
 
 
 @dataclass(slots=True)
-class Parameters:
+class NumberedParameters:
     """All parameters.
 
     numbers     numbered parameters that have been set; others are 0

@@ -22,11 +22,11 @@ from ncfix.text.tree import (
     Assignment,
     Comment,
     Constant,
-    Flow,
     Literal,
     NamedParameter,
+    NumberedParameter,
     Opaque,
-    Parameter,
+    OWordLine,
     Program,
     Span,
     Tape,
@@ -96,7 +96,7 @@ class FlowLine:
 
 
 @dataclass(slots=True)
-class Plan:
+class RS274Plan:
     """What is done with every block of a shape.
 
     literals     (address, slot) of words with a plain number
@@ -140,7 +140,7 @@ class Plan:
         return next((word.span for word in self.template.words if word.address == address), None)
 
 
-class RS274Unit(TextUnit[Plan]):
+class RS274Unit(TextUnit[RS274Plan]):
     """The text of a program, or of a subprogram file, on a machine with some axes (a bit mask of their letters).
 
     flows  the blocks that are flow control, ascending
@@ -153,10 +153,10 @@ class RS274Unit(TextUnit[Plan]):
     def take(self, program: Program, begin: int, stop: int) -> None:
         """See `TextUnit.take`."""
         super().take(program, begin, stop)
-        leading = [any(isinstance(item, Flow) for item in template.items) for template in program.templates]
+        leading = [any(isinstance(item, OWordLine) for item in template.items) for template in program.templates]
         self.flows = self.blocks_of([shape for shape, leads in enumerate(leading) if leads])
 
-    def _planned(self, template: Template) -> Plan:
+    def _planned(self, template: Template) -> RS274Plan:
         plan = plan_of(template, self.rules)
         if plan.axes & ~self.axes:
             plan.lane = None
@@ -172,9 +172,9 @@ def words_of(words: Sequence[Word], address: str) -> list[Word]:
     return [word for word in words if word.address == address]
 
 
-def plan_of(template: Template, rules: Rules) -> Plan:
+def plan_of(template: Template, rules: Rules) -> RS274Plan:
     """The plan for a shape."""
-    plan = Plan(template)
+    plan = RS274Plan(template)
     take_values(plan, rules)
     take_statements(plan, rules)
     take_codes(plan, rules)
@@ -182,7 +182,7 @@ def plan_of(template: Template, rules: Rules) -> Plan:
     return plan
 
 
-def take_values(plan: Plan, rules: Rules) -> None:
+def take_values(plan: RS274Plan, rules: Rules) -> None:
     """The words that come as values to the steps of the block."""
     words = plan.template.words
     standby = words_of(words, "T")[1:] if TOOL_CHANGE in plan.template.m_codes else []
@@ -200,7 +200,7 @@ def take_values(plan: Plan, rules: Rules) -> None:
         plan.axes |= 1 << INDEX["X"] | 1 << INDEX["Y"]
 
 
-def take_aliases(plan: Plan, rules: Rules) -> None:
+def take_aliases(plan: RS274Plan, rules: Rules) -> None:
     """Words that a code of the dialect's own gives to the code of the family that it stands for."""
     codes = [(w.address, round(10 * w.value.value)) for w in plan.template.words if isinstance(w.value, Constant)]
     for code in codes:
@@ -217,18 +217,18 @@ def take_aliases(plan: Plan, rules: Rules) -> None:
         plan.letters = kept | {family[own] for own in plan.letters & family.keys()} | plan.fixed.keys()
 
 
-def take_statements(plan: Plan, rules: Rules) -> None:
+def take_statements(plan: RS274Plan, rules: Rules) -> None:
     """What the block is besides words."""
     items = plan.template.items
     plan.assignments = tuple(assignment(item, rules) for item in items if isinstance(item, Assignment))
-    plan.flow = next((flow_line(item, rules) for item in items if isinstance(item, Flow)), None)
+    plan.flow = next((flow_line(item, rules) for item in items if isinstance(item, OWordLine)), None)
     plan.skip = deletable(plan.template, DWELL_WORDS)
     plan.tape = any(isinstance(item, Tape) for item in items)
     opaque = {item.kind: item.span for item in items if isinstance(item, Opaque)}
     plan.unread, plan.command = UNREAD in opaque, opaque.get("command")
 
 
-def take_codes(plan: Plan, rules: Rules) -> None:
+def take_codes(plan: RS274Plan, rules: Rules) -> None:
     """The codes of the block, by group if they are plain numbers."""
     words = [word for word in plan.template.words if word.address in "GM"]
     plain = [(word, round(10 * word.value.value)) for word in words if isinstance(word.value, Constant)]
@@ -241,12 +241,12 @@ def take_codes(plan: Plan, rules: Rules) -> None:
         plan.fault = fault
 
 
-def has_words(plan: Plan) -> bool:
+def has_words(plan: RS274Plan) -> bool:
     """Whether words stand beside the statement of a block."""
     return bool(plan.letters or plan.assignments or plan.template.g_codes or plan.template.m_codes)
 
 
-def flow_line(item: Flow, rules: Rules) -> FlowLine:
+def flow_line(item: OWordLine, rules: Rules) -> FlowLine:
     """A flow-control line with its expressions as functions."""
     label = item.label if isinstance(item.label, str) else rules.compiled(item.label, "")
     return FlowLine(label, item.keyword, tuple(rules.compiled(each, "") for each in item.arguments), item.span)
@@ -254,7 +254,7 @@ def flow_line(item: Flow, rules: Rules) -> FlowLine:
 
 def assignment(item: Assignment, rules: Rules) -> tuple[int | str | Evaluate, Evaluate, Span]:
     """Target and value of an assignment; a name as it is, a number as a function."""
-    assert isinstance(item.target, NamedParameter | Parameter), "this family has no arrays"
+    assert isinstance(item.target, NamedParameter | NumberedParameter), "this family has no arrays"
     target = item.target.name if isinstance(item.target, NamedParameter) else rules.compiled(item.target.index, "")
     return target, rules.compiled(item.value, ""), item.span
 
@@ -332,7 +332,7 @@ def enter_m(codes: dict[str, int], word: Word, code: int, rules: Rules) -> None:
         raise Fault(UNKNOWN_M, f"M{code / 10:g} is not a code of LinuxCNC", span=word.span)
 
 
-def lane_of(plan: Plan) -> Lane | None:
+def lane_of(plan: RS274Plan) -> Lane | None:
     """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
     codes, slots = plan.codes, dict(plan.literals)
     if codes is None or not only_moves(codes) or not is_plain(plan):
@@ -350,7 +350,7 @@ def lane_of(plan: Plan) -> Lane | None:
     return None if ambiguous or lane.motion not in (-1, 20, 30) else lane
 
 
-def is_plain(plan: Plan) -> bool:
+def is_plain(plan: RS274Plan) -> bool:
     """Whether a block has words of motions only, with plain numbers, and no place without a point that it needs."""
     if plan.unread or plan.command or plan.computed or not plan.letters <= LANE_LETTERS | ARC_LETTERS:
         return False

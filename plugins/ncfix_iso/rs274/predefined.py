@@ -11,7 +11,7 @@ from functools import partial
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.expressions import Value
-from ncfix_iso.rs274.control import Control
+from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.flow import OWords
 
 VERSION = 2.9
@@ -20,13 +20,13 @@ VERSION = 2.9
 Getter = Callable[[], Value]
 
 
-def install(control: Control, flow: OWords) -> None:
+def install(control: RS274Control, flow: OWords) -> None:
     """Give a control its own parameters."""
     control.parameters.live = numbered(control)
     control.parameters.predefined = positions(control) | modes(control) | machine(control) | program(control, flow)
 
 
-def numbered(control: Control) -> dict[int, Getter]:
+def numbered(control: RS274Control) -> dict[int, Getter]:
     """Numbered parameters: tool number and data (5400 ..), position in program units (5420 ..)."""
     getters: dict[int, Getter] = {5420 + index: partial(control.coordinate, index) for index in range(9)}
     getters[5400] = lambda: float(control.tools.spindle)
@@ -41,12 +41,12 @@ def number_or_zero(value: float) -> float:
     return 0.0 if math.isnan(value) else value
 
 
-def positions(control: Control) -> dict[str, Getter]:
+def positions(control: RS274Control) -> dict[str, Getter]:
     """`_x` to `_w`: where the control stands in program units."""
     return {f"_{letter.lower()}": partial(control.coordinate, index) for index, letter in enumerate(LETTERS)}
 
 
-def modes(control: Control) -> dict[str, Getter]:
+def modes(control: RS274Control) -> dict[str, Getter]:
     """The modal state."""
 
     def flag(name: str, value: object) -> Getter:
@@ -77,7 +77,7 @@ def modes(control: Control) -> dict[str, Getter]:
     }
 
 
-def feed(control: Control) -> float:
+def feed(control: RS274Control) -> float:
     """F in program units."""
     unit = 1.0 if control.modal.feed_mode == 93 else control.modal.unit
     return number_or_zero(control.modal.feed) / unit
@@ -88,7 +88,7 @@ def system_code(system: int) -> int:
     return 530 + 10 * system if system < 7 else 584 + system
 
 
-def machine(control: Control) -> dict[str, Getter]:
+def machine(control: RS274Control) -> dict[str, Getter]:
     """What the control knows of itself. `_task` is 0: the program is looked through, not run."""
     constants = {
         "_vmajor": VERSION,
@@ -114,7 +114,7 @@ def machine(control: Control) -> dict[str, Getter]:
     return getters
 
 
-def program(control: Control, flow: OWords) -> dict[str, Getter]:
+def program(control: RS274Control, flow: OWords) -> dict[str, Getter]:
     """Where in the program execution stands, and what the last subprogram returned."""
     return {
         "_line": lambda: float(flow.unit.program.line(flow.block - 1)),

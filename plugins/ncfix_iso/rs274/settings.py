@@ -11,7 +11,7 @@ import math
 from ncfix.control.coordinates import INCH, PLANES
 from ncfix.control.faults import Fault
 from ncfix.control.modal import Modal, Saved
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import activate
 
 BAD_SETTING = "NCF221"
@@ -34,36 +34,36 @@ ENDS = {150: "polar", 500: "scaling", 501: "mirror", 131: "polar plane", 1130: "
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
 
 
-def plane(control: Control, block: Block, code: int) -> None:
+def plane(control: RS274Control, block: Block, code: int) -> None:
     """G17, G18, G19, and G17.1 to G19.1."""
     if control.modal.compensated and control.rules.strict and PLANES[code] is not control.modal.plane:
         raise Fault(BAD_SETTING, "the plane cannot be changed while cutter compensation is on")
     control.modal.plane = PLANES[code]
 
 
-def units(control: Control, block: Block, code: int) -> None:
+def units(control: RS274Control, block: Block, code: int) -> None:
     """G20 and G21."""
     control.modal.unit = INCH if code == 200 else 1.0
     control.refresh()
 
 
-def diameter(control: Control, block: Block, code: int) -> None:
+def diameter(control: RS274Control, block: Block, code: int) -> None:
     """G7 and G8."""
     control.modal.diameter = code == 70
     control.refresh()
 
 
-def distance(control: Control, block: Block, code: int) -> None:
+def distance(control: RS274Control, block: Block, code: int) -> None:
     """G90 and G91."""
     control.modal.incremental = code == 910
 
 
-def arc_distance(control: Control, block: Block, code: int) -> None:
+def arc_distance(control: RS274Control, block: Block, code: int) -> None:
     """G90.1 and G91.1."""
     control.modal.arc_absolute = code == 901
 
 
-def retract(control: Control, block: Block, code: int) -> None:
+def retract(control: RS274Control, block: Block, code: int) -> None:
     """G98 and G99."""
     control.modal.retract_to_r = code == 990
 
@@ -72,7 +72,7 @@ NO_REGISTER = -1
 """The D of a program that has named none: no tool has this number, so the radius is not known."""
 
 
-def compensation(control: Control, block: Block, code: int) -> None:
+def compensation(control: RS274Control, block: Block, code: int) -> None:
     """G40 to G42.1: the programmed contour is followed, the control offsets it."""
     side = 0 if code == 400 else code // 10
     if control.rules.strict and side:
@@ -95,13 +95,13 @@ def compensation(control: Control, block: Block, code: int) -> None:
     control.modal.compensated = side
 
 
-def select_radius(control: Control, block: Block, code: int) -> None:
+def select_radius(control: RS274Control, block: Block, code: int) -> None:
     """D, by which ISO controls know the radius of the cutter from there on; LinuxCNC takes it beside G41 only."""
     if not control.rules.strict:
         control.tools.register = NO_REGISTER if "D" in block.runtime else round(block.values["D"])
 
 
-def unfollowed(control: Control, block: Block, code: int) -> None:
+def unfollowed(control: RS274Control, block: Block, code: int) -> None:
     """Scaling, mirroring, polar coordinates and tilted planes: refused for as long as they are in force."""
     if code in UNFOLLOWED:
         if code == 510 and not block.axes and not block.values.keys() & {"I", "J", "K", "P"}:
@@ -112,7 +112,7 @@ def unfollowed(control: Control, block: Block, code: int) -> None:
         control.lose(control.machine, AFTER_UNFOLLOWED)
 
 
-def unknown_code(control: Control, code: int, *, moving: bool) -> None:
+def unknown_code(control: RS274Control, code: int, *, moving: bool) -> None:
     """A G code that is not known: it may change coordinates, or move."""
     name = f"G{code / 10:g}"
     if control.rules.strict:
@@ -123,7 +123,7 @@ def unknown_code(control: Control, code: int, *, moving: bool) -> None:
 # -- saved states -----------------------------------------------------------------------------------------------------
 
 
-def spindle_or_state(control: Control, block: Block, code: int) -> None:
+def spindle_or_state(control: RS274Control, block: Block, code: int) -> None:
     """M3, M4, M5, M19, and M70 to M73 that save and restore the modal state."""
     match code:
         case 700 | 730:
@@ -139,7 +139,7 @@ def spindle_or_state(control: Control, block: Block, code: int) -> None:
             control.modal.spindle = 5 if code == 190 else code // 10
 
 
-def restore(control: Control, saved: Modal) -> None:
+def restore(control: RS274Control, saved: Modal) -> None:
     """Take a saved modal state into force; the motion code and canned cycle are not part of it."""
     now = control.modal
     restored = copy.copy(saved)

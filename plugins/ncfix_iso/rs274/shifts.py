@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ncfix.control.coordinates import IDENTITY, LETTERS, N_LETTERS, about, mask_of, product, zeros
 from ncfix.control.faults import Fault
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.settings import ENDS, unfollowed
 from ncfix_iso.rs274.systems import (
     SHIFT,
@@ -23,7 +23,7 @@ from ncfix_iso.rs274.systems import (
 SHIFT_ACTIVE = 5210
 
 
-def shift_system(control: Control, block: Block, code: int) -> None:
+def shift_system(control: RS274Control, block: Block, code: int) -> None:
     """G52 and G92: shift all coordinate systems, by the words or so that the position gets their values."""
     if code in (520, 920) and not block.axes:
         if control.rules.strict:
@@ -54,7 +54,7 @@ def shift_system(control: Control, block: Block, code: int) -> None:
         control.places.shift(mask_of(i for i in control.machine if before[i] != after[i] or i in doubtful))
 
 
-def set_local(control: Control, block: Block, *, cancelled: bool) -> None:
+def set_local(control: RS274Control, block: Block, *, cancelled: bool) -> None:
     """G52 of ISO controls, which is not the shift of G92; G92 takes it away along the axes that it names."""
     offsets, local = control.offsets, control.offsets.local[:]
     for index in words_of(block):
@@ -65,7 +65,7 @@ def set_local(control: Control, block: Block, *, cancelled: bool) -> None:
     control.refresh()
 
 
-def set_shift(control: Control, block: Block, *, from_position: bool) -> None:
+def set_shift(control: RS274Control, block: Block, *, from_position: bool) -> None:
     """The shift that the words ask for."""
     shift = control.offsets.shift[:]
     if from_position:
@@ -79,7 +79,7 @@ def set_shift(control: Control, block: Block, *, from_position: bool) -> None:
     control.offsets.shift = shift
 
 
-def rotate_system(control: Control, block: Block, code: int) -> None:
+def rotate_system(control: RS274Control, block: Block, code: int) -> None:
     """G68 X Y R turns the coordinates of the plane about a point, G69 ends it."""
     before = control.offsets.rotation
     if code == 680 and (why := uncertain(control, block)):
@@ -98,7 +98,7 @@ def rotate_system(control: Control, block: Block, code: int) -> None:
     control.places.shift(mask_of(control.unnamed))
 
 
-def uncertain(control: Control, block: Block) -> str:
+def uncertain(control: RS274Control, block: Block) -> str:
     """Why a rotation (G68) is not certain; empty if it is."""
     if "R" not in block.values:
         return "the angle of the rotation (G68) is not in the program"
@@ -109,7 +109,7 @@ def uncertain(control: Control, block: Block) -> str:
     return ""
 
 
-def turn_about_point(control: Control, block: Block, before: tuple[tuple[float, float, float], ...]) -> None:
+def turn_about_point(control: RS274Control, block: Block, before: tuple[tuple[float, float, float], ...]) -> None:
     """Put a rotation by R about the words of the plane into force, on top of another."""
     plane = control.modal.plane
     centre = control.program_position()

@@ -25,7 +25,7 @@ from ncfix.control.coordinates import (
 from ncfix.control.expressions import nominal
 from ncfix.control.faults import Fault
 from ncfix.control.motion import UnknownAxes
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 
 SYSTEM_NAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
@@ -48,7 +48,7 @@ def first_parameter(system: int) -> int:
     return 5201 + 20 * system
 
 
-def load_setup(control: Control) -> None:
+def load_setup(control: RS274Control) -> None:
     """Fill the parameters with what the setup gives, and switch G54 on."""
     tables = [(control.setup.work_offsets, name, first_parameter(i)) for i, name in enumerate(SYSTEM_NAMES, 1)]
     tables += [(control.setup.references, code, first) for code, first in REFERENCES.items()]
@@ -67,20 +67,20 @@ def parameter_key(name: str) -> int | str:
     return int(bare) if bare.isdigit() else bare.strip("<>").replace(" ", "").lower()
 
 
-def stored(control: Control, first: int) -> Vector:
+def stored(control: RS274Control, first: int) -> Vector:
     """Nine parameters as a position, mm and rad."""
     values = control.parameters.numbers
     scales = (DEGREE if turning else 1.0 for turning in control.rotary)
     return [nominal(values.get(first + index, 0.0)) * scale for index, scale in enumerate(scales)]
 
 
-def store(control: Control, first: int, index: int, value: float, runtime: bool) -> None:
+def store(control: RS274Control, first: int, index: int, value: float, runtime: bool) -> None:
     """One number of a position, mm or rad, into its parameter."""
     degrees = value / DEGREE if control.rotary[index] else value
     control.parameters.assign(first + index, degrees, runtime)
 
 
-def is_given(control: Control, first: int, index: int) -> bool:
+def is_given(control: RS274Control, first: int, index: int) -> bool:
     """Whether a parameter of a coordinate system or reference point has been given by setup or program."""
     return first + index in control.parameters.numbers
 
@@ -93,7 +93,7 @@ def words_of(block: Block) -> list[int]:
 # -- selecting --------------------------------------------------------------------------------------------------------
 
 
-def moved_while_turned(control: Control, what: str) -> None:
+def moved_while_turned(control: RS274Control, what: str) -> None:
     """The origin is moved while coordinates are turned, mirrored or tilted: refused until they are not.
 
     LinuxCNC knows only turns of the work offset itself, and what they do.
@@ -102,13 +102,13 @@ def moved_while_turned(control: Control, what: str) -> None:
         control.suspended[TURNED] = MOVED_WHILE_TURNED.format(what)
 
 
-def turned_back(control: Control) -> None:
+def turned_back(control: RS274Control) -> None:
     """Coordinates are no longer turned: where the axes stand after an origin that was moved is not known."""
     if control.offsets.rotation == IDENTITY and not control.tilted and control.suspended.pop(TURNED, ""):
         control.lose(control.machine, AFTER_TURNED)
 
 
-def select_system(control: Control, block: Block, code: int) -> None:
+def select_system(control: RS274Control, block: Block, code: int) -> None:
     """G54 to G59.3, and G54.1 Pn."""
     before = control.modal.system, control.extended_name
     take_system(control, block, code)
@@ -116,7 +116,7 @@ def select_system(control: Control, block: Block, code: int) -> None:
         moved_while_turned(control, f"G{code / 10:g}")
 
 
-def take_system(control: Control, block: Block, code: int) -> None:
+def take_system(control: RS274Control, block: Block, code: int) -> None:
     """Take another work offset into force, if it is another."""
     if code == 541:
         extended_system(control, block)
@@ -127,7 +127,7 @@ def take_system(control: Control, block: Block, code: int) -> None:
         activate(control, system)
 
 
-def activate(control: Control, system: int) -> None:
+def activate(control: RS274Control, system: int) -> None:
     """Take a coordinate system's offset and rotation into force."""
     control.modal.system = system
     control.offsets.origin = stored(control, first_parameter(system))
@@ -140,13 +140,13 @@ def activate(control: Control, system: int) -> None:
     control.refresh()
 
 
-def turn_of(control: Control, system: int) -> Rotation:
+def turn_of(control: RS274Control, system: int) -> Rotation:
     """The rotation of a coordinate system (G10 R)."""
     angle = nominal(control.parameters.numbers.get(first_parameter(system) + 9, 0.0))
     return about(PLANES[170], angle) if angle else IDENTITY
 
 
-def mark_shaky(control: Control) -> None:
+def mark_shaky(control: RS274Control) -> None:
     """Note which letters have an offset that is known only at run time."""
     if control.probes_nominally:
         return
@@ -160,7 +160,7 @@ def mark_shaky(control: Control) -> None:
     control.shaky = dict.fromkeys(sorted(marked), RUNTIME_OFFSET)
 
 
-def extended_system(control: Control, block: Block) -> None:
+def extended_system(control: RS274Control, block: Block) -> None:
     """G54.1 Pn: an additional work offset, `G54.1P1` in the setup."""
     name = f"G54.1P{whole(block.get('P', 1.0), 'P of G54.1')}"
     given = control.extended.get(name, control.setup.work_offsets.get(name))
@@ -180,7 +180,7 @@ def extended_system(control: Control, block: Block) -> None:
 # -- what has to be given ---------------------------------------------------------------------------------------------
 
 
-def check_system(control: Control) -> None:
+def check_system(control: RS274Control) -> None:
     """The coordinate system in force is used: it is given, or lacking."""
     control.offset_checked = True
     name = SYSTEM_NAMES[control.modal.system - 1]
@@ -189,7 +189,7 @@ def check_system(control: Control) -> None:
         control.knowledge.work_offset(name)
 
 
-def before_persistent(control: Control, number: int) -> None:
+def before_persistent(control: RS274Control, number: int) -> None:
     """A parameter between 5161 and 5390 is read: if it is one that the setup should give, it has to be there."""
     if number in control.parameters.numbers:
         return
@@ -206,7 +206,7 @@ def before_persistent(control: Control, number: int) -> None:
 # -- setting ----------------------------------------------------------------------------------------------------------
 
 
-def set_system(control: Control, block: Block, *, at_position: bool) -> None:
+def set_system(control: RS274Control, block: Block, *, at_position: bool) -> None:
     """G10 L2 and L20: the axis words are the new offset, or what the present position is to be called."""
     system = whole(block.get("P"), "P of G10") or control.modal.system
     if not 1 <= system <= len(SYSTEM_NAMES):
@@ -232,7 +232,7 @@ def set_system(control: Control, block: Block, *, at_position: bool) -> None:
         control.places.shift(mask_of(words_of(block)) | (mask_of((X, Y)) if "R" in block.values else 0))
 
 
-def origin_for_position(control: Control, block: Block, system: int, origin: Vector) -> tuple[Vector, UnknownAxes]:
+def origin_for_position(control: RS274Control, block: Block, system: int, origin: Vector) -> tuple[Vector, UnknownAxes]:
     """The origin with which the control stands at the words of the block in that system, and where it is doubtful."""
     turn = turn_of(control, system)
     involved = {*words_of(block), *((X, Y) if turn is not IDENTITY and block.axes & 3 else ())}

@@ -13,7 +13,7 @@ from ncfix.control.expressions import nominal
 from ncfix.control.faults import Fault
 from ncfix.control.motion import UnknownAxes
 from ncfix.control.tcp import from_machine, lost_in_frame, lost_of_axes
-from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import check_system
 
 AFTER_ROTATION = "where the axis {} goes after G68 or G69 differs from control to control until both axes are named"
@@ -21,13 +21,13 @@ RUNTIME = "where the axis {} stands is known only at run time"
 POLAR = "NCF223"
 
 
-def destination(control: Control, block: Block) -> tuple[Vector, UnknownAxes]:
+def destination(control: RS274Control, block: Block) -> tuple[Vector, UnknownAxes]:
     """The command at which a motion of this block ends."""
     target, unknown = words_destination(control, block)
     return (target, unknown | unnamed(control, block)) if control.unnamed else (target, unknown)
 
 
-def unnamed(control: Control, block: Block) -> UnknownAxes:
+def unnamed(control: RS274Control, block: Block) -> UnknownAxes:
     """Axes of the plane that cannot be known until both are named, after a rotation has gone on or off (G68, G69)."""
     named = {index for index in control.unnamed if block.axes >> index & 1}
     if not named:
@@ -42,7 +42,7 @@ def unnamed(control: Control, block: Block) -> UnknownAxes:
     return dict.fromkeys(sorted(doubtful & {*control.machine}), AFTER_ROTATION)
 
 
-def words_destination(control: Control, block: Block) -> tuple[Vector, UnknownAxes]:
+def words_destination(control: RS274Control, block: Block) -> tuple[Vector, UnknownAxes]:
     """The command to which the words of a block lead."""
     incremental = control.modal.incremental
     if not incremental and not control.offset_checked:
@@ -63,7 +63,7 @@ def words_destination(control: Control, block: Block) -> tuple[Vector, UnknownAx
     return target, unknown_after(control, block, incremental, control.unknown)
 
 
-def unknown_after(control: Control, block: Block, incremental: bool, before: UnknownAxes) -> UnknownAxes:
+def unknown_after(control: RS274Control, block: Block, incremental: bool, before: UnknownAxes) -> UnknownAxes:
     """Which axes are not known where the motion ends, of those that were not `before`."""
     if not (before or control.shaky or block.runtime):
         return before
@@ -80,7 +80,7 @@ def unknown_after(control: Control, block: Block, incremental: bool, before: Unk
     return unknown
 
 
-def rotated_destination(control: Control, block: Block, incremental: bool) -> tuple[Vector, UnknownAxes]:
+def rotated_destination(control: RS274Control, block: Block, incremental: bool) -> tuple[Vector, UnknownAxes]:
     """`destination` in a rotated frame, where one word moves several axes."""
     program = control.program_position()
     for letter, value in block.values.items():
@@ -96,7 +96,7 @@ def rotated_destination(control: Control, block: Block, incremental: bool) -> tu
     return target, rotated_unknown(control, block, incremental)
 
 
-def rotated_unknown(control: Control, block: Block, incremental: bool) -> UnknownAxes:
+def rotated_unknown(control: RS274Control, block: Block, incremental: bool) -> UnknownAxes:
     """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
     own = unknown_after(control, block, incremental, lost_in_frame(control))
     unknown = lost_of_axes(control, own) if own else {}
@@ -104,7 +104,7 @@ def rotated_unknown(control: Control, block: Block, incremental: bool) -> Unknow
     return unknown
 
 
-def cartesian(control: Control, block: Block) -> Block:
+def cartesian(control: RS274Control, block: Block) -> Block:
     """A block with polar words `@` (radius) and `^` (angle), in X and Y of the program's frame, absolute."""
     program = [
         nominal(control.coordinate(index)) if index in (X, Y) or block.axes >> index & 1 else 0.0 for index in range(9)
@@ -118,7 +118,7 @@ def cartesian(control: Control, block: Block) -> Block:
     return Block(block.index, others | ends, runtime, block.axes)
 
 
-def by_radius_and_angle(control: Control, block: Block, x: float, y: float) -> tuple[float, float]:
+def by_radius_and_angle(control: RS274Control, block: Block, x: float, y: float) -> tuple[float, float]:
     """Where polar words lead from a place, in program units; what a block does not say stays, or is added in G91."""
     if control.modal.plane.code != 170:
         raise Fault(POLAR, "polar coordinates are for the plane G17 only")
@@ -134,7 +134,7 @@ def by_radius_and_angle(control: Control, block: Block, x: float, y: float) -> t
     return radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle))
 
 
-def machine_destination(control: Control, block: Block) -> tuple[Vector, UnknownAxes]:
+def machine_destination(control: RS274Control, block: Block) -> tuple[Vector, UnknownAxes]:
     """The command at which a motion in machine coordinates (G53) ends."""
     target, unknown = control.position[:], dict(control.unknown)
     for letter, value in block.values.items():

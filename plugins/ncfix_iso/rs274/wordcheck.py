@@ -9,9 +9,9 @@ from collections.abc import Set
 from dataclasses import dataclass
 
 from ncfix.control.faults import Fault
-from ncfix_iso.rs274.control import ARCS, Control
+from ncfix_iso.rs274.control import ARCS, RS274Control
 from ncfix_iso.rs274.groups import CYCLES, TURNING_CYCLES
-from ncfix_iso.rs274.plans import Codes, Plan
+from ncfix_iso.rs274.plans import Codes, RS274Plan
 
 UNUSED = "NCF209"
 
@@ -62,14 +62,14 @@ def unused_word(letters: Set[str], motion: int | None, g_codes: Set[int], m_code
     return None
 
 
-def has_own_codes(control: Control, codes: Codes, motion: int | None) -> bool:
+def has_own_codes(control: RS274Control, codes: Codes, motion: int | None) -> bool:
     """Whether codes of the dialect's own may use words of a block."""
     operations = control.rules.operations
     own = any(("G", code) in operations for code in codes.g.values())
     return own or any(("M", code) in operations for code in codes.m.values()) or motion in control.rules.tables
 
 
-def check_words(control: Control, plan: Plan, codes: Codes, motion: int | None) -> None:
+def check_words(control: RS274Control, plan: RS274Plan, codes: Codes, motion: int | None) -> None:
     """Raise `Fault` for a word that no code uses, where the control does."""
     if not control.rules.strict or motion in plan.checked or has_own_codes(control, codes, motion):
         return

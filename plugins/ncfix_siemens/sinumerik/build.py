@@ -7,23 +7,23 @@ from dataclasses import dataclass
 
 from lark import Token
 
-from ncfix.text.build import NUMBERS, Branch, Builder, Node, Parsed, TooDeepError, edges, kind, tokens_of
+from ncfix.text.build import NUMBERS, Branch, Node, Parsed, TooDeepError, TreeBuilder, edges, kind, tokens_of
 from ncfix.text.grammar import Squeezed
 from ncfix.text.tree import (
     Assignment,
-    Call,
     Command,
     Comment,
     Constant,
     Expression,
-    Flow,
+    FunctionCall,
     Item,
     NamedParameter,
+    NumberedParameter,
     Opaque,
-    Parameter,
+    OWordLine,
     Skip,
+    StringLiteral,
     Template,
-    Text,
     Unary,
     Word,
 )
@@ -56,7 +56,7 @@ def value_of(number: Token) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class SinumerikBuilder(Builder):
+class SinumerikBuilder(TreeBuilder):
     """Makes items of trees."""
 
     def block(self, tree: Branch) -> Iterator[Item]:
@@ -114,21 +114,21 @@ class SinumerikBuilder(Builder):
             return Word(name.upper(), self.expression(value), self.span(tree), self.span(value))
         return Assignment(self.target(target), self.expression(value), self.span(tree))
 
-    def target(self, nodes: list[Node]) -> Parameter | NamedParameter | Call:
+    def target(self, nodes: list[Node]) -> NumberedParameter | NamedParameter | FunctionCall:
         """What gets a value: `R1`, `R[..]`, a variable, an element of an array."""
         name = str(nodes[0])
         if len(nodes) == 2:
             return self.array_element(name, nodes[1])
         if kind(nodes[0]) == "PARAMETER":
-            return Parameter(Constant(float(name[1:])))
+            return NumberedParameter(Constant(float(name[1:])))
         return NamedParameter(name.lower())
 
-    def array_element(self, name: str, index: Node, depth: int = 0) -> Parameter | Call:
+    def array_element(self, name: str, index: Node, depth: int = 0) -> NumberedParameter | FunctionCall:
         """`R[..]`, or an element of another array."""
         places = self.arguments(index, depth)
         if name.upper() == "R" and len(places) == 1 and places[0] is not None:
-            return Parameter(places[0])
-        return Call(name.lower(), places, indexed=True)
+            return NumberedParameter(places[0])
+        return FunctionCall(name.lower(), places, indexed=True)
 
     def command(self, tree: Branch) -> Item:
         """A name, perhaps with arguments."""
@@ -139,7 +139,7 @@ class SinumerikBuilder(Builder):
     def indirect(self, tree: Branch) -> Item:
         """`CALL "NAME"`."""
         name, text = tree.children
-        return Command(str(name).lower(), (Text(str(text)[1:-1]),), True, self.span(tree))
+        return Command(str(name).lower(), (StringLiteral(str(text)[1:-1]),), True, self.span(tree))
 
     def bare_element(self, tree: Branch) -> Item:
         """`NAME[..]` by itself: a macro of an array, not known to do anything."""
@@ -152,7 +152,7 @@ class SinumerikBuilder(Builder):
         for node in tree.children:
             if isinstance(node, Token):
                 if kind(node) == "TYPE":
-                    parts.append(Text(str(node).split("[")[0].strip().lower()))
+                    parts.append(StringLiteral(str(node).split("[")[0].strip().lower()))
                 continue
             name, *rest = node.children
             dimensions = [part for part in rest if kind(part) == "dimensions"]
@@ -164,44 +164,46 @@ class SinumerikBuilder(Builder):
 
     def label_here(self, tree: Branch) -> Item:
         """`NAME:`."""
-        return Flow(str(tree.children[0]).rstrip(": \t").upper(), "label", (), self.span(tree))
+        return OWordLine(str(tree.children[0]).rstrip(": \t").upper(), "label", (), self.span(tree))
 
     def condition(self, tree: Branch) -> Item:
         """`IF`, `WHILE`, `UNTIL`."""
         keyword, value = tree.children
-        return Flow("", str(keyword).lower(), (self.expression(value),), self.span(tree))
+        return OWordLine("", str(keyword).lower(), (self.expression(value),), self.span(tree))
 
     def plain(self, tree: Branch) -> Item:
         """A keyword alone."""
-        return Flow("", str(tree.children[0]).lower(), (), self.span(tree))
+        return OWordLine("", str(tree.children[0]).lower(), (), self.span(tree))
 
     def counted(self, tree: Branch) -> Item:
         """`FOR name = first TO last`."""
         _, *target, first, _, last = tree.children
         values = (self.target(target), self.expression(first), self.expression(last))
-        return Flow("", "for", values, self.span(tree))
+        return OWordLine("", "for", values, self.span(tree))
 
     def jump(self, tree: Branch) -> Item:
         """`GOTOF`, `GOTOB`, ... and where to."""
         keyword, *where = tree.children
-        return Flow(destination(where[0]) if where else "", str(keyword).lower(), (), self.span(tree))
+        return OWordLine(destination(where[0]) if where else "", str(keyword).lower(), (), self.span(tree))
 
     def repetition(self, tree: Branch) -> Item:
         """`REPEAT` that begins a loop, or repeats what stands from a label on, to another if there is one."""
         keyword, *labels = tree.children
         names = [str(label).upper() for label in labels]
-        return Flow(names[0] if names else "", str(keyword).lower(), tuple(map(Text, names[1:])), self.span(tree))
+        return OWordLine(
+            names[0] if names else "", str(keyword).lower(), tuple(map(StringLiteral, names[1:])), self.span(tree)
+        )
 
     def case(self, tree: Branch) -> Iterator[Item]:
         """`CASE value OF constant GOTOF label ... DEFAULT GOTOF label`: one item for each part."""
         keyword, value, of, *choices = tree.children
         head = self.between(edges(keyword)[0], edges(of)[1])
-        yield Flow("", "case", (self.expression(value),), head)
+        yield OWordLine("", "case", (self.expression(value),), head)
         for choice in choices:
             *before, keyword, where = choice.children  # type: ignore[union-attr]
             values = tuple(self.expression(node) for node in before if not isinstance(node, Token))
             name = "of" if kind(choice) == "choice" else "default"
-            yield Flow(destination(where), f"{name} {str(keyword).lower()}", values, self.span(choice))
+            yield OWordLine(destination(where), f"{name} {str(keyword).lower()}", values, self.span(choice))
 
     # -- expressions --------------------------------------------------------------------------------------------------
 
@@ -223,21 +225,21 @@ class SinumerikBuilder(Builder):
             case "bracket":
                 return Unary(BRACKET, self.expression(first, depth))
             case "text":
-                return Text(str(first)[1:-1])
+                return StringLiteral(str(first)[1:-1])
             case "axis":
-                return Text(str(first).upper())
+                return StringLiteral(str(first).upper())
             case "bits":
                 return Constant(bits(str(first)))
             case "parameter":
-                return Parameter(Constant(float(str(first)[1:])))
+                return NumberedParameter(Constant(float(str(first)[1:])))
             case "name":
                 return NamedParameter(str(first).lower())
             case "element":
                 return self.array_element(str(first), parts[1], depth)
             case "call":
-                return Call(str(first).lower(), self.arguments(parts[1], depth))
+                return FunctionCall(str(first).lower(), self.arguments(parts[1], depth))
             case "list":
-                return Call(BRACKET, self.arguments(tree, depth))
+                return FunctionCall(BRACKET, self.arguments(tree, depth))
             case "unary":
                 return Unary(str(first).lower(), self.expression(parts[1], depth))
             case "binary":

@@ -8,9 +8,16 @@ from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, 
 from ncfix.control.builder import Arc
 from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
 from ncfix.control.faults import Fault
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix_siemens.sinumerik.affine import handed
-from ncfix_siemens.sinumerik.destination import NO_POLE, End, Leg, Words, destination, doubtful_polar
+from ncfix_siemens.sinumerik.destination import (
+    NO_POLE,
+    BlockWordValues,
+    End,
+    ProgrammedMotion,
+    destination,
+    doubtful_polar,
+)
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE
 
@@ -31,7 +38,7 @@ FLAT = 1e-9
 Triple = tuple[float, float, float]
 
 
-def misled(control: Sinumerik, words: Words, name: str, taken: frozenset[str]) -> str:
+def misled(control: Sinumerik, words: BlockWordValues, name: str, taken: frozenset[str]) -> str:
     """Why a motion is refused that has words of arcs beyond those that it takes, or more than say an arc; or empty."""
     named = words.values.keys() & (OF_ARCS | OF_CIP)
     if not named:
@@ -47,7 +54,7 @@ def misled(control: Sinumerik, words: Words, name: str, taken: frozenset[str]) -
     return TWICE.format(name, "AR", "an end point beside its centre") if "AR" in named and centre and ended else ""
 
 
-def arc(control: Sinumerik, words: Words, code: int) -> None:
+def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """An arc, helix or full circle by its centre, radius or opening angle."""
     control.settle_all()
     end = destination(control, words)
@@ -64,16 +71,16 @@ def arc(control: Sinumerik, words: Words, code: int) -> None:
     finish = step[plane.first], step[plane.second]
     sweep = sweep_angle(centre, finish, 1 + max(round(words.get("TURN")), 0), clockwise=clockwise)
     circle = circle_of(control, plane, centre, sweep)._replace(fixed=is_fixed(words, plane))
-    control.go(Leg(Kind.ARC, words, end, code, refusal=refusal, arc=circle))
+    control.go(ProgrammedMotion(MotionKind.ARC, words, end, code, refusal=refusal, arc=circle))
 
 
-def is_fixed(words: Words, plane: Plane) -> bool:
+def is_fixed(words: BlockWordValues, plane: Plane) -> bool:
     """Whether words say where the centre is: by `AC`, or as the pole."""
     letters = (CENTRE_LETTERS[index] for index in (plane.first, plane.second))
     return bool({"AP", "RP"} & words.values.keys()) or any(words.forms.get(each) == ABSOLUTE for each in letters)
 
 
-def refusal_of(words: Words, plane: Plane) -> str:
+def refusal_of(words: BlockWordValues, plane: Plane) -> str:
     """Why an arc is refused: something of it is known only at run time, or not followed."""
     letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
     if words.runtime(*letters, "CR", "AR", "TURN"):
@@ -82,7 +89,7 @@ def refusal_of(words: Words, plane: Plane) -> str:
     return POLAR_AND_CENTRE if doubled else ""
 
 
-def doubtful_diameter(control: Sinumerik, words: Words, address: str) -> str:
+def doubtful_diameter(control: Sinumerik, words: BlockWordValues, address: str) -> str:
     """Why an arc is refused whose point with this X might be meant as a diameter."""
     form = words.forms.get(address, "")
     absolute = form == ABSOLUTE or (address == "I1" and not form and not control.modal.incremental)
@@ -90,7 +97,7 @@ def doubtful_diameter(control: Sinumerik, words: Words, address: str) -> str:
     return DIAMETERS.format(address) if counts else ""
 
 
-def geometry(control: Sinumerik, words: Words, end: End, *, clockwise: bool) -> tuple[Point, End]:
+def geometry(control: Sinumerik, words: BlockWordValues, end: End, *, clockwise: bool) -> tuple[Point, End]:
     """The centre relative to the start in the plane, mm, and the end; raises `Fault` if the control refuses the arc."""
     plane = control.modal.plane
     step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
@@ -122,7 +129,7 @@ def centre_at_pole(control: Sinumerik, plane: Plane) -> Point:
     return control.modes.pole[0] - here[plane.first], control.modes.pole[1] - here[plane.second]
 
 
-def centre_words(control: Sinumerik, words: Words, plane: Plane) -> Point:
+def centre_words(control: Sinumerik, words: BlockWordValues, plane: Plane) -> Point:
     """The centre relative to the start, mm: I J K count from the start unless they say `AC`."""
     here = control.program_position()
     found = []
@@ -141,7 +148,7 @@ def centre_from_angle(chord: Point, degrees: float, *, clockwise: bool) -> Point
     return centre_from_radius(chord, radius if degrees <= 180.0 else -radius, clockwise=clockwise)
 
 
-def ended_by_angle(control: Sinumerik, words: Words, end: End, centre: Point, *, clockwise: bool) -> End:
+def ended_by_angle(control: Sinumerik, words: BlockWordValues, end: End, centre: Point, *, clockwise: bool) -> End:
     """The end of an arc given by its centre and opening angle."""
     plane = control.modal.plane
     angle = math.radians(words.get("AR")) * (-1.0 if clockwise else 1.0)
@@ -173,26 +180,30 @@ def circle_of(control: Sinumerik, plane: Plane, centre: Point, sweep: float) -> 
 # -- by way of a point ------------------------------------------------------------------------------------------------
 
 
-def through_point(control: Sinumerik, words: Words, code: int) -> None:
+def through_point(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """CIP: the circle through the start, the point I1 J1 K1 and the end, in any plane."""
     control.settle_all()
     end = destination(control, words)
     why = VIA_AT_RUNTIME if words.runtime(*VIA, "TURN") else doubtful_diameter(control, words, "I1")
     if why:
-        control.go(Leg(Kind.FEED, words, end, code, refusal=why))
+        control.go(ProgrammedMotion(MotionKind.FEED, words, end, code, refusal=why))
         return
     if end.unknown or control.unknown:
-        control.go(Leg(Kind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known"))
+        control.go(
+            ProgrammedMotion(
+                MotionKind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known"
+            )
+        )
         return
     start, finish = tuple(control.position[:3]), tuple(end.target[:3])
     if not words.axes & 0b111 and not {"AP", "RP"} & words.values.keys():
         raise Fault(ARC_FAULT, NO_END)
     circle = circle_through(start, via_point(control, words), finish)  # type: ignore[arg-type]
     circle = circle._replace(sweep=circle.sweep + 2 * math.pi * max(round(words.get("TURN")), 0))
-    control.go(Leg(Kind.ARC, words, end, code, arc=circle))
+    control.go(ProgrammedMotion(MotionKind.ARC, words, end, code, arc=circle))
 
 
-def via_point(control: Sinumerik, words: Words) -> Triple:
+def via_point(control: Sinumerik, words: BlockWordValues) -> Triple:
     """The intermediate point as a command."""
     program = control.program_position()
     for index, address in enumerate(VIA):

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from ncfix.control.coordinates import LETTERS, rotated
 from ncfix.control.expressions import Unknown, number
-from ncfix.control.moves import CycleCall, Kind
-from ncfix_siemens.sinumerik.destination import End, Leg, Words
+from ncfix.control.moves import CycleCall, MotionKind
+from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.increments import stand
 from ncfix_siemens.sinumerik.patterns import AFTER_PATTERN, Points, lead_to, points_of
@@ -115,7 +115,7 @@ class Drilling:
         return [place for place in given if place not in (DPR, FIRST_DEPTH[1]) or self.values[place] != 0.0]
 
 
-def cycle(control: Sinumerik, words: Words, step: Calling, *, modal: bool) -> None:
+def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: bool) -> None:
     """A cycle of the control: kept for later (MCALL), or executed here."""
     name, block = step.name.upper(), words.block
     if step.name not in DRILLING:
@@ -138,7 +138,7 @@ def cycle(control: Sinumerik, words: Words, step: Calling, *, modal: bool) -> No
     mind_carried(control)
     control.settle_all()
     here = End(control.position[:], dict(control.unknown), dict(control.lost))
-    drill(control, Words(block, {}, {}, 0), here, drilling, refusal=WITH_WORDS if words.axes else "")
+    drill(control, BlockWordValues(block, {}, {}, 0), here, drilling, refusal=WITH_WORDS if words.axes else "")
 
 
 def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
@@ -153,16 +153,16 @@ def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
     control.unknown = control.unknown_for(control.lost)
 
 
-def hole_after(control: Sinumerik, words: Words) -> None:
+def hole_after(control: Sinumerik, words: BlockWordValues) -> None:
     """The modal cycle behind a motion that is none to a hole: a hole where that has led."""
     drilling = control.modes.modal_cycle
     assert drilling is not None
     here = End(control.position[:], dict(control.unknown), dict(control.lost))
-    drill(control, Words(words.block, {}, {}, 0), here, drilling, refusal=TO_A_HOLE, modal=True)
+    drill(control, BlockWordValues(words.block, {}, {}, 0), here, drilling, refusal=TO_A_HOLE, modal=True)
 
 
 def drill(
-    control: Sinumerik, words: Words, over: End, drilling: Drilling, *, refusal: str = "", modal: bool = False
+    control: Sinumerik, words: BlockWordValues, over: End, drilling: Drilling, *, refusal: str = "", modal: bool = False
 ) -> None:
     """One hole: over its place, which the words say, down to its depth, and up again.
 
@@ -177,7 +177,9 @@ def drill(
     settles = (stated & ~counted) | (1 << across if depth is not None else 0)
     control.builder.called(drilling.call(control, words.block, modal=modal))
     code = control.modal.motion
-    control.go(Leg(Kind.CYCLE, words, bottom, code if code >= 0 else 10, refusal=refusal, settles=settles))
+    control.go(
+        ProgrammedMotion(MotionKind.CYCLE, words, bottom, code if code >= 0 else 10, refusal=refusal, settles=settles)
+    )
     control.heading = None
     if clear is None or depth is None:
         up = End(control.position, control.unknown, dict(control.lost) | {across: AFTER_CYCLE})
@@ -207,6 +209,6 @@ def refuse(control: Sinumerik, block: int, why: str) -> None:
     """Motions that are not followed: where the axes stand after them is not known."""
     gone = [index for index in GEOMETRY if index in control.machine]
     lost = dict(control.lost) | dict.fromkeys(gone, AFTER_CYCLE)
-    words = Words(block, {}, {}, sum(1 << index for index in gone))
+    words = BlockWordValues(block, {}, {}, sum(1 << index for index in gone))
     end = End(control.position[:], control.unknown_for(lost), lost)
-    control.go(Leg(Kind.RAPID, words, end, control.modal.motion, refusal=why))
+    control.go(ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, refusal=why))

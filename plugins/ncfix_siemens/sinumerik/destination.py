@@ -11,7 +11,7 @@ from ncfix.control.builder import Arc
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of, rotated
 from ncfix.control.faults import Fault
 from ncfix.control.motion import UnknownAxes
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Passing
 from ncfix_siemens.sinumerik.increments import unsteady
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
@@ -33,7 +33,7 @@ STILL = 1e-9
 
 
 @dataclass(slots=True)
-class Words:
+class BlockWordValues:
     """The words of a block while it is executed.
 
     block    the block in its program
@@ -79,7 +79,7 @@ class End:
     lost: UnknownAxes
 
 
-class Leg(NamedTuple):
+class ProgrammedMotion(NamedTuple):
     """One motion of a block, as its words say it: what `Sinumerik.go` makes a `Motion` of.
 
     code        the motion code, in tenths
@@ -88,8 +88,8 @@ class Leg(NamedTuple):
     by_machine  the words are machine coordinates
     """
 
-    kind: Kind
-    words: Words
+    kind: MotionKind
+    words: BlockWordValues
     end: End
     code: int
     refusal: str = ""
@@ -99,7 +99,7 @@ class Leg(NamedTuple):
     by_machine: bool = False
 
 
-def destination(control: Sinumerik, words: Words) -> End:
+def destination(control: Sinumerik, words: BlockWordValues) -> End:
     """The command at which a motion of this block ends; refused where a word of X that is added would be a radius."""
     program = control.program_position()
     lost = dict(control.lost)
@@ -115,7 +115,7 @@ def destination(control: Sinumerik, words: Words) -> End:
     return End(command(control, program, moved), control.unknown_for(lost), lost)
 
 
-def place(control: Sinumerik, words: Words, letter: str, program: Vector, lost: UnknownAxes) -> None:
+def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vector, lost: UnknownAxes) -> None:
     """Take one axis word."""
     index, value = INDEX[letter], words.values[letter]
     form = words.forms.get(letter, "")
@@ -176,7 +176,7 @@ def command(control: Sinumerik, program: Vector, moved: set[int]) -> Vector:
 # -- polar coordinates ------------------------------------------------------------------------------------------------
 
 
-def polar(control: Sinumerik, words: Words, program: Vector, lost: UnknownAxes) -> set[int]:
+def polar(control: Sinumerik, words: BlockWordValues, program: Vector, lost: UnknownAxes) -> set[int]:
     """Take AP and RP, about the pole, in the plane; the coordinates that they move."""
     plane, pole = control.modal.plane, control.modes.pole
     angle, radius = (polar_word(control, words, address) for address in ("AP", "RP"))
@@ -193,7 +193,7 @@ def polar(control: Sinumerik, words: Words, program: Vector, lost: UnknownAxes) 
     return {plane.first, plane.second}
 
 
-def doubtful_polar_word(control: Sinumerik, words: Words, here: Vector, radius: float | None) -> str:
+def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector, radius: float | None) -> str:
     """Why nobody can say where polar words lead, though they are known.
 
     A radius of zero means the distance of the start. A radius alone goes with the angle of the start, or with the last
@@ -221,12 +221,12 @@ def stands_there(control: Sinumerik, here: Vector, angle: float | None, distance
     return near and ahead > NEAR_POLE and abs(aside) < NEAR_POLE
 
 
-def doubtful_polar(control: Sinumerik, words: Words) -> str:
+def doubtful_polar(control: Sinumerik, words: BlockWordValues) -> str:
     """Why a motion with polar coordinates is refused whose radius might be meant as a diameter."""
     return POLAR_DIAMETER if control.modal.diameter and {"AP", "RP"} & words.values.keys() else ""
 
 
-def polar_word(control: Sinumerik, words: Words, address: str) -> float | None:
+def polar_word(control: Sinumerik, words: BlockWordValues, address: str) -> float | None:
     """AP in rad or RP in mm: as written, added to the last one, or the last one."""
     before = control.modes.polar[0 if address == "AP" else 1]
     if address not in words.values:
@@ -241,7 +241,7 @@ def polar_word(control: Sinumerik, words: Words, address: str) -> float | None:
     return value
 
 
-def set_pole(control: Sinumerik, words: Words, code: int) -> None:
+def set_pole(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """G110 to G112: the pole is given from where the axes stand, in the frame, or from the last pole."""
     plane = control.modal.plane
     base: tuple[float, float] | None = (0.0, 0.0)
@@ -275,7 +275,7 @@ def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
     return None if any(unsteady(control, index) for index in axes) else (here[plane.first], here[plane.second])
 
 
-def machine_destination(control: Sinumerik, words: Words) -> End:
+def machine_destination(control: Sinumerik, words: BlockWordValues) -> End:
     """The command at which a motion in machine coordinates (SUPA, G53, G153) ends: frames off, the tool's length on."""
     target, unknown = control.position[:], dict(control.unknown)
     for letter in LETTERS:
@@ -286,7 +286,9 @@ def machine_destination(control: Sinumerik, words: Words) -> End:
     return End(target, unknown, lost_in_frame(control, unknown))
 
 
-def place_at_machine(control: Sinumerik, words: Words, letter: str, target: Vector, unknown: UnknownAxes) -> None:
+def place_at_machine(
+    control: Sinumerik, words: BlockWordValues, letter: str, target: Vector, unknown: UnknownAxes
+) -> None:
     """Take one axis word in machine coordinates."""
     index, value = INDEX[letter], words.values[letter]
     if counts_on(control, words.forms.get(letter, "")):

@@ -20,7 +20,7 @@ NO_LENGTH = 1e-9
 """A shorter vector says nothing."""
 
 
-class Text(Protocol):
+class VectorText(Protocol):
     """A program text whose blocks give vectors."""
 
     @property
@@ -39,14 +39,14 @@ class Directions:
     begin: int = 0
     ways: list[Ways] = field(default_factory=list)
 
-    def known(self, pointing: Pointing, text: Text, block: int, stop: int, least: int) -> list[Ways]:
+    def known(self, pointing: Pointing, text: VectorText, block: int, stop: int, least: int) -> list[Ways]:
         """The ways from a block on: of so many blocks at least, unless one of them gives no direction, up to `stop`."""
         if not self.begin <= block <= self.begin + len(self.ways) - least:
             self.begin, self.ways = block, ways_of(pointing, vectors_of(text, block, stop))
         return self.ways[block - self.begin : stop - self.begin]
 
 
-def vectors_of(text: Text, start: int, stop: int) -> FloatArray:
+def vectors_of(text: VectorText, start: int, stop: int) -> FloatArray:
     """(n, 3) the components of the vectors of blocks; zero where one is not written."""
     program = text.program
     slots = text.vectors[program.template[start:stop]]

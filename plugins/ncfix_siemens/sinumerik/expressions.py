@@ -23,7 +23,7 @@ from ncfix.control.expressions import (
     number,
     power,
 )
-from ncfix.text.tree import Binary, Constant, Expression, Parameter
+from ncfix.text.tree import Binary, Constant, Expression, NumberedParameter
 from ncfix_siemens.sinumerik.build import BRACKET
 
 Key = str | tuple[str, tuple[float, ...]]
@@ -107,7 +107,7 @@ class VariableExpressions(Expressions):
 
     def compiled(self, expression: Expression, address: str = "") -> Evaluate:
         """As everywhere; an R parameter with a plain number is found at once."""
-        if isinstance(expression, Parameter) and isinstance(expression.index, Constant):
+        if isinstance(expression, NumberedParameter) and isinstance(expression.index, Constant):
             key = ("r", (expression.index.value,))
             return lambda scope: scope.variables.value(key)
         return super().compiled(expression, address)

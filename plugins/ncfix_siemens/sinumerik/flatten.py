@@ -16,15 +16,15 @@ from ncfix.control.flatten import RUNTIME, Change, Flattener
 from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import (
     Assignment,
-    Call,
     Command,
     Constant,
     Expression,
+    FunctionCall,
     Literal,
     NamedParameter,
+    NumberedParameter,
     Opaque,
-    Parameter,
-    Text,
+    StringLiteral,
     Unary,
     Word,
 )
@@ -34,7 +34,7 @@ from ncfix_siemens.sinumerik.render import FORM
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
-from ncfix_siemens.sinumerik.variables import Variables, key_of
+from ncfix_siemens.sinumerik.variables import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.vocabulary import FORMS, HARMLESS
 
 BARE = Spelling(point=False)
@@ -124,7 +124,7 @@ class SinumerikFlattener(Flattener):
         step = self.steps.get(word.address)
         digits = OTHER_DECIMALS if step is None else decimals_for(step) + MORE_DECIMALS
         shown = BARE.short(value, digits)
-        found = FORM.match(text) if isinstance(word.value, Call) and word.value.name in FORMS else None
+        found = FORM.match(text) if isinstance(word.value, FunctionCall) and word.value.name in FORMS else None
         return shown if found is None else text[: found.start("value")] + shown + text[found.end("value") :]
 
     def place(self, point: tuple[float, float]) -> str:
@@ -159,26 +159,26 @@ class SinumerikFlattener(Flattener):
 def is_plain(value: Expression) -> bool:
     """Whether a value is written as a number or text, in brackets perhaps."""
     match value:
-        case Literal() | Constant() | Text():
+        case Literal() | Constant() | StringLiteral():
             return True
         case Unary(operator, operand):
             return operator in "+-" and is_plain(operand)
-        case Call(name, arguments, False):
+        case FunctionCall(name, arguments, False):
             return name in FORMS and all(part is not None and is_plain(part) for part in arguments)
     return False
 
 
-def indices(target: Parameter | NamedParameter | Call) -> tuple[Expression | None, ...]:
+def indices(target: NumberedParameter | NamedParameter | FunctionCall) -> tuple[Expression | None, ...]:
     """The indices of what gets a value."""
     match target:
-        case Parameter(index):
+        case NumberedParameter(index):
             return (index,)
-        case Call(_, arguments):
+        case FunctionCall(_, arguments):
             return arguments
     return ()
 
 
-def has_value(variables: Variables, name: str) -> bool:
+def has_value(variables: SinumerikVariables, name: str) -> bool:
     """Whether a name in an expression is, or may be, that of a variable whose value is known."""
     return name == ANY_PARAMETER or not isinstance(variables.value(key_of(name)), Unknown)
 

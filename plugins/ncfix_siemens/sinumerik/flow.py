@@ -8,8 +8,8 @@ from functools import partial
 
 from ncfix.control.expressions import Evaluate, Unknown, Value, number
 from ncfix.control.faults import Fault
-from ncfix.control.flow import NO_LABEL, Flow, Jump, Let, OpenCall, Operation, Repeat
-from ncfix.text.tree import Expression, NamedParameter, Parameter
+from ncfix.control.flow import NO_LABEL, Jump, Let, OpenCall, Operation, ProgramFlow, Repeat
+from ncfix.text.tree import Expression, NamedParameter, NumberedParameter
 from ncfix_siemens.sinumerik.expressions import Key, compiled
 from ncfix_siemens.sinumerik.plans import Branching, Letting
 from ncfix_siemens.sinumerik.state import Sinumerik
@@ -29,7 +29,7 @@ def decided(value: Value) -> float:
     return found
 
 
-class SinumerikFlow(Flow[SinumerikUnit]):
+class SinumerikFlow(ProgramFlow[SinumerikUnit]):
     """Where execution stands, and what takes it elsewhere.
 
     times  how often the block that is executed says (P); None where only the control knows
@@ -193,7 +193,7 @@ class SinumerikFlow(Flow[SinumerikUnit]):
         match expression:
             case NamedParameter(name):
                 return name
-            case Parameter(index):
+            case NumberedParameter(index):
                 place = number(compiled(index)(self.control))
                 return None if place is None else ("r", (place,))
         return None
@@ -232,6 +232,6 @@ class SinumerikFlow(Flow[SinumerikUnit]):
         return OpenCall(unit.name, (unit, unit.begin), times - 1, leave=leave)
 
     def finish(self, kind: str = "", *, again: bool = True) -> None:
-        """See `Flow`; a subprogram that is gone through counts as a block."""
+        """See `ProgramFlow`; a subprogram that is gone through counts as a block."""
         self.budget.spend(1 if self.calls else 0)
         super().finish(kind, again=again)

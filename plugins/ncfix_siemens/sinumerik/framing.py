@@ -10,7 +10,7 @@ from collections.abc import Callable
 from ncfix.control.coordinates import INCH, INDEX, PLANES, Vector, mask_of, zeros
 from ncfix.control.expressions import Unknown
 from ncfix_siemens.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
-from ncfix_siemens.sinumerik.destination import Words
+from ncfix_siemens.sinumerik.destination import BlockWordValues
 from ncfix_siemens.sinumerik.increments import had_from_the_start
 from ncfix_siemens.sinumerik.state import RESET_OF_DIAMETER, Sinumerik
 
@@ -39,7 +39,7 @@ PLANE_LENGTH = (
 # -- programmable frames ----------------------------------------------------------------------------------------------
 
 
-def programmable(control: Sinumerik, name: str, words: Words) -> None:
+def programmable(control: Sinumerik, name: str, words: BlockWordValues) -> None:
     """TRANS, ROT, SCALE, MIRROR and, with A before them, what is added to what is in force."""
     kind = name.removeprefix("a") if name.startswith("a") else name
     if any(value is None for value in words.values.values()):
@@ -61,7 +61,7 @@ def programmable(control: Sinumerik, name: str, words: Words) -> None:
     control.refresh()
 
 
-def over_fine(control: Sinumerik, name: str, words: Words) -> None:
+def over_fine(control: Sinumerik, name: str, words: BlockWordValues) -> None:
     """A frame is programmed anew; whether what G59 has set goes with the one before is told in two ways."""
     frames = control.frames
     if frames.fine and axis_values(words):
@@ -74,21 +74,21 @@ def total(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, .
     return tuple(a + b for a, b in zip(first, second, strict=True))
 
 
-def translation(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+def translation(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
     """TRANS."""
     steps = {INDEX[letter]: value for letter, value in axis_values(words).items()}
     doubtful = DIAMETER_SHIFT.format(control.modes.diameter) if control.modal.diameter and steps.get(0) else ""
     return shifted({index: value * unit(control, index) for index, value in steps.items()}), doubtful
 
 
-def rotation(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+def rotation(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
     """ROT X Y Z, or ROT RPL in the plane."""
     if "RPL" in words.values:
         return turned_in(control.modal.plane, words.get("RPL")), ""
     return turned(axis_values(words)), ""
 
 
-def scaling(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+def scaling(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
     """SCALE: one factor for all three axes is followed."""
     factors = axis_values(words)
     plain = {letter: factor for letter, factor in factors.items() if factor != 1.0}
@@ -99,7 +99,7 @@ def scaling(control: Sinumerik, words: Words) -> tuple[Affine, str]:
     return WORLD, UNEQUAL.format("SCALE") + " is in force, which ncfix does not follow"
 
 
-def mirroring(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+def mirroring(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
     """MIRROR: the axes named run the other way."""
     letters = "".join(axis_values(words))
     if set(letters) - set("XYZ"):
@@ -107,7 +107,7 @@ def mirroring(control: Sinumerik, words: Words) -> tuple[Affine, str]:
     return mirrored(letters), ""
 
 
-FRAMES: dict[str, Callable[[Sinumerik, Words], tuple[Affine, str]]] = {
+FRAMES: dict[str, Callable[[Sinumerik, BlockWordValues], tuple[Affine, str]]] = {
     "trans": translation,
     "rot": rotation,
     "scale": scaling,
@@ -116,7 +116,7 @@ FRAMES: dict[str, Callable[[Sinumerik, Words], tuple[Affine, str]]] = {
 PROGRAMMABLE = frozenset(FRAMES) | {"a" + name for name in FRAMES}
 
 
-def axis_values(words: Words) -> dict[str, float]:
+def axis_values(words: BlockWordValues) -> dict[str, float]:
     """The axis words of a block."""
     return {letter: value for letter, value in words.values.items() if letter in INDEX and value is not None}
 
@@ -126,7 +126,7 @@ def unit(control: Sinumerik, index: int) -> float:
     return control.of_setup("XYZABCUVW"[index]) * (1.0 if control.rotary[index] else control.modal.unit)
 
 
-def programmed_shift(control: Sinumerik, words: Words, code: int) -> None:
+def programmed_shift(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """G58 and G59 with axis words replace the absolute and the additive part of the shift."""
     values = {INDEX[letter]: value * unit(control, INDEX[letter]) for letter, value in axis_values(words).items()}
     if any(value is None for value in words.values.values()):
@@ -201,7 +201,7 @@ def compensation(control: Sinumerik, code: int) -> None:
 # -- tools ------------------------------------------------------------------------------------------------------------
 
 
-def tool(control: Sinumerik, words: Words, change: bool, at_once: bool) -> None:
+def tool(control: Sinumerik, words: BlockWordValues, change: bool, at_once: bool) -> None:
     """T, D and M6: `at_once` where the program has no M6, so that T itself changes the tool."""
     called, edge = "T" in words.values or "T" in words.texts, "D" in words.values
     if called and not call_tool(control, words):
@@ -218,7 +218,7 @@ def tool(control: Sinumerik, words: Words, change: bool, at_once: bool) -> None:
         set_length(control)
 
 
-def call_tool(control: Sinumerik, words: Words) -> bool:
+def call_tool(control: Sinumerik, words: BlockWordValues) -> bool:
     """T: the tool that is changed next; False where that is not known."""
     control.fresh_tool = True
     name, value = words.texts.get("T"), words.values.get("T")
@@ -229,7 +229,7 @@ def call_tool(control: Sinumerik, words: Words) -> bool:
     return True
 
 
-def choose_edge(control: Sinumerik, words: Words) -> bool:
+def choose_edge(control: Sinumerik, words: BlockWordValues) -> bool:
     """D: the cutting edge in force; False where that is not known."""
     value = words.values["D"]
     if value is None:

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.builder import Arc
 from ncfix.control.coordinates import Vector, X, Y, Z
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 
 if TYPE_CHECKING:
-    from ncfix_siemens.sinumerik.destination import Leg
+    from ncfix_siemens.sinumerik.destination import ProgrammedMotion
     from ncfix_siemens.sinumerik.state import Sinumerik
 
 
-def note(control: Sinumerik, leg: Leg, *, follows: bool) -> None:
+def note(control: Sinumerik, leg: ProgrammedMotion, *, follows: bool) -> None:
     """Keep the direction in which a motion is about to end; None where it is not known, or not followed."""
     end, arc = leg.end, leg.arc
-    if leg.kind == Kind.DWELL:
+    if leg.kind == MotionKind.DWELL:
         return
     step = [b - a for a, b in zip(control.position, end.target, strict=True)]
     if not follows or any(index in control.unknown or index in end.unknown for index in (X, Y, Z)):

@@ -20,14 +20,14 @@ from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
 from ncfix.text.tree import Program
 from ncfix_siemens.sinumerik.calling import call_word, ran_elsewhere
-from ncfix_siemens.sinumerik.destination import Words
+from ncfix_siemens.sinumerik.destination import BlockWordValues
 from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.heading import note_stretch
 from ncfix_siemens.sinumerik.increments import stand
 from ncfix_siemens.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
 from ncfix_siemens.sinumerik.orientation import leads_along
-from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
+from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, SinumerikPlan, is_statement
 from ncfix_siemens.sinumerik.poles import all_or_none
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn, act, finish_block, say
@@ -44,7 +44,7 @@ PERHAPS = re.compile(rb"[Mm][ \t]*=[ \t]*0*6")
 """What `TOOL_CHANGE` finds has this in it, which is found sooner."""
 
 
-def changes_tools(plans: Iterable[Plan], source: bytes) -> bool:
+def changes_tools(plans: Iterable[SinumerikPlan], source: bytes) -> bool:
     """Whether a text has an M6, so that T by itself changes no tool."""
     return any(60 in plan.m for plan in plans) or bool(PERHAPS.search(source) and TOOL_CHANGE.search(source))
 
@@ -142,13 +142,13 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         """The motions of the program, when it has been followed."""
         return all_or_none(demoted(self.control.moves(), self.again), self.main.program)
 
-    def run_lane(self, unit: SinumerikUnit, block: int, plan: Plan) -> int:
+    def run_lane(self, unit: SinumerikUnit, block: int, plan: SinumerikPlan) -> int:
         """See `Interpreter`; blocks that point the tool go in a lane of their own."""
         if plan.vector is None:
             return super().run_lane(unit, block, plan)
         return run_vectors(self.control, unit, block, not unit.external)
 
-    def lane_is_open(self, plan: Plan) -> bool:
+    def lane_is_open(self, plan: SinumerikPlan) -> bool:
         """See `Interpreter`."""
         control = self.control
         if plan.lane is None or self.watcher is not None:
@@ -174,7 +174,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
-    def execute(self, plan: Plan, unit: SinumerikUnit, block: int) -> bool:
+    def execute(self, plan: SinumerikPlan, unit: SinumerikUnit, block: int) -> bool:
         """Execute a block; True if the program ends there."""
         control, flow = self.control, self.flow
         if plan.opaque:
@@ -204,7 +204,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             ran_elsewhere(control, turn.elsewhere, changes_tool=control.tools.selected != 0)
         return self.go_on(plan, turn, unit, block)
 
-    def go_on(self, plan: Plan, turn: Turn, unit: SinumerikUnit, block: int) -> bool:
+    def go_on(self, plan: SinumerikPlan, turn: Turn, unit: SinumerikUnit, block: int) -> bool:
         """Where the block leads: into a subprogram, to the end, by a jump, or on. True if the program ends."""
         flow, called = self.flow, turn.subprogram
         if called is not None:
@@ -229,7 +229,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             flow.finish()
         return flow.ended
 
-    def opaque(self, plan: Plan, text: str) -> None:
+    def opaque(self, plan: SinumerikPlan, text: str) -> None:
         """Text that is no motion, or that nobody understands."""
         control = self.control
         if is_statement(plan):
@@ -241,7 +241,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             control.refusal = control.refusal or why
             control.warn(SYNCHRONOUS, control.refusal, "all motions after it are refused")
 
-    def evaluate(self, plan: Plan, index: int) -> Words:
+    def evaluate(self, plan: SinumerikPlan, index: int) -> BlockWordValues:
         """The values of the words of a block."""
         values: dict[str, float | None] = {}
         texts: dict[str, str] = {}
@@ -258,4 +258,4 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
                 forms[address] = setting.form
         self.span = None
         self.called |= "T" in values or "T" in texts
-        return Words(index, values, forms, plan.axes, texts)
+        return BlockWordValues(index, values, forms, plan.axes, texts)

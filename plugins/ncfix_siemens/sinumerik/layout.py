@@ -17,9 +17,9 @@ from ncfix.text.tree import (
     Command,
     Comment,
     Constant,
-    Flow,
     Item,
     Opaque,
+    OWordLine,
     Program,
     Skip,
     Span,
@@ -114,7 +114,7 @@ def drilling_call(words: BlockWords) -> Span | None:
 def is_prefix(item: Item) -> bool:
     """Block skip, block number, or label."""
     numbered = isinstance(item, Word) and item.address in ("N", ":")
-    return numbered or isinstance(item, Skip) or (isinstance(item, Flow) and item.keyword == "label")
+    return numbered or isinstance(item, Skip) or (isinstance(item, OWordLine) and item.keyword == "label")
 
 
 def is_quiet(item: Command) -> bool:
@@ -124,7 +124,7 @@ def is_quiet(item: Command) -> bool:
 
 def may_stay(item: object) -> bool:
     """Whether lines may be put after a block with this item."""
-    if isinstance(item, Flow):
+    if isinstance(item, OWordLine):
         return item.keyword == "label"
     return not isinstance(item, (Command, Opaque, Tape))
 

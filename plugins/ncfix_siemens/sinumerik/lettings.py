@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import INDEX, LETTERS
 from ncfix.control.expressions import number
-from ncfix.control.moves import Kind
-from ncfix_siemens.sinumerik.destination import End, Leg, Words, destination
+from ncfix.control.moves import MotionKind
+from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion, destination
 from ncfix_siemens.sinumerik.plans import Letting
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import (
@@ -44,9 +44,13 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
         return
     why = ASYNCHRONOUS.get(step.name, "a positioning axis (POS)")
     if step.name in GO_SOMEWHERE:
-        still = Words(turn.words.block, {}, {}, sum(1 << index for index in gone))
+        still = BlockWordValues(turn.words.block, {}, {}, sum(1 << index for index in gone))
         lost = dict(control.lost) | dict.fromkeys(gone, AFTER_POSITIONING)
-        control.go(Leg(Kind.RAPID, still, End(control.position[:], control.unknown_for(lost), lost), 0, refusal=why))
+        control.go(
+            ProgrammedMotion(
+                MotionKind.RAPID, still, End(control.position[:], control.unknown_for(lost), lost), 0, refusal=why
+            )
+        )
     else:
         control.refusal = control.refusal or f"{why} is not followed"
 
@@ -58,8 +62,10 @@ def follow_polynomial(control: Sinumerik, turn: Turn, step: Letting, letter: str
     letters = LETTERS if letter is None else letter
     axes = [each for each in letters if INDEX[each] in control.machine]
     ends: dict[str, float | None] = dict.fromkeys(axes, None if value is None else number(value))
-    words = Words(turn.words.block, ends, {}, sum(1 << INDEX[each] for each in axes))
-    control.go(Leg(Kind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS))
+    words = BlockWordValues(turn.words.block, ends, {}, sum(1 << INDEX[each] for each in axes))
+    control.go(
+        ProgrammedMotion(MotionKind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS)
+    )
 
 
 def note_letting(control: Sinumerik, turn: Turn, step: Letting) -> None:

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
 from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, through_point
 from ncfix_siemens.sinumerik.cycles import TO_A_HOLE, drill, hole_after
-from ncfix_siemens.sinumerik.destination import End, Leg, Words, destination, doubtful_polar, machine_destination
+from ncfix_siemens.sinumerik.destination import (
+    BlockWordValues,
+    End,
+    ProgrammedMotion,
+    destination,
+    doubtful_polar,
+    machine_destination,
+)
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.orientation import oriented
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
@@ -39,7 +46,7 @@ TAKING = {20: ("G2", OF_ARCS), 30: ("G3", OF_ARCS), CIP: ("CIP", OF_CIP), CT: ("
 WHERE_IT_ENDS = "where the axis {{}} stands is not known after this: {}"
 
 
-def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
+def moved(control: Sinumerik, words: BlockWordValues, special: frozenset[str]) -> None:
     """The motion of a block; `special` says what applies to this block only (`supa`, `meas`, ...)."""
     code = control.modal.motion
     if code in (0, 10):
@@ -65,7 +72,7 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     control.cornered, control.at_corner = corner, False
 
 
-def by_itself(control: Sinumerik, words: Words, special: frozenset[str], machine: str) -> None:
+def by_itself(control: Sinumerik, words: BlockWordValues, special: frozenset[str], machine: str) -> None:
     """A motion with which nothing is drilled; `machine` says by which name it is in machine coordinates."""
     if machine:
         to_machine_position(control, words, machine.upper())
@@ -77,19 +84,23 @@ def by_itself(control: Sinumerik, words: Words, special: frozenset[str], machine
         as_coded(control, words, control.modal.motion)
 
 
-def straight(control: Sinumerik, words: Words, code: int) -> None:
+def straight(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """G0 and G1."""
     end = destination(control, words)
-    control.go(Leg(Kind.FEED if code else Kind.RAPID, words, end, code, refusal=refusal_of(control, words)))
+    control.go(
+        ProgrammedMotion(
+            MotionKind.FEED if code else MotionKind.RAPID, words, end, code, refusal=refusal_of(control, words)
+        )
+    )
 
 
-def is_one_piece(control: Sinumerik, words: Words) -> bool:
+def is_one_piece(control: Sinumerik, words: BlockWordValues) -> bool:
     """Whether a motion must not be split: its time is another block's, or REPEAT would miss lines."""
     timed = control.modal.feed_mode == 93 and control.modal.motion != 0 and "F" not in words.values
     return timed or words.block in control.solitary
 
 
-def as_coded(control: Sinumerik, words: Words, code: int) -> None:
+def as_coded(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """The motion that the code in force makes of the words."""
     name, taken = TAKING.get(code, (f"G{code // 10}", frozenset(CENTRE_LETTERS)))
     why = "" if code in UNFOLLOWED_MOTIONS else misled(control, words, name, taken)
@@ -108,7 +119,7 @@ def as_coded(control: Sinumerik, words: Words, code: int) -> None:
         straight(control, words, 10 if code not in (0, 10) else code)
 
 
-def refusal_of(control: Sinumerik, words: Words) -> str:
+def refusal_of(control: Sinumerik, words: BlockWordValues) -> str:
     """Why a straight motion is refused, though its end is known."""
     if words.values.keys() & {"RND", "RNDM", "CHF", "CHR", "ANG"} and words.runtime("RND", "RNDM", "CHF", "CHR"):
         return "a rounding or chamfer is known only at run time"
@@ -117,29 +128,31 @@ def refusal_of(control: Sinumerik, words: Words) -> str:
     return doubtful_polar(control, words)
 
 
-def refused(control: Sinumerik, words: Words, code: int, why: str) -> None:
+def refused(control: Sinumerik, words: BlockWordValues, code: int, why: str) -> None:
     """A motion that is followed only as far as its end."""
     control.settle_all()
-    control.go(Leg(Kind.FEED, words, destination(control, words), code, refusal=why))
+    control.go(ProgrammedMotion(MotionKind.FEED, words, destination(control, words), code, refusal=why))
 
 
-def to_machine_position(control: Sinumerik, words: Words, name: str) -> None:
+def to_machine_position(control: Sinumerik, words: BlockWordValues, name: str) -> None:
     """SUPA, G53 and G153."""
     end = machine_destination(control, words)
     code = control.modal.motion if control.modal.motion in (0, 10) else control.modal.straight
-    kind = Kind.RAPID if code == 0 else Kind.FEED
+    kind = MotionKind.RAPID if code == 0 else MotionKind.FEED
     control.go(
-        Leg(kind, words, end, code, passing=Passing(Pass.MACHINE_COORDINATES, MACHINE.format(name)), by_machine=True)
+        ProgrammedMotion(
+            kind, words, end, code, passing=Passing(Pass.MACHINE_COORDINATES, MACHINE.format(name)), by_machine=True
+        )
     )
 
 
-def measure(control: Sinumerik, words: Words) -> None:
+def measure(control: Sinumerik, words: BlockWordValues) -> None:
     """MEAS: towards the words until the probe switches."""
     end = destination(control, words)
     gone = {i: AFTER_MEASURING for i in control.machine if end.target[i] != control.position[i] or i in end.unknown}
     lost = end.lost | dict.fromkeys(spread(control, gone), AFTER_MEASURING)
     ends = End(end.target, end.unknown | gone, lost)
-    control.go(Leg(Kind.FEED, words, ends, control.modal.motion, passing=MEASURING))
+    control.go(ProgrammedMotion(MotionKind.FEED, words, ends, control.modal.motion, passing=MEASURING))
 
 
 def spread(control: Sinumerik, gone: dict[int, str]) -> list[int]:
@@ -148,25 +161,27 @@ def spread(control: Sinumerik, gone: dict[int, str]) -> list[int]:
     return sorted(set(gone) | ({index for index in GEOMETRY if index in control.machine} if hidden else set()))
 
 
-def soft_approach(control: Sinumerik, words: Words) -> None:
+def soft_approach(control: Sinumerik, words: BlockWordValues) -> None:
     """G147, G148 and their like: the control adds motions of its own."""
     refused(control, words, control.modal.motion, "a soft approach or retraction (G147, G148, ...)")
     control.lose_axes(GEOMETRY, AFTER_APPROACH)
 
 
-def to_reference(control: Sinumerik, words: Words, code: int) -> None:
+def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """G74 and G75: the axes named, `X1=0` among them, go to a point that the machine knows."""
     named = [INDEX[address[0]] for address in words.values if address[:1] in INDEX]
     gone = tuple(index for index in dict.fromkeys(named) if index in control.machine)
     unknown = dict(control.unknown) | dict.fromkeys(gone, AFTER_REFERENCE)
     lost = dict(control.lost) | dict.fromkeys(spread(control, dict.fromkeys(gone, "")), AFTER_REFERENCE)
-    words = Words(words.block, {}, {}, sum(1 << index for index in gone))
+    words = BlockWordValues(words.block, {}, {}, sum(1 << index for index in gone))
     end = End(control.position[:], unknown, lost)
-    control.go(Leg(Kind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True))
+    control.go(
+        ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True)
+    )
 
 
-def dwell(control: Sinumerik, words: Words) -> None:
+def dwell(control: Sinumerik, words: BlockWordValues) -> None:
     """G4: F is seconds, S turns of the spindle."""
-    still = Words(words.block, {}, {}, 0)
+    still = BlockWordValues(words.block, {}, {}, 0)
     end = End(control.position, control.unknown, control.lost)
-    control.go(Leg(Kind.DWELL, still, end, control.modal.motion, passing=DWELL))
+    control.go(ProgrammedMotion(MotionKind.DWELL, still, end, control.modal.motion, passing=DWELL))

@@ -17,7 +17,7 @@ from ncfix.control.faults import Fault
 from ncfix.control.pointing import Triple, dot
 from ncfix.control.posture import postures
 from ncfix_siemens.sinumerik.affine import turned
-from ncfix_siemens.sinumerik.destination import Words
+from ncfix_siemens.sinumerik.destination import BlockWordValues
 from ncfix_siemens.sinumerik.directions import NO_LENGTH
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ANGLES, NORMALS, OTHERS, VECTOR
@@ -44,7 +44,7 @@ ON_CURVES = ("oricon", "oricurve", "oripath")
 BY_CURVE = "the tool turns on a cone, or after a curve ({})"
 
 
-def oriented(control: Sinumerik, words: Words) -> None:
+def oriented(control: Sinumerik, words: BlockWordValues) -> None:
     """Give the block the rotary words that its direction of the tool amounts to, or the reason why it is refused."""
     if leads_along(control):
         words.refuse(ALONG_PATH.format(control.modes.orientation.upper()), control.turning)
@@ -64,7 +64,7 @@ def leads_along(control: Sinumerik) -> bool:
     return control.modes.transformed and control.modes.orientation.startswith(BY_PATH)
 
 
-def by_direction(control: Sinumerik, words: Words) -> str:
+def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
     """Take A3 B3 C3 or A2 B2 C2; why the motion is refused, if it is."""
     if not control.modes.transformed:
         return NOT_ON
@@ -98,13 +98,13 @@ def by_direction(control: Sinumerik, words: Words) -> str:
     return ""
 
 
-def by_vector(words: Words) -> Triple:
+def by_vector(words: BlockWordValues) -> Triple:
     """A3 B3 C3."""
     a, b, c = (words.get(address) for address in VECTOR)
     return a, b, c
 
 
-def by_angles(control: Sinumerik, words: Words) -> Triple | None:
+def by_angles(control: Sinumerik, words: BlockWordValues) -> Triple | None:
     """The direction that A2 B2 C2 say, as a vector; None where nobody says how they are meant."""
     euler = number(control.variables.value(MEANT.strip('"').lower()))
     default = "" if euler is None else "orieuler" if euler else "orirpy"

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ncfix.control.expressions import number
-from ncfix_siemens.sinumerik.destination import End, Words, command
+from ncfix_siemens.sinumerik.destination import BlockWordValues, End, command
 
 if TYPE_CHECKING:
     from ncfix_siemens.sinumerik.plans import Calling
@@ -77,7 +77,7 @@ def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float,
     return math.dist(here, last) < math.dist(here, first)
 
 
-def lead_to(control: Sinumerik, block: int, point: tuple[float, float], name: str) -> tuple[Words, End, str]:
+def lead_to(control: Sinumerik, block: int, point: tuple[float, float], name: str) -> tuple[BlockWordValues, End, str]:
     """The words that lead to a place, where that is, and why its hole is not corrected."""
     plane, program, lost = control.modal.plane, control.program_position(), dict(control.lost)
     moved = {plane.first, plane.second}
@@ -85,4 +85,4 @@ def lead_to(control: Sinumerik, block: int, point: tuple[float, float], name: st
         program[index] = control.stretch * value
         lost.pop(index, None)
     end = End(command(control, program, moved), control.unknown_for(lost), lost)
-    return Words(block, {}, {}, 1 << plane.first | 1 << plane.second), end, WRITE_OUT.format(name)
+    return BlockWordValues(block, {}, {}, 1 << plane.first | 1 << plane.second), end, WRITE_OUT.format(name)

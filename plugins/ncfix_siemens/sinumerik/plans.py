@@ -12,19 +12,19 @@ from ncfix.text.reach import Deletable, deletable
 from ncfix.text.tree import (
     Assignment,
     Binary,
-    Call,
     Command,
     Comment,
     Constant,
     Expression,
-    Flow,
+    FunctionCall,
     Literal,
     NamedParameter,
+    NumberedParameter,
     Opaque,
-    Parameter,
+    OWordLine,
     Span,
+    StringLiteral,
     Template,
-    Text,
     Unary,
     Word,
 )
@@ -101,7 +101,7 @@ Step = Letting | Calling | Branching
 
 
 @dataclass(slots=True)
-class Plan:
+class SinumerikPlan:
     """What is done with every block of a shape.
 
     settings   words but G and M with plain codes, and N
@@ -127,12 +127,12 @@ class Plan:
     names: frozenset[str] = field(default=frozenset())
 
 
-def plan_of(template: Template) -> Plan:
+def plan_of(template: Template) -> SinumerikPlan:
     """The plan for a shape."""
     items = template.items
-    plan = Plan(template)
+    plan = SinumerikPlan(template)
     plan.settings = settings_of(template)
-    makers: dict[type, Callable[..., Step]] = {Assignment: letting, Command: calling, Flow: branching}
+    makers: dict[type, Callable[..., Step]] = {Assignment: letting, Command: calling, OWordLine: branching}
     plan.steps = tuple(makers[type(item)](item) for item in items if type(item) in makers)
     plan.g, plan.m = template.g_codes, template.m_codes
     plan.axes = sum({1 << INDEX[each.address] for each in plan.settings if each.address in INDEX})
@@ -160,7 +160,7 @@ def is_code(word: Word) -> bool:
 def setting(word: Word) -> Setting:
     """A word with its value as a function."""
     value = word.value
-    if isinstance(value, Call) and value.name in FORMS and not value.indexed:
+    if isinstance(value, FunctionCall) and value.name in FORMS and not value.indexed:
         inner = value.arguments[0] if value.arguments else None
         return Setting(word.address, left_out if inner is None else compiled(inner), value.name, word.span)
     return Setting(word.address, compiled(value), "", word.span)
@@ -183,9 +183,9 @@ def is_parameter(name: str) -> bool:
 def names_in(expression: Expression) -> Iterator[str]:
     """The variables that an expression names; an R parameter with a computed number may be any."""
     match expression:
-        case Parameter(Constant(number)):
+        case NumberedParameter(Constant(number)):
             yield f"r{number:g}"
-        case Parameter(index):
+        case NumberedParameter(index):
             yield from (ANY_PARAMETER, *names_in(index))
         case NamedParameter(name):
             yield name
@@ -193,7 +193,7 @@ def names_in(expression: Expression) -> Iterator[str]:
             yield from names_in(operand)
         case Binary(_, left, right):
             yield from (*names_in(left), *names_in(right))
-        case Call(name, arguments):
+        case FunctionCall(name, arguments):
             yield name
             yield from (each for part in arguments if part is not None for each in names_in(part))
 
@@ -201,7 +201,7 @@ def names_in(expression: Expression) -> Iterator[str]:
 def letting(item: Assignment) -> Letting:
     """An assignment with its value as a function."""
     name, index = target_of(item)
-    if isinstance(item.value, Call) and item.value.name in LISTS:
+    if isinstance(item.value, FunctionCall) and item.value.name in LISTS:
         return Letting(name, index, None, item.span, evaluates(item.value.arguments), item.value.name == "rep")
     return Letting(name, index, compiled(item.value), item.span)
 
@@ -209,11 +209,11 @@ def letting(item: Assignment) -> Letting:
 def target_of(item: Assignment) -> tuple[str, tuple[Evaluate, ...]]:
     """The variable that gets a value, and the index if it is an element."""
     match item.target:
-        case Parameter(number):
+        case NumberedParameter(number):
             return "r", (compiled(number),)
         case NamedParameter(name):
             return name, ()
-        case Call(name, arguments):
+        case FunctionCall(name, arguments):
             return name, evaluates(arguments)
     raise AssertionError("there are no other targets")
 
@@ -228,13 +228,13 @@ def calling(item: Command) -> Calling:
     return Calling(item.name, evaluates(item.arguments), item.arguments, item.called, item.span)
 
 
-def branching(item: Flow) -> Branching:
+def branching(item: OWordLine) -> Branching:
     """A control structure with its values as functions."""
     label = item.label if isinstance(item.label, str) else ""
     return Branching(item.keyword, label, tuple(map(compiled, item.arguments)), item.arguments, item.span)
 
 
-def lane_of(plan: Plan) -> Lane | None:
+def lane_of(plan: SinumerikPlan) -> Lane | None:
     """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
     template, fixed = plan.template, fixed_centre(plan.template)
     words, slots = [word for word in template.words if not is_code(word)], {**template.slots, **fixed}
@@ -258,7 +258,12 @@ def fixed_centre(template: Template) -> dict[str, int]:
     found = {}
     for word in template.words:
         value = word.value
-        if word.address in CENTRE_LETTERS and isinstance(value, Call) and value.name == ABSOLUTE and not value.indexed:
+        if (
+            word.address in CENTRE_LETTERS
+            and isinstance(value, FunctionCall)
+            and value.name == ABSOLUTE
+            and not value.indexed
+        ):
             match value.arguments:
                 case (Literal(slot),):
                     found[word.address] = slot
@@ -269,9 +274,9 @@ def plain_text(expression: Expression | None) -> str | None:
     """The text that an argument is, if it is one."""
     while isinstance(expression, Unary):
         expression = expression.operand
-    return expression.value if isinstance(expression, Text) else None
+    return expression.value if isinstance(expression, StringLiteral) else None
 
 
-def is_statement(plan: Plan) -> bool:
+def is_statement(plan: SinumerikPlan) -> bool:
     """Whether the block could not be understood."""
     return STATEMENT in plan.opaque

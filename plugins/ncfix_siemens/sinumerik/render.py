@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ncfix.control.pointing import Pointing
 from ncfix.text.layout import CENTRE_LETTERS
 from ncfix.text.spelling import NumberStyle
-from ncfix.text.tree import Call, Literal, Word
+from ncfix.text.tree import FunctionCall, Literal, Word
 from ncfix.writer.render import BlockRenderer
 from ncfix.writer.target import TANGENTIAL
 from ncfix_siemens.sinumerik.circles import VIA, circle_through
@@ -153,11 +153,11 @@ class SinumerikRenderer(BlockRenderer):
 
     def _form(self, word: Word) -> str:
         """How the word is meant, if it says so: `ac`, `ic`, `dc`, ..."""
-        return word.value.name if isinstance(word.value, Call) and word.value.name in FORMS else ""
+        return word.value.name if isinstance(word.value, FunctionCall) and word.value.name in FORMS else ""
 
     def _value(self, word: Word, otherwise: float) -> float:
         if self._form(word):
-            assert isinstance(word.value, Call)
+            assert isinstance(word.value, FunctionCall)
             inner = word.value.arguments[0] if word.value.arguments else None
             if isinstance(inner, Literal):
                 return float(self.program.values_of(self.block)[inner.slot])

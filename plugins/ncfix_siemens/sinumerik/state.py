@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ncfix.control.control import AFTER_THAT, Control
+from ncfix.control.control import AFTER_THAT, ProgramControl
 from ncfix.control.coordinates import (
     CENTRE_LETTERS,
     DEGREE,
@@ -30,7 +30,7 @@ from ncfix.control.coordinates import (
 from ncfix.control.expressions import Unknown, Value
 from ncfix.control.modal import Modal
 from ncfix.control.motion import AT_START, Motion, UnknownAxes
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.passing import Pass
 from ncfix.control.setup import Tool
 from ncfix.control.tcp import switch
@@ -41,11 +41,11 @@ from ncfix_siemens.sinumerik import heading
 from ncfix_siemens.sinumerik.affine import WORLD, shifted
 from ncfix_siemens.sinumerik.increments import Footing, footings, stand
 from ncfix_siemens.sinumerik.modes import Frames, Modes, Named
-from ncfix_siemens.sinumerik.variables import Variables, key_of
+from ncfix_siemens.sinumerik.variables import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.vocabulary import MOTIONS, PATH_WORDS, TURNING
 
 if TYPE_CHECKING:
-    from ncfix_siemens.sinumerik.destination import Leg, Words
+    from ncfix_siemens.sinumerik.destination import BlockWordValues, ProgrammedMotion
 
 GEOMETRY = (X, Y, Z)
 ROUND = frozenset({20, 30, MOTIONS["cip"]})
@@ -58,7 +58,7 @@ RESET_OF_DIAMETER = "$MC_GCODE_RESET_VALUES[28]"
 DIAMETERS: Mapping[Value, str] = {1.0: "diamof", 2.0: "diamon", 3.0: "diam90"}
 
 
-class Sinumerik(Control):
+class Sinumerik(ProgramControl):
     """Everything that the steps of a block read and change.
 
     lost        letter index -> why that coordinate of the program's frame is not known
@@ -94,7 +94,7 @@ class Sinumerik(Control):
         self.whole = self.cornered = False
         self.stated = True
         self.solitary: frozenset[int] = frozenset()
-        self.variables = Variables.given(run.setup.variables)
+        self.variables = SinumerikVariables.given(run.setup.variables)
         self.named = Named()
         self.refresh()
         self.lost = dict(self.unknown)
@@ -273,7 +273,7 @@ class Sinumerik(Control):
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
-    def go(self, leg: Leg) -> None:
+    def go(self, leg: ProgrammedMotion) -> None:
         """Make a motion of a block, and keep where it leads in coordinates of the program."""
         words, end = leg.words, leg.end
         axes, settles = self._axes_of(words), leg.settles
@@ -292,7 +292,7 @@ class Sinumerik(Control):
         stand(self, axes, by_machine=leg.by_machine)
         self.forget_settled()
 
-    def _axes_of(self, words: Words) -> int:
+    def _axes_of(self, words: BlockWordValues) -> int:
         """The axes that a block names, as bits: polar coordinates name both axes of the plane."""
         plane = self.modal.plane
         return words.axes | (1 << plane.first | 1 << plane.second if words.values.keys() & {"AP", "RP"} else 0)
@@ -305,7 +305,7 @@ class Sinumerik(Control):
         """As for all controls; whether it is a rapid, the program has to have said."""
         return self.stated and super()._leaves_unknown(rapid)
 
-    def counted_words(self, words: Words) -> list[int]:
+    def counted_words(self, words: BlockWordValues) -> list[int]:
         """The axes whose words count from where they stand."""
         forms = {index: words.forms.get(letter, "") for letter, index in INDEX.items() if letter in words.values}
         return [index for index, form in forms.items() if form == "ic" or (not form and self.modal.incremental)]
@@ -314,7 +314,7 @@ class Sinumerik(Control):
         """As of every control; a modal cycle (MCALL) drills where motions end."""
         return super().ends_in_hole(motion) or self.modes.modal_cycle is not None
 
-    def _style(self, kind: Kind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
+    def _style(self, kind: MotionKind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
         index = super()._style(kind, rule, reason, code, passing)
         held = self.modes.swivelled and not self.modes.transformed
         if not held and not self.whole:
@@ -322,7 +322,7 @@ class Sinumerik(Control):
         style = self.builder.styles[index]
         return self.builder.style(style._replace(held=held, compensated=style.compensated or self.whole))
 
-    def _passes_zero(self, words: Words, target: Vector) -> bool:
+    def _passes_zero(self, words: BlockWordValues, target: Vector) -> bool:
         """Whether DC, ACP, ACN or IC leads an axis past a full turn: then pieces of the way would count otherwise."""
         turn, endless = 2 * math.pi, self.builder.endless
         steps = [] if self.modal.incremental else [index for index in self.counted_words(words) if endless >> index & 1]

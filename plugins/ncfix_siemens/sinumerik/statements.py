@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from ncfix.control.coordinates import INDEX
 from ncfix.control.expressions import Evaluate, number
 from ncfix.control.faults import Fault
-from ncfix.text.tree import Call, Expression, NamedParameter
+from ncfix.text.tree import Expression, FunctionCall, NamedParameter
 from ncfix_siemens.sinumerik import framing, motion
 from ncfix_siemens.sinumerik.affine import WORLD
 from ncfix_siemens.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
 from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
-from ncfix_siemens.sinumerik.destination import Words, set_pole
-from ncfix_siemens.sinumerik.plans import LISTS, Calling, Plan, evaluates
+from ncfix_siemens.sinumerik.destination import BlockWordValues, set_pole
+from ncfix_siemens.sinumerik.plans import LISTS, Calling, SinumerikPlan, evaluates
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.swivel import swivel
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
@@ -83,8 +83,8 @@ class Turn:
     used        something takes the axis words for itself
     """
 
-    words: Words
-    plan: Plan
+    words: BlockWordValues
+    plan: SinumerikPlan
     at_once: bool
     special: set[str] = field(default_factory=set)
     frame: str = ""
@@ -209,19 +209,19 @@ def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
     kind = str(step.arguments[0](control))
     for place in range(1, len(step.written), 2):
         variable, value = step.written[place], step.written[place + 1]
-        assert isinstance(variable, NamedParameter | Call)
+        assert isinstance(variable, NamedParameter | FunctionCall)
         control.variables.define(kind, variable.name, sizes_of(control, variable))
-        if isinstance(value, Call) and value.name in LISTS:
+        if isinstance(value, FunctionCall) and value.name in LISTS:
             values = [each(control) for each in evaluates(value.arguments)]
             start = (0.0,) * len(control.variables.scopes[-1].sizes[variable.name])
             control.variables.fill(variable.name, start, values, repeated=value.name == "rep")
-        elif isinstance(variable, Call) and value is not None:
+        elif isinstance(variable, FunctionCall) and value is not None:
             control.variables.forget(variable.name)
         elif value is not None:
             control.variables.assign(variable.name, step.arguments[place + 1](control))
 
 
-def sizes_of(control: Sinumerik, variable: NamedParameter | Call) -> tuple[int, ...]:
+def sizes_of(control: Sinumerik, variable: NamedParameter | FunctionCall) -> tuple[int, ...]:
     """How many elements an array has; none for a plain variable, and where that is known only at run time."""
     if isinstance(variable, NamedParameter):
         return ()
@@ -329,7 +329,7 @@ def feed(control: Sinumerik, turn: Turn) -> None:
     modal.feed = float("nan") if value is None else unit * value
 
 
-def strangers(control: Sinumerik, words: Words) -> None:
+def strangers(control: Sinumerik, words: BlockWordValues) -> None:
     """Axes that the program moves and the machine lacks."""
     for address in words.values:
         extended = len(address) > 1 and address[0] in "XYZABCUVWQ" and address[1:].isdigit()

@@ -15,13 +15,13 @@ import numpy as np
 
 from ncfix.control.coordinates import X, Y, Z, as_rotation, mask_of
 from ncfix.control.expressions import number
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.posture import WayRules, normal_of, postures
 from ncfix.control.tcp import rotary_at_zero
-from ncfix.text.tree import Text
+from ncfix.text.tree import StringLiteral
 from ncfix_siemens.sinumerik.affine import WORLD, Affine, shifted, turned
-from ncfix_siemens.sinumerik.destination import End, Leg, Words
+from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.orientation import WAY
 from ncfix_siemens.sinumerik.plans import Calling, plain_text
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
@@ -54,7 +54,7 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
     control.suspended.pop("tilt", None)
     if control.frames.program != WORLD:
         control.suspended["frame"] = OVER_FRAME
-    if all(part is None or isinstance(part, Text) for part in step.written):
+    if all(part is None or isinstance(part, StringLiteral) for part in step.written):
         untilted(control)
         return
     if len(step.written) > 1 and plain_text(step.written[1]) == DESELECTED:
@@ -63,7 +63,7 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
         return
     values = [number(value(control)) for value in step.arguments]
     written = zip(values, step.written, strict=True)
-    if any(value is None and part is not None and not isinstance(part, Text) for value, part in written):
+    if any(value is None and part is not None and not isinstance(part, StringLiteral) for value, part in written):
         control.refusal = control.refusal or "a tilted plane (CYCLE800) is known only at run time"
         return
     plane = SwivelPlane.of([value or 0.0 for value in values] + [0.0] * 16)
@@ -166,7 +166,11 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
     lost = {index: why for index, why in lost.items() if index not in axes}
     mask = mask_of(control.turning)
     end = End(target, control.unknown_for(lost), lost)
-    control.go(Leg(Kind.RAPID, Words(block, {}, {}, mask), end, control.modal.motion, passing=SWIVEL))
+    control.go(
+        ProgrammedMotion(
+            MotionKind.RAPID, BlockWordValues(block, {}, {}, mask), end, control.modal.motion, passing=SWIVEL
+        )
+    )
 
 
 def level(control: Sinumerik, plane: SwivelPlane) -> None:

@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.passing import Pass, Passing
-from ncfix_siemens.sinumerik.destination import End, Leg, Words
+from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.flow import SinumerikFlow
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
 from ncfix_siemens.sinumerik.lettings import BY_THEMSELVES
-from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, Plan
+from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, SinumerikPlan
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.vocabulary import HARMLESS, OF_THE_CONTROL, PROBING, UNSEEN
@@ -42,7 +42,7 @@ def sweep(flow: SinumerikFlow) -> int | None:
     return min(again, default=None)
 
 
-def refuse(control: Sinumerik, plan: Plan, block: int) -> None:
+def refuse(control: Sinumerik, plan: SinumerikPlan, block: int) -> None:
     """Note the motion of a block, if it has one."""
     if not plan.axes or plan.names & PROGRAMMABLE or not NO_MOTIONS.isdisjoint(plan.g):
         return
@@ -50,8 +50,10 @@ def refuse(control: Sinumerik, plan: Plan, block: int) -> None:
     passing = Passing(Pass.MACHINE_COORDINATES, "machine coordinates") if machine else None
     control.row_block = block
     lost = dict.fromkeys(control.machine, DECIDED_AT_RUNTIME)
-    words = Words(block, {}, {}, plan.axes)
-    control.go(Leg(Kind.RAPID, words, End(control.position[:], lost, dict(lost)), 0, passing=passing))
+    words = BlockWordValues(block, {}, {}, plan.axes)
+    control.go(
+        ProgrammedMotion(MotionKind.RAPID, words, End(control.position[:], lost, dict(lost)), 0, passing=passing)
+    )
 
 
 def earliest(unit: SinumerikUnit, block: int) -> int | None:
@@ -115,7 +117,7 @@ def bypassed(control: Sinumerik, flow: SinumerikFlow, step: Branching, steps: It
     return True
 
 
-def is_quiet(plan: Plan) -> bool:
+def is_quiet(plan: SinumerikPlan) -> bool:
     """Whether a block moves nothing, changes no coordinates, and leads nowhere else."""
     if plan.opaque or plan.g or not LOUD_M.isdisjoint(plan.m):
         return False

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from ncfix.control.faults import Fault
 from ncfix.control.unit import TextUnit
 from ncfix.text.tree import Constant, Literal, Program, Word
-from ncfix.text.tree import Text as Label
+from ncfix.text.tree import StringLiteral as Label
 from ncfix_siemens.sinumerik.directions import Directions
-from ncfix_siemens.sinumerik.plans import Branching, Plan, plan_of
+from ncfix_siemens.sinumerik.plans import Branching, SinumerikPlan, plan_of
 
 HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*(?:;.*)?$", re.IGNORECASE)
 PROCEDURE = re.compile(r"PROC[ \t]+(?P<name>\w+)[ \t]*(?:\((?P<parameters>.*)\))?(?P<rest>[^()]*)$", re.IGNORECASE)
@@ -33,7 +33,7 @@ BROKEN = "NCF230"
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class ProcParameter:
     """A parameter of a `PROC`: its type and name; `by_reference`: the caller's variable may be changed (VAR)."""
 
     kind: str
@@ -41,7 +41,7 @@ class Parameter:
     by_reference: bool
 
 
-class SinumerikUnit(TextUnit[Plan]):
+class SinumerikUnit(TextUnit[SinumerikPlan]):
     """One program of a text.
 
     name        upper case; empty where no head says it
@@ -55,7 +55,12 @@ class SinumerikUnit(TextUnit[Plan]):
     """
 
     def __init__(
-        self, program: Program, blocks: tuple[int, int], plans: list[Plan | None], name: str = "", external: str = ""
+        self,
+        program: Program,
+        blocks: tuple[int, int],
+        plans: list[SinumerikPlan | None],
+        name: str = "",
+        external: str = "",
     ) -> None:
         self.name = name
         super().__init__(program, plan_of, external, blocks, plans)
@@ -67,7 +72,7 @@ class SinumerikUnit(TextUnit[Plan]):
         self.others: dict[int, int] = {}
         self.begins: dict[int, int] = {}
         self.labels: dict[str, list[int]] = {}
-        self.parameters: tuple[Parameter, ...] = ()
+        self.parameters: tuple[ProcParameter, ...] = ()
         self.saves = False
         self.directions = Directions()
         self._vector_stops: NDArray[np.int64] | None = None
@@ -188,21 +193,21 @@ class SinumerikUnit(TextUnit[Plan]):
                 return
 
 
-def parameters(text: str) -> Iterator[Parameter]:
+def parameters(text: str) -> Iterator[ProcParameter]:
     """The parameters between the brackets of a PROC."""
     for part in text.split(","):
         if found := PARAMETER.match(part):
-            yield Parameter(found["type"].lower(), found["name"].lower(), bool(found["var"]))
+            yield ProcParameter(found["type"].lower(), found["name"].lower(), bool(found["var"]))
 
 
-def is_remark(plan: Plan) -> bool:
+def is_remark(plan: SinumerikPlan) -> bool:
     """Whether a block does nothing."""
     return not (plan.settings or plan.steps or plan.g or plan.m or plan.opaque)
 
 
 def units_of(program: Program, external: str = "") -> list[SinumerikUnit]:
     """The programs of a text, in the order written."""
-    plans: list[Plan | None] = [plan_of(template) for template in program.templates]
+    plans: list[SinumerikPlan | None] = [plan_of(template) for template in program.templates]
     heads: list[tuple[int, str]] = []
     shapes = {i for i, plan in enumerate(plans) if plan is not None and "program head" in plan.opaque}
     for block in np.flatnonzero(np.isin(program.template, list(shapes))).tolist():

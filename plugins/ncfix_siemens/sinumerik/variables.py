@@ -34,7 +34,7 @@ class Local:
 
 
 @dataclass(slots=True)
-class Variables:
+class SinumerikVariables:
     """All variables; what nobody has set is known only at run time.
 
     shared  R parameters and whatever the control has of its own
@@ -47,7 +47,7 @@ class Variables:
     changes: int = 0
 
     @classmethod
-    def given(cls, variables: Mapping[str, float]) -> Variables:
+    def given(cls, variables: Mapping[str, float]) -> SinumerikVariables:
         """What a setup gives: `R1`, `_GUD`, `$MC_NAME`, `NAME[1,2]`."""
         return cls({key_of(name): value for name, value in variables.items()})
 

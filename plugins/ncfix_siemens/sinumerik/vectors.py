@@ -17,7 +17,7 @@ from ncfix.control.lane import SHORTEST, before_placing, is_open, take
 from ncfix.control.moves import FeedMode
 from ncfix.control.pointing import Pointing, Ways, nearest
 from ncfix.control.posture import FAR
-from ncfix.control.stage import IntArray, Stage, stage_of
+from ncfix.control.stage import BlockRows, IntArray, stage_of
 from ncfix_siemens.sinumerik.orientation import BY_AXES, ON_CURVES
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
@@ -61,7 +61,7 @@ def is_ready(control: Sinumerik) -> bool:
     return plain and followed and control.pointing is not None
 
 
-def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Sequence[Ways], stage: Stage) -> int:
+def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Sequence[Ways], stage: BlockRows) -> int:
     """Put the rotary axes of a stage where one of two ways leads them; up to which motion that goes without saying."""
     first, second = letters
     (scale, other_scale), (offset, other_offset) = (

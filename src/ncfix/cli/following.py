@@ -18,7 +18,7 @@ from ncfix.cli.targets import shown
 from ncfix.diagnostics import DifferenceError, Message, NcfixError, UsageError
 
 if TYPE_CHECKING:
-    from ncfix.compensate.block_delete import Position
+    from ncfix.compensate.block_delete import SwitchSetting
     from ncfix.compensate.checking import Checked
     from ncfix.compensate.figures.simulation import Along
     from ncfix.compensate.following import Followed, Task
@@ -87,7 +87,7 @@ class Following:
         assert self.machine is not None
         return follow(program, self.machine, self.setup, subprograms(self.setup, *paths))
 
-    def in_positions(self, program: Program, *paths: str) -> tuple[Position, ...]:
+    def in_positions(self, program: Program, *paths: str) -> tuple[SwitchSetting, ...]:
         """A program as this machine follows it in all positions of block delete, or in the one that is stated."""
         from ncfix.compensate.block_delete import positions_of
         from ncfix.compensate.following import follow

@@ -162,10 +162,10 @@ class Motions:
 def table_of(program: Program, moves: Moves, machine: Machine | None) -> Columns:
     """The motions by columns, mm and degrees; the tip only where the machine is known."""
     from ncfix.cli.columns import WordColumn, named
-    from ncfix.control.moves import FeedMode, Kind, Rule
+    from ncfix.control.moves import FeedMode, MotionKind, Rule
 
     positions, tip = _positions(moves, machine)
-    columns: Columns = {"line": program.lines(moves.block), "kind": named(Kind, moves.kind)}
+    columns: Columns = {"line": program.lines(moves.block), "kind": named(MotionKind, moves.kind)}
     columns |= dict(zip(moves.axes, positions.T, strict=True))
     columns |= {f"tip_{name}": values for name, values in zip("xyz", tip.T, strict=False)}
     columns |= {"feed": moves.feed, "feed_mode": named(FeedMode, moves.feed_mode)}

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.passing import PASS_RULES, Pass
 from ncfix.diagnostics import Message, Place
 from ncfix.text.tree import Program
@@ -45,7 +45,7 @@ def rule_of(moves: Moves, row: int) -> Why:
 
 def at_feed(moves: Moves) -> Mask:
     """(n,) feeds, arcs and holes, also those that pass."""
-    found: Mask = (moves.kind != Kind.RAPID) & (moves.kind != Kind.DWELL)
+    found: Mask = (moves.kind != MotionKind.RAPID) & (moves.kind != MotionKind.DWELL)
     return found
 
 
@@ -74,7 +74,7 @@ def without_figure(moves: Moves, kept: Mask, left: Mask | None, own: Mask | None
 def not_looked_at(moves: Moves) -> dict[Why, Index]:
     """The feeds, arcs and holes that a look along the path leaves out."""
     ends, starts = (np.isfinite(places).all(axis=1) for places in (moves.end, moves.start))
-    lost = np.where(moves.kind == Kind.CYCLE, ~ends, ~(ends & starts))
+    lost = np.where(moves.kind == MotionKind.CYCLE, ~ends, ~(ends & starts))
     found: dict[Why, list[int]] = {}
     measured = at_measured_places(moves)
     for row in np.flatnonzero(at_feed(moves) & (lost | measured | (moves.rule == Rule.PASS))).tolist():
@@ -243,7 +243,7 @@ class Account:
     @classmethod
     def of(cls, moves: Moves, kept: NDArray[np.bool_], reasons: Mapping[int, Reason]) -> Account:
         """Account for the motions. A block with several motions is refused if any of them is, else passed if any is."""
-        motion = moves.kind != Kind.DWELL
+        motion = moves.kind != MotionKind.DWELL
         by_rule = np.flatnonzero(motion & (moves.rule == Rule.PASS))
         refused = {block: reasons[block] for block in moves.block[motion & kept].tolist() if block in reasons}
         passed = {int(moves.block[row]): moves.reasons[moves.reason[row]] for row in by_rule}

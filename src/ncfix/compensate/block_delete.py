@@ -20,7 +20,7 @@ from ncfix.compensate.account import Reason
 from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import PathError
 from ncfix.compensate.plan.findings import Finding
-from ncfix.compensate.solve import Agreed, Before, SelfCheckError, Settled, differences, settle
+from ncfix.compensate.solve import Agreed, PrecedingMotion, SelfCheckError, Settled, differences, settle
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.standing import BLOCK_DELETE, named_switches
@@ -48,7 +48,7 @@ Readings = Sequence[SecondReading | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Position:
+class SwitchSetting:
     """How the switches stand: `on` are those that are; None where the program asks none. And what the control does.
 
     setup  says so
@@ -72,7 +72,7 @@ def named(on: Iterable[int], switches: Iterable[int]) -> str:
     return "on" if on >= switches else f"on for {named_switches(on)} only"
 
 
-def positions_of(setup: Setup, follow: Follow) -> tuple[Position, ...]:
+def positions_of(setup: Setup, follow: Follow) -> tuple[SwitchSetting, ...]:
     """A program followed in all positions of the switches that it asks, or in the one that the setup states.
 
     The first has all of them off, if it is not stated. Raises what `follow` raises, of switches that are on with these
@@ -81,7 +81,7 @@ def positions_of(setup: Setup, follow: Follow) -> tuple[Position, ...]:
     if setup.block_skip is not None:
         trace, stated = follow(setup), setup.block_skip
         on = trace.switches & stated if isinstance(stated, frozenset) else trace.switches if stated else frozenset()
-        return (Position(on if trace.switches else None, setup, trace),)
+        return (SwitchSetting(on if trace.switches else None, setup, trace),)
     found, lacking = {frozenset[int](): _tried(setup, follow)}, list[Message]()
     switches = _asked(found.values())
     while len(found) < 2 ** len(switches):
@@ -101,9 +101,9 @@ def positions_of(setup: Setup, follow: Follow) -> tuple[Position, ...]:
         raise UsageError.collected(dict.fromkeys(lacking))
     if not switches:
         (trace,) = (each for each in found.values() if isinstance(each, Trace))
-        return (Position(None, setup, trace),)
+        return (SwitchSetting(None, setup, trace),)
     return tuple(
-        Position(on, replace(setup, block_skip=on), replace(each, switches=switches))
+        SwitchSetting(on, replace(setup, block_skip=on), replace(each, switches=switches))
         for on, each in found.items()
         if isinstance(each, Trace)
     )
@@ -130,7 +130,9 @@ def _asked(found: Iterable[Trace | UsageError]) -> frozenset[int]:
     return frozenset[int]().union(*(each.switches for each in found if isinstance(each, Trace)))
 
 
-def in_pairs(first: Sequence[Position], second: Sequence[Position]) -> Iterator[tuple[Position, Position]]:
+def in_pairs(
+    first: Sequence[SwitchSetting], second: Sequence[SwitchSetting]
+) -> Iterator[tuple[SwitchSetting, SwitchSetting]]:
     """Two programs in the same positions of block delete; a program does not mind switches that it does not ask."""
     if len(first) == len(second) == 1:
         yield first[0], second[0]
@@ -144,7 +146,7 @@ def in_pairs(first: Sequence[Position], second: Sequence[Position]) -> Iterator[
 # -- what there is to say ---------------------------------------------------------------------------------------------
 
 
-def messages_of(positions: Sequence[Position]) -> tuple[Message, ...]:
+def messages_of(positions: Sequence[SwitchSetting]) -> tuple[Message, ...]:
     """What there is to say of a program in all positions, once each; of block delete, that all were looked at."""
     told = [each for position in positions for each in position.trace.messages]
     if len(positions) == 1:
@@ -158,7 +160,7 @@ def messages_of(positions: Sequence[Position]) -> tuple[Message, ...]:
     return (Message(BLOCK_DELETE, text, first, "--block-skip on or off looks at one position only"), *rest)
 
 
-def most_moves(positions: Sequence[Position]) -> int:
+def most_moves(positions: Sequence[SwitchSetting]) -> int:
     """Motions of a program, in the position of block delete in which it has most."""
     return max(len(each.trace.moves) for each in positions)
 
@@ -183,14 +185,14 @@ def worst_findings(every: Sequence[Settled]) -> list[tuple[Finding, ...]]:
     ]
 
 
-def assumed_of(positions: Sequence[Position]) -> tuple[str, ...]:
+def assumed_of(positions: Sequence[SwitchSetting]) -> tuple[str, ...]:
     """What was taken as zero in any position, in words."""
     if len(positions) == 1:
         return positions[0].trace.assumed
     return tuple(dict.fromkeys(name for each in positions for name in each.trace.assumed))
 
 
-def stamped(positions: Sequence[Position]) -> str:
+def stamped(positions: Sequence[SwitchSetting]) -> str:
     """What the stamp says of block delete; empty for a program without."""
     if positions[0].on is None:
         return ""
@@ -227,7 +229,7 @@ def settle_together(
     machine: Machine,
     options: FixOptions,
     readings: Readings,
-    before: Before | None = None,
+    before: PrecedingMotion | None = None,
     first: Agreed | None = None,
 ) -> Together:
     """Settle a program in all positions, so that they agree on the text; `moves` and `readings` of each of them.

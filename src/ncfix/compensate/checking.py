@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix.compensate import FixOptions
-from ncfix.compensate.block_delete import Position, messages_of, most_moves, positions_of
+from ncfix.compensate.block_delete import SwitchSetting, messages_of, most_moves, positions_of
 from ncfix.compensate.driver import PartCorrector, fix_program
 from ncfix.compensate.following import Resolve, Task, follow, placed, suspected
 from ncfix.compensate.parts import Part, Parts, Units
@@ -21,7 +21,7 @@ from ncfix.compensate.plan.limits import findings
 from ncfix.compensate.plan.path import untouched
 from ncfix.compensate.report import FixReport, Tally
 from ncfix.compensate.workers import Read, Share
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import Message, Place
@@ -120,7 +120,7 @@ class Survey:
             if block >= 0:
                 self.refused.append(Message("NCF432", moves.reasons[moves.reason[row]], program.place(block)))
         if self.machine is not None:
-            adrift = (moves.kind == Kind.ARC) & ~np.isfinite(moves.centre).all(axis=1)
+            adrift = (moves.kind == MotionKind.ARC) & ~np.isfinite(moves.centre).all(axis=1)
             kept = (moves.rule == Rule.PASS) | ~np.isfinite(moves.end).all(axis=1) | adrift
             for finding in findings(self.machine, moves, untouched(moves, kept).pieces):
                 self.travel.add(finding, program, moves, position=position)
@@ -134,7 +134,7 @@ class Survey:
 
 
 def _checked(
-    program: Program, positions: Sequence[Position], survey: Survey, report: FixReport | None = None
+    program: Program, positions: Sequence[SwitchSetting], survey: Survey, report: FixReport | None = None
 ) -> Checked:
     """What is found in a program, in all positions of block delete; what was assumed is no finding."""
     for k, position in enumerate(positions):

@@ -8,8 +8,8 @@ plan meant. If it would not, that is a fault of ncfix, and nothing is written.
 A whole program is one part (`fix_program`). A long one is corrected while it is read, part after part, in memory that
 does not depend on its length (`Stream`): every part goes through the same plan, emitter, checks and proof, and what
 comes out is the same, byte for byte. A part begins with the last motion of the one before it, which is written already:
-all that one part has to know of the earlier ones is what that motion left (`Before`). What cannot be done that way
-raises `NotInPartsError`, and the caller takes the program as a whole. Several processes can work on a program (see
+all that one part has to know of the earlier ones is what that motion left (`PrecedingMotion`). What cannot be done that
+way raises `NotInPartsError`, and the caller takes the program as a whole. Several processes can work on a program (see
 `workers`): each corrects parts in turn, and follows what it has to of others.
 """
 
@@ -46,14 +46,14 @@ from ncfix.compensate.following import (
     traced,
     with_tool_lengths,
 )
-from ncfix.compensate.parts import PartProof, Unit, Units
-from ncfix.compensate.plain import Course, Planner
+from ncfix.compensate.parts import PartProof, ProgramPart, Units
+from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.plain_figures import figures, largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import PathError, path_error
 from ncfix.compensate.plan.offset import is_offset
 from ncfix.compensate.report import FixReport, Tally, in_lines
-from ncfix.compensate.solve import Agreed, Before, Settled, agree, increments
+from ncfix.compensate.solve import Agreed, PrecedingMotion, Settled, agree, increments
 from ncfix.compensate.workers import Ground, Read, Share, crew
 from ncfix.control.flatten import flatten
 from ncfix.control.moves import Moves, Trace
@@ -75,7 +75,7 @@ ASTRAY = 1.0
 class Proof(Protocol):
     """Reads a text that was written again, and follows it."""
 
-    def taught(self, unit: Unit, together: Together, text: bytes) -> Readings | None:
+    def taught(self, unit: ProgramPart, together: Together, text: bytes) -> Readings | None:
         """What a control makes of the text, if that is not what was meant, for another attempt; None if it is.
 
         Raises `SelfCheckError` for a text that cannot be read, or that never is right, `NotInPartsError` for one that
@@ -90,7 +90,7 @@ class Proof(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class ProvedPart:
     """A part that has been corrected and proved.
 
     text       what it is now; how many bytes that are, where it has been put into a file
@@ -102,14 +102,14 @@ class Done:
     tally: Tally
     next_line: int
 
-    def placed(self, file: int, at: int) -> Done:
+    def placed(self, file: int, at: int) -> ProvedPart:
         """The same with the text put into a file, from a byte on."""
         assert isinstance(self.text, bytes)
         put_at(file, at, self.text)
         return replace(self, text=len(self.text))
 
 
-def _nobody(left: Before, size: int) -> None:
+def _nobody(left: PrecedingMotion, size: int) -> None:
     """Takes what a part leaves where nothing comes behind it."""
 
 
@@ -139,12 +139,12 @@ class Corrector:
 
     def correct(
         self,
-        unit: Unit,
+        unit: ProgramPart,
         moves: Sequence[Moves],
         agreed: Agreed | None = None,
-        before: Before | None = None,
-        leave: Callable[[Before, int], object] = _nobody,
-    ) -> Done:
+        before: PrecedingMotion | None = None,
+        leave: Callable[[PrecedingMotion, int], object] = _nobody,
+    ) -> ProvedPart:
         """Settle, write, prove and count a part.
 
         moves   its motions, in each position of block delete
@@ -161,7 +161,7 @@ class Corrector:
                 raise NotInPartsError("a refusal reaches back into an earlier part")
             text = self._text(part.program, together.splices, before is None)
             if not part.last:
-                leave(Before.of(settled.rounds, np.zeros(len(settled.moves.axes), dtype=np.int8)), len(text))
+                leave(PrecedingMotion.of(settled.rounds, np.zeros(len(settled.moves.axes), dtype=np.int8)), len(text))
             readings = self.proof.taught(unit, together, text)
         own, tally = None, Tally(self.machine.least_increment[0])
         if unit.head is not None:
@@ -171,7 +171,7 @@ class Corrector:
         if task.options.verify:
             errors = [(each.moves, self._tip_errors(each, own, unit)) for each in together.settled]
             self.note(tally, part.program, *errors)
-        return Done(text, tally, part.program.first_line + part.program.lines_ended)
+        return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _text(self, program: Program, splices: Splices, first: bool) -> bytes:
         """The corrected text of a part; the first one gets a stamp, if it differs."""
@@ -186,7 +186,7 @@ class Corrector:
         self.stamped = edit.text
         return spliced(program.source, Splices.joined([splices, Splices.of([edit])]))
 
-    def _tip_errors(self, settled: Settled, own: Mask | None, unit: Unit) -> PathError:
+    def _tip_errors(self, settled: Settled, own: Mask | None, unit: ProgramPart) -> PathError:
         """Tip errors before and after, with the numbers as the control will understand them; of motions `own` (n,)."""
         emission, shown = settled.emission, settled.shown(self.task.options.split_rapids)
         return path_error(
@@ -253,7 +253,7 @@ def fix_program(
     moves, words = [each.trace.moves for each in positions], (stamped(positions), assumed_of(positions))
     proof = WholeProof(program, [partial(follow, own=each.setup) for each in positions])
     corrector = Corrector(task, placed(machine, setup), proof, lambda: words)
-    done = corrector.correct(Unit.whole(program, moves[0], corrector.machine), moves)
+    done = corrector.correct(ProgramPart.whole(program, moves[0], corrector.machine), moves)
     tally, text = done.tally, done.text
     assert isinstance(text, bytes)
     suspicion = suspected(tally.numbers, tally.step, program.path, options.force)
@@ -304,7 +304,7 @@ class PartCorrector(Corrector):
         super().__init__(task, units.placed, self.parts_proof, lambda: ("", units.assumed))
         self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect)
 
-    def work(self, share: Share) -> Iterator[tuple[int, Done]]:
+    def work(self, share: Share) -> Iterator[tuple[int, ProvedPart]]:
         """The number of each part of the share, and what it has become; the others are followed, or passed over.
 
         Raises what reading, following and correcting do, and at last UsageError for what the setup does not give.
@@ -318,7 +318,7 @@ class PartCorrector(Corrector):
             yield number, self._corrected(unit, number, share, foreign)
             foreign = False
 
-    def _corrected(self, unit: Unit, number: int, share: Share, foreign: bool) -> Done:
+    def _corrected(self, unit: ProgramPart, number: int, share: Share, foreign: bool) -> ProvedPart:
         """Correct a part, hand on what the next one has to know, and prove it; `foreign`: the one before was not."""
         if unit.head is not None and is_offset(unit.head.moves).any():
             raise NotInPartsError("the control offsets a contour from one part into the next")
@@ -338,13 +338,13 @@ class PartCorrector(Corrector):
                 agreed = None  # the motion before was left as it was, or an axis goes on standing off its place
         return self.correct(unit, [moves], agreed, before, partial(share.leave, number))
 
-    def _plainly(self, course: Course, plain: Emission, number: int, share: Share) -> Done:
+    def _plainly(self, course: PlainPlan, plain: Emission, number: int, share: Share) -> ProvedPart:
         """Finish a part of plain motions."""
         part, moves = course.part, course.part.moves
         text = spliced(part.program.source, plain.splices)
         if not part.last:
             shift = course.real.start[-1] - moves.start[-1]
-            left = Before.steady(shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy())
+            left = PrecedingMotion.steady(shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy())
             share.leave(number, left, len(text))
         settled = course.settled(plain)
         self.parts_proof.check(part, settled, text, plain.splices)
@@ -352,13 +352,13 @@ class PartCorrector(Corrector):
         tally.add_plain(part.program, settled, largest_shift(course, plain), course.intent)
         if self.task.options.verify:
             self.note(tally, part.program, (moves, figures(course, plain, self.task.options.split_rapids)))
-        return Done(text, tally, part.program.first_line + part.program.lines_ended)
+        return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
-    def _agreed(self, unit: Unit) -> Agreed:
+    def _agreed(self, unit: ProgramPart) -> Agreed:
         """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
         part = unit.together
         nowhere = np.zeros(len(part.moves.axes))
-        guess = None if unit.head is None else Before.steady(nowhere, unit.direction, nowhere)
+        guess = None if unit.head is None else PrecedingMotion.steady(nowhere, unit.direction, nowhere)
         return agree(part.moves, self.machine, self.task.dialect, self.task.options, guess)
 
     def report(self, tally: Tally, suspicion: tuple[Message, ...]) -> FixReport:
@@ -428,7 +428,7 @@ class Stream:
         report = own.report(self.tally, self._judged())
         return Streamed(report, Stamp(own.at, own.stamped, own.stamp() if self.tally.changed else b""))
 
-    def _take(self, parts: Iterator[Done]) -> None:
+    def _take(self, parts: Iterator[ProvedPart]) -> None:
         """Write parts, and report them."""
         for done in parts:
             self.tally.take(done.tally)

@@ -21,7 +21,7 @@ LIBRARY = Library(__name__)
 
 @LIBRARY.helper
 def deviation(fraction: Array, command: Array, follow: Array, a: int, b: int) -> float:
-    """The largest deviation of the straight piece from node a to node b: as `Grid.deviations`."""
+    """The largest deviation of the straight piece from node a to node b: as `PathNodes.deviations`."""
     most = 0.0
     for node in range(a + 1, b):
         seen = node if len(follow) > 1 else 0

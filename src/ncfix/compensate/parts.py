@@ -22,7 +22,7 @@ from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.solve import SelfCheckError, Settled, differences
 from ncfix.compensate.workers import Passage, Read, Share
 from ncfix.control.following import Follower
-from ncfix.control.moves import Kind, Moves, Rule, Trace
+from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.parts import NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message, NcfixError, UsageError
@@ -197,13 +197,13 @@ def _ends_clean(program: Program, moves: Moves) -> bool:
     """Whether another part may follow: the last block is a straight motion that may be corrected, and nothing else."""
     if len(moves) < 2 or moves.block[-1] != len(program) - 1 or moves.block[-2] == moves.block[-1]:
         return False
-    straight = moves.kind[-1] in (Kind.RAPID, Kind.FEED) and moves.modal[-1] in (0, 10)
+    straight = moves.kind[-1] in (MotionKind.RAPID, MotionKind.FEED) and moves.modal[-1] in (0, 10)
     known = np.isfinite(moves.start[-1]).all() and np.isfinite(moves.end[-1]).all()
     return bool(straight and known and moves.rule[-1] == Rule.CORRECT)
 
 
 @dataclass(frozen=True)
-class Unit:
+class ProgramPart:
     """A part, and the last motion of the one before, which is written already.
 
     head       that motion and its block; None for the first part
@@ -217,7 +217,7 @@ class Unit:
     machine: Machine
 
     @classmethod
-    def whole(cls, program: Program, moves: Moves, machine: Machine) -> Unit:
+    def whole(cls, program: Program, moves: Moves, machine: Machine) -> ProgramPart:
         """A program that is one part."""
         return cls(Part(program, moves, True), None, np.zeros(len(machine.axes), dtype=np.int8), machine)
 
@@ -284,7 +284,7 @@ class Units(Parts):
         """What there is to say of following the program, so far."""
         return (*self.follower.messages, *self.notes.values())
 
-    def __iter__(self) -> Iterator[Unit]:
+    def __iter__(self) -> Iterator[ProgramPart]:
         """The parts; none any more once something is lacking.
 
         Raises what reading and following do, and at last UsageError for what the setup does not give.
@@ -296,7 +296,7 @@ class Units(Parts):
                 continue
             if self.look is not None:
                 self.look(part)
-            unit = Unit(part, head, direction, self.placed)
+            unit = ProgramPart(part, head, direction, self.placed)
             self._check_units(part.moves, head is None)
             if not part.last:
                 head, direction = self._head(unit)
@@ -323,7 +323,7 @@ class Units(Parts):
             raise NotInPartsError("the program changes between inch and mm")
         self.units |= units
 
-    def _head(self, unit: Unit) -> tuple[Part, Signs]:
+    def _head(self, unit: ProgramPart) -> tuple[Part, Signs]:
         """The last motion with its block, and the way in which the axes came there."""
         part, direction = unit.part, unit.direction
         head = Part(*last_of(part.program, part.moves), False)
@@ -341,7 +341,7 @@ class PartProof:
         self.again, self.follower = PartReader(task.path, task.dialect, task.head), task.follower()
         self.again.templates, self.again.index = reader.templates, reader.index
 
-    def pass_over(self, unit: Unit, foreign: bool) -> None:
+    def pass_over(self, unit: ProgramPart, foreign: bool) -> None:
         """Go past a part of another process, as programmed; `foreign`: so was the one before."""
         part = unit.part
         if unit.head is not None and not foreign:
@@ -352,7 +352,7 @@ class PartProof:
         self.again.first_line += part.program.lines_ended
         self.follower.follow(part.program, part.last)
 
-    def taught(self, unit: Unit, together: Together, text: bytes) -> Readings | None:
+    def taught(self, unit: ProgramPart, together: Together, text: bytes) -> Readings | None:
         """See `driver.Proof.taught`."""
         (settled,), head = together.settled, unit.head
         if head is None:

@@ -22,7 +22,7 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.compensate import FixOptions
-from ncfix.compensate.parts import Part, Unit
+from ncfix.compensate.parts import Part, ProgramPart
 from ncfix.compensate.plan.arcs import Closure, fitted, full_circles
 from ncfix.compensate.plan.arrays import (
     Array,
@@ -43,14 +43,14 @@ from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import REST, matters, moves_as_one, reached_joints
 from ncfix.compensate.plan.limits import FUZZ, JUMP, excess
-from ncfix.compensate.plan.path import Budget, Demands, Plan, in_pieces, not_split
+from ncfix.compensate.plan.path import Demands, PathTolerance, Plan, in_pieces, not_split
 from ncfix.compensate.plan.sampling import passed
 from ncfix.compensate.plan.segments import Segments, accelerations, arcs_within, skew, stays_within
 from ncfix.compensate.plan.splitting import Split
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding
 from ncfix.compensate.solve import Settled, agree
-from ncfix.control.moves import FeedMode, Kind, Moves, Rule
+from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
 from ncfix.control.parts import taken
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
@@ -61,7 +61,7 @@ from ncfix.writer.pieces import Pieces
 
 
 @dataclass(frozen=True, slots=True)
-class Poses:
+class MotionEnds:
     """Axis positions and commands at the ends of motions that go on from each other, (n + 1, n_axes) each.
 
     machine      with the workpiece in its place
@@ -78,7 +78,7 @@ class Poses:
     meant: Array
 
     @classmethod
-    def of(cls, machine: Machine, tool_length: float, commands: Array, led: bool) -> Poses | None:
+    def of(cls, machine: Machine, tool_length: float, commands: Array, led: bool) -> MotionEnds | None:
         """From the commands of a program; None where axes under TCP may not reach every point, or stray by no bound."""
         if led and not (moves_as_one(machine) and skew(machine) is not None):
             return None
@@ -146,7 +146,7 @@ def arcs_and_dwells(
     None if there are many arcs, or some that do not surely stay arcs within the travels.
     """
     moves, arc = intent.moves, intent.segments.arc
-    dwell, turn = moves.kind == Kind.DWELL, (moves.kind == Kind.FEED) & (moves.modal == 10)
+    dwell, turn = moves.kind == MotionKind.DWELL, (moves.kind == MotionKind.FEED) & (moves.modal == 10)
     arcs, dwells = np.flatnonzero(arc), np.flatnonzero(dwell)
     if FEW * len(arcs) > len(plain) or not (plain | arc | dwell | turn).all():
         return None
@@ -176,7 +176,7 @@ def by_the_long_way(
     near = distinct(np.concatenate([odd - 1, odd, odd + 1]))
     few = taken(moves, near)
     agreed = agree(few, machine, dialect, options)
-    still = few.kind == Kind.DWELL
+    still = few.kind == MotionKind.DWELL
     if agreed.reasons or agreed.plan.findings or (agreed.kept != still).any():
         return None
     pieces = agreed.plan.pieces
@@ -194,7 +194,7 @@ NEARLY = 1 - 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class PlainPlan:
     """The plan of a part of plain motions.
 
     part          its text and motions
@@ -227,14 +227,14 @@ class Course:
     def uneasy(self) -> Mask:
         """(n,) motions whose starts no figure of the one before shows: as `deviation.uneasy`."""
         kind = self.part.moves.kind[:-1]
-        return np.append(self.behind_rapid, (kind == Kind.DWELL) | (kind == Kind.RAPID))
+        return np.append(self.behind_rapid, (kind == MotionKind.DWELL) | (kind == MotionKind.RAPID))
 
     def settled(self, emission: Emission) -> Settled:
         """The plan and its text as the long way has them."""
         moves = self.part.moves
         untold = np.zeros(len(moves)), np.ones(len(moves), dtype=bool)
         plan = Plan(self.pieces, self.real.start, *untold, self.findings)
-        return Settled(moves, plan, emission, moves.kind == Kind.DWELL, {}, unmoored=False)
+        return Settled(moves, plan, emission, moves.kind == MotionKind.DWELL, {}, unmoored=False)
 
     def last(self, of_pieces: Array) -> Array:
         """Of what all pieces (m, k) have that of the last piece of each motion, (n, k)."""
@@ -257,21 +257,21 @@ class Planner:
     def of(cls, machine: Machine, options: FixOptions) -> Planner | None:
         """For a machine and options; None if these need the long way."""
         strategy = get_strategy(options.strategy)
-        budget = Budget(options.tolerance_mm, rounding(machine))
+        budget = PathTolerance(options.tolerance_mm, rounding(machine))
         able = strategy.follows_path and not strategy.corrects_orientation and budget.fine
         if not able or matters(machine) or machine.inputs or machine.bow is None or machine.linear_ways is None:
             return None
         demands = Demands(budget, Closure(), options.split_rapids, arc_pieces=False)
         return cls(machine, options, strategy, demands)
 
-    def plan(self, unit: Unit) -> Course | None:
+    def plan(self, unit: ProgramPart) -> PlainPlan | None:
         """The plan of a part behind the last motion of the one before; None if it needs the long way."""
         part, moves = unit.part, unit.part.moves
         plain = None if unit.head is None else plain_ones(unit.head.moves, moves)
         if unit.head is None or plain is None or moves.beside is not None:
             return None
         commands, led = np.concatenate([unit.head.moves.end, moves.end]), bool(moves.tcp[0])
-        poses = Poses.of(self.machine, float(moves.tool_length[0]), commands, led)
+        poses = MotionEnds.of(self.machine, float(moves.tool_length[0]), commands, led)
         if poses is None:
             return None
         found = self.strategy.solve(self.machine, poses.meant, State(poses.tool_length))
@@ -299,10 +299,10 @@ class Planner:
             pieces = on_digits(intent, pieces, inner)
             if not self._fine_inside(poses, real, pieces, inner, found.q):
                 return None
-        behind_rapid = bool(unit.head.moves.kind[-1] == Kind.RAPID)
-        return Course(part, plain, intent, real, pieces, first, found.before[1:], findings, behind_rapid)
+        behind_rapid = bool(unit.head.moves.kind[-1] == MotionKind.RAPID)
+        return PlainPlan(part, plain, intent, real, pieces, first, found.before[1:], findings, behind_rapid)
 
-    def _bounds_of(self, poses: Poses, intent: Intent, real: Segments, done: Array) -> Array | None:
+    def _bounds_of(self, poses: MotionEnds, intent: Intent, real: Segments, done: Array) -> Array | None:
         """What the deviation of the tip does not exceed along motions, (n,) mm; None if one leaves a travel on its way.
 
         done  (n + 1, n_axes) corrected axis positions
@@ -322,7 +322,7 @@ class Planner:
         return led_bounds(intent, self.machine.bow, begin, end, acceleration, poses.tool_length)
 
     def _in_one_look(
-        self, unit: Unit, intent: Intent, real: Segments, bound: Array, plain: Mask
+        self, unit: ProgramPart, intent: Intent, real: Segments, bound: Array, plain: Mask
     ) -> tuple[Others, Looked] | tuple[None, None]:
         """The arcs and dwells among `plain` motions (n,), and which motions must be split, all looked at together.
 
@@ -331,12 +331,12 @@ class Planner:
         moves, found = intent.moves, None
         if not moves.tcp[0]:
             found = arcs_and_dwells(intent, real, plain, unit.part.program.dialect, self.demands.budget.rounding)
-        if found is None or moves.kind[-1] == Kind.DWELL:
+        if found is None or moves.kind[-1] == MotionKind.DWELL:
             return None, None
         turned, others = found
-        uneasy = np.append(False, moves.kind[:-1] == Kind.DWELL)
+        uneasy = np.append(False, moves.kind[:-1] == MotionKind.DWELL)
         unknown = np.where(uneasy | turned.arc, np.inf, bound)
-        over, parts, _ = looked = self._split(intent, turned, unknown, moves.kind != Kind.DWELL, uneasy)
+        over, parts, _ = looked = self._split(intent, turned, unknown, moves.kind != MotionKind.DWELL, uneasy)
         return (None, None) if over.size and parts is None else (others, looked)
 
     def _split(self, intent: Intent, real: Segments, bound: Array, among: Mask, uneasy: Mask | None = None) -> Looked:
@@ -350,7 +350,7 @@ class Planner:
         moves, limit = intent.moves, self.demands.budget.path
         rows = np.flatnonzero(~(bound <= SURE * limit) & among)
         moving = some(np.abs(picked(moves.end, rows) - picked(moves.start, rows)) >= REST)
-        rows = rows[moving if self.demands.split_rapids else moving & (moves.kind[rows] != Kind.RAPID)]
+        rows = rows[moving if self.demands.split_rapids else moving & (moves.kind[rows] != MotionKind.RAPID)]
         if not rows.size:
             return rows, None, ()
         worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool) if uneasy is None else uneasy, limit)
@@ -402,7 +402,7 @@ class Planner:
         shift = done - meant
         return self._small(shift) and self._steady(shift[1:] - shift[:-1])
 
-    def _fine_inside(self, poses: Poses, real: Segments, pieces: Pieces, inner: Index, done: Array) -> bool:
+    def _fine_inside(self, poses: MotionEnds, real: Segments, pieces: Pieces, inner: Index, done: Array) -> bool:
         """The same of pieces that end inside of motions (k,); `done` (n + 1, n_axes) poses between these, corrected."""
         near = distinct(np.concatenate([inner, inner + 1]))
         own, ends, fraction = pieces.move[near], pieces.end[near], pieces.fraction[near]
@@ -454,8 +454,8 @@ def plain_ones(head: Moves, moves: Moves) -> Mask | None:
 
 def _may_be_planned(moves: Moves) -> bool:
     """Whether motions are to be corrected, in the axes that they name, from where they begin to where they say."""
-    rule = (moves.rule != Rule.CORRECT) & (moves.kind != Kind.DWELL)
-    special = moves.incremental | rule | (moves.kind == Kind.CYCLE)
+    rule = (moves.rule != Rule.CORRECT) & (moves.kind != MotionKind.DWELL)
+    special = moves.incremental | rule | (moves.kind == MotionKind.CYCLE)
     columns = moves.approach, moves.counted, moves.resting
     if special.any() or not all(each is None or not np.any(each) for each in columns):
         return False
@@ -465,7 +465,10 @@ def _may_be_planned(moves: Moves) -> bool:
 
 def _are_straight(moves: Moves) -> Mask:
     """(n,) straight motions; at feed only those along which linear axes move."""
-    rapid, cut = (moves.kind == Kind.RAPID) & (moves.modal == 0), (moves.kind == Kind.FEED) & (moves.modal == 10)
+    rapid, cut = (
+        (moves.kind == MotionKind.RAPID) & (moves.modal == 0),
+        (moves.kind == MotionKind.FEED) & (moves.modal == 10),
+    )
     straight: Mask = rapid | (cut & some((moves.start != moves.end)[:, ~moves.rotary]))
     return straight
 

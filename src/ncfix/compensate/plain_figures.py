@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix import fast
-from ncfix.compensate.plain import Course
+from ncfix.compensate.plain import PlainPlan
 from ncfix.compensate.plan.arrays import (
     Array,
     Index,
@@ -28,18 +28,18 @@ from ncfix.compensate.plan.arrays import (
     squares,
     totals,
 )
-from ncfix.compensate.plan.deviation import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
+from ncfix.compensate.plan.deviation import BATCH, STRAIGHT, FigureTally, PathError, PathSamples, errors_at, samples
 from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends_closely, even, features, passed
 from ncfix.compensate.plan.segments import Segments
-from ncfix.compensate.plan.written import TURNED, Known, Written, standing_still
-from ncfix.control.moves import Kind
+from ncfix.compensate.plan.written import TURNED, Known, WrittenPieces, standing_still
+from ncfix.control.moves import MotionKind
 from ncfix.text.language import Language
 from ncfix.writer.bulk import Bulk
 from ncfix.writer.emit import Emission, emit
 from ncfix.writer.pieces import Pieces
 
 
-def written(language: Language, course: Course, position: Array, steps: Array) -> Emission | None:
+def written(language: Language, course: PlainPlan, position: Array, steps: Array) -> Emission | None:
     """Write a part; None if any of it cannot be written, or would not move.
 
     position  (n_axes,) the command at which the control stands
@@ -54,16 +54,16 @@ def written(language: Language, course: Course, position: Array, steps: Array) -
     return None if emission.conflicts or idle else emission
 
 
-def largest_shift(course: Course, emission: Emission) -> float:
+def largest_shift(course: PlainPlan, emission: Emission) -> float:
     """The largest shift of the linear axes at the end of a motion, mm."""
     moves = course.part.moves
     return float(np.sqrt(squares((course.last(emission.end) - moves.end)[:, ~moves.rotary]).max()))
 
 
-def figures(course: Course, text: Emission, rapids: bool) -> PathError:
+def figures(course: PlainPlan, text: Emission, rapids: bool) -> PathError:
     """Tip errors over the motions that cut, and over rapids if the tolerance holds along them."""
     moves, written = course.part.moves, replace(course.real, start=text.start, end=course.last(text.end))
-    shown = (moves.kind != Kind.DWELL) & (rapids | (moves.kind != Kind.RAPID))
+    shown = (moves.kind != MotionKind.DWELL) & (rapids | (moves.kind != MotionKind.RAPID))
     uneasy = course.uneasy
     apart = ~course.plain | uneasy | (np.diff(course.first) > 1)
     if moves.tcp[0]:
@@ -83,7 +83,7 @@ def figures(course: Course, text: Emission, rapids: bool) -> PathError:
 
 
 def _by_columns(
-    course: Course, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally
+    course: PlainPlan, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally
 ) -> Index:
     """Count the errors at the ends of motions that are shown, and not apart; at how many places inside to look, (n,).
 
@@ -99,7 +99,9 @@ def _by_columns(
     return counts
 
 
-def _compiled(course: Course, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally) -> Index:
+def _compiled(
+    course: PlainPlan, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally
+) -> Index:
     """As `_by_columns`."""
     from ncfix.compensate import kernels
 
@@ -114,7 +116,7 @@ def _compiled(course: Course, text: Emission, written: Segments, masks: tuple[Ma
         (course.real.end, course.before),
         (bending, np.ascontiguousarray(machine.linear_ways), course.intent.columns, ~machine.rotary),
         (STRAIGHT, TURNED, DENSITY, MOST_SHOWN),
-        (*masks, moves.kind == Kind.FEED),
+        (*masks, moves.kind == MotionKind.FEED),
         (sums, places, counts),
     )
     way, *squares = sums[:3].tolist()
@@ -124,18 +126,18 @@ def _compiled(course: Course, text: Emission, written: Segments, masks: tuple[Ma
     return counts
 
 
-def _led_bends(course: Course) -> Array:
+def _led_bends(course: PlainPlan) -> Array:
     """About how many times the error may bend along each motion under TCP, (n,)."""
     return bends_closely(course.intent, np.arange(len(course.part.moves)))
 
 
-def _looks(course: Course, among: Mask, bends: Array) -> Index:
+def _looks(course: PlainPlan, among: Mask, bends: Array) -> Index:
     """At how many places inside of motions `among` (n,) to look, over which the error may bend so many times, (n,)."""
-    bent = among & (course.part.moves.kind == Kind.FEED) & (bends >= STRAIGHT)
+    bent = among & (course.part.moves.kind == MotionKind.FEED) & (bends >= STRAIGHT)
     return np.where(bent, np.minimum(np.ceil(DENSITY * bends), MOST_SHOWN), 0).astype(np.intp)
 
 
-def _at_ends(course: Course, written: Segments, rows: Index, counts: Index) -> Samples:
+def _at_ends(course: PlainPlan, written: Segments, rows: Index, counts: Index) -> PathSamples:
     """The errors at the ends of motions `rows` (k,), each for its share of the way; `counts` (n,) places are inside."""
     ways, columns = course.intent.machine.linear_ways, course.intent.columns
     assert ways is not None
@@ -144,23 +146,23 @@ def _at_ends(course: Course, written: Segments, rows: Index, counts: Index) -> S
     way = lengths((written.end[chosen] - written.start[chosen])[:, ~course.intent.machine.rotary]) / (
         counts[chosen] + 1
     )
-    return Samples(rows, np.ones(len(rows)), course.before[chosen], lengths(off), way, 0.0, 0.0)
+    return PathSamples(rows, np.ones(len(rows)), course.before[chosen], lengths(off), way, 0.0, 0.0)
 
 
-def _inside(course: Course, written: Segments, rows: Index, counts: Index) -> Samples:
+def _inside(course: PlainPlan, written: Segments, rows: Index, counts: Index) -> PathSamples:
     """The errors inside of motions `rows` (k,), at `counts` (k,) places each."""
     intent, move, fraction = course.intent, np.repeat(rows, counts), even(counts)
     chord = (picked(written.end, rows) - picked(written.start, rows))[:, ~intent.machine.rotary]
     weight = np.repeat(lengths(chord) / (counts + 1), counts)
-    return Samples(move, fraction, *errors_at(intent, move, fraction, written.at(move, fraction)), weight, 0.0, 0.0)
+    return PathSamples(move, fraction, *errors_at(intent, move, fraction, written.at(move, fraction)), weight, 0.0, 0.0)
 
 
-def _along(course: Course, text: Emission, rows: Index, uneasy: Mask) -> Iterator[Samples]:
-    """The errors along motions `rows` (k,); `uneasy` (n,) as in `Course`."""
+def _along(course: PlainPlan, text: Emission, rows: Index, uneasy: Mask) -> Iterator[PathSamples]:
+    """The errors along motions `rows` (k,); `uneasy` (n,) as in `PlainPlan`."""
     counts = np.diff(course.first)[rows]
     own = np.repeat(course.first[:-1][rows], counts) + places(counts)
     whole, no = course.pieces, np.broadcast_to(False, len(own))
     pieces = Pieces(rows[owners(counts)], whole.fraction[own], text.end[own], whole.arc[own], text.centre[own], no)
-    written = Written(course.intent, pieces, text.start)
+    written = WrittenPieces(course.intent, pieces, text.start)
     known = Known(course.before, course.real.end)
     return samples(written, np.arange(len(own)), tilts=False, known=known, uneasy=uneasy)

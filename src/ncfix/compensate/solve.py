@@ -5,9 +5,9 @@ began. Both show only when the text is written, and both change what the other m
 take turns until nothing more has to be kept; motions are only ever added to those that are, so this ends: a fixed
 point.
 
-A part of a program goes through the same rounds as the part before it, with what that one left in each (`Before`): what
-has to be left shows by and by, and motions behind it are planned before that, too. So a part refuses what the whole
-program would, and no less.
+A part of a program goes through the same rounds as the part before it, with what that one left in each
+(`PrecedingMotion`): what has to be left shows by and by, and motions behind it are planned before that, too. So a part
+refuses what the whole program would, and no less.
 
 What was written is read again. The new text must say what the plan meant (`differences`).
 """
@@ -31,7 +31,7 @@ from ncfix.compensate.plan.limits import findings, led_astray
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding, without_idle
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import language_of
@@ -67,7 +67,7 @@ class Round:
 
 
 @dataclass(frozen=True, slots=True)
-class Before:
+class PrecedingMotion:
     """The last motion of the part before, with which a part begins once more.
 
     rounds     in each round, see there; behind the last it stays as it is
@@ -78,12 +78,12 @@ class Before:
     direction: Signs
 
     @classmethod
-    def steady(cls, shift: Array, direction: Signs, position: Array) -> Before:
+    def steady(cls, shift: Array, direction: Signs, position: Array) -> PrecedingMotion:
         """It was never left as it was; arrays (n_axes,) as in `Round`."""
         return cls((Round(np.zeros(1, dtype=bool), shift[None], position),), direction)
 
     @classmethod
-    def of(cls, rounds: tuple[Round, ...], direction: Signs) -> Before:
+    def of(cls, rounds: tuple[Round, ...], direction: Signs) -> PrecedingMotion:
         """From all rounds of a part."""
         found: list[Round] = []
         for each in map(Round.shortened, rounds):
@@ -140,7 +140,7 @@ class Settled:
 
         Not those to a place that the machine measures itself: what it finds has its error in it.
         """
-        wanted = self.moves.cuts | (self.moves.kind == Kind.RAPID) if rapids else self.moves.cuts
+        wanted = self.moves.cuts | (self.moves.kind == MotionKind.RAPID) if rapids else self.moves.cuts
         shown: Mask = wanted & ~self.kept & ~at_measured_places(self.moves)
         return shown
 
@@ -197,7 +197,7 @@ def settle(
     machine: Machine,
     options: FixOptions,
     reading: SecondReading | None = None,
-    before: Before | None = None,
+    before: PrecedingMotion | None = None,
     first: Agreed | None = None,
     refused: Mapping[int, Reason] = NONE,
 ) -> Settled:
@@ -233,7 +233,7 @@ def agree(
     machine: Machine,
     dialect: Dialect,
     options: FixOptions,
-    before: Before | None = None,
+    before: PrecedingMotion | None = None,
     earlier: Agreed | None = None,
     number: int = 0,
     refused: Mapping[int, Reason] = NONE,
@@ -242,7 +242,9 @@ def agree(
 
     refused  blocks that are refused in any case, where there is no `earlier` plan
     """
-    kept = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL)) if earlier is None else earlier.kept
+    kept = (
+        np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)) if earlier is None else earlier.kept
+    )
     reasons = {**refused, **_by_rule(moves)} if earlier is None else earlier.reasons
     head = None if before is None else before.in_round(number)
     state, trail = State() if before is None else State(direction=before.direction), list[tuple[bool, Array]]()
@@ -314,7 +316,7 @@ def increments(machine: Machine) -> Array:
 
 def _by_rule(moves: Moves) -> dict[int, Reason]:
     reasons: dict[int, Reason] = {}
-    relative = (moves.kind == Kind.CYCLE) & moves.incremental & (moves.rule == Rule.CORRECT)
+    relative = (moves.kind == MotionKind.CYCLE) & moves.incremental & (moves.rule == Rule.CORRECT)
     relative &= True if moves.call is None else moves.call < 0
     _explain(reasons, moves.block[relative].tolist(), CODE_OF_RULE, RELATIVE_CYCLE)
     for row in np.flatnonzero(moves.rule == Rule.REFUSE):

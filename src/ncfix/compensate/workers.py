@@ -2,9 +2,9 @@
 
 Parts are taken in turn. What a part leaves in the control (`Passage`) is told to all as soon as it has been followed;
 only where that is more than can be told, the others read and follow it, too. What it leaves to the motions behind it
-(`Before`) is handed on as soon as its text is there, so that the next one can be written, too, while it is still being
-proved. Texts do not go from one process to another: each reads the program from its file, and puts what it has
-corrected where it belongs (`Ground`); the first process counts, and hands out what comes through a pipe.
+(`PrecedingMotion`) is handed on as soon as its text is there, so that the next one can be written, too, while it is
+still being proved. Texts do not go from one process to another: each reads the program from its file, and puts what it
+has corrected where it belongs (`Ground`); the first process counts, and hands out what comes through a pipe.
 
 Each process has a line to each of the others. Nobody waits for a process that is gone: its lines end (`Post`), also in
 the middle of a message, and who listens there gets `GoneError`; and when the first process leaves the work, whatever
@@ -24,7 +24,7 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from ncfix.compensate.solve import Before
+from ncfix.compensate.solve import PrecedingMotion
 from ncfix.control.following import Checkpoint
 from ncfix.host import tie
 from ncfix.plugins import blamed
@@ -144,14 +144,14 @@ class Passage:
 
 
 Result = TypeVar("Result")
-Made = TypeVar("Made", bound="Done", covariant=True)
+Made = TypeVar("Made", bound="PartResult", covariant=True)
 FORKS = hasattr(os, "fork") and sys.platform != "darwin"
 """Whether a process can be forked: not with Windows, and not in safety with the libraries of macOS."""
 Read = Callable[[int], bytes]
 """Gives the next so many bytes of a text, just as many but at its end."""
 
 
-class Done(Protocol):
+class PartResult(Protocol):
     """What has been done to a part."""
 
     def placed(self, file: int, at: int) -> Any:
@@ -206,20 +206,20 @@ class Share:
         found: Passage | None = heard.get(("passage", number))
         return found
 
-    def before(self, number: int) -> Before | None:
+    def before(self, number: int) -> PrecedingMotion | None:
         """What the part before that one has left, as soon as it is known; None for the first part.
 
         Raises what kept another process from finding it out.
         """
         if number == 0:
             return None
-        found: tuple[Before, int] | Exception = self.post.waited_for("before", number)
+        found: tuple[PrecedingMotion, int] | Exception = self.post.waited_for("before", number)
         if isinstance(found, Exception):
             raise found
         before, self.begin = found
         return before
 
-    def leave(self, number: int, before: Before, size: int) -> None:
+    def leave(self, number: int, before: PrecedingMotion, size: int) -> None:
         """Hand on what an own part leaves, which has become a text of so many bytes."""
         self._hand_on(number, (before, self.begin + size))
 
@@ -234,7 +234,7 @@ class Share:
 
 
 @dataclass(slots=True)
-class Ahead:
+class ReadAhead:
     """Reads a text in pieces of just the size that is wanted, and so many pieces ahead; the last one may be shorter."""
 
     source: Read
@@ -253,7 +253,7 @@ class Ahead:
 
 
 @dataclass(slots=True)
-class Beside:
+class BackgroundReader:
     """Reads a text beside the first process, from the file where it stands.
 
     file   that file
@@ -309,7 +309,7 @@ class Crew(Generic[Result]):
             pieces += 1
             return text
 
-        return Ahead(spreading, self.share.jobs - 1)
+        return ReadAhead(spreading, self.share.jobs - 1)
 
     def put(self, number: int, result: Result) -> None:
         """Note what this process has done."""
@@ -379,7 +379,7 @@ def _work(worker: Callable[[Read], Worker[Any]], ground: Ground, jobs: int, mine
     with Post(mine, own_lines(lines, mine)).opened(lambda: os._exit(1)) as post, suppress(GoneError, KeyboardInterrupt):
         share, number = Share(jobs, post), mine
         try:
-            for number, done in worker(Beside(ground.text, ground.whole, post)).work(share):
+            for number, done in worker(BackgroundReader(ground.text, ground.whole, post)).work(share):
                 post.tell("done", number, done.placed(ground.out, share.begin), 0)
                 number += jobs
         except GoneError:

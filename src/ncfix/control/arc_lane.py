@@ -12,14 +12,14 @@ import numpy as np
 
 from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
 from ncfix.control.builder import Circles
-from ncfix.control.control import Control
+from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import IDENTITY, X
 from ncfix.control.faults import Fault
 from ncfix.control.lane_tables import LaneTables
-from ncfix.control.stage import FloatArray, IntArray, Mask, Stage, Text, words
+from ncfix.control.stage import BlockRows, FloatArray, IntArray, Mask, ProgramText, words
 
 
-def turned(control: Control, unit: Text, block: int, stage: Stage) -> tuple[Circles | None, int]:
+def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockRows) -> tuple[Circles | None, int]:
     """The circles of the arcs of a stage that begins with a block, and how many blocks run before one for `arc`.
 
     That is what the lane cannot take: an arc that the control refuses, or one without the words that it needs.
@@ -52,7 +52,7 @@ def turned(control: Control, unit: Text, block: int, stage: Stage) -> tuple[Circ
 
 
 def on_circle(
-    control: Control, end: list[float], centre: list[float], radius: float, *, clockwise: bool
+    control: ProgramControl, end: list[float], centre: list[float], radius: float, *, clockwise: bool
 ) -> tuple[float, float]:
     """The centre relative to the start, from R (NaN without) or from what centre words say; raises `Fault`."""
     way = end[0], end[1]
@@ -63,7 +63,7 @@ def on_circle(
     return point
 
 
-def fitting(control: Control, unit: Text, block: int, stage: Stage, rows: IntArray) -> int:
+def fitting(control: ProgramControl, unit: ProgramText, block: int, stage: BlockRows, rows: IntArray) -> int:
     """How many blocks run before an arc without the words that it needs, or a straight motion with those of one.
 
     rows  (k,) the blocks that have such words, or that G2 or G3 is in force at
@@ -76,7 +76,7 @@ def fitting(control: Control, unit: Text, block: int, stage: Stage, rows: IntArr
     return int(rows[np.argmax(odd)]) if odd.any() else len(stage.mask)
 
 
-def named(control: Control, lanes: LaneTables) -> Mask:
+def named(control: ProgramControl, lanes: LaneTables) -> Mask:
     """(s,) shapes with the words that an arc needs in the plane in force."""
     plane = control.modal.plane
     if plane.across > 2:
@@ -88,7 +88,7 @@ def named(control: Control, lanes: LaneTables) -> Mask:
     return able & ~lanes.fixed[:, X] if control.modal.diameter else able
 
 
-def is_flat(control: Control, unit: Text, blocks: IntArray) -> Mask:
+def is_flat(control: ProgramControl, unit: ProgramText, blocks: IntArray) -> Mask:
     """(k,) blocks without a centre word across the plane in force, or with one that says nothing: no spirals."""
     program, plane = unit.program, control.modal.plane
     if plane.across > 2:
@@ -99,7 +99,9 @@ def is_flat(control: Control, unit: Text, blocks: IntArray) -> Mask:
     return flat
 
 
-def said(control: Control, unit: Text, blocks: IntArray, begin: FloatArray) -> tuple[FloatArray, FloatArray]:
+def said(
+    control: ProgramControl, unit: ProgramText, blocks: IntArray, begin: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """What the centre words of blocks say, (k, 2) relative to their starts `begin`, and R, (k,) NaN without; in mm."""
     program, lanes, plane = unit.program, unit.lanes, control.modal.plane
     shapes, first, mm = program.template[blocks], program.first_number[blocks], control.unit_of(X)

@@ -24,7 +24,7 @@ from ncfix.control.coordinates import mask_of, rotated
 from ncfix.control.faults import Fault
 
 if TYPE_CHECKING:
-    from ncfix.control.control import Control
+    from ncfix.control.control import ProgramControl
     from ncfix.control.motion import Motion
 
 
@@ -102,12 +102,12 @@ NO_WAY = 1e-9
 """mm"""
 
 
-def plane_of(control: Control) -> int:
+def plane_of(control: ProgramControl) -> int:
     """The axes of the plane that the machine has, as bits."""
     return mask_of((control.modal.plane.first, control.modal.plane.second)) & mask_of(control.machine)
 
 
-def resting(control: Control, motion: Motion) -> int:
+def resting(control: ProgramControl, motion: Motion) -> int:
     """Axes that must stay where they stand in a motion.
 
     Those of the plane, if it names some of them without any way in it; at a corner all others that make no way.
@@ -124,7 +124,7 @@ def resting(control: Control, motion: Motion) -> int:
     return across | (plane if beside and plane & ~still == 0 else 0)
 
 
-def resting_of_many(control: Control, mask: IntArray, starts: FloatArray, ends: FloatArray) -> IntArray:
+def resting_of_many(control: ProgramControl, mask: IntArray, starts: FloatArray, ends: FloatArray) -> IntArray:
     """The same of motions with words `mask` (n,) from `starts` to `ends` (n, 9), in coordinates that are not turned."""
     columns = [control.modal.plane.first, control.modal.plane.second]
     still = (np.abs(ends[:, columns] - starts[:, columns]) <= NO_WAY).all(axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
-from ncfix.control.moves import CycleCall, Frame, Kind, Moves, Rule
+from ncfix.control.moves import CycleCall, Frame, MotionKind, Moves, Rule
 from ncfix.control.passing import Pass
 from ncfix.control.turns import Winding, doubtful, extremes, overturned
 
@@ -20,10 +20,10 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-class Style(NamedTuple):
+class MotionStyle(NamedTuple):
     """What many motions have in common; `frame` and `reason` are indices."""
 
-    kind: Kind
+    kind: MotionKind
     rule: Rule
     reason: int
     frame: int
@@ -83,7 +83,7 @@ BUFFERED = 65536
 """Motions that are kept as Python numbers before they become arrays."""
 
 
-class Builder:
+class MotionBuilder:
     """Gathers motions; `moves()` makes the columns of them.
 
     rolls       (n_axes,) rotary axes that may roll over (see `rollover`); None: none
@@ -98,8 +98,8 @@ class Builder:
         self.columns = [INDEX[axis] for axis in axes]
         self.count = 0
         self._buffer = Buffer()
-        self._stretches: list[Stretch] = []
-        self._styles: dict[Style, int] = {}
+        self._stretches: list[MotionColumns] = []
+        self._styles: dict[MotionStyle, int] = {}
         self._reasons: dict[str, int] = {"": 0}
         self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
         self._arcs: dict[int, Arc] = {}
@@ -123,12 +123,12 @@ class Builder:
 
     # -- what is shared -----------------------------------------------------------------------------------------------
 
-    def style(self, style: Style) -> int:
+    def style(self, style: MotionStyle) -> int:
         """The index of a style."""
         return self._styles.setdefault(style, len(self._styles))
 
     @property
-    def styles(self) -> tuple[Style, ...]:
+    def styles(self) -> tuple[MotionStyle, ...]:
         """The styles by their index."""
         return tuple(self._styles)
 
@@ -206,14 +206,14 @@ class Builder:
         """The motions that are added next turn these axes in a way that their words say, or nothing leaves open."""
         self._said.append((self.count, self.count + motions, axes))
 
-    def extend(self, stretch: Stretch) -> None:
+    def extend(self, stretch: MotionColumns) -> None:
         """Many motions."""
         self._flush()
         self._stretches.append(stretch)
         self.count += len(stretch.block)
 
     @property
-    def latest(self) -> Stretch | None:
+    def latest(self) -> MotionColumns | None:
         """The motions that came together last; None if single ones came behind them, or none at all."""
         return self._stretches[-1] if self._stretches and not self._buffer.block else None
 
@@ -289,7 +289,7 @@ class Builder:
         """The columns of what styles hold, one row per motion."""
         rows, used = list(self._styles), np.flatnonzero(np.bincount(style)).tolist()
         columns: dict[str, NDArray[Any]] = {}
-        for index, name in enumerate(Style._fields):
+        for index, name in enumerate(MotionStyle._fields):
             kind, values = DTYPES.get(name, np.bool_), {rows[each][index] for each in used}
             of_styles = np.array([row[index] for row in rows], dtype=kind)
             columns[name] = np.full(len(style), values.pop(), kind) if len(values) == 1 else of_styles.take(style)
@@ -322,7 +322,7 @@ class Builder:
             back = self.winding.back(self.rolls, plain, start - offset, end - offset) & free & ~rows
         styles["compensated"] = styles["compensated"] | rows | back
         styles["held"] = styles["held"] | doubtful(self.rolls, start, end)
-        cuts = styles["kind"] != Kind.RAPID
+        cuts = styles["kind"] != MotionKind.RAPID
         self.overturned = _first(block, rows & cuts, self.overturned)
         self.brought_back = _first(block, back & cuts, self.brought_back)
         return extremes(self.rolls, plain, end - offset)
@@ -383,7 +383,7 @@ def _first(block: IntArray, rows: NDArray[np.bool_], known: int | None) -> int |
     return int(block[found[0]]) if known is None and found.size else known
 
 
-def _joined_ends(parts: Sequence[Stretch], columns: list[int]) -> tuple[FloatArray, FloatArray]:
+def _joined_ends(parts: Sequence[MotionColumns], columns: list[int]) -> tuple[FloatArray, FloatArray]:
     """Where the motions of stretches start and end; views of one path where all go on from each other, to the bit."""
     starts, ends = zip(*(part.ends(columns) for part in parts), strict=True)
     if len(parts) == 1:
@@ -403,7 +403,7 @@ def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
 
 
 @dataclass(slots=True)
-class Stretch:
+class MotionColumns:
     """Consecutive motions as columns; `programmed` and `adrift` are bit masks by letter, `start` and `end` (n, 9).
 
     path  (n + 1, 9) what both are views of, where each motion begins where the one before it ends
@@ -439,9 +439,9 @@ class Buffer:
     end: list[float] = field(default_factory=list)
     adrift: list[int] = field(default_factory=list)
 
-    def stretch(self) -> Stretch:
+    def stretch(self) -> MotionColumns:
         """The motions as columns."""
-        return Stretch(
+        return MotionColumns(
             np.array(self.block, dtype=np.int64),
             np.array(self.programmed, dtype=np.int64),
             np.array(self.style, dtype=np.int64),

@@ -10,15 +10,15 @@ from functools import cached_property
 from typing import Any
 
 from ncfix.control.arcs import plane_of, resting
-from ncfix.control.builder import Builder, Style
+from ncfix.control.builder import MotionBuilder, MotionStyle
 from ncfix.control.coordinates import LETTERS, Vector, mask_of
 from ncfix.control.flow import Budget
 from ncfix.control.motion import AT_START, Motion, UnknownAxes, blanked, first_reason, leaves_unknown
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.passing import Pass, Passing, may_pass
 from ncfix.control.pointing import Pointing
 from ncfix.control.posture import MachineDirections, pointing_of
-from ncfix.control.standing import Standing
+from ncfix.control.standing import ControlState
 from ncfix.control.tcp import along_frame, lost_in_frame
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
@@ -41,7 +41,7 @@ SQUARE = 1 - 1e-12
 """A component of a turned axis that is no less lies along the axis itself."""
 
 
-class Control(Standing):
+class ProgramControl(ControlState):
     """What every control keeps while it follows a program, whatever its language; its motions go to `builder`.
 
     budget     how much may still be executed
@@ -64,7 +64,7 @@ class Control(Standing):
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
         super().__init__(run, dialect)
-        self.builder = Builder(run.axes, run.rotary)
+        self.builder = MotionBuilder(run.axes, run.rotary)
         self.budget = Budget(run.setup.most_blocks, run.setup.most_blocks)
         self.needs_feed = False
         self.refusal = ""
@@ -153,7 +153,7 @@ class Control(Standing):
     def refuse_here(self, reason: str) -> None:
         """A block of which it is not known where it leads: none of the axes is known afterwards."""
         unknown = dict.fromkeys(self.machine, AFTER_THAT.format(reason))
-        self.make(Motion(Kind.FEED, 0, self.position[:], unknown, 10, refusal=reason))
+        self.make(Motion(MotionKind.FEED, 0, self.position[:], unknown, 10, refusal=reason))
 
     @property
     def frame(self) -> int:
@@ -179,9 +179,9 @@ class Control(Standing):
         self.beside &= ~fate.axes
         if fate.arc is not None:
             self.builder.arc(fate.arc)
-        if not fate.passing and fate.kind != Kind.DWELL:
+        if not fate.passing and fate.kind != MotionKind.DWELL:
             self.builder.rests(resting(self, fate))
-        if fate.kind != Kind.DWELL:
+        if fate.kind != MotionKind.DWELL:
             self.block_words = ()
         start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
         self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, adrift)
@@ -192,8 +192,8 @@ class Control(Standing):
     def _ask_for_start(self, motion: Motion) -> None:
         """Settle start positions that matter: where the motion ends, and for all but rapids where it begins."""
         kind, unknown = motion.kind, motion.unknown
-        if AT_START in unknown.values() or (kind != Kind.RAPID and AT_START in self.unknown.values()):
-            everywhere = tuple(self.unknown) if kind != Kind.RAPID else tuple(unknown)
+        if AT_START in unknown.values() or (kind != MotionKind.RAPID and AT_START in self.unknown.values()):
+            everywhere = tuple(self.unknown) if kind != MotionKind.RAPID else tuple(unknown)
             self.settle(everywhere)
             for index in [index for index, why in unknown.items() if why is AT_START]:
                 del unknown[index]
@@ -211,12 +211,12 @@ class Control(Standing):
 
     def _keep_places(self, motion: Motion, settles: int) -> None:
         """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
-        if motion.passing and motion.kind != Kind.DWELL:
+        if motion.passing and motion.kind != MotionKind.DWELL:
             target, here = motion.target, self.position
             self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
         lost = self._lost_at_end(motion)
         told = self.saying is not None and self.saying[0] is motion.unknown
-        if motion.kind != Kind.DWELL:
+        if motion.kind != MotionKind.DWELL:
             self.said = lost if told else None
         self.saying = None
         self.places.settle(settles)
@@ -227,11 +227,11 @@ class Control(Standing):
         """What is not known at the end of a motion, along the axes of the program's frame."""
         if self.saying is not None and self.saying[0] is motion.unknown:
             return self.saying[1]
-        return lost_in_frame(self) if motion.kind == Kind.DWELL else along_frame(self, motion.unknown)
+        return lost_in_frame(self) if motion.kind == MotionKind.DWELL else along_frame(self, motion.unknown)
 
     def ends_in_hole(self, motion: Motion) -> bool:
         """Whether there is a hole where the motion ends: then it matters where that is, as in a cut."""
-        return motion.kind == Kind.CYCLE
+        return motion.kind == MotionKind.CYCLE
 
     def _fate(self, motion: Motion, adrift: int) -> Motion:
         """The motion as it will be judged: rapids pass that need words for axes of which nobody has said enough."""
@@ -241,7 +241,7 @@ class Control(Standing):
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
-        if not rapid.unknown or rapid.kind != Kind.RAPID or rapid.refusal or self.refusal or self.suspended:
+        if not rapid.unknown or rapid.kind != MotionKind.RAPID or rapid.refusal or self.refusal or self.suspended:
             return False
         before = {*self.unknown.values(), *lost_in_frame(self).values()}
         return leaves_unknown(rapid, before, self._lost_at_end(rapid))
@@ -282,11 +282,11 @@ class Control(Standing):
         if index is None:
             return motion
         why = ADRIFT.format(LETTERS[index])
-        if motion.kind == Kind.RAPID and not self.ends_in_hole(motion):
+        if motion.kind == MotionKind.RAPID and not self.ends_in_hole(motion):
             return motion._replace(passing=Passing(Pass.UNSAID, why))
         return motion._replace(refusal=why)
 
-    def _verdict(self, kind: Kind, unknown: UnknownAxes, refusal: str) -> str:
+    def _verdict(self, kind: MotionKind, unknown: UnknownAxes, refusal: str) -> str:
         """Why a motion that does not pass is refused; empty if it may be corrected.
 
         A canned cycle begins with a rapid, so it does not matter where from.
@@ -294,7 +294,7 @@ class Control(Standing):
         reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
         if not reason and unknown:
             reason = first_reason(unknown)
-        if not reason and kind not in (Kind.RAPID, Kind.CYCLE) and self.unknown:
+        if not reason and kind not in (MotionKind.RAPID, MotionKind.CYCLE) and self.unknown:
             reason = first_reason(self.unknown)
         if not reason and self.external:
             reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
@@ -312,12 +312,12 @@ class Control(Standing):
         self.whole = whole
         return style
 
-    def _judged(self, kind: Kind, unknown: UnknownAxes, refusal: str, code: int) -> int:
+    def _judged(self, kind: MotionKind, unknown: UnknownAxes, refusal: str, code: int) -> int:
         """The style of a motion that does not pass."""
         reason = self._verdict(kind, unknown, refusal)
         return self._style(kind, Rule.REFUSE if reason else Rule.CORRECT, reason, code)
 
-    def style_of(self, kind: Kind, code: int) -> int:
+    def style_of(self, kind: MotionKind, code: int) -> int:
         """The style of motions whose start and end are known and that have no reason of their own."""
         return self._judged(kind, {}, "", code)
 
@@ -327,11 +327,11 @@ class Control(Standing):
         text = f"the program moves the axis {letter}, and the machine has only {names}"
         self.foreign[letter] = Message(UNKNOWN_AXIS, text, self.place(), f"is it the right machine file?{also}")
 
-    def _style(self, kind: Kind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
+    def _style(self, kind: MotionKind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
         modal = self.modal
         tool, length = self.tool_length()
         return self.builder.style(
-            Style(
+            MotionStyle(
                 kind,
                 rule,
                 self.builder.reason(reason),

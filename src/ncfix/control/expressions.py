@@ -16,14 +16,14 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 from ncfix.control.faults import Fault
 from ncfix.text.tree import (
     Binary,
-    Call,
     Constant,
     Exists,
     Expression,
+    FunctionCall,
     Literal,
     NamedParameter,
-    Parameter,
-    Text,
+    NumberedParameter,
+    StringLiteral,
     Unary,
 )
 
@@ -83,9 +83,9 @@ class Expressions:
                 return lambda scope: scope.numbers[scope.first + slot]
             case Constant(value):
                 return lambda scope: value
-            case Text(text):
+            case StringLiteral(text):
                 return self.text(text)
-            case Parameter(index):
+            case NumberedParameter(index):
                 return self.numbered(self.compiled(index))
             case NamedParameter(name):
                 return self.named(name)
@@ -95,7 +95,7 @@ class Expressions:
                 return self.function(operator, (self.compiled(operand, address),), address)
             case Binary(operator, left, right):
                 return self.operator(operator, left, right, address)
-            case Call(name, arguments, indexed):
+            case FunctionCall(name, arguments, indexed):
                 parts = tuple(left_out if part is None else self.compiled(part) for part in arguments)
                 return self.element(name, parts) if indexed else self.function(name, parts, address)
         raise self.none_such(expression)
@@ -130,7 +130,7 @@ class Expressions:
         """An element of an array."""
         raise self.none_such(name)
 
-    def existence(self, parameter: Parameter | NamedParameter) -> Evaluate:
+    def existence(self, parameter: NumberedParameter | NamedParameter) -> Evaluate:
         """Whether a variable has been defined."""
         raise self.none_such(parameter)
 

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ncfix.control.faults import Fault
-from ncfix.control.moves import Kind, Kinematics, Moves, Rule
+from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule
 from ncfix.control.trace import interpreter_of, trace
 from ncfix.diagnostics import RefusedError, SourceError
 from ncfix.text.language import Resolve, Run, language_of
 from ncfix.text.reader import read
-from ncfix.text.tree import Assignment, Command, Flow, Item, Opaque, Program, Span, Word
+from ncfix.text.tree import Assignment, Command, Item, Opaque, OWordLine, Program, Span, Word
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup
@@ -29,7 +29,7 @@ RUNTIME, TOO_LONG, NOT_FLAT = "NCF237", "NCF238", "NCF239"
 LINES = 500_000
 """A flat program has no more lines."""
 
-LEADING = (Kind.RAPID, Kind.CYCLE)
+LEADING = (MotionKind.RAPID, MotionKind.CYCLE)
 """Motions that lead somewhere, wherever they begin."""
 
 ROUNDINGS = 2.0
@@ -101,7 +101,7 @@ class Flattener:
                 return self.command(item)
             case Opaque():
                 return self.opaque(item)
-            case Flow():
+            case OWordLine():
                 return self.dropped(item)
         return None
 
@@ -201,7 +201,7 @@ def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
     end of a rapid, or at a hole, the flat form may tell, and the program not: holes that the control would make up lead
     it there.
     """
-    rows, flat = (np.flatnonzero(moves.kind != Kind.DWELL) for moves in (before, after))
+    rows, flat = (np.flatnonzero(moves.kind != MotionKind.DWELL) for moves in (before, after))
     if len(rows) != len(flat):
         return f"it has {len(rows)} motions, and would have {len(flat)}"
     size = np.array([steps[axis] for axis in before.axes])
@@ -210,6 +210,6 @@ def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
     other = (np.abs(ends - flat_ends) > ROUNDINGS * size).any(axis=1)
     told = (np.isnan(ends) & ~np.isnan(flat_ends)).any(axis=1) & ~np.isin(before.kind[rows], LEADING)
     other |= told | (np.isnan(flat_ends) & ~np.isnan(ends)).any(axis=1)
-    stands_in = (before.kind == Kind.ARC) & (before.sweep == 0) & (before.rule == Rule.REFUSE)
+    stands_in = (before.kind == MotionKind.ARC) & (before.sweep == 0) & (before.rule == Rule.REFUSE)
     other |= (before.kind[rows] != after.kind[flat]) & ~stands_in[rows] | (before.tcp[rows] != after.tcp[flat])
     return f"motion {int(np.argmax(other)) + 1} of {len(rows)} would be another" if other.any() else ""

@@ -167,7 +167,7 @@ class Return(NamedTuple):
 Operation = Let | Jump | Repeat | Call | Return
 
 
-class Flow(Generic[U]):
+class ProgramFlow(Generic[U]):
     """Where execution stands, and what takes it elsewhere.
 
     unit, block  what is executed next: the program counter

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.control import Control
+from ncfix.control.control import ProgramControl
 from ncfix.control.interpreter import Interpreter
-from ncfix.control.moves import Kind, Moves, Rule, Trace
+from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.parts import NotInPartsError
 from ncfix.control.turns import remarks, say
 from ncfix.diagnostics import Message, SourceError, UsageError
@@ -48,7 +48,9 @@ class Follower:
     watched  it is to be found out what the next part leaves behind
     """
 
-    def __init__(self, control: Control, run: Run, walk: Callable[[Any, Program, Run], Interpreter[Any]]) -> None:
+    def __init__(
+        self, control: ProgramControl, run: Run, walk: Callable[[Any, Program, Run], Interpreter[Any]]
+    ) -> None:
         self.control, self.run, self.walk = control, run, walk
         self.interpreter: Interpreter[Any] | None = None
         self.watched = self.unchanged = False
@@ -92,7 +94,7 @@ class Follower:
         control, modal = self.control, self.control.modal
         if not self.unchanged or control.unknown or control.builder.winding is not None or len(moves) < 2:
             return None
-        straight = np.isin(moves.kind[-2:], (Kind.RAPID, Kind.FEED)) & np.isin(moves.modal[-2:], (0, 10))
+        straight = np.isin(moves.kind[-2:], (MotionKind.RAPID, MotionKind.FEED)) & np.isin(moves.modal[-2:], (0, 10))
         if not straight.all() or moves.block[-2] + 1 != moves.block[-1] or _changes_tools(moves):
             return None
         before = moves.start[-1].tolist(), float(moves.feed[-2]), modal.feed_given, int(moves.modal[-2])
@@ -143,7 +145,7 @@ TOO_FAR = "NCF248"
 
 def check_reach(program: Program, moves: Moves) -> None:
     """Raise SourceError at the first motion that leads farther away than any machine goes."""
-    far, arcs = _are_far(moves.end), np.flatnonzero(moves.kind == Kind.ARC)
+    far, arcs = _are_far(moves.end), np.flatnonzero(moves.kind == MotionKind.ARC)
     far[arcs] |= _are_far(moves.centre[arcs])
     rows = np.flatnonzero(far & (moves.rule != Rule.REFUSE))
     if rows.size:
@@ -160,7 +162,7 @@ def _are_far(places: NDArray[np.float64]) -> NDArray[np.bool_]:
     return rows
 
 
-def finished(control: Control, program: Program, moves: Moves) -> Trace:
+def finished(control: ProgramControl, program: Program, moves: Moves) -> Trace:
     """The trace of a program; raises UsageError with all that was not given."""
     check_reach(program, moves)
     say(control, program)

@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from ncfix.control.arc_lane import turned
-from ncfix.control.control import Control
+from ncfix.control.control import ProgramControl
 from ncfix.control.faults import Fault
 from ncfix.control.flow import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.control.lane import run_lane
@@ -45,7 +45,7 @@ class Interpreter(ABC, Generic[U]):
     main: U
     flow: Any
 
-    def __init__(self, control: Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
+    def __init__(self, control: ProgramControl, program: Program, run: Run, *, in_parts: bool = False) -> None:
         self.control: Any = control
         self.dialect = program.dialect
         self.resolve = run.resolve

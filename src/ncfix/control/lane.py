@@ -12,11 +12,11 @@ from typing import Protocol
 import numpy as np
 
 from ncfix.control.arcs import CLOCKWISE, COUNTER, resting_of_many
-from ncfix.control.builder import Circles, Stretch
-from ncfix.control.control import Control
+from ncfix.control.builder import Circles, MotionColumns
+from ncfix.control.control import ProgramControl
 from ncfix.control.lane_tables import Lane
-from ncfix.control.moves import FeedMode, Kind
-from ncfix.control.stage import Ahead, IntArray, Mask, Stage, Text, rows_before
+from ncfix.control.moves import FeedMode, MotionKind
+from ncfix.control.stage import BlockRows, IntArray, Lookahead, Mask, ProgramText, rows_before
 
 SHORTEST = 16
 """Stretches of fewer blocks go one by one."""
@@ -31,11 +31,11 @@ class HasLane(Protocol):
         """Where its numbers are, if it may go through the fast lane."""
 
 
-class Unit(Text, Protocol):
+class LaneText(ProgramText, Protocol):
     """A program text of which stretches are taken."""
 
     @property
-    def ahead(self) -> Ahead:
+    def ahead(self) -> Lookahead:
         """What has been seen of the blocks to come."""
 
     def plan(self, block: int) -> HasLane:
@@ -50,11 +50,11 @@ Turned = tuple[Circles | None, int]
 
 
 def run_lane(
-    control: Control,
-    unit: Unit,
+    control: ProgramControl,
+    unit: LaneText,
     block: int,
     main: bool,
-    turned: Callable[[int, Stage], Turned] | None = None,
+    turned: Callable[[int, BlockRows], Turned] | None = None,
 ) -> int:
     """Take the stretch that begins with a block; the number of blocks taken, 0 for none.
 
@@ -75,7 +75,7 @@ def run_lane(
     return count
 
 
-def is_open(control: Control, unit: Unit, block: int) -> bool:
+def is_open(control: ProgramControl, unit: LaneText, block: int) -> bool:
     """Whether the state allows the fast lane at all."""
     modal = control.modal
     lane = unit.plan(block).lane
@@ -84,7 +84,7 @@ def is_open(control: Control, unit: Unit, block: int) -> bool:
     return begun and known and (modal.incremental or control.offset_checked)
 
 
-def before_placing(control: Control, mask: IntArray, block: int) -> int:
+def before_placing(control: ProgramControl, mask: IntArray, block: int) -> int:
     """The block that first brings an adrift axis to its place, or the end of blocks with these axis words (n,).
 
     That block goes by itself, so that all of a stretch have the same axes adrift.
@@ -95,7 +95,7 @@ def before_placing(control: Control, mask: IntArray, block: int) -> int:
     return block + (int(np.argmax(placing)) if placing.any() else len(mask))
 
 
-def count_allowed(control: Control, stage: Stage) -> int:
+def count_allowed(control: ProgramControl, stage: BlockRows) -> int:
     """How many blocks run before one that is refused for want of a feed, or that has no time of its own."""
     modal, count = control.modal, len(stage.mask)
     exact = control.needs_feed or modal.feed_mode == FeedMode.INVERSE_TIME
@@ -112,13 +112,13 @@ def count_allowed(control: Control, stage: Stage) -> int:
     return int(np.argmax(refused)) if refused.any() else count
 
 
-def moving(stage: Stage) -> Mask:
+def moving(stage: BlockRows) -> Mask:
     """(n,) blocks that make a motion."""
     named: Mask = stage.mask != 0
     return named if stage.turns is None else named | stage.turns
 
 
-def take(control: Control, stage: Stage, block: int, main: bool, circles: Circles | None = None) -> None:
+def take(control: ProgramControl, stage: BlockRows, block: int, main: bool, circles: Circles | None = None) -> None:
     """Add the motions of a stretch, and leave the control as they leave it; `circles`: of its arcs, by their block."""
     modal, moves = control.modal, moving(stage)
     note_codes(control, stage)
@@ -132,7 +132,7 @@ def take(control: Control, stage: Stage, block: int, main: bool, circles: Circle
     if plane:
         adrift |= np.where(stage.mask & plane != 0, 0, plane)
     path = stage.path
-    stretch = Stretch(blocks, stage.mask, styles(control, stage), stage.feed, path[:-1], path[1:], adrift, path)
+    stretch = MotionColumns(blocks, stage.mask, styles(control, stage), stage.feed, path[:-1], path[1:], adrift, path)
     if plane:
         resting = resting_of_many(control, stretch.programmed, stretch.start, stretch.end)
         resting[rows] = 0
@@ -144,7 +144,7 @@ def take(control: Control, stage: Stage, block: int, main: bool, circles: Circle
     modal.cycle.initial = None
 
 
-def note_codes(control: Control, stage: Stage) -> None:
+def note_codes(control: ProgramControl, stage: BlockRows) -> None:
     """Leave feed and motion codes in force as a stretch leaves them."""
     modal = control.modal
     modal.motion = int(stage.motion[-1])
@@ -156,13 +156,13 @@ def note_codes(control: Control, stage: Stage) -> None:
         modal.feed_given = modal.feed != 0.0
 
 
-def styles(control: Control, stage: Stage) -> IntArray:
+def styles(control: ProgramControl, stage: BlockRows) -> IntArray:
     """The styles of motions whose start and end are known, (n,)."""
-    found = np.full(len(stage.motion), control.style_of(Kind.FEED, 10))
+    found = np.full(len(stage.motion), control.style_of(MotionKind.FEED, 10))
     rapid = stage.motion == 0
     if rapid.any():
-        found[rapid] = control.style_of(Kind.RAPID, 0)
+        found[rapid] = control.style_of(MotionKind.RAPID, 0)
     for code in () if stage.turns is None or not stage.turns.any() else ARCS:
         if (round_ := stage.motion == code).any():
-            found[round_] = control.style_of(Kind.ARC, code)
+            found[round_] = control.style_of(MotionKind.ARC, code)
     return found

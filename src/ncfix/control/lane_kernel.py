@@ -36,7 +36,7 @@ def followed(
     tables  axes, feed, motion, mask of `LaneTables`
     before  the command before the first block (letters,), what the number of F counts, feed and motion code in force
     frame   offset and scale (letters,), and whether words are increments
-    stage   room for path, feed, fed, motion, coded, mask of `Stage`
+    stage   room for path, feed, fed, motion, coded, mask of `BlockRows`
     """
     (numbers, first, shapes), (slots, feeds, motions, masks) = blocks, tables
     (position, unit, feed, motion), (offset, scale, incremental) = before, frame

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ncfix.control.builder import Arc
 from ncfix.control.coordinates import LETTERS, Vector
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Passing
 
 AT_START = "where the axis {} stands when the program starts is not given"
@@ -28,7 +28,7 @@ class Motion(NamedTuple):
     settles  the axes whose words say where they stand afterwards; None: those of absolute words
     """
 
-    kind: Kind
+    kind: MotionKind
     axes: int
     target: Vector
     unknown: UnknownAxes

@@ -20,7 +20,7 @@ from ncfix.control.pointing import Pointing
 from ncfix.diagnostics import Message
 
 
-class Kind(IntEnum):
+class MotionKind(IntEnum):
     """What sort of motion."""
 
     RAPID = 0
@@ -126,7 +126,7 @@ class Moves:
     start, end   (n, n_axes) commands in mm and rad; NaN where not known. A rapid that may be corrected has a known
                  end, but its start need not be; other motions that may be corrected have both
     programmed   (n, n_axes) True where the block has a word for the axis
-    kind         (n,) `Kind`
+    kind         (n,) `MotionKind`
     rule         (n,) `Rule`
     reason       (n,) index into `reasons`; 0 is the empty reason
     block        (n,) index of the block in the program
@@ -245,14 +245,16 @@ class Moves:
     @property
     def cuts(self) -> NDArray[np.bool_]:
         """(n,) motions at feed: straight ones, arcs and canned cycles, but for what is passed by rule."""
-        cuts: NDArray[np.bool_] = (self.kind != Kind.RAPID) & (self.kind != Kind.DWELL) & (self.rule != Rule.PASS)
+        cuts: NDArray[np.bool_] = (
+            (self.kind != MotionKind.RAPID) & (self.kind != MotionKind.DWELL) & (self.rule != Rule.PASS)
+        )
         return cuts
 
     @property
     def moved(self) -> NDArray[np.bool_]:
         """(n, n_axes) axes that a motion takes to its end; a reference point without words takes all of them."""
         moved: NDArray[np.bool_] = self.programmed | (self.end != self.start)
-        passed = np.flatnonzero((self.rule == Rule.PASS) & (self.kind != Kind.DWELL))
+        passed = np.flatnonzero((self.rule == Rule.PASS) & (self.kind != MotionKind.DWELL))
         moved[passed[~self.programmed[passed].any(axis=1)]] = True
         return moved
 

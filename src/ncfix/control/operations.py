@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 from ncfix.control.coordinates import INDEX, Vector, mask_of
 from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 
 if TYPE_CHECKING:
-    from ncfix.control.control import Control
+    from ncfix.control.control import ProgramControl
 
 LEVELS = "DEHIJKLPQR"
 LOST = "where the axis {{}} stands after {} is not known"
@@ -61,7 +61,7 @@ class Operation(ABC):
     """It takes the axis words of its block, so that these make no other motion."""
 
     @abstractmethod
-    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """Do it."""
 
 
@@ -75,7 +75,7 @@ class Like(Operation):
     code: str
     words: tuple[tuple[str, str | float], ...] = ()
 
-    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """The family's code stands in its place wherever blocks are read: there is nothing left to do."""
 
 
@@ -90,7 +90,7 @@ class SetTool(Operation):
 
     address: str = "T"
 
-    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         if self.address in block.values:
             control.tools.selected = round(block.values[self.address])
@@ -109,7 +109,7 @@ class Lose(Operation):
     axes: str
     after: str
 
-    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         indices = [INDEX[letter] for letter in self.axes if INDEX[letter] in control.machine]
         control.lose(indices, LOST.format(self.after))
@@ -122,12 +122,12 @@ class Rapid(Operation):
 
     takes: ClassVar[bool] = True
 
-    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         if block.axes:
             target, unknown = destination()
             whole, control.whole = control.whole, True
-            control.make(Motion(Kind.RAPID, block.axes, target, unknown, 0))
+            control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
             control.whole = whole
 
 
@@ -137,7 +137,7 @@ class Suspend(Operation):
 
     mode: str
 
-    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         control.suspended[self.mode] = NOT_FOLLOWED.format(self.mode)
 
@@ -148,7 +148,7 @@ class Resume(Operation):
 
     mode: str
 
-    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         if control.suspended.pop(self.mode, None):
             control.lose(control.machine, AFTER.format(self.mode))
@@ -160,7 +160,7 @@ class Refuse(Operation):
 
     why: str
 
-    def carry_out(self, control: Control, block: BlockValues, destination: Destination) -> None:
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         control.refusal = control.refusal or self.why
 

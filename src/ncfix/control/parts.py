@@ -17,7 +17,7 @@ from ncfix.control.moves import Moves
 from ncfix.text.dialect import Dialect
 from ncfix.text.dialects import check_content, check_zeros, header_length
 from ncfix.text.language import Language, language_of
-from ncfix.text.reader import Reading
+from ncfix.text.reader import ProgramReading
 from ncfix.text.tree import Program, Skip, Template
 
 TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles", "calls"})
@@ -61,7 +61,9 @@ class PartReader:
         if not begun:
             blocks[0, 0] = header_length(source)
         end = self._end_later(source, blocks) if begun else self.language.end(source, blocks)
-        reading = Reading(source, self.path, self.dialect, self.language, blocks, end, self.templates, self.index)
+        reading = ProgramReading(
+            source, self.path, self.dialect, self.language, blocks, end, self.templates, self.index
+        )
         reading.first_line, reading.line_end = self.first_line, self.line_end
         before = len(self.templates)
         program = reading.program()

@@ -10,7 +10,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -42,7 +42,7 @@ class PassRule(NamedTuple):
     """
 
     name: str
-    kinds: frozenset[Kind]
+    kinds: frozenset[MotionKind]
     cuts: bool
     why: str
 
@@ -54,14 +54,14 @@ class Passing(NamedTuple):
     words: str
 
 
-RAPIDS = frozenset({Kind.RAPID})
-STRAIGHT = frozenset({Kind.RAPID, Kind.FEED})
+RAPIDS = frozenset({MotionKind.RAPID})
+STRAIGHT = frozenset({MotionKind.RAPID, MotionKind.FEED})
 
 PASS_RULES: Mapping[Pass, PassRule] = {
-    Pass.DWELL: PassRule("dwell", frozenset({Kind.DWELL}), False, "Nothing moves."),
+    Pass.DWELL: PassRule("dwell", frozenset({MotionKind.DWELL}), False, "Nothing moves."),
     Pass.MACHINE_COORDINATES: PassRule(
         "machine coordinates",
-        STRAIGHT | {Kind.ARC},
+        STRAIGHT | {MotionKind.ARC},
         True,
         "The program means places of the machine's axes (a tool changer, a limit), not places on the workpiece.",
     ),
@@ -101,7 +101,7 @@ PASS_RULES: Mapping[Pass, PassRule] = {
     ),
     Pass.DEPARTURE: PassRule(
         "departure from a contour",
-        frozenset({Kind.FEED}),
+        frozenset({MotionKind.FEED}),
         True,
         "The control goes on from the corrected end of the contour (DEP); no word says where that leads.",
     ),
@@ -109,6 +109,6 @@ PASS_RULES: Mapping[Pass, PassRule] = {
 """The list: nothing else may pass."""
 
 
-def may_pass(passing: Passing, kind: Kind) -> bool:
+def may_pass(passing: Passing, kind: MotionKind) -> bool:
     """Whether a rule may pass a motion of this kind."""
     return kind in PASS_RULES[passing.rule].kinds

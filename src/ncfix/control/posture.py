@@ -22,7 +22,7 @@ from ncfix.control.moves import TcpState
 from ncfix.control.pointing import FloatArray, Pair, Pointing, Triple
 
 if TYPE_CHECKING:
-    from ncfix.control.control import Control
+    from ncfix.control.control import ProgramControl
 
 PROBE = 128.0
 """mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""
@@ -97,7 +97,7 @@ class Postures:
 
 
 def postures(
-    control: Control, direction: Sequence[float], rules: WayRules = NEAREST, here: Pair | None = None
+    control: ProgramControl, direction: Sequence[float], rules: WayRules = NEAREST, here: Pair | None = None
 ) -> Postures | None:
     """The ways to point the tool along a unit vector in the workpiece.
 
@@ -158,7 +158,7 @@ class MachineDirections:
     axes: Rotation
 
 
-def machine_directions(control: Control, position: Vector) -> MachineDirections | None:
+def machine_directions(control: ProgramControl, position: Vector) -> MachineDirections | None:
     """How the machine stands with its rotary axes at these positions; None if nobody knows its kinematics."""
     if control.kinematics is None or not {X, Y, Z} <= {*control.machine}:
         return None
@@ -176,7 +176,7 @@ def machine_directions(control: Control, position: Vector) -> MachineDirections 
     return control.directions[1]
 
 
-def stands_square(control: Control, frame: Rotation) -> bool | None:
+def stands_square(control: ProgramControl, frame: Rotation) -> bool | None:
     """Whether the tool lies along Z of a frame in the workpiece; None if that is not known."""
     if control.unknown.keys() & {*control.turning}:
         return None
@@ -189,7 +189,7 @@ def normal_of(frame: Rotation) -> Triple:
     return frame[0][2], frame[1][2], frame[2][2]
 
 
-def pointing_of(control: Control) -> Pointing | None:
+def pointing_of(control: ProgramControl) -> Pointing | None:
     """How the machine's two rotary axes point the tool: the tips of two tool lengths say which way it points.
 
     None if it has others, if it lacks X, Y or Z, or if nobody knows its kinematics.
@@ -208,7 +208,7 @@ def pointing_of(control: Control) -> Pointing | None:
     return Pointing.of((columns[0], columns[1]), directions)
 
 
-def _tip(control: Control, position: Vector, length: float) -> FloatArray:
+def _tip(control: ProgramControl, position: Vector, length: float) -> FloatArray:
     """The tip (3,) of a tool of some length in the workpiece, mm."""
     assert control.kinematics is not None
     command = [position[index] for index in control.machine]

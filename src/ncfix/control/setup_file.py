@@ -52,7 +52,7 @@ def loads(text: str, path: str = "<setup>") -> Setup:
     content = parsed(text, path, NOT_TOML, "docs/formats.md shows a setup file")
     if "topology" in content:
         raise ConfigError.of(UNKNOWN_KEY, "this is a machine file, not a setup file", Place(path), "-m is for machines")
-    reading = Reading(path, text, key_lines(text))
+    reading = SetupReading(path, text, key_lines(text))
     values = {key: reading.entry(key, value) for key, value in content.items()}
     if reading.faults:
         raise ConfigError.collected(reading.faults)
@@ -64,7 +64,7 @@ def loads(text: str, path: str = "<setup>") -> Setup:
 
 
 @dataclass(slots=True)
-class Reading:
+class SetupReading:
     """A setup file while it is read; faults are collected."""
 
     path: str

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.control.control import Control
+from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import N_LETTERS
 from ncfix.control.lane_tables import LaneTables
 from ncfix.control.moves import FeedMode
@@ -26,7 +26,7 @@ LONGEST = 1 << 16
 """Blocks that are taken at once."""
 
 
-class Text(Protocol):
+class ProgramText(Protocol):
     """A program text while it is executed."""
 
     @property
@@ -39,7 +39,7 @@ class Text(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class BlockRows:
     """Consecutive blocks as the control takes them, one row per block.
 
     path    (n + 1, 9) the command before the first block, and at the end of each
@@ -57,14 +57,14 @@ class Stage:
     mask: IntArray
     turns: Mask | None = None
 
-    def rows(self, start: int, stop: int) -> Stage:
+    def rows(self, start: int, stop: int) -> BlockRows:
         """Some of the blocks."""
         own = slice(start, stop)
         path = self.path[start : stop + 1]
         turns = None if self.turns is None else self.turns[own]
-        return Stage(path, self.feed[own], self.fed[own], self.motion[own], self.coded[own], self.mask[own], turns)
+        return BlockRows(path, self.feed[own], self.fed[own], self.motion[own], self.coded[own], self.mask[own], turns)
 
-    def only(self, moving: Mask) -> Stage:
+    def only(self, moving: Mask) -> BlockRows:
         """The blocks that move anything, (n,): the others lead nowhere."""
         if moving.all():
             return self
@@ -73,7 +73,7 @@ class Stage:
         return replace(self, path=path, **{name: getattr(self, name).compress(moving) for name in names})
 
 
-def stage_of(control: Control, unit: Text, start: int, stop: int) -> Stage:
+def stage_of(control: ProgramControl, unit: ProgramText, start: int, stop: int) -> BlockRows:
     """What blocks say, and where they lead."""
     program = unit.program
     shapes, first = program.template[start:stop], program.first_number[start:stop]
@@ -83,14 +83,14 @@ def stage_of(control: Control, unit: Text, start: int, stop: int) -> Stage:
     return replace(stage, turns=unit.lanes.turns.take(shapes)) if unit.lanes.turns.any() else stage
 
 
-def feed_unit(control: Control) -> float:
+def feed_unit(control: ProgramControl) -> float:
     """What the number of an F word counts."""
     return 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
 
 
 def followed(
-    control: Control, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
-) -> Stage:
+    control: ProgramControl, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
+) -> BlockRows:
     """What blocks of some shapes with numbers from `first` on say, and where they lead."""
     unit, feed_before, motion_before = before
     path = np.empty((len(first) + 1, N_LETTERS))
@@ -101,7 +101,7 @@ def followed(
     fed, coded = ~np.isnan(feeds), motion >= 0
     feed = filled(unit * feeds, fed, feed_before)
     codes = filled(motion.astype(np.float64), coded, motion_before)
-    return Stage(path, feed, fed, codes, coded, tables.mask.take(shapes))
+    return BlockRows(path, feed, fed, codes, coded, tables.mask.take(shapes))
 
 
 def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
@@ -114,7 +114,7 @@ def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
     return values
 
 
-def column(control: Control, letter: int, words: FloatArray) -> FloatArray:
+def column(control: ProgramControl, letter: int, words: FloatArray) -> FloatArray:
     """The commands of one axis at the ends of blocks with these words, (n,)."""
     here, given = control.position[letter], ~np.isnan(words)
     if not given.any():
@@ -126,14 +126,14 @@ def column(control: Control, letter: int, words: FloatArray) -> FloatArray:
 
 
 def followed_compiled(
-    control: Control, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
-) -> Stage:
+    control: ProgramControl, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
+) -> BlockRows:
     """As `followed`."""
     from ncfix.control import lane_kernel
 
     position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
     n = len(first)
-    stage = Stage(
+    stage = BlockRows(
         np.empty((n + 1, N_LETTERS)),
         np.empty(n),
         np.empty(n, dtype=np.bool_),
@@ -164,7 +164,7 @@ FEWEST = 256
 
 
 @dataclass(slots=True)
-class Ahead:
+class Lookahead:
     """The blocks that were looked at together, of which one stretch after the other is taken.
 
     What stands between stretches (arcs, dwells, expressions) counts as if it did nothing; what it has really done is
@@ -181,13 +181,13 @@ class Ahead:
     """
 
     begin: int = 0
-    stage: Stage | None = None
+    stage: BlockRows | None = None
     frame: object = None
     done: int = 0
     reach: int = field(default=LONGEST)
     most: int = field(default=LONGEST)
 
-    def stretch(self, control: Control, unit: Text, block: int, stop: int) -> Stage:
+    def stretch(self, control: ProgramControl, unit: ProgramText, block: int, stop: int) -> BlockRows:
         """The blocks from one on; the control stands before it. `done` is to be set to what has been taken of them."""
         frame = control.modal.incremental, feed_unit(control), *control.offset, *control.scale
         begin, stage = self.begin, self.stage
@@ -207,7 +207,7 @@ class Ahead:
         """
         self.most = min(2 * self.most, LONGEST) if taken == offered else max(2 * taken, FEWEST)
 
-    def _looked(self, control: Control, unit: Text, block: int, stop: int) -> Stage:
+    def _looked(self, control: ProgramControl, unit: ProgramText, block: int, stop: int) -> BlockRows:
         """Look at blocks, at twice as many as the last look was good for, but for those to `stop` at least."""
         if control.modal.incremental:
             return stage_of(control, unit, block, stop)
@@ -216,7 +216,7 @@ class Ahead:
         return stage_of(control, unit, block, min(max(stop, block + self.reach), len(unit.program)))
 
 
-def put_right(stage: Stage, control: Control) -> None:
+def put_right(stage: BlockRows, control: ProgramControl) -> None:
     """Let blocks go on from where the control stands."""
     here = np.array(control.position)
     for letter in np.flatnonzero(here.view(np.int64) != stage.path[0].view(np.int64)).tolist():

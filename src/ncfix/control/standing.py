@@ -38,7 +38,7 @@ def named_switches(switches: Collection[int]) -> str:
     return " ".join(f"/{number}" for number in sorted(switches))
 
 
-class Standing(ABC):
+class ControlState(ABC):
     """Where the axes stand, in commands and in the coordinates of the program.
 
     machine    letter indices of the machine's axes, in the order of its columns

@@ -20,25 +20,27 @@ from ncfix.control.coordinates import Rotation, Vector, X, Y, Z
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState
 
 if TYPE_CHECKING:
-    from ncfix.control.control import Control
+    from ncfix.control.control import ProgramControl
     from ncfix.control.motion import UnknownAxes
 
 
 TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
 
 
-def rotary_at_zero(control: Control, position: Vector, unknown: UnknownAxes) -> bool:
+def rotary_at_zero(control: ProgramControl, position: Vector, unknown: UnknownAxes) -> bool:
     """Whether all rotary axes of the machine stand at zero."""
     return all(index not in unknown and abs(position[index]) < 1e-12 for index in control.turning)
 
 
-def from_machine(control: Control, target: Vector, unknown: UnknownAxes) -> None:
+def from_machine(control: ProgramControl, target: Vector, unknown: UnknownAxes) -> None:
     """Make a position of the axes one of tool-centre-point control, in place."""
     if not converted(control, target, unknown, TcpState(False, 0.0), TcpState(True, control.offsets.tool[Z])):
         unknown |= {index: TURNED for index in (X, Y, Z) if index in control.machine}
 
 
-def converted(control: Control, position: Vector, unknown: UnknownAxes, before: TcpState, after: TcpState) -> bool:
+def converted(
+    control: ProgramControl, position: Vector, unknown: UnknownAxes, before: TcpState, after: TcpState
+) -> bool:
     """Say the same position as another command, in place; False where that is not known."""
     if rotary_at_zero(control, position, unknown):
         position[Z] += before.shift - after.shift
@@ -51,19 +53,19 @@ def converted(control: Control, position: Vector, unknown: UnknownAxes, before: 
     return True
 
 
-def lost_in_frame(control: Control) -> UnknownAxes:
+def lost_in_frame(control: ProgramControl) -> UnknownAxes:
     """What is not known along the axes of the program's frame."""
     if control.said is not None and control.unknown:
         return control.said
     return along_frame(control, control.unknown)
 
 
-def along_frame(control: Control, unknown: UnknownAxes) -> UnknownAxes:
+def along_frame(control: ProgramControl, unknown: UnknownAxes) -> UnknownAxes:
     """The axes of the program's frame that have a part in one of these of the machine."""
     return mixed_into(unknown, control.inverse) if unknown and control.is_rotated else unknown
 
 
-def lost_of_axes(control: Control, lost: UnknownAxes) -> UnknownAxes:
+def lost_of_axes(control: ProgramControl, lost: UnknownAxes) -> UnknownAxes:
     """Which axes of the machine are not known where this is not known along those of the program's frame."""
     return {index: why for index, why in mixed_into(lost, control.rotation).items() if index in control.machine}
 
@@ -78,7 +80,7 @@ def mixed_into(unknown: UnknownAxes, rotation: Rotation) -> UnknownAxes:
     return mixed
 
 
-def switch(control: Control, tool: Vector, on: bool) -> None:
+def switch(control: ProgramControl, tool: Vector, on: bool) -> None:
     """Another tool length, and tool-centre-point control on or off: the machine stands still, the tip may not.
 
     Where the tool lies along Z of a tilted plane, another length moves the tip along that only.

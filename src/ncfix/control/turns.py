@@ -30,12 +30,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.moves import FeedMode, Kind, Moves
+from ncfix.control.moves import FeedMode, MotionKind, Moves
 from ncfix.diagnostics import Message
 from ncfix.text.tree import Program
 
 if TYPE_CHECKING:
-    from ncfix.control.control import Control
+    from ncfix.control.control import ProgramControl
     from ncfix.writer.target import Target
 
 
@@ -52,7 +52,7 @@ DIGITS = 6
 
 def turns_alone(moves: Moves) -> NDArray[np.bool_]:
     """(n,) motions at feed in which no linear axis moves: whether `turn_alone` can be other than 0."""
-    alone: NDArray[np.bool_] = moves.kind == Kind.FEED
+    alone: NDArray[np.bool_] = moves.kind == MotionKind.FEED
     for column in np.flatnonzero(~moves.rotary):
         alone &= moves.end[:, column] - moves.start[:, column] == 0
     return alone
@@ -60,7 +60,7 @@ def turns_alone(moves: Moves) -> NDArray[np.bool_]:
 
 def turn_alone(moves: Moves, row: int) -> float:
     """The angle of a motion at feed that turns rotary axes alone, in degrees; 0 for others."""
-    if moves.kind[row] != Kind.FEED:
+    if moves.kind[row] != MotionKind.FEED:
         return 0.0
     way = moves.end[row] - moves.start[row]
     if (way[~moves.rotary] != 0).any():
@@ -145,7 +145,7 @@ HINT = "write such a turn in two blocks, if it is meant to go the longer way"
 WORDS = "say which way it is meant to go: ACP, ACN or DC"
 
 
-def watch(control: Control) -> None:
+def watch(control: ProgramControl) -> None:
     """Have motions watched in which an axis might roll over: one that goes a full turn or more, as far as is known."""
     travel = [(-math.inf, math.inf)] * len(control.machine) if control.kinematics is None else control.kinematics.travel
     wide = np.array([high - low >= 2 * math.pi for low, high in travel])
@@ -210,14 +210,14 @@ def extremes(rolls: Mask, plain: Mask, end: NDArray[np.float64]) -> NDArray[np.f
     return np.where(rolls[:, None], np.column_stack((low, high)), np.nan)
 
 
-def say(control: Control, program: Program) -> None:
+def say(control: ProgramControl, program: Program) -> None:
     """Say where the first of them is, of each kind."""
     for block, text, hint in ((control.builder.overturned, TEXT, HINT), (control.builder.brought_back, BACK, WORDS)):
         if block is not None and text not in control.rolled:
             control.rolled[text] = Message(ROLLED, text, program.place(block), hint)
 
 
-def remarks(control: Control) -> tuple[Message, ...]:
+def remarks(control: ProgramControl) -> tuple[Message, ...]:
     """All that there is to say of the program, in the same order whether it was followed in parts or as a whole."""
     rolled = (control.rolled[text] for text in (TEXT, BACK) if text in control.rolled)
     return (*control.knowledge.assumed.values(), *control.messages.values(), *rolled)

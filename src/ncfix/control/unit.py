@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.lane_tables import LaneTables
-from ncfix.control.stage import Ahead
+from ncfix.control.stage import Lookahead
 from ncfix.text.tree import Program, Template, view
 
 P = TypeVar("P")
@@ -49,7 +49,7 @@ class TextUnit(ABC, Generic[P]):
         self.first: Sequence[int] = view(program.first_number)
         self.numbers: Sequence[float] = view(program.numbers)
         self.operations: dict[int, Any] = {}
-        self.ahead = Ahead()
+        self.ahead = Lookahead()
         self._lanes: Any = None
         self._stops: NDArray[np.int64] | None = None
 

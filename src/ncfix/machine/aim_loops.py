@@ -9,10 +9,10 @@ import numpy as np
 from ncfix.machine.loops import (
     HANDFUL,
     Array,
-    Columns,
     Hand,
     Ints,
     Packed,
+    PoseColumns,
     add_up,
     carry,
     laid_out,
@@ -42,7 +42,7 @@ def aim(
     perfect: Packed,
     within: Packed,
     behind: Packed,
-    columns: Columns,
+    columns: PoseColumns,
     axes: Ints,
     target: Array,
     limits: Array,
@@ -165,7 +165,7 @@ def follow(steps: Steps, column: int, hand: Hand, count: int, way: Array) -> Non
 
 
 def placed(
-    perfect: Packed, columns: Columns, axes: Ints, ways_back: Array, target: Array, work: Array, out: Array
+    perfect: Packed, columns: PoseColumns, axes: Ints, ways_back: Array, target: Array, work: Array, out: Array
 ) -> None:
     """Where linear axes have to be for all tips to be at `target` (3, n) mm, out (3, n): as `Route.placed`.
 

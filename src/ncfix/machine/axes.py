@@ -113,7 +113,7 @@ class Axis:
 
 
 @dataclass(frozen=True, slots=True)
-class Tool:
+class GaugeLine:
     """The end of the tool branch, base frame with all axes at zero: the gauge line, and the way from the tip to it."""
 
     direction: Vector = (0.0, 0.0, 1.0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.machine import se3
-from ncfix.machine.axes import Axis, Tool, Vector
+from ncfix.machine.axes import Axis, GaugeLine, Vector
 from ncfix.machine.error_model import ErrorModel, Slot, Sort
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
@@ -320,14 +320,14 @@ def carry(joints: tuple[JointPose, ...], moved: Array, weight: Weight = 1.0) -> 
     return moved
 
 
-def carried_tips(joints: tuple[JointPose, ...], tool: Tool, lengths: Array, offset: Vector) -> Array:
+def carried_tips(joints: tuple[JointPose, ...], tool: GaugeLine, lengths: Array, offset: Vector) -> Array:
     """The tip of a tool of `lengths` (n,) or (1,), (3, 1, n) mm, in the frame at `offset` on the workpiece branch."""
     start = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
     tip: Array = carry(joints, start) - columns(offset)
     return tip
 
 
-def carried_frames(joints: tuple[JointPose, ...], tool: Tool, lengths: Array, offset: Vector) -> Array:
+def carried_frames(joints: tuple[JointPose, ...], tool: GaugeLine, lengths: Array, offset: Vector) -> Array:
     """The frame at the tip, as `carried_tips`: the directions of its axes, and where it is, (3, 4, n)."""
     tip = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
     axes = np.broadcast_to(FRAME_AXES, (3, 3, tip.shape[-1]))

@@ -15,7 +15,7 @@ from functools import cached_property, reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.machine.axes import BASE_AXES, SPINDLE, Axis, Effect, Tool, Vector
+from ncfix.machine.axes import BASE_AXES, SPINDLE, Axis, Effect, GaugeLine, Vector
 from ncfix.machine.basis import Basis
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal, inputs_of, signal_called
@@ -125,7 +125,7 @@ class ErrorModel:
         return any(group.gains[group.slots.index(slot), 3:].any() for group in self.groups if slot in group.slots)
 
 
-def compile_effects(axes: tuple[Axis, ...], tool: Tool, effects: Iterable[Effect]) -> ErrorModel:
+def compile_effects(axes: tuple[Axis, ...], tool: GaugeLine, effects: Iterable[Effect]) -> ErrorModel:
     """Sort the effects that are not zero into groups."""
     together: dict[tuple[object, ...], list[tuple[Effect, Dependence]]] = {}
     for effect in effects:
@@ -153,7 +153,7 @@ def joint_index(axes: tuple[Axis, ...], effect: Effect) -> int:
     return len(axes) if effect.joint == SPINDLE else names.index(effect.joint)
 
 
-def slot_of(axes: tuple[Axis, ...], tool: Tool, effect: Effect) -> Slot:
+def slot_of(axes: tuple[Axis, ...], tool: GaugeLine, effect: Effect) -> Slot:
     """Where the effect's small motion belongs. The spindle has no motion of its own: its body is what is carried."""
     joint = joint_index(axes, effect)
     default = tool.point if joint == len(axes) else axes[joint].reference
@@ -338,7 +338,7 @@ class Bow:
         return bow, angle
 
 
-def bow_of(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...]) -> Bow | None:
+def bow_of(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...]) -> Bow | None:
     """The bounds of a machine; None if one of its effects does not say its own, or depends on more than one axis."""
     sizes, slopes, curvatures = np.zeros(2), np.zeros((2, len(axes))), np.zeros((2, len(axes)))
     for effect in effects:
@@ -361,7 +361,7 @@ def bow_of(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...]) -> B
     return Bow(float(sizes[0]), float(sizes[1]), slopes, curvatures, _reach(axes, tool, effects))
 
 
-def _reach(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...]) -> float:
+def _reach(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...]) -> float:
     """`Bow.reach`: from a reference point over the rotary axes between it and the tool, along the chain.
 
     However an axis turns what is behind it, it keeps its distance from that axis.

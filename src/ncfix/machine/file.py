@@ -29,8 +29,8 @@ from ncfix.machine.axes import (
     SPINDLE,
     Axis,
     Effect,
+    GaugeLine,
     Matrix,
-    Tool,
     Topology,
     Triad,
     Vector,
@@ -93,10 +93,10 @@ def _machine(root: TomlTable) -> Machine | None:
         order, wrong = parse_topology(chain)
         for fault in wrong:
             root.note("NCF306", "topology", f"{chain!r}: {fault}", 'it reads like "w C B F X Y Z t"')
-    axes, tool = _axes(root, order), Tool()
+    axes, tool = _axes(root, order), GaugeLine()
     if (section := root.table("tool")) is not None:
         direction = _unit(section, required=False, default=(0.0, 0.0, 1.0))
-        tool = Tool(direction, _vector(section, "point", ORIGIN))
+        tool = GaugeLine(direction, _vector(section, "point", ORIGIN))
         section.close()
 
     def physical() -> Mapping[str, PhysicalEffect]:

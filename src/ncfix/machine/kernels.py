@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 LIBRARY = Library(__name__, (*steps.FORMULAS, *loops.HELPERS, *aim_loops.HELPERS))
 ROUTE = "i8[:]", "f8[:]"
-COLUMNS = loops.Columns, "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:]"
+COLUMNS = loops.PoseColumns, "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:]"
 
 tips = LIBRARY.kernel(*ROUTE, COLUMNS, "f8[:,:]", "f8[:,:]")(loops.tips)
 gaps = LIBRARY.kernel(ROUTE, ROUTE, COLUMNS, "f8[:,:]", "i8[:]", "f8[:,:]", "f8[:,:,:]", "f8[:,:]")(loops.gaps)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, Tool
+from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, GaugeLine
 from ncfix.machine.chain import advance, columns, cross, turned_with
 from ncfix.machine.error_model import Dependence, Slot, Sort, dependence_of, joint_index, slot_of, unit_motion
 from ncfix.machine.se3 import Array
@@ -34,7 +34,7 @@ class Jacobians:
     joints: Array
 
 
-def axis_jacobian(axes: tuple[Axis, ...], tool: Tool, poses: Poses) -> Array:
+def axis_jacobian(axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses) -> Array:
     """By the axis positions, poses last: (6, n_axes, n)."""
     tip, joints = _in_workpiece_frame(axes, tool, poses, with_errors=False)
     columns = np.empty((6, len(axes), poses.positions.shape[1]))
@@ -45,7 +45,7 @@ def axis_jacobian(axes: tuple[Axis, ...], tool: Tool, poses: Poses) -> Array:
     return columns
 
 
-def joint_jacobian(axes: tuple[Axis, ...], tool: Tool, poses: Poses) -> Array:
+def joint_jacobian(axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses) -> Array:
     """By the error twists of the joints, poses last: (6, n_joints, 6, n)."""
     tip, joints = _in_workpiece_frame(axes, tool, poses, with_errors=True)
     columns = np.empty((6, len(axes) + 1, 6, poses.positions.shape[1]))
@@ -67,7 +67,7 @@ def _turning(direction: Array, arm: Array) -> Array:
 
 
 def _in_workpiece_frame(
-    axes: tuple[Axis, ...], tool: Tool, poses: Poses, with_errors: bool
+    axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses, with_errors: bool
 ) -> tuple[Array, list[Array]]:
     """The tip (3, n), and the vectors of each joint (3, 2 or 4, n), the spindle last.
 
@@ -136,7 +136,7 @@ class Dependences:
         return frozenset().union(*(each.signals for each in self.ways))
 
 
-def joint_errors(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], poses: Poses) -> Array:
+def joint_errors(axes: tuple[Axis, ...], tool: GaugeLine, effects: Sequence[Effect], poses: Poses) -> Array:
     """See `Machine.joint_errors`; poses last: (n_joints, 6, n)."""
     errors = np.zeros((len(axes) + 1, 6, poses.positions.shape[1]))
     for effect in effects:
@@ -145,7 +145,9 @@ def joint_errors(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], 
     return errors
 
 
-def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], shared: Dependences, poses: Poses) -> Array:
+def design(
+    axes: tuple[Axis, ...], tool: GaugeLine, effects: Sequence[Effect], shared: Dependences, poses: Poses
+) -> Array:
     """See `Machine.design`; `shared` says how the effects depend on the state; poses last: (6, k, n)."""
     n = poses.positions.shape[1]
     by_joint = joint_jacobian(axes, tool, poses)
@@ -162,7 +164,7 @@ def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], shared
     return found
 
 
-def unit_twist(axes: tuple[Axis, ...], tool: Tool, effect: Effect, poses: Poses) -> Array:
+def unit_twist(axes: tuple[Axis, ...], tool: GaugeLine, effect: Effect, poses: Poses) -> Array:
     """What an effect of 1 mm or 1 rad does to its joint, at its reference point in its error axes: (6, n) or (6, 1)."""
     slot, motion = slot_of(axes, tool, effect), unit_motion(axes, effect)
     if slot.joint == len(axes):

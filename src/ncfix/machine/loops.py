@@ -43,7 +43,7 @@ SPARE = 14
 """Rows for those who do more with a handful of poses."""
 
 
-class Columns(NamedTuple):
+class PoseColumns(NamedTuple):
     """Poses in columns: positions (n_axes, n), sines and versines, other functions, tool lengths (n,) or (1,)."""
 
     q: Array
@@ -112,7 +112,7 @@ def unpacked(ints: Ints, reals: Array) -> tuple[Steps, Functions]:
     return steps, functions
 
 
-def room(columns: Columns, *routes: Packed) -> Array:
+def room(columns: PoseColumns, *routes: Packed) -> Array:
     """Room for a handful of poses on some routes, and `SPARE` rows more, as `laid_out` divides it.
 
     Each route has small motions of its own: what none of its functions adds to has to stay zero.
@@ -125,7 +125,7 @@ def room(columns: Columns, *routes: Packed) -> Array:
     return memory[begin : begin + count].reshape(-1, HANDFUL)
 
 
-def laid_out(work: Array, columns: Columns, f: int, m: int) -> tuple[Hand, Array]:
+def laid_out(work: Array, columns: PoseColumns, f: int, m: int) -> tuple[Hand, Array]:
     """The parts of the room for f functions and m small motions, and the rows to spare."""
     axes, sines, others = len(columns.q), len(columns.sine), len(columns.others)
     a = axes + 2 * sines
@@ -137,7 +137,7 @@ def laid_out(work: Array, columns: Columns, f: int, m: int) -> tuple[Hand, Array
     return hand, work[c + 5 :]
 
 
-def tips(ints: Ints, reals: Array, columns: Columns, work: Array, out: Array) -> None:
+def tips(ints: Ints, reals: Array, columns: PoseColumns, work: Array, out: Array) -> None:
     """The tips of all poses: out (4, n) are x, y, z in mm, and the largest squared angle of a small motion."""
     steps, functions = unpacked(ints, reals)
     hand, _ = laid_out(work, columns, len(functions.order), len(steps.kind))
@@ -155,7 +155,14 @@ def tips(ints: Ints, reals: Array, columns: Columns, work: Array, out: Array) ->
 
 
 def gaps(
-    perfect: Packed, real: Packed, columns: Columns, target: Array, sides: Ints, work: Array, out: Array, angle: Array
+    perfect: Packed,
+    real: Packed,
+    columns: PoseColumns,
+    target: Array,
+    sides: Ints,
+    work: Array,
+    out: Array,
+    angle: Array,
 ) -> None:
     """How far the tips of all poses are from where they shall be: out (k, n, 3) mm.
 
@@ -268,7 +275,7 @@ def nudge(small: Array, center: tuple[float, float, float], kind: int, count: in
             tip[0, k], tip[1, k], tip[2, k] = moved_back(tip[0, k], tip[1, k], tip[2, k], s, t, r, a, b, c)
 
 
-def take_up(columns: Columns, begin: int, count: int, hand: Hand) -> None:
+def take_up(columns: PoseColumns, begin: int, count: int, hand: Hand) -> None:
     """Put a handful of poses next to each other."""
     copy(columns.q, begin, count, hand.q)
     copy(columns.sine, begin, count, hand.sine)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ncfix.machine import error_model, linear, se3
 from ncfix.machine.aim import Aim, aimed, aimed_ahead, gaps
-from ncfix.machine.axes import ORIGIN, Axis, Effect, Tool, Vector, degrees
+from ncfix.machine.axes import ORIGIN, Axis, Effect, GaugeLine, Vector, degrees
 from ncfix.machine.chain import JointChain, build_chain, carried_frames, carried_tips
 from ncfix.machine.error_model import Bow, ErrorModel, bow_of, compile_effects, direction_axis
 from ncfix.machine.linear import Jacobians
@@ -54,7 +54,7 @@ class Machine:
     name: str
     topology: str
     axes: tuple[Axis, ...]
-    tool: Tool = Tool()  # noqa: RUF009
+    tool: GaugeLine = GaugeLine()  # noqa: RUF009
     effects: tuple[Effect, ...] = ()
     control: str | None = None
     least_increment: tuple[float, float] = DEFAULT_INCREMENT
@@ -414,7 +414,7 @@ def dumps(machine: Machine) -> str:
     if machine.workpiece_offset != ORIGIN:
         head["workpiece_offset"] = machine.workpiece_offset
     blocks = [written("ncfix = 1", head), *(written(f"[axis.{axis.name}]", axis.file_keys()) for axis in machine.axes)]
-    if machine.tool != Tool():
+    if machine.tool != GaugeLine():
         blocks.append(written("[tool]", {"direction": machine.tool.direction, "point": machine.tool.point}))
     blocks += [written("[[effect]]", effect.file_keys()) for effect in machine.effects]
     if machine.provenance:

@@ -17,11 +17,11 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.machine import se3, steps
-from ncfix.machine.axes import Axis, Tool, Vector
+from ncfix.machine.axes import Axis, GaugeLine, Vector
 from ncfix.machine.basis import ConstantBasis, Fourier, Polynomial
 from ncfix.machine.chain import JointModel, SmallMotion, columns, lies_on_axis, turn
 from ncfix.machine.error_model import EffectGroup, ErrorModel, Slot
-from ncfix.machine.loops import Columns, Packed, packed, room
+from ncfix.machine.loops import Packed, PoseColumns, packed, room
 from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
@@ -237,12 +237,12 @@ class Route:
                 return None
         return np.array([direction for _, direction in sorted(found)]).T if len(found) == len(axes) else None
 
-    def columns(self, poses: Poses, turns: Turns, given: Sequence[Array]) -> Columns:
+    def columns(self, poses: Poses, turns: Turns, given: Sequence[Array]) -> PoseColumns:
         """What compiled kernels are given; `given` are the functions that come from elsewhere."""
         n = poses.positions.shape[1]
         others = np.array([np.broadcast_to(row, n) for row in given]).reshape(len(given), n)
         rows = (np.ascontiguousarray(each) for each in (poses.positions, *turns, others, poses.tool_length))
-        return Columns(*rows)
+        return PoseColumns(*rows)
 
     def turns(self, poses: Poses) -> Turns:
         """Sines and versines by columns, (n_axes + k, n): of the rotary axes, and of the k held by their ranges."""
@@ -277,7 +277,7 @@ class SplitRoute:
 
 
 def route_of(
-    axes: tuple[Axis, ...], tool: Tool, joints: tuple[JointModel, ...], model: ErrorModel | None, offset: Vector
+    axes: tuple[Axis, ...], tool: GaugeLine, joints: tuple[JointModel, ...], model: ErrorModel | None, offset: Vector
 ) -> Route | None:
     """The route through joints with the errors of a model, or without; None where it cannot be written as steps.
 
@@ -290,7 +290,7 @@ def route_of(
 
 
 def split_route_of(
-    axes: tuple[Axis, ...], tool: Tool, joints: tuple[JointModel, ...], model: ErrorModel, offset: Vector
+    axes: tuple[Axis, ...], tool: GaugeLine, joints: tuple[JointModel, ...], model: ErrorModel, offset: Vector
 ) -> SplitRoute | None:
     """The route with errors in two, for those who move X, Y and Z.
 
@@ -309,7 +309,7 @@ def split_route_of(
 
 
 def _path(
-    tool: Tool, joints: tuple[JointModel, ...], groups: tuple[EffectGroup, ...], offset: Vector, *, real: bool
+    tool: GaugeLine, joints: tuple[JointModel, ...], groups: tuple[EffectGroup, ...], offset: Vector, *, real: bool
 ) -> tuple[Array, list[Link]] | None:
     """The start of a route, as in `Steps`, and its steps, with errors if it is the `real` one; None without one."""
     links: list[Link] = []

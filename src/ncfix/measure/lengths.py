@@ -140,7 +140,7 @@ class BallBar(Length):
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class CircularDeviations:
     """ISO 230-4, um. `G` circular deviation of each way round, `Gb` of both, `H` hysteresis, `F` radial deviation.
 
     Clockwise and the other way are as seen against the normal of the plane that points up (+z, else +y, else +x); NaN
@@ -174,7 +174,7 @@ class BallBarFigures:
     form: float
     form_rms: float
     radial: float
-    circle: Circle | None
+    circle: CircularDeviations | None
 
 
 def ball_bar_figures(measurement: Measurement, machine: Machine) -> Iterator[BallBarFigures]:
@@ -222,7 +222,7 @@ def _in_plane(normal: Array) -> Array:
     return np.column_stack([first, np.cross(normal, first)])
 
 
-def _circle(place: Array, radius: Array) -> Circle:
+def _circle(place: Array, radius: Array) -> CircularDeviations:
     """`place` (n, 2) unit vectors in the order of the run; `radius` (n,) minus the nominal one about the centre, um."""
     angle = np.unwrap(np.arctan2(place[:, 1], place[:, 0]))
     turning = np.sign(np.gradient(angle)) if len(angle) > 1 else np.ones(len(angle))
@@ -233,7 +233,7 @@ def _circle(place: Array, radius: Array) -> Circle:
     if all(each.size > 1 for each in ways):
         hysteresis = _apart(angle, radius, turning)
     means = [float(each.mean()) for each in ways if each.size]
-    return Circle(
+    return CircularDeviations(
         spans[0], spans[1], float(np.ptp(both)), hysteresis, float(both.max()), float(both.min()), float(np.mean(means))
     )
 

@@ -26,7 +26,7 @@ COMMON = ("ncfix-measurement", "kind", "noise_um", "noise_urad", *NOTES)
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class MeasurementKind:
     """The columns of a kind of measurement besides axes and state.
 
     measured  the columns that the instrument filled in: empty in a plan
@@ -56,9 +56,11 @@ CENTRE, ENDS = ("cx", "cy", "cz"), ("ax", "ay", "az", "bx", "by", "bz")
 KINDS = {
     kind.name: kind
     for kind in (
-        Kind("tcp", "position error of the tool point", (), SHIFTS, headers=("frame", "setup"), any_of=True),
-        Kind("tcp6", "position and orientation error", (), SHIFTS + TURNS, headers=("frame", "setup"), any_of=True),
-        Kind(
+        MeasurementKind("tcp", "position error of the tool point", (), SHIFTS, headers=("frame", "setup"), any_of=True),
+        MeasurementKind(
+            "tcp6", "position and orientation error", (), SHIFTS + TURNS, headers=("frame", "setup"), any_of=True
+        ),
+        MeasurementKind(
             "probe",
             "axis positions with the stylus in a ball's centre",
             ("ball",),
@@ -66,7 +68,7 @@ KINDS = {
             labels=("ball",),
             headers=("distance",),
         ),
-        Kind(
+        MeasurementKind(
             "axis",
             "one error motion of one axis",
             ("axis", "component", "position"),
@@ -75,7 +77,7 @@ KINDS = {
             labels=("axis", "component"),
             headers=("point", "setup"),
         ),
-        Kind(
+        MeasurementKind(
             "points",
             "targets in the frame of an instrument that stands on the foundation",
             ("target",),
@@ -83,7 +85,7 @@ KINDS = {
             labels=("target",),
             headers=("carried_by", "target", "frame"),
         ),
-        Kind(
+        MeasurementKind(
             "length",
             "distances: a gauge between two positions, or a ball-bar",
             (),
@@ -133,7 +135,7 @@ class Measurement:
         return sizes[0] if sizes else 0
 
     @property
-    def form(self) -> Kind:
+    def form(self) -> MeasurementKind:
         """What this kind has for columns."""
         return KINDS[self.kind]
 

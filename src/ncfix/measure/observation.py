@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import ConfigError, Message
-from ncfix.machine import Effect, Machine, Tool, se3
+from ncfix.machine import Effect, GaugeLine, Machine, se3
 from ncfix.machine.axes import SPINDLE
 from ncfix.measure.measurement import Array, Index, Measurement, groups
 
@@ -242,7 +242,7 @@ def branch(machine: Machine, side: str) -> tuple[Machine, list[int]]:
     order = f"w {letters} F t" if held else f"w F {letters} t"
     effects = tuple(effect for effect in machine.effects if effect.joint in joints)
     changes = {"topology": " ".join(order.split()), "axes": axes, "effects": effects}
-    tool = Tool() if held else machine.tool
+    tool = GaugeLine() if held else machine.tool
     offset = machine.workpiece_offset if held else (0.0, 0.0, 0.0)
     return machine.replace(**changes, tool=tool, workpiece_offset=offset), keep
 

@@ -19,7 +19,7 @@ from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Machine
 from ncfix.machine.fields import LARGEST, did_you_mean
 from ncfix.measure import checks, foreign
-from ncfix.measure.measurement import CENTRE, CHOICES, COMMON, ENDS, KINDS, STATES, Array, Kind, Measurement
+from ncfix.measure.measurement import CENTRE, CHOICES, COMMON, ENDS, KINDS, STATES, Array, Measurement, MeasurementKind
 
 SHOWN = 25
 """Faults that are named one by one; a file with more has a fault of another sort."""
@@ -55,7 +55,7 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
         found = foreign.recognised(text, machine, path)
         if found is not None:
             return found
-    lines = Text(path, text.splitlines())
+    lines = MeasurementLines(path, text.splitlines())
     measurement = _measurement(lines, machine, plan)
     return checks.checked(measurement, machine, lines.lines)
 
@@ -71,7 +71,7 @@ def _decoded(source: bytes, path: str) -> str:
         return source.decode("latin-1")
 
 
-def _measurement(text: Text, machine: Machine, plan: bool) -> Measurement:
+def _measurement(text: MeasurementLines, machine: Machine, plan: bool) -> Measurement:
     pairs = _header_lines(text)
     kind = _kind_of(text, pairs)
     text.stop()
@@ -98,7 +98,7 @@ def _measurement(text: Text, machine: Machine, plan: bool) -> Measurement:
 
 
 @dataclass(slots=True)
-class Text:
+class MeasurementLines:
     """The lines of a file and what is wrong with them."""
 
     path: str
@@ -135,7 +135,7 @@ class Cell:
 # -- the head ----------------------------------------------------------------------------------------------------------
 
 
-def _header_lines(text: Text) -> list[tuple[Cell, Cell]]:
+def _header_lines(text: MeasurementLines) -> list[tuple[Cell, Cell]]:
     """The header lines before the columns; a comment without a colon is one for people."""
     pairs = []
     for number, line in enumerate(text.lines, 1):
@@ -148,7 +148,7 @@ def _header_lines(text: Text) -> list[tuple[Cell, Cell]]:
     return pairs
 
 
-def _note_stray(text: Text, start: int, kind: str) -> None:
+def _note_stray(text: MeasurementLines, start: int, kind: str) -> None:
     """Note header lines after the first `start` lines: there they would be taken for a comment."""
     for number, line in enumerate(text.lines[start:], start + 1):
         key, colon, _ = line.removeprefix("#").partition(":")
@@ -157,7 +157,7 @@ def _note_stray(text: Text, start: int, kind: str) -> None:
             text.note("NCF602", f"header line {key.strip()!r} below the columns", number, 1, hint)
 
 
-def _kind_of(text: Text, pairs: list[tuple[Cell, Cell]]) -> str:
+def _kind_of(text: MeasurementLines, pairs: list[tuple[Cell, Cell]]) -> str:
     """The kind; what is wrong with version and kind is noted."""
     found = {key.text: value for key, value in pairs}
     version = found.get("ncfix-measurement")
@@ -175,7 +175,7 @@ def _kind_of(text: Text, pairs: list[tuple[Cell, Cell]]) -> str:
     return kind.text
 
 
-def _check_header(text: Text, pairs: list[tuple[Cell, Cell]], kind: str) -> None:
+def _check_header(text: MeasurementLines, pairs: list[tuple[Cell, Cell]], kind: str) -> None:
     """Note unknown keys and values that cannot be."""
     known = (*COMMON, *KINDS[kind].headers)
     said: set[str] = set()
@@ -195,7 +195,7 @@ def _check_header(text: Text, pairs: list[tuple[Cell, Cell]], kind: str) -> None
             text.mark(value, "NCF603", f"{key.text} is {one}, not {value.text!r}")
 
 
-def _header_numbers(text: Text, value: Cell, key: str, count: int) -> None:
+def _header_numbers(text: MeasurementLines, value: Cell, key: str, count: int) -> None:
     found = [_finite(part) for part in value.text.split()]
     if len(found) != count or any(number is None for number in found):
         wanted = "a number" if count == 1 else f"{count} numbers"
@@ -204,7 +204,7 @@ def _header_numbers(text: Text, value: Cell, key: str, count: int) -> None:
         text.mark(value, "NCF603", f"{key} is above zero, not {value.text}")
 
 
-def _named(text: Text, value: Cell, key: str, names: int, numbers: int) -> None:
+def _named(text: MeasurementLines, value: Cell, key: str, names: int, numbers: int) -> None:
     parts = value.text.split()
     if len(parts) != names + numbers or any(_finite(part) is None for part in parts[names:]):
         wanted = f"{names} names and {numbers} numbers"
@@ -235,7 +235,9 @@ def _cells(line: str, number: int) -> list[Cell]:
     return cells
 
 
-def _check_names(text: Text, names: list[Cell], form: Kind, machine: Machine, plan: bool) -> None:
+def _check_names(
+    text: MeasurementLines, names: list[Cell], form: MeasurementKind, machine: Machine, plan: bool
+) -> None:
     """Note columns that are unknown, there twice, or missing; a plan lacks what will be measured."""
     known = {*machine.axis_names, *form.columns, *form.labels, *LABELS, *machine.inputs, "tool_length", "time_s"}
     known |= {f"dir_{axis}" for axis in machine.axis_names}
@@ -255,7 +257,7 @@ def _check_names(text: Text, names: list[Cell], form: Kind, machine: Machine, pl
     _check_missing(text, seen, form, names[0].line, plan)
 
 
-def _check_missing(text: Text, seen: set[str], form: Kind, line: int, plan: bool) -> None:
+def _check_missing(text: MeasurementLines, seen: set[str], form: MeasurementKind, line: int, plan: bool) -> None:
     wanted = form.required if plan or form.any_of else (*form.required, *form.measured)
     for missing in [each for each in wanted if each not in seen]:
         text.note("NCF605", f"kind {form.name} has a column {missing!r}", line)
@@ -264,7 +266,7 @@ def _check_missing(text: Text, seen: set[str], form: Kind, line: int, plan: bool
         text.note("NCF605", f"kind {form.name} has at least one of {one}", line)
 
 
-def _unknown_name(text: Text, name: Cell, known: set[str], form: Kind, machine: Machine) -> None:
+def _unknown_name(text: MeasurementLines, name: Cell, known: set[str], form: MeasurementKind, machine: Machine) -> None:
     axis = name.text.removeprefix("dir_")
     if len(axis) == 1 and axis.isalpha() and axis.isupper():
         has = " ".join(machine.axis_names)
@@ -277,14 +279,14 @@ def _unknown_name(text: Text, name: Cell, known: set[str], form: Kind, machine: 
     text.mark(name, "NCF604", f"unknown column {name.text!r}", hint)
 
 
-def _check_length_form(text: Text, seen: set[str], line: int) -> None:
+def _check_length_form(text: MeasurementLines, seen: set[str], line: int) -> None:
     gauge, bar = set(ENDS), {*CENTRE, "radius"}
     if not (gauge <= seen and not bar & seen) and not (bar <= seen and not gauge & seen):
         forms = "ax,ay,az,bx,by,bz,length[,nominal] or cx,cy,cz,radius,length"
         text.note("NCF605", f"kind length has the columns {forms}", line)
 
 
-def _rows(text: Text, names: list[Cell], start: int) -> list[list[Cell]]:
+def _rows(text: MeasurementLines, names: list[Cell], start: int) -> list[list[Cell]]:
     rows = []
     for number, line in enumerate(text.lines[start + 1 :], start + 2):
         if not line.strip() or line.startswith("#"):
@@ -300,7 +302,7 @@ def _rows(text: Text, names: list[Cell], start: int) -> list[list[Cell]]:
 
 
 def _columns(
-    text: Text, names: list[str], rows: list[list[Cell]], form: Kind, plan: bool
+    text: MeasurementLines, names: list[str], rows: list[list[Cell]], form: MeasurementKind, plan: bool
 ) -> tuple[dict[str, Array], dict[str, tuple[str, ...]]]:
     columns: dict[str, Array] = {}
     labels: dict[str, tuple[str, ...]] = {}
@@ -319,17 +321,17 @@ def _columns(
     return columns, labels
 
 
-def _label(text: Text, cell: Cell, name: str) -> str:
+def _label(text: MeasurementLines, cell: Cell, name: str) -> str:
     if not cell.text:
         text.mark(cell, "NCF607", f"column {name!r} is empty in this row")
     return cell.text
 
 
-def _numbers(text: Text, cells: Iterable[Cell], name: str) -> Array:
+def _numbers(text: MeasurementLines, cells: Iterable[Cell], name: str) -> Array:
     return np.array([_number(text, cell, name) for cell in cells])
 
 
-def _number(text: Text, cell: Cell, name: str) -> float:
+def _number(text: MeasurementLines, cell: Cell, name: str) -> float:
     if not cell.text:
         text.mark(cell, "NCF607", f"column {name!r} is empty in this row")
         return math.nan

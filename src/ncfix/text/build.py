@@ -21,12 +21,12 @@ from ncfix.text.tree import (
     Constant,
     Exists,
     Expression,
-    Flow,
     Item,
     Literal,
     NamedParameter,
+    NumberedParameter,
     Opaque,
-    Parameter,
+    OWordLine,
     Skip,
     Span,
     Tape,
@@ -69,12 +69,12 @@ class Parsed:
     comment: int
 
 
-def build(tree: Branch, text: str, squeezed: Squeezed, maker: type[Builder] | None = None) -> Parsed:
+def build(tree: Branch, text: str, squeezed: Squeezed, maker: type[TreeBuilder] | None = None) -> Parsed:
     """Make the template of a block from its tree, by a language's own kind of builder; raises `TooDeepError`."""
     tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
     spans = tuple(squeezed.span(*edges(token)) for token in tokens)
     slots = {edges(token): slot for slot, token in enumerate(tokens)}
-    items = (maker or Builder)(text, squeezed, slots, tuple(stop for _, stop in spans)).items(tree)
+    items = (maker or TreeBuilder)(text, squeezed, slots, tuple(stop for _, stop in spans)).items(tree)
     comment = final_comment(tree)
     place = squeezed.span(*edges(comment))[0] if comment else -1
     return Parsed(Template(items, len(tokens)), spans, tuple(map(float, tokens)), place)
@@ -104,7 +104,7 @@ def tokens_of(tree: Branch) -> Iterator[Token]:
 
 
 @dataclass(frozen=True, slots=True)
-class Builder:
+class TreeBuilder:
     """Makes items of trees; knows where the numbers of the block stand.
 
     slots  edges of a number in the squeezed block -> its slot
@@ -192,19 +192,19 @@ class Builder:
         """A parameter that gets a value."""
         target, value = tree.children
         parameter = self.expression(target)
-        assert isinstance(parameter, Parameter | NamedParameter)
+        assert isinstance(parameter, NumberedParameter | NamedParameter)
         return Assignment(parameter, self.expression(value), self.span(tree))
 
-    def flow(self, tree: Branch) -> Flow:
+    def flow(self, tree: Branch) -> OWordLine:
         """A label, a keyword and its arguments; comments may stand between them."""
         label, keyword, *arguments = tree.children
         values = tuple(self.expression(each) for each in arguments if kind(each) != "ARGUMENT_COMMENT")
-        return Flow(self.label(label), str(keyword).lower(), values, self.span(tree))
+        return OWordLine(self.label(label), str(keyword).lower(), values, self.span(tree))
 
-    def program_number(self, tree: Branch) -> Flow:
+    def program_number(self, tree: Branch) -> OWordLine:
         """A bare O-word."""
         (label,) = tree.children
-        return Flow(self.label(label), "program", (), self.span(tree))
+        return OWordLine(self.label(label), "program", (), self.span(tree))
 
     def label(self, node: Node) -> str | Expression:
         """The label of an O-word."""
@@ -236,7 +236,7 @@ class Builder:
             case "literal" | "bracket":
                 return self.expression(parts[0], depth)
             case "parameter":
-                return Parameter(self.expression(parts[0], depth))
+                return NumberedParameter(self.expression(parts[0], depth))
             case "named_parameter":
                 return NamedParameter(name_of(parts[0]))
             case "unary":
@@ -258,7 +258,7 @@ class Builder:
     def exists(self, node: Node, depth: int) -> Exists:
         """`EXISTS[parameter]`."""
         parameter = self.expression(node, depth)
-        assert isinstance(parameter, Parameter | NamedParameter)
+        assert isinstance(parameter, NumberedParameter | NamedParameter)
         return Exists(parameter)
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ncfix.control.control import Control
+    from ncfix.control.control import ProgramControl
     from ncfix.control.flatten import FlatLine
     from ncfix.control.interpreter import Interpreter
     from ncfix.control.moves import Kinematics, Moves
@@ -140,7 +140,7 @@ class Language:
     end: Callable[[bytes, NDArray[np.int64]], int]
     scan: Callable[[bytes, NDArray[np.int64]], Scan]
     parse: Callable[[Dialect, str], Parsed]
-    control: Callable[[Run, Dialect], Control]
+    control: Callable[[Run, Dialect], ProgramControl]
     interpreter: Callable[..., Interpreter[Any]]
     layout: Callable[[Program, int], BlockLayout | None]
     render: Callable[[Program, int, Any, Target], Rendered]

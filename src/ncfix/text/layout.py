@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from ncfix.text.language import ArcLayout, BulkLayout
-from ncfix.text.tree import Anchor, Constant, Flow, Literal, Opaque, Program, Skip, Span, Tape, Word
+from ncfix.text.tree import Anchor, Constant, Literal, Opaque, OWordLine, Program, Skip, Span, Tape, Word
 
 #: In the order in which programs write them.
 AXIS_LETTERS = "XYZABCUVW"
@@ -127,7 +127,7 @@ def layout_of(program: Program, block: int) -> Layout:
 def has_free_text(program: Program, block: int) -> bool:
     """Whether the block holds what may mean more than words do: flow, tape marks, opaque text."""
     return any(
-        isinstance(item, (Flow, Tape)) or (isinstance(item, Opaque) and item.kind != CONTROL_CHARACTER)
+        isinstance(item, (OWordLine, Tape)) or (isinstance(item, Opaque) and item.kind != CONTROL_CHARACTER)
         for item in program.items_of(block)
     )
 

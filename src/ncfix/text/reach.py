@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.text.tree import Comment, Constant, Flow, Skip, Template, Word
+from ncfix.text.tree import Comment, Constant, OWordLine, Skip, Template, Word
 
 UNREAD = "unread"
 """The kind of an `Opaque` that could not be read where nobody may need it."""
@@ -58,7 +58,7 @@ def whole_text(source: bytes, blocks: NDArray[np.int64]) -> int:
 
 def runs_straight_on(template: Template) -> bool:
     """Whether nothing leads from a block of this shape to another part of the text, or from there to it."""
-    return not any(isinstance(item, Flow) for item in template.items) and CALL not in template.m_codes
+    return not any(isinstance(item, OWordLine) for item in template.items) and CALL not in template.m_codes
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,12 +105,12 @@ class Reach:
     def follow(self, template: Template) -> None:
         """Take note of a block."""
         for item in template.items:
-            if isinstance(item, Flow):
+            if isinstance(item, OWordLine):
                 self.enter_or_leave(item)
         if not self.open and not PROGRAM_ENDS.isdisjoint(template.m_codes):
             self.ended = True
 
-    def enter_or_leave(self, flow: Flow) -> None:
+    def enter_or_leave(self, flow: OWordLine) -> None:
         """Take note of an o-word. `while` closes the `do` of its label; other than that it opens."""
         if flow.keyword in CLOSING or (flow.keyword == "while" and ("do", flow.label) in self.open):
             labels = [label for _, label in self.open]

@@ -57,7 +57,7 @@ def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None =
     language = language_of(known)
     blocks = language.split(source)
     blocks[0, 0] = header_length(source)
-    return Reading(source, path, known, language, blocks, language.end(source, blocks)).program()
+    return ProgramReading(source, path, known, language, blocks, language.end(source, blocks)).program()
 
 
 def source_error(path: str, block: int, text: str, fault: BlockError) -> SourceError:
@@ -72,7 +72,7 @@ def check_length(dialect: Dialect, length: int) -> None:
         raise BlockError("NCF105", text, dialect.line_limit, "break the line or shorten its comment")
 
 
-class Columns(NamedTuple):
+class PartColumns(NamedTuple):
     """The columns of a part of a program: the first number of each block, and how many there are; spans and values."""
 
     first: NDArray[np.int64]
@@ -81,7 +81,7 @@ class Columns(NamedTuple):
 
 
 @dataclass(slots=True)
-class Reading:
+class ProgramReading:
     """One program while it is being read, part by part.
 
     tape_end   the block that ends the tape
@@ -140,7 +140,7 @@ class Reading:
             yield first, stop
             first = stop
 
-    def part(self, first: int, stop: int) -> Columns:
+    def part(self, first: int, stop: int) -> PartColumns:
         """Read the blocks from `first` up to `stop`."""
         found = self.scan(first, stop)
         known = list(map(self.index.get, found.shapes))
@@ -149,7 +149,7 @@ class Reading:
         if None not in known:
             shapes = np.array(known, dtype=np.int32)
             self.take(shapes if found.group is None else shapes[found.group])
-            return Columns(found.first_number, moved_by(found.spans, self.blocks[first, 0]), found.values)
+            return PartColumns(found.first_number, moved_by(found.spans, self.blocks[first, 0]), found.values)
         exact: dict[int, Parsed] = {}
         if found.group is not None:
             known = [known[group] for group in found.group.tolist()]
@@ -186,12 +186,12 @@ class Reading:
             shapes_of(self.dialect).keep(shape, template)
         return self.number(shape, template)
 
-    def tail(self) -> Columns:
+    def tail(self) -> PartColumns:
         """The blocks after the end of the tape."""
         count = len(self.blocks) - self.done
         if count:
             self.take(np.full(count, self.number(b"\n", AFTER_TAPE.template), dtype=np.int32))
-        return Columns(np.zeros(count + 1, np.int64), np.empty((0, 2), np.int64), np.empty(0))
+        return PartColumns(np.zeros(count + 1, np.int64), np.empty((0, 2), np.int64), np.empty(0))
 
     def take(self, templates: NDArray[np.int32]) -> None:
         """Note the templates of the next blocks."""
@@ -276,10 +276,10 @@ def agrees(scan: Scan, row: int, parsed: Parsed, start: int) -> bool:
     return bool(comment == parsed.comment and np.array_equal(spans, np.reshape(parsed.spans, (-1, 2))))
 
 
-def with_exact(scan: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64]) -> Columns:
+def with_exact(scan: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64]) -> PartColumns:
     """The columns of a scan, where the blocks in `exact` have the grammar's numbers instead of the scan's."""
     if not exact:
-        return Columns(scan.first_number, scan.spans, scan.values)
+        return PartColumns(scan.first_number, scan.spans, scan.values)
     counts = np.diff(scan.first_number)
     owner = np.repeat(np.arange(len(counts)), counts)
     keep = ~np.isin(owner, list(exact))
@@ -289,10 +289,10 @@ def with_exact(scan: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64]) 
         parts.append((np.full(len(spans), row), spans, np.array(parsed.values)))
     owner, spans, values = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.argsort(owner, kind="stable")
-    return Columns(firsts(np.bincount(owner, minlength=len(counts))), spans[order], values[order])
+    return PartColumns(firsts(np.bincount(owner, minlength=len(counts))), spans[order], values[order])
 
 
-def joined(parts: list[Columns]) -> Columns:
+def joined(parts: list[PartColumns]) -> PartColumns:
     """The columns of parts that follow each other."""
     counts, spans, values = map(np.concatenate, zip(*((np.diff(each[0]), *each[1:]) for each in parts), strict=True))
-    return Columns(firsts(counts), spans, values)
+    return PartColumns(firsts(counts), spans, values)

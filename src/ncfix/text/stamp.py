@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from ncfix.text.tree import Comment, Flow, Opaque, Program, Tape, Word
+from ncfix.text.tree import Comment, Opaque, OWordLine, Program, Tape, Word
 from ncfix.text.writer import Edit
 
 #: How every stamp begins; what follows it is for people.
@@ -70,5 +70,5 @@ def _is_number(item: object) -> bool:
     return (
         _is_line_number(item)
         or (isinstance(item, Word) and item.address == "O")
-        or (isinstance(item, Flow) and item.keyword == "program")
+        or (isinstance(item, OWordLine) and item.keyword == "program")
     )

@@ -69,7 +69,7 @@ class Constant:
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class NumberedParameter:
     """A numbered parameter, `#5`, `##5`, `#[1+2]`."""
 
     index: Expression
@@ -103,18 +103,18 @@ class Binary:
 class Exists:
     """`EXISTS[#<name>]` or `EXISTS[#5]`."""
 
-    parameter: Parameter | NamedParameter
+    parameter: NumberedParameter | NamedParameter
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class StringLiteral:
     """A string, `"DRILL 8.5"`, without its quotation marks."""
 
     value: str
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class FunctionCall:
     """A name with something in brackets, lower case: a function, `SIN(R1)`, or an element of an array, `BORE[2]`.
 
     An argument that is left out is None. `indexed`: the brackets are square.
@@ -125,7 +125,9 @@ class Call:
     indexed: bool = False
 
 
-Expression = Literal | Constant | Parameter | NamedParameter | Unary | Binary | Exists | Text | Call
+Expression = (
+    Literal | Constant | NumberedParameter | NamedParameter | Unary | Binary | Exists | StringLiteral | FunctionCall
+)
 
 
 # -- the items of a block ---------------------------------------------------------------------------------------------
@@ -148,7 +150,7 @@ class Word:
 class Assignment:
     """`#1=...`, `#<name>=...`: takes effect after the whole block."""
 
-    target: Parameter | NamedParameter | Call
+    target: NumberedParameter | NamedParameter | FunctionCall
     value: Expression
     span: Span
 
@@ -182,7 +184,7 @@ class Skip:
 
 
 @dataclass(frozen=True, slots=True)
-class Flow:
+class OWordLine:
     """A flow-control line of RS274NGC: `o100 while [...]`, `o<name> call [..]`.
 
     `label` is the name, or the number without leading zeros, as text (`o100` and `o<100>` are the same), else an
@@ -211,7 +213,7 @@ class Opaque:
     span: Span
 
 
-Item = Word | Assignment | Command | Comment | Skip | Flow | Tape | Opaque
+Item = Word | Assignment | Command | Comment | Skip | OWordLine | Tape | Opaque
 
 
 BEYOND = 1e9

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.control.moves import Frame, Kind, Moves
+from ncfix.control.moves import Frame, MotionKind, Moves
 from ncfix.text.language import Language
 from ncfix.text.number_text import NumberColumns, Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.text.tree import Program
@@ -114,7 +114,7 @@ class Bulk:
         fit = plain & layouts.known[shapes]
         several = np.flatnonzero(np.diff(first_piece) > 1)
         fit[several] &= layouts.further[shapes[several]]
-        if (moves.kind == Kind.ARC).any():
+        if (moves.kind == MotionKind.ARC).any():
             fit |= sound(moves, pieces, first_piece) & whole_arcs(program, moves, pieces, first_piece[:-1], layouts)
         if language.one_by_one is not None:
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
@@ -313,7 +313,7 @@ class Stretch:
                 )
             alone = np.flatnonzero(further)
             clear[alone[~add[alone].any(axis=1)]] = False
-            still = np.flatnonzero(bulk.moves.kind[move] == Kind.DWELL)
+            still = np.flatnonzero(bulk.moves.kind[move] == MotionKind.DWELL)
             add[still], clear[still] = False, True
         return cls(bulk, block, further, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
 

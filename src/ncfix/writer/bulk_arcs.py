@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.number_text import Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
@@ -40,7 +40,7 @@ def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, 
 
     first  (n,) the first piece of each motion
     """
-    fit: Mask = moves.kind == Kind.ARC
+    fit: Mask = moves.kind == MotionKind.ARC
     if not fit.any() or not {"X", "Y", "Z"} <= set(moves.axes):
         return np.zeros(len(moves), dtype=np.bool_)
     shapes = program.template[moves.block]

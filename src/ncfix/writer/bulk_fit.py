@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.moves import FeedMode, Kind, Moves, Rule
+from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
 from ncfix.text.tree import Program
 from ncfix.writer.bulk_arcs import whole_arcs
 from ncfix.writer.bulk_layouts import NONE, Layouts
@@ -18,10 +18,12 @@ Mask = NDArray[np.bool_]
 def qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
     """(n,) straight motions and arcs that may be written in bulk; `first_piece` (n + 1,) as in `Bulk`."""
     first = first_piece[:-1]
-    turns = moves.kind == Kind.FEED
+    turns = moves.kind == MotionKind.FEED
     for column in np.flatnonzero(~moves.rotary):
         turns &= moves.end[:, column] == moves.start[:, column]
-    fit: Mask = ((moves.kind == Kind.RAPID) & (moves.modal == 0)) | ((moves.kind == Kind.FEED) & (moves.modal == 10))
+    fit: Mask = ((moves.kind == MotionKind.RAPID) & (moves.modal == 0)) | (
+        (moves.kind == MotionKind.FEED) & (moves.modal == 10)
+    )
     fit &= ~turns & _writable_pieces(program, moves, pieces, first_piece, layouts)
     fit |= whole_arcs(program, moves, pieces, first, layouts)
     fit &= layouts.known[program.template[moves.block]] & sound(moves, pieces, first_piece)
@@ -48,7 +50,7 @@ def with_dwells(
     Nothing is written of such a dwell: its block is its own, and none of its numbers is the place of an axis (times and
     motions that go with a dwell may have these letters).
     """
-    rows = np.flatnonzero(moves.kind[1:] == Kind.DWELL) + 1
+    rows = np.flatnonzero(moves.kind[1:] == MotionKind.DWELL) + 1
     at, block = first_piece[rows], moves.block[rows]
     alone = (block != moves.block[rows - 1]) & (block != np.append(moves.block, -1)[rows + 1])
     wordless = (layouts.slots[program.template[block]] == NONE).all(axis=1)

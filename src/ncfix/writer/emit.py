@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.moves import FeedMode, Kind, Kinematics, Moves, Rule
+from ncfix.control.moves import FeedMode, Kinematics, MotionKind, Moves, Rule
 from ncfix.control.tcp import jumps, passed_through, renamed
 from ncfix.control.turns import UNTIMED, at_their_pace, is_dragged, minutes, turn_alone, turns_alone
 from ncfix.text.language import BlockLayout, language_of
@@ -148,10 +148,10 @@ class _Emitter:
                 self._keep(row)
             else:
                 self._write(row)
-            if self.kind[row] == Kind.CYCLE:
+            if self.kind[row] == MotionKind.CYCLE:
                 self.cycle_end = self.position
                 self._retract(row)
-            elif self.kind[row] != Kind.DWELL:
+            elif self.kind[row] != MotionKind.DWELL:
                 self.cycle_end = None
                 self.levels.forget()
             row += 1
@@ -243,7 +243,7 @@ class _Emitter:
 
     def _keep(self, row: int) -> None:
         moves = self.moves
-        if self.kind[row] != Kind.DWELL:
+        if self.kind[row] != MotionKind.DWELL:
             self.levels.forget()
         moved, began, ended = self.moved[row], self.reading.start, self.reading.end
         if began is not None and ended is not None:  # a departure goes on along a line that is now a corrected one
@@ -251,7 +251,7 @@ class _Emitter:
         passed = passed_through(moves, row, self.position, self.kinematics) if began is None else None
         self.position = np.where(moved, self._kept_end(row), self.position) if passed is None else passed
         self.end[self.first_piece[row]] = self.position
-        if self.kind[row] not in (Kind.RAPID, Kind.FEED, Kind.ARC) or moves.rule[row] == Rule.PASS:
+        if self.kind[row] not in (MotionKind.RAPID, MotionKind.FEED, MotionKind.ARC) or moves.rule[row] == Rule.PASS:
             return
         self._check_code(row)
 
@@ -320,7 +320,7 @@ class _Emitter:
         nominal_start = as_programmed.program(moves.start[row].copy())
         nominal = as_programmed.program(moves.end[row].copy())
         arc, modal, kind = bool(pieces.arc[rows.start]), int(moves.modal[row]), self.kind[row]
-        straight = modal if modal in (0, 10) or kind == Kind.CYCLE else 10
+        straight = modal if modal in (0, 10) or kind == MotionKind.CYCLE else 10
         fractions, ends, wordless = pieces.fraction[rows], frame.program(pieces.end[rows].copy()), self.wordless[row]
         if wordless.any():
             ends[:, wordless] = start[wordless]
@@ -335,9 +335,9 @@ class _Emitter:
             ends=ends,
             arc=arc,
             centre=frame.program_point(pieces.centre[rows.start]) if arc else NOWHERE,
-            original_centre=as_programmed.program_point(moves.centre[row]) if kind == Kind.ARC else NOWHERE,
+            original_centre=as_programmed.program_point(moves.centre[row]) if kind == MotionKind.ARC else NOWHERE,
             origin=as_programmed.point_of(nominal_start),
-            plane=plane_across(frame.frame.rotation.T @ moves.normal[row]) if kind == Kind.ARC else (0, 1, 2),
+            plane=plane_across(frame.frame.rotation.T @ moves.normal[row]) if kind == MotionKind.ARC else (0, 1, 2),
             spatial=self.spatial,
             diameter=frame.frame.diameter,
             incremental=bool(moves.incremental[row]),
@@ -375,7 +375,7 @@ class _Emitter:
 
     def _before(self, row: int) -> FloatArray:
         """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""
-        if self.cycle_end is not None and self.kind[row] == Kind.CYCLE:
+        if self.cycle_end is not None and self.kind[row] == MotionKind.CYCLE:
             return self.cycle_end
         return self.position
 

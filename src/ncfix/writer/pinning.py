@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 
 Mask = NDArray[np.bool_]
 
@@ -60,7 +60,7 @@ class _Walk:
         self.columns = [moves.axes.index(letter) if letter in moves.axes else -1 for letter in "XYZ"]
         self.passed = moves.rule == Rule.PASS
         self.said = moves.programmed & ~moves.increments
-        arcs = np.flatnonzero(moves.kind == Kind.ARC)
+        arcs = np.flatnonzero(moves.kind == MotionKind.ARC)
         self.anchored = bound & ~self.passed
         self.anchored[arcs] |= ~self._floating(arcs) & ~self.passed[arcs]
 

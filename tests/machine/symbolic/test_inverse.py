@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from machine import chains
-from ncfix.machine import Axis, Machine, Tool, load
+from ncfix.machine import Axis, GaugeLine, Machine, load
 from ncfix.machine.symbolic import derive, inverse_nominal, load_chain
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -51,7 +51,7 @@ def test_round_trip_with_skew_rotary_axes(seed: int) -> None:
         Axis(letter, letter in "BC", k < 2, chains.unit_vector(rng), chains.point(rng))
         for k, letter in enumerate(names)
     )
-    machine = Machine("skew", "w C X F Y Z B t", axes, Tool(chains.unit_vector(rng)))
+    machine = Machine("skew", "w C X F Y Z B t", axes, GaugeLine(chains.unit_vector(rng)))
     q = np.array([0.4, 30.0, -20.0, 50.0, -0.7])
     pose = machine.nominal(q, 60.0)
     direction = np.asarray(machine.tool.direction)

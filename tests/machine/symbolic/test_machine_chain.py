@@ -10,7 +10,7 @@ import sympy as sp
 
 from machine import chains
 from ncfix.diagnostics import UsageError
-from ncfix.machine import Axis, Effect, Machine, State, Tool
+from ncfix.machine import Axis, Effect, GaugeLine, Machine, State
 from ncfix.machine.basis import Polynomial
 from ncfix.machine.symbolic import derive, from_machine
 from ncfix.machine.symbolic.from_machine import Constants
@@ -58,7 +58,7 @@ def test_three_axis_errors_by_hand(name: str, component: str, formula: str) -> N
 def test_a_turntable_by_hand() -> None:
     """The table turns by -C about z: the workpiece sees a fixed tool turn by +C."""
     axis = Axis("C", True, True, (0.0, 0.0, -1.0))
-    machine = Machine("table", "w C F t", (axis,), Tool(point=(100.0, 0.0, 0.0)))
+    machine = Machine("table", "w C F t", (axis,), GaugeLine(point=(100.0, 0.0, 0.0)))
     derivation = derive(machine, include=["ECC", "EXC", "EA0C"])
     xT = sp.Symbol("xT", real=True)
     assert derivation.nominal["x"] == xT * sp.cos(C)
@@ -173,7 +173,7 @@ def test_a_skew_direction_stays_a_number() -> None:
 
 def test_fixed_angles_as_letters() -> None:
     axis = Axis("B", True, True, (0.0, -HALF, HALF))
-    machine = Machine("tilted", "w B F t", (axis,), Tool(point=(0.0, 0.0, 50.0)))
+    machine = Machine("tilted", "w B F t", (axis,), GaugeLine(point=(0.0, 0.0, 50.0)))
     assert derive(machine, include="ECB").nominal["k"] == sp.cos(B) / 2 + sp.Rational(1, 2)
     lettered = derive(machine, include="ECB", lettered=True)
     phi = sp.Symbol("phiB", real=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from ncfix.machine import Axis, Machine, Tool, load
+from ncfix.machine import Axis, GaugeLine, Machine, load
 from ncfix.machine.symbolic import Derivation, derive, equations, identifiable, protocol
 from ncfix.machine.symbolic.identification import Equation, report, simplest
 from ncfix.machine.symbolic.printing import compiled
@@ -67,7 +67,7 @@ def test_text_says_what_is_inseparable_and_what_is_invisible(trunnion: Derivatio
 def table_with_two_tilts() -> Derivation:
     """A table C whose line may be shifted and tilted, probed away from its axis."""
     axis = Axis("C", True, True, (0.0, 0.0, -1.0))
-    machine = Machine("table", "w C F t", (axis,), Tool(point=(100.0, 0.0, 40.0)))
+    machine = Machine("table", "w C F t", (axis,), GaugeLine(point=(100.0, 0.0, 40.0)))
     return derive(machine, include=["EX0C", "EY0C", "EA0C", "EB0C"])
 
 

@@ -9,7 +9,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.text.dialects import get
@@ -103,7 +103,7 @@ def test_arcs_among_many_at_a_time_as_one_by_one(comma: bool, size: float) -> No
         source = program("\n".join(["TOOL CALL 1 Z S1000", "L X+0 Y+0 Z+0 B+0 C+0 R0 F1000", *blocks]))
         found, moves = followed(source, ("same", "none")[seed % 2])
         pieces = moved(moves, seed, size)
-        arcs = (moves.kind == Kind.ARC)[pieces.move] & (np.arange(len(pieces)) % 3 > 0)
+        arcs = (moves.kind == MotionKind.ARC)[pieces.move] & (np.arange(len(pieces)) % 3 > 0)
         assert_same(found, moves, replace(pieces, arc=pieces.arc | arcs))
 
 
@@ -112,7 +112,7 @@ def test_motions_between_arcs_are_written_at_once() -> None:
     found, moves = followed(program("\n".join(["L X+0 Y+0 Z+0 B+0 C+0 R0 F1000", *arcs])), "same")
     with mock.patch.object(emit._Emitter, "_write", autospec=True, side_effect=emit._Emitter._write) as one_by_one:
         emit.emit(found, moves, moved(moves, 3, 0.0003), STEPS)
-    assert {Kind(moves.kind[call.args[1]]) for call in one_by_one.call_args_list[1:]} == {Kind.ARC}
+    assert {MotionKind(moves.kind[call.args[1]]) for call in one_by_one.call_args_list[1:]} == {MotionKind.ARC}
 
 
 def test_most_are_written_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

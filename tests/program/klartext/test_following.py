@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import SourceError, UsageError
 from program.klartext.tnc import KNOWN, ends, follow
@@ -25,7 +25,7 @@ def test_straight_lines_absolute_and_incremental() -> None:
 
 def test_rapids_last_for_their_block() -> None:
     moves = follow("L X+1 F100\nL X+2 FMAX\nL X+3").moves
-    assert moves.kind.tolist() == [Kind.FEED, Kind.RAPID, Kind.FEED]
+    assert moves.kind.tolist() == [MotionKind.FEED, MotionKind.RAPID, MotionKind.FEED]
     assert moves.feed.tolist() == [100, 100, 100]
 
 
@@ -233,7 +233,14 @@ def test_holes() -> None:
     body = "CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=10\nL Z+50 FMAX\nL X+10 Y+20 FMAX M99\n"
     body += "L IX+5 M89\nL IX+5\nL IX+5 M99\nL IX+5"
     moves = follow(body).moves
-    assert moves.kind.tolist() == [Kind.RAPID, Kind.CYCLE, Kind.CYCLE, Kind.CYCLE, Kind.CYCLE, Kind.FEED]
+    assert moves.kind.tolist() == [
+        MotionKind.RAPID,
+        MotionKind.CYCLE,
+        MotionKind.CYCLE,
+        MotionKind.CYCLE,
+        MotionKind.CYCLE,
+        MotionKind.FEED,
+    ]
     assert moves.end[1:5].tolist() == [[10, 20, -14], [15, 20, -14], [20, 20, -14], [25, 20, -14]]
     assert moves.start[2].tolist() == [10, 20, 11]
     assert moves.end[5].tolist() == [30, 20, 11]

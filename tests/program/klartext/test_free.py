@@ -11,9 +11,9 @@ import pytest
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_flat
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.text.reader import read
-from ncfix_heidenhain.klartext.free import Element, Leg, solved
+from ncfix_heidenhain.klartext.free import ContourElement, Element, solved
 from program.klartext.tnc import KNOWN, THREE, fixed, follow, program
 
 NEAR = 1e-3
@@ -44,7 +44,7 @@ def arc(sense: int, radius: float, centre: complex, *, tangential: bool = True) 
     return Element(arc=True, tangential=tangential, sense=sense, radius=radius, centre=centre)
 
 
-def check(elements: list[Element], start: complex, heading: complex | None, legs: list[Leg]) -> None:
+def check(elements: list[Element], start: complex, heading: complex | None, legs: list[ContourElement]) -> None:
     """Each leg does what its element says, and goes on in the direction of the one before where it has to."""
     at = start
     for element, leg in zip(elements, legs, strict=True):
@@ -176,7 +176,7 @@ def test_a_frame_turns_a_contour() -> None:
     turned = "CYCL DEF 10.1 ROT+90\nCYCL DEF 8.1 X\nCYCL DEF 8.1\n"
     moves = follow(f"{turned}L X+0 Y+0 Z+0 FMAX\nL X+10 F100\nFCT DR+ R10 CCA90\nFLT LEN5").moves
     assert moves.end[-1, :2] == pytest.approx([-15, 20])
-    assert moves.kind[-1] == Kind.ARC
+    assert moves.kind[-1] == MotionKind.ARC
 
 
 def test_a_pole_may_stand_beside_a_corner() -> None:

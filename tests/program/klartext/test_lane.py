@@ -16,7 +16,7 @@ from ncfix.control.moves import Moves
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix_heidenhain.klartext import lane
-from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.units import KlartextUnit
 from program.arcs import full_of_klartext_arcs
 from program.klartext.tnc import KNOWN, follow
@@ -161,7 +161,9 @@ def test_arcs_of_both_ways_are_the_same(odd: float) -> None:
 def test_stretches_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     taken, take = [], lane.take
 
-    def noting(control: Control, stage: lane.Stage, unit: KlartextUnit, block: int, circles: Circles) -> None:
+    def noting(
+        control: KlartextControl, stage: lane.KlartextBlockRows, unit: KlartextUnit, block: int, circles: Circles
+    ) -> None:
         taken.append(len(stage.feed))
         take(control, stage, unit, block, circles)
 

@@ -9,7 +9,7 @@ import pytest
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_flat
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.text.reader import read
 from program.klartext.tnc import KNOWN, THREE, follow, program
 
@@ -34,14 +34,14 @@ PATTERNS = {
 @pytest.mark.parametrize("text", PATTERNS)
 def test_pattern_definitions(text: str) -> None:
     moves = follow(f"Q1 = 7\n{DRILL}PATTERN DEF {text}\nCYCL CALL PAT FMAX M3").moves
-    holes = moves.kind == Kind.CYCLE
+    holes = moves.kind == MotionKind.CYCLE
     assert moves.end[holes] == pytest.approx(np.array(PATTERNS[text]))
     assert (moves.rule[holes] == Rule.REFUSE).all()
 
 
 def test_the_frame_of_a_pattern_is_its_outer_holes() -> None:
     moves = follow(DRILL + "PATTERN DEF FRAME1 (X+0 Y+0 DX+1 DY+1 NUMX4 NUMY3 ROT+0 Z+0)\nCYCL CALL PAT").moves
-    assert np.count_nonzero(moves.kind == Kind.CYCLE) == 10
+    assert np.count_nonzero(moves.kind == MotionKind.CYCLE) == 10
 
 
 CIRCLE = (

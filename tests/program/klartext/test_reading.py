@@ -11,7 +11,7 @@ from ncfix.diagnostics import SourceError
 from ncfix.text.dialects import detect
 from ncfix.text.reach import UNREAD
 from ncfix.text.reader import read
-from ncfix.text.tree import Assignment, Command, Flow, Opaque, Program, Word
+from ncfix.text.tree import Assignment, Command, Opaque, OWordLine, Program, Word
 from ncfix.text.writer import apply
 from program.klartext.tnc import program
 from program.lanes import assert_read_right
@@ -118,9 +118,9 @@ def test_words(block: str, expected: dict[str, float]) -> None:
         ("CYCL  CALL M3", Command, ["cycl call"]),
         ("L M140 MB MAX", Command, ["l", "mb max"]),
         ("APPR PLT PR+1 PA+2 LEN5 R0 ", Command, ["appr plt", "r0"]),
-        ("CALL LBL 5 REP 3/3", Flow, ["5"]),
-        ("LBL 007", Flow, ["7"]),
-        ('FN 9: IF +Q1 EQU -Q2 GOTO LBL "END"', Flow, ["END"]),
+        ("CALL LBL 5 REP 3/3", OWordLine, ["5"]),
+        ("LBL 007", OWordLine, ["7"]),
+        ('FN 9: IF +Q1 EQU -Q2 GOTO LBL "END"', OWordLine, ["END"]),
         ("FN 0 : Q1 = - 10", Assignment, ["Q1"]),
         ("Q5 = ( Q1 + SIN 30 ) * Q2 ^ 2 ; note", Assignment, ["Q5"]),
         ("CYCL DEF 200 DRILLING Q200=2. Q201=-5.", Assignment, ["Q200", "Q201"]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
 from program.klartext.tnc import KNOWN, ends, fixed, follow
 
@@ -147,7 +147,7 @@ def test_a_called_program_does_not_end_by_m30() -> None:
 def test_a_pocket_is_corrected_at_its_place_and_bottom_which_is_said() -> None:
     trace = follow(f"L X+1 Y+1 Z+90 FMAX\n{POCKET}\nL X+50 Y+40 FMAX M99\nL X+80 FMAX M99\nL X+5 Y+6 FMAX")
     moves = trace.moves
-    assert moves.kind.tolist() == [Kind.RAPID, Kind.CYCLE, Kind.CYCLE, Kind.RAPID]
+    assert moves.kind.tolist() == [MotionKind.RAPID, MotionKind.CYCLE, MotionKind.CYCLE, MotionKind.RAPID]
     assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE, Rule.CORRECT]
     assert moves.end[1].tolist() == [50, 40, -15]
     assert moves.end[3].tolist() == [5, 6, 55]
@@ -177,5 +177,5 @@ def test_the_depth_of_an_old_cycle_counts_from_a_height_that_has_to_be_known() -
 def test_statements_that_move_nothing() -> None:
     body = 'FUNCTION FEED DWELL TIME0.5\nMONITORING HEATMAP START AS "A"\nSECTION MONITORING STOP\nL X+5 FMAX'
     moves = follow(body).moves
-    assert moves.kind.tolist() == [Kind.RAPID]
+    assert moves.kind.tolist() == [MotionKind.RAPID]
     assert moves.rule.tolist() == [Rule.CORRECT]

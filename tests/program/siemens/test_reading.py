@@ -10,7 +10,7 @@ import pytest
 from ncfix.diagnostics import SourceError
 from ncfix.text.dialects import detect
 from ncfix.text.reader import read
-from ncfix.text.tree import Assignment, Call, Command, Flow, Literal, NamedParameter, Opaque, Program, Word
+from ncfix.text.tree import Assignment, Command, FunctionCall, Literal, NamedParameter, Opaque, OWordLine, Program, Word
 from program.lanes import assert_read_right
 
 BLOCKS = """%_N_PART_MPF
@@ -53,7 +53,7 @@ def test_every_byte_stays_and_templates_mean_what_the_grammar_says(end: str) -> 
 def test_packed_words_are_words() -> None:
     words = [item for item in items("N440G01X498.375Y82.325C1=DC(0)") if isinstance(item, Word)]
     assert [word.address for word in words] == ["N", "G", "X", "Y", "C1"]
-    assert isinstance(words[-1].value, Call)
+    assert isinstance(words[-1].value, FunctionCall)
     assert words[-1].value.name == "dc"
 
 
@@ -96,7 +96,7 @@ def test_what_is_no_block_is_an_error_with_its_place(text: str, code: str) -> No
 
 
 def test_jumps_know_where_they_lead() -> None:
-    found = [item for item in items("IF R1==1 GOTOF N 100") if isinstance(item, Flow)]
+    found = [item for item in items("IF R1==1 GOTOF N 100") if isinstance(item, OWordLine)]
     assert [(item.keyword, item.label) for item in found] == [("if", ""), ("gotof", "N100")]
 
 

@@ -12,7 +12,7 @@ import pytest
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import kinematics_of
-from ncfix.control.moves import Kind, Rule
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
@@ -58,10 +58,10 @@ def test_what_may_be_corrected_is_known(machine: Machine) -> None:
             continue
         followed += 1
         free = moves.rule == Rule.CORRECT
-        cut = free & (moves.kind != Kind.RAPID) & (moves.kind != Kind.DWELL)
+        cut = free & (moves.kind != MotionKind.RAPID) & (moves.kind != MotionKind.DWELL)
         assert not np.isnan(moves.end[free]).any(), seed
         assert not np.isnan(moves.start[cut]).any(), seed
-        assert not np.isnan(moves.centre[free & (moves.kind == Kind.ARC)]).any(), seed
+        assert not np.isnan(moves.centre[free & (moves.kind == MotionKind.ARC)]).any(), seed
     assert followed > SEEDS / 3
 
 

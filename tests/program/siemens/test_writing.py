@@ -13,7 +13,7 @@ from classes.judging import SETUP, machine
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import traced
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
 from ncfix.text.reader import read
@@ -106,7 +106,7 @@ def test_a_full_circle_ends_where_it_starts() -> None:
         words = f"X{x} Y{y}" if code == 2 else ""
         lines += [f"ROT RPL={turn}", f"G0 X{x} Y{y} Z20 A{x} C{y}", f"G{code} {words} I{i} J{j} F500"]
     _, moves = on_the_cradle("\n".join(lines))
-    turns = moves.sweep[moves.kind == Kind.ARC]
+    turns = moves.sweep[moves.kind == MotionKind.ARC]
     assert np.allclose(np.abs(turns), 2 * np.pi, atol=1e-9)
     assert len(turns) == 8
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.compensate.figures.curve import Curve, Samples, Stretches, length
+from ncfix.compensate.figures.curve import Curve, CurvePoints, Stretches, length
 from ncfix.compensate.figures.nearest import Nearest, Search
 from ncfix.compensate.plan.arrays import Array, Index, finite, some
 from ncfix.compensate.plan.intent import Intent
@@ -247,7 +247,7 @@ class Flank:
     @classmethod
     def of(cls, bodies: Bodies, actual: Curve) -> Flank:
         """Of a path on the real machine."""
-        at, aside = Samples.of(actual), np.zeros((len(actual), 3, 3), dtype=np.float32)
+        at, aside = CurvePoints.of(actual), np.zeros((len(actual), 3, 3), dtype=np.float32)
         rows, place = actual.rows[at.piece], (2 * at.share).astype(np.intp)
         fraction = (1 - at.share) * actual.start[at.piece] + at.share * actual.stop[at.piece]
         q = bodies.intent.joints_at(rows, fraction)
@@ -268,7 +268,7 @@ class Flank:
         """That of two parts of a path that follow each other."""
         return Flank(np.concatenate([self.aside, other.aside]))
 
-    def there(self, search: Search, path: Curve, samples: Samples, found: Nearest) -> Array:
+    def there(self, search: Search, path: Curve, samples: CurvePoints, found: Nearest) -> Array:
         """The gaps (k,) from samples of what is made, on the side on which it is nearer, to what is meant."""
         return self._lessened(search, samples.points, found, path, (samples.piece, samples.share), 1.0)
 

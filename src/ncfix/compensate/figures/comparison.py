@@ -24,7 +24,7 @@ import numpy as np
 
 from ncfix.compensate.account import Why, not_looked_at
 from ncfix.compensate.figures.backlash import Bodies, Flank
-from ncfix.compensate.figures.curve import Curve, Samples, Stretches
+from ncfix.compensate.figures.curve import Curve, CurvePoints, Stretches
 from ncfix.compensate.figures.nearest import Nearest, Search, over_holes, over_peaks
 from ncfix.compensate.figures.simulation import Along, actual_tip, lines_of
 from ncfix.compensate.following import Task
@@ -275,7 +275,7 @@ class Match:
     def _look(self, start: int, stop: int) -> None:
         """Look from some parabolas of what is at hand."""
         part, other, flank = self.path.part(start, stop), self.other, self.path.flank
-        samples = Samples.of(part, self.path.joined(stop))
+        samples = CurvePoints.of(part, self.path.joined(stop))
         search = Search(other.curve, self.near, self.ahead, other.dropped == 0, other.complete)
         groups = np.searchsorted(samples.piece, np.arange(GROUP, len(part), GROUP))
         found = search.all(samples.points, part.way(samples.piece, samples.share), groups)

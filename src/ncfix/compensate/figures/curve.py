@@ -28,7 +28,7 @@ from ncfix.compensate.plan.sampling import (
     reversals,
     with_kinks,
 )
-from ncfix.control.moves import Kind
+from ncfix.control.moves import MotionKind
 
 ROUND, TWISTED = 1e-6, 2e-5
 """mm; so far a parabola may be from a circle on which the tip goes, and from a path on which it goes on besides."""
@@ -59,7 +59,7 @@ class Stretches:
         """Of a program."""
         moves = intent.moves
         known = finite(moves.end) & moves.cuts & ~at_measured_places(moves)
-        hole = moves.kind == Kind.CYCLE
+        hole = moves.kind == MotionKind.CYCLE
         along = np.flatnonzero(known & ~hole & finite(moves.start))
         counts, between = with_kinks(intent, intent.segments, along, *_evenly(intent, along), JUMP)
         turning = reversals(intent, along, *_with_ends(counts, between))
@@ -139,14 +139,14 @@ def _round_axes(intent: Intent, rows: Index) -> Array:
 def _opening(intent: Intent, rows: Index, start: Array) -> Mask:
     """(k,) stretches of motions that may begin elsewhere than the one before ends."""
     opens: Mask = start == 0
-    opens |= intent.moves.kind[rows] == Kind.CYCLE
+    opens |= intent.moves.kind[rows] == MotionKind.CYCLE
     if not len(rows) or intent.arrival is not None:
         return opens
     moves = intent.moves
     next_one = np.flatnonzero(opens[1:]) + 1
     row, before = rows[next_one], rows[next_one - 1]
     same = every(picked(moves.start, row) == picked(moves.end, before)) & (moves.tcp[row] == moves.tcp[before])
-    same &= (moves.tool_length[row] == moves.tool_length[before]) & (moves.kind[row] != Kind.CYCLE)
+    same &= (moves.tool_length[row] == moves.tool_length[before]) & (moves.kind[row] != MotionKind.CYCLE)
     opens[next_one[same]] = False
     return opens
 
@@ -288,7 +288,7 @@ COLUMNS = [each.name for each in fields(Curve) if each.name != "first"]
 
 
 @dataclass(frozen=True, slots=True)
-class Samples:
+class CurvePoints:
     """Points of a curve at which it is looked at: half-way and at the end of each parabola, and where a cut begins.
 
     piece   (k,) the parabola, ascending
@@ -303,7 +303,7 @@ class Samples:
     weight: Array
 
     @classmethod
-    def of(cls, curve: Curve, after: float = 0.0) -> Samples:
+    def of(cls, curve: Curve, after: float = 0.0) -> CurvePoints:
         """Of a curve, at the end of which another parabola goes on that is so long, mm."""
         hole = curve.ways == 0
         counts = np.where(hole, 1, 2 + curve.opens)
@@ -319,10 +319,10 @@ class Samples:
         weight[-1:] += after / 6
         return cls(piece, share, points, weight)
 
-    def and_more(self, other: Samples) -> Samples:
+    def and_more(self, other: CurvePoints) -> CurvePoints:
         """These, and then others."""
         names = ("piece", "share", "points", "weight")
-        return Samples(*(np.concatenate([getattr(each, name) for each in (self, other)]) for name in names))
+        return CurvePoints(*(np.concatenate([getattr(each, name) for each in (self, other)]) for name in names))
 
 
 def arc_lengths(begin: Array, middle: Array, end: Array) -> Array:

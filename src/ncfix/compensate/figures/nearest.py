@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix import fast
-from ncfix.compensate.figures.curve import Curve, Samples, length
+from ncfix.compensate.figures.curve import Curve, CurvePoints, length
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places
 from ncfix.control.parts import NotInPartsError
 
@@ -296,7 +296,9 @@ def _on_chords(curve: Curve, points: Array, piece: Index) -> tuple[Array, Array]
     return share, length(gap - share[:, None] * chord) - length(picked(curve.bend, piece)) / 4
 
 
-def over_holes(search: Search, path: Curve, samples: Samples, before: Index, found: Nearest) -> tuple[Samples, Nearest]:
+def over_holes(
+    search: Search, path: Curve, samples: CurvePoints, before: Index, found: Nearest
+) -> tuple[CurvePoints, Nearest]:
     """More samples of a path, where it goes over holes of the other one, and what is nearest to them.
 
     samples, found  (n,) those that there are
@@ -307,10 +309,10 @@ def over_holes(search: Search, path: Curve, samples: Samples, before: Index, fou
     points = path.point(piece, share)
     back = (samples.share[rows] - share) * path.ways[piece]
     more = search.around(points, search.curve.way(found.piece, found.share)[rows] - back)
-    return Samples(piece, share, points, np.zeros(len(rows))), more
+    return CurvePoints(piece, share, points, np.zeros(len(rows))), more
 
 
-def _crossed(search: Search, samples: Samples, before: Index, behind: Index) -> tuple[Index, Array]:
+def _crossed(search: Search, samples: CurvePoints, before: Index, behind: Index) -> tuple[Index, Array]:
     """Samples (k,) before which holes are gone over, from parabolas (n,) to others (n,), and the middles (k, 3)."""
     curve = search.curve
     holes = np.flatnonzero(curve.gaps > search.near)
@@ -322,7 +324,7 @@ def _crossed(search: Search, samples: Samples, before: Index, behind: Index) -> 
     return rows, (curve.end[hole - 1] + curve.begin[hole]) / 2
 
 
-def _shares_beside(path: Curve, samples: Samples, rows: Index, points: Array) -> Array:
+def _shares_beside(path: Curve, samples: CurvePoints, rows: Index, points: Array) -> Array:
     """The shares of the parabolas that are beside points (k, 3), in the half of each before a sample (k,)."""
     piece, share = samples.piece[rows], samples.share[rows]
     begin = path.point(piece, share - 0.5)
@@ -385,8 +387,8 @@ class Between:
 
 
 def over_peaks(
-    search: Search, path: Curve, samples: Samples, before: Nearest, found: Nearest
-) -> Iterator[tuple[Samples, Nearest]]:
+    search: Search, path: Curve, samples: CurvePoints, before: Nearest, found: Nearest
+) -> Iterator[tuple[CurvePoints, Nearest]]:
     """More samples of a path, where there are peaks between those that there are, and what is nearest to them.
 
     samples, found  (n,) those that there are
@@ -401,5 +403,5 @@ def over_peaks(
             return
         half = (left.low + left.high) / 2
         middle = left.middle(search, path)
-        yield Samples(left.piece, half, path.point(left.piece, half), np.zeros(len(half))), middle
+        yield CurvePoints(left.piece, half, path.point(left.piece, half), np.zeros(len(half))), middle
         left = left.halves(middle)

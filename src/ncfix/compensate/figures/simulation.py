@@ -23,7 +23,7 @@ from ncfix.compensate.plan.kinematics import commands_from_joints
 from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, closely, even, merged, with_kinks
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.workers import Read
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
 
@@ -200,7 +200,7 @@ def samples(intent: Intent, first: int = 0) -> Iterator[tuple[Index, Array]]:
     moves = intent.moves
     known = np.isfinite(moves.end).all(axis=1) & moves.cuts
     known[:first] = False
-    hole = moves.kind == Kind.CYCLE
+    hole = moves.kind == MotionKind.CYCLE
     rows = np.flatnonzero(known & (hole | np.isfinite(moves.start).all(axis=1)))
     counts, along = np.zeros(len(rows), dtype=np.intp), np.flatnonzero(~hole[rows])
     counts[along] = closely(intent, rows[along], DENSITY, LEAST, MOST_SHOWN)
@@ -210,7 +210,7 @@ def samples(intent: Intent, first: int = 0) -> Iterator[tuple[Index, Array]]:
 
 def _samples(intent: Intent, rows: Index, counts: Index) -> tuple[Index, Array]:
     """Motions and fractions: of motions `rows` (k,) both ends, `counts` (k,) places between them, and kinks."""
-    along = np.flatnonzero(intent.moves.kind[rows] != Kind.CYCLE)
+    along = np.flatnonzero(intent.moves.kind[rows] != MotionKind.CYCLE)
     on, inside = rows[along], counts[along]
     inside, between = with_kinks(intent, intent.segments, on, inside, even(inside))
     begins, ends = (along, np.zeros(len(along))), (np.arange(len(rows)), np.ones(len(rows)))

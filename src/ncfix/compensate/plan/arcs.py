@@ -13,7 +13,7 @@ import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask, picked, slices, vector_product
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.segments import Circles, Segments, sweep_between
+from ncfix.compensate.plan.segments import ArcColumns, Segments, sweep_between
 
 LOOKS = np.arange(1, 13) / 13
 """Fractions of each arc at which the corrected path is looked at to find the centre."""
@@ -164,7 +164,7 @@ def _farthest(off: Array) -> Array:
 def _points(arcs: Segments, ends: Pair, centre: Array) -> Array:
     """X Y Z at `LOOKS` of arcs about other centres, (3, looks, k)."""
     sweep = sweep_between(*ends, centre, arcs.normal, arcs.sweep)
-    return Circles.of(replace(arcs, centre=centre, sweep=sweep), np.arange(len(centre))).at(LOOKS[:, None])
+    return ArcColumns.of(replace(arcs, centre=centre, sweep=sweep), np.arange(len(centre))).at(LOOKS[:, None])
 
 
 def _sound(

@@ -34,8 +34,8 @@ from ncfix.compensate.plan.offset import beside_contours
 from ncfix.compensate.plan.sampling import DENSITY, MOST, MOST_SHOWN, bends, bends_closely, interior, merged, passed
 from ncfix.compensate.plan.segments import Segments, accelerations
 from ncfix.compensate.plan.splitting import INSTANT
-from ncfix.compensate.plan.written import Known, Written
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.compensate.plan.written import Known, WrittenPieces
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import Bow
@@ -89,7 +89,7 @@ def bounds(intent: Intent, real: Segments, rows: Index, uneasy: Mask) -> Array:
     Known it is for straight motions from one corrected end to the next.
     """
     most, moves = np.full(len(rows), np.inf), intent.moves
-    plain = ~((moves.kind == Kind.ARC)[rows] | uneasy[rows])
+    plain = ~((moves.kind == MotionKind.ARC)[rows] | uneasy[rows])
     plain[lacking(intent, rows)] = False
     if intent.machine.bow is None or intent.state.inputs or not plain.any():
         return most
@@ -257,7 +257,7 @@ class PathError:
 
 
 @dataclass(frozen=True, slots=True)
-class Samples:
+class PathSamples:
     """Places on a path, flat: motion, fraction, tip error before and after (mm), share of the way (mm); tilts (rad)."""
 
     move: Index
@@ -290,9 +290,9 @@ def path_error(
     tilts    find the tilts of the tool, too; else they are 0
     known    what has been found out of the ends of motions; they are not looked at again then
     """
-    written = Written(Intent(machine, moves, state), pieces, moves.start if start is None else start)
+    written = WrittenPieces(Intent(machine, moves, state), pieces, moves.start if start is None else start)
     chosen = ~pieces.kept if rows is None else rows[pieces.move]
-    tally, which = FigureTally(), np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move])
+    tally, which = FigureTally(), np.flatnonzero(chosen & (moves.kind != MotionKind.DWELL)[pieces.move])
     for part in samples(written, which, density, tilts, known):
         tally.add(part)
     found = _beside(written, chosen)
@@ -301,7 +301,7 @@ def path_error(
     return tally.result()
 
 
-def _beside(written: Written, chosen: Mask) -> Samples | None:
+def _beside(written: WrittenPieces, chosen: Mask) -> PathSamples | None:
     """Where the tool goes beside contours, of pieces `chosen` (m,): for the largest errors, and no share of the way."""
     moves = written.intent.moves
     if moves.beside is None:
@@ -312,17 +312,17 @@ def _beside(written: Written, chosen: Mask) -> Samples | None:
         return None
     shown = chosen[last][found.move]
     before, after, move = found.before[shown], found.after[shown], found.move[shown]
-    return Samples(move, np.ones(len(move)), before, after, np.zeros(len(move)), 0.0, 0.0) if len(move) else None
+    return PathSamples(move, np.ones(len(move)), before, after, np.zeros(len(move)), 0.0, 0.0) if len(move) else None
 
 
 def samples(
-    written: Written,
+    written: WrittenPieces,
     which: Index,
     density: float = DENSITY,
     tilts: bool = True,
     known: Known | None = None,
     uneasy: Mask | None = None,
-) -> Iterator[Samples]:
+) -> Iterator[PathSamples]:
     """Look at pieces `which`, in batches; what is known of their ends need not be looked at.
 
     uneasy  (n,) motions whose start is looked at, too, if that is known
@@ -335,18 +335,18 @@ def samples(
         yield _errors(written, piece, fraction, known, tilts)
 
 
-def _counts(written: Written, which: Index, density: float) -> tuple[Index, Mask]:
+def _counts(written: WrittenPieces, which: Index, density: float) -> tuple[Index, Mask]:
     """Samples inside each piece, ends left out, and which pieces are looked at along the way, not at the end only."""
     intent, move, span = written.intent, written.pieces.move[which], written.span[which]
     wished, kind = bends_closely(intent, move) * span, intent.moves.kind[move]
-    along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (span > 2 * INSTANT) & intent.moving(move)
+    along = ((kind == MotionKind.FEED) | (kind == MotionKind.ARC)) & (span > 2 * INSTANT) & intent.moving(move)
     begun = picked(written.segments.start, which) + picked(written.start, move) + picked(intent.moves.start, move)
     along &= finite(begun)
     counts = np.minimum(np.nan_to_num(np.ceil(density * wished)), MOST_SHOWN)
     return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 
 
-def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: Mask) -> tuple[Index, Array]:
+def _places(written: WrittenPieces, which: Index, counts: Index, along: Mask, uneasy: Mask) -> tuple[Index, Array]:
     """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
     many = counts + 1
     fraction = (places(many) + 1) / np.repeat(many, many)
@@ -361,7 +361,7 @@ def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: 
     return which[owners(many)], fraction
 
 
-def _uneasy(written: Written) -> Mask:
+def _uneasy(written: WrittenPieces) -> Mask:
     """Motions whose start the end of the one before does not show: also those behind rapids, (n,).
 
     Not behind rapids of which an axis is left where it stands: what that leaves is said by itself, and seen in a cut
@@ -371,24 +371,28 @@ def _uneasy(written: Written) -> Mask:
     kept = np.ones(len(moves), dtype=bool)
     kept[written.pieces.move] = written.pieces.kept
     found = uneasy_starts(written.intent, kept)
-    found[1:] |= (moves.kind[:-1] == Kind.RAPID) & ~some(moves.wordless[:-1])
+    found[1:] |= (moves.kind[:-1] == MotionKind.RAPID) & ~some(moves.wordless[:-1])
     return found
 
 
-def _leaps(written: Written, which: Index) -> Mask:
+def _leaps(written: WrittenPieces, which: Index) -> Mask:
     """Of pieces with which motions begin, those that lead a cut to where it should begin.
 
     They come from where axes were left, or from a hole: the place is right at its bottom, and not at the level to which
     the cycle goes back.
     """
     moves, move = written.intent.moves, written.pieces.move[which]
-    behind = (moves.rule[move - 1] == Rule.PASS) | (moves.kind[move - 1] == Kind.CYCLE) | some(moves.wordless[move - 1])
+    behind = (
+        (moves.rule[move - 1] == Rule.PASS)
+        | (moves.kind[move - 1] == MotionKind.CYCLE)
+        | some(moves.wordless[move - 1])
+    )
     leads = (written.span[which] <= 2 * INSTANT) | ~written.intent.moving(move)
     leaps: Mask = (move > 0) & behind & leads & finite(picked(moves.start, move))
     return leaps
 
 
-def _passed(written: Written, which: Index, along: Mask) -> tuple[Index, Array]:
+def _passed(written: WrittenPieces, which: Index, along: Mask) -> tuple[Index, Array]:
     """Where pieces pass a kink or a jump: which of them, and fraction."""
     long = np.flatnonzero(along)
     ends = [written.joints(which[long], np.full(len(long), place)) for place in (0.0, 1.0)]
@@ -396,7 +400,7 @@ def _passed(written: Written, which: Index, along: Mask) -> tuple[Index, Array]:
     return long[on], share
 
 
-def _errors(written: Written, piece: Index, fraction: Array, known: Known | None, tilts: bool) -> Samples:
+def _errors(written: WrittenPieces, piece: Index, fraction: Array, known: Known | None, tilts: bool) -> PathSamples:
     """The errors at fractions of pieces (k,); those at ends where they are known are taken from there."""
     move, at = written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
     before, after = np.empty(len(piece)), np.empty(len(piece))
@@ -411,7 +415,7 @@ def _errors(written: Written, piece: Index, fraction: Array, known: Known | None
         commands = written.segments.at(piece[rows], fraction[rows])
         before[rows], after[rows] = errors_at(written.intent, move[rows], at[rows], commands)
     tilted = _tilts(written, piece[ends]) if tilts else (0.0, 0.0)
-    return Samples(move, at, before, after, _way(written, piece), *tilted)
+    return PathSamples(move, at, before, after, _way(written, piece), *tilted)
 
 
 def errors_at(intent: Intent, move: Index, fraction: Array, commands: Array) -> tuple[Array, Array]:
@@ -423,7 +427,7 @@ def errors_at(intent: Intent, move: Index, fraction: Array, commands: Array) -> 
     return before, after
 
 
-def _tilts(written: Written, piece: Index) -> tuple[float, float]:
+def _tilts(written: WrittenPieces, piece: Index) -> tuple[float, float]:
     """The largest angles between the actual tool direction and the meant one at ends of pieces, before and after."""
     intent, move = written.intent, written.pieces.move[piece]
     intended, done = written.programmed[piece], written.done[piece]
@@ -440,7 +444,7 @@ def _tilt(machine: Machine, q: Array, state: State, meant: Array) -> float:
     return float(np.nanmax(np.arcsin(np.minimum(sine, 1.0)), initial=0.0))
 
 
-def _way(written: Written, piece: Index) -> Array:
+def _way(written: WrittenPieces, piece: Index) -> Array:
     """The part of the way that each sample stands for, mm: its piece's chord shared out, or arc length."""
     segments = written.segments
     first = np.flatnonzero(np.diff(piece, prepend=-1))
@@ -472,7 +476,7 @@ class FigureTally:
         self.way = 0.0
         self.samples = 0
 
-    def add(self, part: Samples) -> None:
+    def add(self, part: PathSamples) -> None:
         """Take in a batch; places at which an error is not known do not count."""
         self.way += float(part.weight.sum())
         self.samples += int(np.count_nonzero(np.isfinite(part.after)))

@@ -28,14 +28,14 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask, chosen, distinct, e
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent, stays
 from ncfix.compensate.plan.kinematics import Correction, commands_from_joints, reached_joints, steer
-from ncfix.compensate.plan.strategies import Path, Strategy
-from ncfix.control.moves import Kind, Moves
+from ncfix.compensate.plan.strategies import PoseSequence, Strategy
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
 from ncfix.writer.frames import FrameMap
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class EndCommands:
     """Commands at which each motion really starts and ends, (n, n_axes) mm and rad, before rounding; NaN if unknown."""
 
     start: Array
@@ -49,7 +49,7 @@ def standing(
     kept: Mask,
     before: Array | None = None,
     approaches: Array | None = None,
-) -> Standing:
+) -> EndCommands:
     """Where each motion starts and ends if motions that are not `kept` (n,) end at `wanted` (n, n_axes).
 
     Axes that must get no word stay where they stand.
@@ -65,7 +65,7 @@ def standing(
     if _goes_on(moves):
         first = np.zeros((1, shift.shape[1])) if before is None else before[None]
         left = _carried(shift, decides, first)
-        return Standing(moves.start + left[:-1], moves.end + left[1:])
+        return EndCommands(moves.start + left[:-1], moves.end + left[1:])
     back = _gone_back(moves)
     restarts = _restarts(moves, back)
     jumps, risen = _risen(moves, approaches)
@@ -79,12 +79,12 @@ def standing(
             restarts[run.start] = False
         part = shift[run], decides[run], back[run], jumps[run], restarts[run]
         at_start[run], at_end[run], carried = _filled(*part, carried)
-    return Standing(moves.start + at_start, moves.end + at_end)
+    return EndCommands(moves.start + at_start, moves.end + at_end)
 
 
 def _goes_on(moves: Moves) -> bool:
     """Whether every motion begins where the one before ended, and commands mean the same all along."""
-    joined = bool((moves.start[1:] == moves.end[:-1]).all()) and not (moves.kind == Kind.CYCLE).any()
+    joined = bool((moves.start[1:] == moves.end[:-1]).all()) and not (moves.kind == MotionKind.CYCLE).any()
     return joined and len(_runs(moves)) == 1
 
 
@@ -126,7 +126,7 @@ def _gone_back(moves: Moves) -> Mask:
     """Axes along which a canned cycle returns to where it started, (n, n_axes)."""
     back = np.zeros(moves.start.shape, dtype=bool)
     back[:-1] = (moves.start[1:] == moves.start[:-1]) & (moves.end[:-1] != moves.start[:-1])
-    back &= (moves.kind == Kind.CYCLE)[:, None]
+    back &= (moves.kind == MotionKind.CYCLE)[:, None]
     return back
 
 
@@ -382,7 +382,7 @@ def led_as_commands(
     return result
 
 
-def along(intent: Intent, rows: Index, fraction: Array) -> Path:
+def along(intent: Intent, rows: Index, fraction: Array) -> PoseSequence:
     """How the ends of motions follow each other, for limits on rates; a motion that is kept begins a new stretch."""
     q = intent.joints_at(rows, fraction)
     tips = intent.machine.tip(q, intent.lengths(rows))
@@ -391,13 +391,13 @@ def along(intent: Intent, rows: Index, fraction: Array) -> Path:
     return path_of(intent, q, tips, begins, np.zeros(len(rows), dtype=bool), q)
 
 
-def path_of(intent: Intent, q: Array, tips: Array, begins: Mask, pinned: Mask, decided: Array) -> Path:
-    """The `Path` of poses q (k, n_axes) with tips (k, 3); `decided` (k, n_axes) corrections of pinned poses."""
+def path_of(intent: Intent, q: Array, tips: Array, begins: Mask, pinned: Mask, decided: Array) -> PoseSequence:
+    """The `PoseSequence` of poses q (k, n_axes) with tips (k, 3); `decided` (k, n_axes) corrections of pinned poses."""
     rotary = intent.machine.rotary
     travel_mm, travel_rad = np.zeros(len(q)), np.zeros(len(q))
     travel_mm[1:] = np.linalg.norm(np.diff(tips, axis=0), axis=1)
     travel_rad[1:] = np.abs(np.diff(q[:, rotary], axis=0)).sum(axis=1)
-    return Path(travel_mm, travel_rad, begins, pinned, decided[:, rotary])
+    return PoseSequence(travel_mm, travel_rad, begins, pinned, decided[:, rotary])
 
 
 def with_closed_circles(

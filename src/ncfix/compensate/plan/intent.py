@@ -41,7 +41,7 @@ from ncfix.compensate.plan.kinematics import (
     tip_maps,
 )
 from ncfix.compensate.plan.segments import Segments
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
 
 INSTANT, WHILE = 1e-4, 1e-3
@@ -81,12 +81,12 @@ class Intent:
     @cached_property
     def curved(self) -> Mask:
         """Motions whose axes do not move linearly with the fraction, (n,)."""
-        return np.asarray((self.moves.kind == Kind.ARC) | self.moves.tcp, dtype=bool)
+        return np.asarray((self.moves.kind == MotionKind.ARC) | self.moves.tcp, dtype=bool)
 
     def moving(self, rows: Index) -> Mask:
         """Which of motions `rows` (k,) are to move anything; others only take up what is off where they begin."""
         way = np.abs(picked(self.moves.end, rows) - picked(self.moves.start, rows))
-        moving: Mask = some((way >= REST) & (way < np.inf)) | (self.moves.kind[rows] == Kind.ARC)
+        moving: Mask = some((way >= REST) & (way < np.inf)) | (self.moves.kind[rows] == MotionKind.ARC)
         return moving
 
     @cached_property

@@ -10,7 +10,7 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask, distinct, finite, g
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import Segments, arcs_within, surely_within
-from ncfix.compensate.plan.written import Written
+from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.control.moves import Moves
 from ncfix.machine import Machine, State
 from ncfix.writer.pieces import Pieces
@@ -42,7 +42,7 @@ def findings(
 
     start  (n, n_axes) where motions really start, as in `Plan` or `Emission`; those of the program if not given
     """
-    written = Written(Intent(machine, moves, state or State()), pieces, moves.start if start is None else start)
+    written = WrittenPieces(Intent(machine, moves, state or State()), pieces, moves.start if start is None else start)
     found = [
         not_a_number(written),
         *beyond_ranges(written),
@@ -52,7 +52,7 @@ def findings(
     return tuple(finding for finding in found if len(finding))
 
 
-def not_a_number(written: Written) -> Finding:
+def not_a_number(written: WrittenPieces) -> Finding:
     """NCF408: motions with a corrected end that is not finite."""
     pieces = written.pieces
     bad = ~finite(pieces.end)
@@ -61,7 +61,7 @@ def not_a_number(written: Written) -> Finding:
     return Finding("NCF408", rows, np.zeros(len(rows)), "the corrected position is not a finite number")
 
 
-def beyond_ranges(written: Written) -> tuple[Finding, Finding]:
+def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
     """NCF405: motions that leave the range of an axis as programmed, or come back from beyond it in several blocks.
 
     NCF404: motions that stay within the range of every axis as programmed, and leave one when corrected. On the limit
@@ -85,14 +85,14 @@ def led_astray(machine: Machine, moves: Moves, pieces: Pieces, start: Array, sta
         return rows[:0]
     kept = np.zeros(len(moves), dtype=bool)
     kept[pieces.move] = pieces.kept
-    written = Written(Intent(machine, moves, state), pieces, start)
+    written = WrittenPieces(Intent(machine, moves, state), pieces, start)
     beyond = _corrected_excess(written)
     if (beyond > FUZZ).any():
         beyond[programmed_excess(written) > FUZZ] = -np.inf
     return rows[kept[rows] & (beyond[rows] > FUZZ).any(axis=1)]
 
 
-def _begun_beyond(written: Written, corrected: Array) -> Array:
+def _begun_beyond(written: WrittenPieces, corrected: Array) -> Array:
     """(n, n_axes) how far motions begin beyond ranges, where a block of theirs ends there; -inf elsewhere."""
     each = np.flatnonzero((corrected > FUZZ).any(axis=1))
     begun = np.full(corrected.shape, -np.inf)
@@ -100,7 +100,7 @@ def _begun_beyond(written: Written, corrected: Array) -> Array:
     return np.where(corrected > FUZZ, begun, -np.inf)
 
 
-def _corrected_excess(written: Written) -> Array:
+def _corrected_excess(written: WrittenPieces) -> Array:
     """As `excess`, of the corrected program, (n, n_axes)."""
     pieces = written.pieces
     each = np.arange(len(pieces))
@@ -117,7 +117,7 @@ def _corrected_excess(written: Written) -> Array:
     return beyond
 
 
-def too_large(written: Written) -> Finding:
+def too_large(written: WrittenPieces) -> Finding:
     """NCF406: corrections above the machine's `max_correction`: the linear axes together, each rotary axis alone."""
     machine = written.intent.machine
     shift = written.correction
@@ -130,7 +130,7 @@ def too_large(written: Written) -> Finding:
     return Finding("NCF406", rows, values, text)
 
 
-def too_fast(written: Written) -> Finding:
+def too_fast(written: WrittenPieces) -> Finding:
     """NCF407: corrections of the linear axes that change by more than the way in between accounts for."""
     machine, pieces = written.intent.machine, written.pieces
     change = np.diff(written.correction[:, ~machine.rotary], axis=0)
@@ -201,7 +201,7 @@ def _beyond(machine: Machine, q: Array) -> Array:
     return result
 
 
-def programmed_excess(written: Written) -> Array:
+def programmed_excess(written: WrittenPieces) -> Array:
     """As `excess`, of the program as it is; (n, n_axes)."""
     intent = written.intent
     each = np.arange(len(intent.moves))
@@ -235,7 +235,7 @@ def _arcs_may_leave(machine: Machine, segments: Segments, tcp: Mask) -> Mask:
     return may_leave
 
 
-def _of_axes(written: Written, code: str, text: str, beyond: Array) -> Finding:
+def _of_axes(written: WrittenPieces, code: str, text: str, beyond: Array) -> Finding:
     """A finding for each corrected motion with an axis beyond its range; values in mm or degrees."""
     machine, pieces = written.intent.machine, written.pieces
     if not (beyond > FUZZ).any():

@@ -20,7 +20,7 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, owners, pi
 from ncfix.compensate.plan.intent import Intent, correctable
 from ncfix.compensate.plan.sampling import interior
 from ncfix.compensate.plan.segments import Segments
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 
 NO_WAY = 1e-9
 """mm in the plane; a motion that goes no farther makes no corner."""
@@ -38,7 +38,7 @@ LEAST = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class OffsetPoints:
     """Places of the tool beside a contour, flat.
 
     move      (k,) the motion, or the one that ends at the corner
@@ -56,7 +56,7 @@ class Beside:
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class ContactPath:
     """A path of tool contact in columns: rows are those motions of a program that make a way beside a contour.
 
     start, end  (k, 3) of the contour, mm
@@ -75,7 +75,7 @@ class Course:
     radius: Array
 
     @classmethod
-    def of(cls, segments: Segments, rows: Index, up: Array, radius: Array) -> Course:
+    def of(cls, segments: Segments, rows: Index, up: Array, radius: Array) -> ContactPath:
         """Of motions `rows` done as `segments` have them."""
         columns = segments.columns
         sense = np.sign(np.nan_to_num(segments.sweep[rows]) * _dot(np.nan_to_num(segments.normal[rows]), up))
@@ -83,10 +83,10 @@ class Course:
         arc = segments.arc[rows] & (sense != 0)
         return cls(*ends, arc, np.nan_to_num(segments.centre[rows]), sense, up, radius)
 
-    def taken(self, rows: Index) -> Course:
+    def taken(self, rows: Index) -> ContactPath:
         """Some of them."""
         ends = self.start[rows], self.end[rows]
-        return Course(*ends, self.arc[rows], self.centre[rows], self.turn[rows], self.up[rows], self.radius[rows])
+        return ContactPath(*ends, self.arc[rows], self.centre[rows], self.turn[rows], self.up[rows], self.radius[rows])
 
     def heading(self, points: Array) -> Array:
         """The way in the plane at points (k, 3) of the motions, unit vectors."""
@@ -127,7 +127,7 @@ def is_offset(moves: Moves) -> Mask:
     return offset
 
 
-def beside_contours(intent: Intent, real: Segments) -> Beside | None:
+def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
     """How far the tool is off beside contours of which its radius is known; None if there are none.
 
     real  all motions as they are done
@@ -135,7 +135,7 @@ def beside_contours(intent: Intent, real: Segments) -> Beside | None:
     moves = intent.moves
     if moves.beside is None or moves.across is None:
         return None
-    rows = np.flatnonzero(is_offset(moves) & (moves.kind != Kind.DWELL) & (moves.kind != Kind.CYCLE))
+    rows = np.flatnonzero(is_offset(moves) & (moves.kind != MotionKind.DWELL) & (moves.kind != MotionKind.CYCLE))
     columns = intent.columns
     known = np.isfinite(
         np.hstack([table[rows][:, columns] for table in (moves.start, moves.end, real.start, real.end)])
@@ -144,7 +144,7 @@ def beside_contours(intent: Intent, real: Segments) -> Beside | None:
     if not rows.size:
         return None
     up = np.array([frame.rotation for frame in moves.frames])[moves.frame[rows], :, moves.across[rows]]
-    meant, done = (Course.of(each, rows, up, moves.beside[rows]) for each in (intent.segments, real))
+    meant, done = (ContactPath.of(each, rows, up, moves.beside[rows]) for each in (intent.segments, real))
     makes = np.flatnonzero((lengths(_flat(meant.end - meant.start, up)) > NO_WAY) | meant.arc)
     rows, meant, done = rows[makes], meant.taken(makes), done.taken(makes)
     if not rows.size:
@@ -168,10 +168,10 @@ def beside_contours(intent: Intent, real: Segments) -> Beside | None:
         leads_in[:] = (before < 0) | (np.nan_to_num(moves.beside, nan=1.0)[np.maximum(before, 0)] == 0)
         parts += _at_corners(intent, real, rows[first], pairs, leads_in)
     names = ("move", "before", "after", "corner", "rounding")
-    return Beside(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return OffsetPoints(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def _along(intent: Intent, real: Segments, rows: Index, meant: Course, done: Course) -> Beside:
+def _along(intent: Intent, real: Segments, rows: Index, meant: ContactPath, done: ContactPath) -> OffsetPoints:
     """Beside the motions, from begin to end."""
     counts, fraction = interior(intent, real, rows, LOOKS, LEAST)
     own, fraction = owners(counts), fraction
@@ -193,12 +193,12 @@ def _along(intent: Intent, real: Segments, rows: Index, meant: Course, done: Cou
     tangent = _in_tip(intent, move, places[0], heading)
     found = [_across(gap, tangent) for gap in (before, after)]
     none = np.zeros(len(move), dtype=bool)
-    return Beside(move, found[0], found[1], none, np.full(len(move), 3**0.5))
+    return OffsetPoints(move, found[0], found[1], none, np.full(len(move), 3**0.5))
 
 
 def _at_corners(
-    intent: Intent, real: Segments, rows: Index, pairs: list[tuple[Course, Course]], leads_in: Mask
-) -> list[Beside]:
+    intent: Intent, real: Segments, rows: Index, pairs: list[tuple[ContactPath, ContactPath]], leads_in: Mask
+) -> list[OffsetPoints]:
     """At corners between motions `rows` (k,) and the next ones of the contour."""
     first, second = pairs[0]
     ones = np.ones(len(rows))
@@ -226,7 +226,7 @@ def _at_corners(
             _in_tip(intent, rows[wedge], places[0][wedge], each.taken(wedge).beside_heading(at)) for each in pairs[0]
         ]
         sizes = _from_wedge(before, *rays), _from_wedge(after, *rays)
-        found.append(Beside(rows[wedge], *sizes, sharp[wedge], digits[wedge]))
+        found.append(OffsetPoints(rows[wedge], *sizes, sharp[wedge], digits[wedge]))
     # round it, and where the tool comes from and goes on; all the more where nothing meets
     round_ = np.flatnonzero(~inner | leads_in | ~(arrived[0] & arrived[1]))
     for share in (0.0, 0.5, 1.0):
@@ -241,11 +241,11 @@ def _at_corners(
         before, after = _gaps(intent, rows[round_], ones[round_], *places)
         tangent = _in_tip(intent, rows[round_], places[0], np.cross(way, up))
         sizes = _across(before, tangent), _across(after, tangent)
-        found.append(Beside(rows[round_], *sizes, sharp[round_], np.full(len(round_), 3**0.5)))
+        found.append(OffsetPoints(rows[round_], *sizes, sharp[round_], np.full(len(round_), 3**0.5)))
     return found
 
 
-def _meeting(one: Course, other: Course, turn: Array) -> tuple[Array, Mask]:
+def _meeting(one: ContactPath, other: ContactPath, turn: Array) -> tuple[Array, Mask]:
     """Where the curves beside two motions meet that meet at a corner, (k, 3), and whether they do."""
     corner = one.radius * np.tan(np.clip(turn, -3.0, 3.0) / 2)
     most = np.abs(one.radius) / SHARPEST

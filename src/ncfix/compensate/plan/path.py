@@ -40,13 +40,13 @@ from ncfix.compensate.plan.ends import (
 )
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent, crooked
-from ncfix.compensate.plan.offset import Beside, beside_contours
+from ncfix.compensate.plan.offset import OffsetPoints, beside_contours
 from ncfix.compensate.plan.sampling import too_long
 from ncfix.compensate.plan.segments import Segments
 from ncfix.compensate.plan.splitting import INSTANT, Cutter, Split, joined, may_be_round, split, taken
 from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.plan.written import Known
-from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.writer.pieces import Pieces
 
@@ -79,7 +79,7 @@ class Plan:
 def untouched(moves: Moves, kept: Mask) -> Plan:
     """The plan that changes nothing."""
     n = len(moves)
-    pieces = Pieces(np.arange(n), np.ones(n), moves.end.copy(), moves.kind == Kind.ARC, moves.centre.copy(), kept)
+    pieces = Pieces(np.arange(n), np.ones(n), moves.end.copy(), moves.kind == MotionKind.ARC, moves.centre.copy(), kept)
     return Plan(pieces, moves.start.copy(), np.zeros(n), np.ones(n, dtype=bool), ())
 
 
@@ -143,7 +143,7 @@ less than 1 - cos(pi / 32) = 0.5 % of its height, and a parabola's over its chor
 
 
 @dataclass(frozen=True, slots=True)
-class Budget:
+class PathTolerance:
     """A path tolerance, and what rounding does besides.
 
     tolerance  what was asked of the path before rounding, mm
@@ -174,7 +174,7 @@ class Demands:
     arc_pieces    an arc may be made of several arcs
     """
 
-    budget: Budget
+    budget: PathTolerance
     closure: Closure
     split_rapids: bool
     arc_pieces: bool
@@ -209,12 +209,12 @@ def plan(
     Motions that cannot be corrected are kept and named in the findings. Raises `RefusedError` NCF401 if the machine
     has no X, Y and Z.
     """
-    kept = (moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL)
+    kept = (moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)
     kept |= keep if keep is not None else False
     if machine.is_perfect or kept.all():
         as_it_is = untouched(moves, kept)
         return as_it_is if before is None else _behind(machine, as_it_is, moves, before)
-    demands = Demands(Budget(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
+    demands = Demands(PathTolerance(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
     return _plan(Intent(machine, moves, state, before), strategy, demands, kept)
 
 
@@ -266,7 +266,7 @@ def _with(kept: Mask, rows: Index) -> Mask:
     return also
 
 
-def _worse_contours(intent: Intent, beside: Beside | None, kept: Mask, demands: Demands) -> Finding:
+def _worse_contours(intent: Intent, beside: OffsetPoints | None, kept: Mask, demands: Demands) -> Finding:
     """NCF454: contours (k,) with a corner that the control would make worse of what is corrected than it is without.
 
     Worse is what is beyond the tolerance, and more than before and what the control's digits do there.
@@ -287,7 +287,7 @@ def _worse_contours(intent: Intent, beside: Beside | None, kept: Mask, demands: 
     return Finding("NCF454", rows, most[contour[rows]] * 1e3, text)
 
 
-def _digits_at_corners(beside: Beside | None, kept: Mask) -> float:
+def _digits_at_corners(beside: OffsetPoints | None, kept: Mask) -> float:
     """What the control's digits may do at corners of corrected contours, in half steps."""
     if beside is None:
         return 0.0
@@ -318,7 +318,9 @@ def _followed(intent: Intent, real: Segments, kept: Mask, strategy: Strategy, de
     if not strategy.follows_path:
         return np.zeros(len(kept), dtype=bool)
     kind = intent.moves.kind
-    followed = (kind == Kind.FEED) | (kind == Kind.ARC) | ((kind == Kind.RAPID) & demands.split_rapids)
+    followed = (
+        (kind == MotionKind.FEED) | (kind == MotionKind.ARC) | ((kind == MotionKind.RAPID) & demands.split_rapids)
+    )
     result: Mask = followed & ~kept & intent.moving(np.arange(len(kept))) & finite(real.start)
     return result
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask, every, lengths, owners, picked, spread, vector_product
 from ncfix.compensate.plan.kinematics import linear_columns
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
 from ncfix.machine.chain import turn
 from ncfix.machine.steps import dot
@@ -48,7 +48,9 @@ class Segments:
     @classmethod
     def of_moves(cls, moves: Moves, columns: Index) -> Segments:
         """The motions as programmed."""
-        return cls(moves.start, moves.end, moves.kind == Kind.ARC, moves.centre, moves.normal, moves.sweep, columns)
+        return cls(
+            moves.start, moves.end, moves.kind == MotionKind.ARC, moves.centre, moves.normal, moves.sweep, columns
+        )
 
     def __len__(self) -> int:
         return len(self.start)
@@ -67,13 +69,13 @@ class Segments:
         if self.arc.any():
             on_arc = np.flatnonzero(self.arc[rows] & (fraction != 1))
             if on_arc.size:
-                self._onto(command[None], on_arc, Circles.each(self, rows[on_arc]).at(fraction[on_arc])[:, None])
+                self._onto(command[None], on_arc, ArcColumns.each(self, rows[on_arc]).at(fraction[on_arc])[:, None])
         return command
 
     def evenly(self, rows: Index, fraction: Array) -> Array:
         """The commands at the same fractions (m,), not at ends, of all `rows` (k,), which are arcs, (m, k, n_axes)."""
         commands = self.chords(rows, fraction)
-        self._onto(commands, slice(None), Circles.of(self, rows).at(fraction[:, None]))
+        self._onto(commands, slice(None), ArcColumns.of(self, rows).at(fraction[:, None]))
         return commands
 
     def chords(self, rows: Index, fraction: Array) -> Array:
@@ -109,7 +111,7 @@ class Segments:
 
 
 @dataclass(frozen=True, slots=True)
-class Circles:
+class ArcColumns:
     """Arcs in columns, X Y Z first: at their starts and at their ends where these are, and two ways from the axis.
 
     start, end  (9, k) mm: the point, the way to it from the axis, and that turned on by a right angle
@@ -121,7 +123,7 @@ class Circles:
     sweep: Array
 
     @classmethod
-    def of(cls, arcs: Segments, rows: Index) -> Circles:
+    def of(cls, arcs: Segments, rows: Index) -> ArcColumns:
         """Some of the motions, all of which are arcs."""
         centre, normal = _columns(arcs.centre, rows), _columns(arcs.normal, rows)
         points = (picked(table, rows).T[arcs.columns] for table in (arcs.start, arcs.end))
@@ -129,7 +131,7 @@ class Circles:
         return cls(start, end, arcs.sweep[rows])
 
     @classmethod
-    def each(cls, arcs: Segments, rows: Index) -> Circles:
+    def each(cls, arcs: Segments, rows: Index) -> ArcColumns:
         """As `of`, of motions that come several times, one after the other."""
         first = np.flatnonzero(np.diff(rows, prepend=-1))
         found = cls.of(arcs, rows[first])

@@ -56,7 +56,7 @@ class Cuttable(Protocol):
 
 
 @dataclass(frozen=True)
-class Grid:
+class PathNodes:
     """Nodes of motions, flat, all nodes of a motion next to each other.
 
     counts    (g,) nodes of each motion, its start and end included; at least 2
@@ -101,7 +101,7 @@ def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
 
     A piece from one node to the next is always allowed: it has no nodes between.
     """
-    if fast.engaged() and isinstance(grid, Grid):
+    if fast.engaged() and isinstance(grid, PathNodes):
         from ncfix.compensate import kernels
 
         nodes, motions = np.zeros(len(grid.fraction), dtype=bool), np.zeros(len(grid.counts))
@@ -188,7 +188,7 @@ def radii(intent: Intent, rows: Index) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class RoundGrid:
-    """Nodes of arcs, as `Grid` has them, between which pieces are arcs.
+    """Nodes of arcs, as `PathNodes` has them, between which pieces are arcs.
 
     normal   (k, 3) of each node's motion
     sweep    (k,) of each node's motion, rad
@@ -196,14 +196,14 @@ class RoundGrid:
     columns  (3,) of X, Y and Z
     """
 
-    grid: Grid
+    grid: PathNodes
     normal: Array
     sweep: Array
     radius: Array
     columns: Index
 
     @classmethod
-    def of(cls, grid: Grid, intent: Intent, rows: Index) -> RoundGrid:
+    def of(cls, grid: PathNodes, intent: Intent, rows: Index) -> RoundGrid:
         """Nodes of motions `rows`, which are arcs."""
         move, moves = rows[owners(grid.counts)], intent.moves
         return cls(grid, moves.normal[move], moves.sweep[move], radii(intent, move), intent.columns)
@@ -404,7 +404,7 @@ def _split(intent: Intent, real: Segments, rows: Index, nodes: Index, cutter: Cu
     return Split(counts, grid.fraction[last], picked(grid.command, last), *cut.shape(first, last), worst)
 
 
-def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: Strategy) -> Grid:
+def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: Strategy) -> PathNodes:
     """Exactly corrected commands of motions at nodes; at both ends where the machine really stands."""
     counts, fraction = _fractions(intent, real, rows, nodes)
     move = rows[owners(counts)]
@@ -427,7 +427,7 @@ def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: S
     counts = sums(use.astype(np.intp), counts).astype(np.intp)
     if not use.all():
         move, fraction, command = move[use], fraction[use], command[use]
-    return Grid(counts, fraction, command, _follow(intent, move, command, strategy))
+    return PathNodes(counts, fraction, command, _follow(intent, move, command, strategy))
 
 
 def _as_they_stand(intent: Intent, real: Segments, move: Index, fraction: Array, command: Array) -> Array:

@@ -33,7 +33,7 @@ APART = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
+class PoseSequence:
     """How poses follow each other, for limits on rates.
 
     travel_mm   (n,) way of the tool tip in the workpiece from the pose before, mm
@@ -49,11 +49,11 @@ class Path:
     pinned: Mask
     decided: Array
 
-    def rows(self, rows: Index) -> Path:
+    def rows(self, rows: Index) -> PoseSequence:
         """Some of the poses; where poses are left out a new stretch begins."""
         begins = self.begins[rows].copy()
         begins[1:] |= np.diff(rows) != 1
-        return Path(self.travel_mm[rows], self.travel_rad[rows], begins, self.pinned[rows], self.decided[rows])
+        return PoseSequence(self.travel_mm[rows], self.travel_rad[rows], begins, self.pinned[rows], self.decided[rows])
 
     def allowance(self, per_mm: float, per_rad: float) -> Array:
         """By how much a correction may have changed since the first pose, (n,) rad, never descending."""
@@ -61,7 +61,7 @@ class Path:
         return np.cumsum(np.where(self.begins, APART, step))
 
 
-def limited(correction: Array, path: Path, per_mm: float, per_rad: float) -> Array:
+def limited(correction: Array, path: PoseSequence, per_mm: float, per_rad: float) -> Array:
     """Rotary corrections (n, k) that change no faster along the path than allowed, near the given ones.
 
     The mean of the largest function below and the smallest above the given values that keep the rate (McShane's
@@ -98,7 +98,7 @@ class Strategy(ABC):
     follows_path: ClassVar[bool] = True
 
     @abstractmethod
-    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+    def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
         """Corrected axis positions for poses q (n, n_axes) [mm, rad] that were meant for a perfect machine.
 
         `path` tells how the poses lie along the path, for strategies with limits on rates. The state broadcasts.
@@ -116,13 +116,13 @@ class Strategy(ABC):
         return correction.q
 
 
-class Position(Strategy):
+class PositionStrategy(Strategy):
     """The tool tip exactly, by Newton's method on the whole model; rotary axes keep their values."""
 
     name = "position"
     leaves = "The orientation of the tool is left as the machine makes it; rotary axes keep their values."
 
-    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+    def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
         """See `Strategy.solve`."""
         return _position(machine, q, state)
 
@@ -144,7 +144,7 @@ class RotaryThenLinear(Strategy):
     def __init__(self, passes: int | None = None) -> None:
         self.passes = passes
 
-    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+    def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
         """See `Strategy.solve`."""
         if machine.is_perfect:
             return untouched(q)
@@ -183,7 +183,7 @@ def untouched(q: Array) -> Correction:
 def strategies() -> dict[str, Strategy]:
     """All strategies by name, in the order in which the command line lists them."""
 
-    found: tuple[Strategy, ...] = (RotaryThenLinear(), Full(), Position(), Thesis())
+    found: tuple[Strategy, ...] = (RotaryThenLinear(), Full(), PositionStrategy(), Thesis())
     return {strategy.name: strategy for strategy in found}
 
 
@@ -230,7 +230,7 @@ class Full(Strategy):
         self.per_mm = per_mm
         self.per_rad = per_rad
 
-    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+    def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
         """See `Strategy.solve`. Rates are limited only if `path` is given."""
         if machine.is_perfect:
             return untouched(q)
@@ -248,7 +248,9 @@ class Full(Strategy):
         corrected, arrived = steer(machine, corrected, target, state)
         return Correction(corrected, arrived, free)
 
-    def _known_only(self, machine: Machine, q: Array, state: State, path: Path | None, known: Mask) -> Correction:
+    def _known_only(
+        self, machine: Machine, q: Array, state: State, path: PoseSequence | None, known: Mask
+    ) -> Correction:
         """Poses with numbers missing are left alone; they end a stretch of the path."""
         rows = np.flatnonzero(known)
         rest = None if path is None else path.rows(rows)
@@ -363,7 +365,7 @@ class Thesis(Strategy):
     )
     follows_path = False
 
-    def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
+    def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
         """See `Strategy.solve`. Raises `UsageError` NCF412 for machines of another kind."""
         if any(axis.workpiece_side is not axis.rotary for axis in machine.axes):
             raise UsageError.of(

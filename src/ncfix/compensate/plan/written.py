@@ -24,7 +24,7 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask, finite, greatest, l
 from ncfix.compensate.plan.intent import Intent, lacking
 from ncfix.compensate.plan.sampling import reach
 from ncfix.compensate.plan.segments import Segments, sweep_between
-from ncfix.control.moves import Kind, Moves
+from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
 from ncfix.text.spelling import decimals_for
 from ncfix.writer.emit import Emission
@@ -32,7 +32,7 @@ from ncfix.writer.pieces import Pieces
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenPieces:
     """Pieces on a program on a machine.
 
     start  (n, n_axes) the command at which each motion really starts; NaN where not known
@@ -124,7 +124,7 @@ class Known:
     end: Array
     beside: Array | None = None
 
-    def at(self, written: Written, piece: Index) -> tuple[Mask, Array, Array]:
+    def at(self, written: WrittenPieces, piece: Index) -> tuple[Mask, Array, Array]:
         """Which of these pieces (k,) end where errors are known, and these: before and after (k,) mm.
 
         After a correction what is off is what the numbers that were written differ from those that were meant, as the
@@ -138,7 +138,7 @@ class Known:
             return np.zeros(len(piece), dtype=bool), before, before
         off = picked(pieces.end, piece) - picked(self.end, move)
         turned = greatest(np.abs(off[:, machine.rotary]))
-        straight = (intent.moves.kind[move] != Kind.ARC) & (turned <= TURNED)
+        straight = (intent.moves.kind[move] != MotionKind.ARC) & (turned <= TURNED)
         here = np.isfinite(before) & (pieces.fraction[piece] == 1) & straight
         here[lacking(intent, move)] = False
         shift = off[:, intent.columns] @ ways.T
@@ -257,7 +257,7 @@ def rounding_along(intent: Intent, pieces: Pieces, corners: float, own: Mask | N
     own      (n,) motions that count; all if not given
     """
     machine, moves = intent.machine, intent.moves
-    rows = np.flatnonzero(~pieces.kept & (moves.kind != Kind.DWELL)[pieces.move])
+    rows = np.flatnonzero(~pieces.kept & (moves.kind != MotionKind.DWELL)[pieces.move])
     rows = rows if own is None else rows[own[pieces.move[rows]]]
     if not rows.size:
         return 0.0
