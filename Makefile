@@ -32,17 +32,17 @@ same-bytes:      ## correct programs in all ways, compare, into docs/performance
 tables:          ## all controls on all shipped machines into docs/controllers.md (ten minutes)
 	OMP_NUM_THREADS=1 $(PYTHON) tests/tables/all_controls.py
 
-study:           ## the diagnosis on worlds of its own and other values of its constants into docs/diagnose.md (an hour); SCENES="single=40 two=20" AGAIN=6
-	PYTHONPATH=src:plugins:tests OMP_NUM_THREADS=1 $(PYTHON) tests/diagnose/study.py --table docs/diagnose.md --from 24 \
+study:           ## the diagnosis on worlds of its own and other values of its constants into docs/accuracy.md (an hour); SCENES="single=40 two=20" AGAIN=6
+	PYTHONPATH=src:plugins:tests OMP_NUM_THREADS=1 $(PYTHON) tests/diagnose/study.py --table docs/accuracy.md --from 24 \
 		$(or $(SCENES),clean=10 clutter=20 single=30 thermal=20 curves=20 weak=20 two=20 three=15 deleted=20 foreign=20)
-	PYTHONPATH=src:plugins:tests OMP_NUM_THREADS=1 $(PYTHON) tests/diagnose/calibration.py $(or $(AGAIN),6) --from 30 --table docs/diagnose.md
+	PYTHONPATH=src:plugins:tests OMP_NUM_THREADS=1 $(PYTHON) tests/diagnose/calibration.py $(or $(AGAIN),6) --from 30 --table docs/accuracy.md
 
 hidden:          ## the hidden-effect benchmark into docs/accuracy.md (two hours); FINAL=1 for the final seeds, COUNT="10 single=40"
 	$(PYTHON) -m tests.hidden --callable tests.diagnose.resident:resident --table docs/accuracy.md \
 		$(if $(FINAL),--final) $(foreach count,$(COUNT),--count $(count)) $(if $(RECORDS),--records $(RECORDS))
 
-metamorphic:     ## 500 pairs of programs for each relation, into docs/dialects.md (an hour); PAIRS=50 DIALECTS="siemens or haas"
-	NCFIX_PAIRS=$(or $(PAIRS),500) NCFIX_TABLE=docs/dialects.md OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q \
+metamorphic:     ## 500 pairs of programs for each relation, into docs/accuracy.md (an hour); PAIRS=50 DIALECTS="siemens or haas"
+	NCFIX_PAIRS=$(or $(PAIRS),500) NCFIX_TABLE=docs/accuracy.md OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q \
 		tests/metamorphic $(if $(DIALECTS),-k "$(DIALECTS)")
 
 refusals:        ## what becomes of the motion blocks of the corpus, all folders, also flat (half an hour)

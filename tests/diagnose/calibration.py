@@ -1,7 +1,7 @@
 """What the constants that were argued, not derived, do: `python tests/diagnose/calibration.py 10 [--from 40]`.
 
 So many scenes of every family (study.py) are diagnosed with each constant at its value and at others. What was computed
-of a scene is used again, so another value costs little. Prints the table, and puts it into `--table docs/diagnose.md`.
+of a scene is used again, so another value costs little. Prints the table, and puts it into `--table docs/accuracy.md`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """How often the diagnosis is right on worlds of its own: `python tests/diagnose/study.py single=20 deleted=20 ...`.
 
 `--set evidence.MISSHAPEN=0.1` tries another value of a constant, `--from 40` other worlds, `--log FILE` keeps a line
-of JSON for every scene, and `--read FILE` takes such scenes as done. Prints the table of docs/diagnose.md, or puts it
-there with `--table docs/diagnose.md`.
+of JSON for every scene, and `--read FILE` takes such scenes as done. Prints the table of docs/accuracy.md, or puts it
+there with `--table docs/accuracy.md`.
 """
 
 from __future__ import annotations

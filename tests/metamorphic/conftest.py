@@ -1,4 +1,4 @@
-"""`NCFIX_TABLE=docs/dialects.md`: each relation puts its figure into the table there."""
+"""`NCFIX_TABLE=docs/accuracy.md`: each relation puts its figure into the table there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table of docs/dialects.md with what the relations came to: each run writes its rows, the others stay."""
+"""The table of docs/accuracy.md with what the relations came to: each run writes its rows, the others stay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table in docs/dialects.md: rows stay until they are measured again."""
+"""The table in docs/accuracy.md: rows stay until they are measured again."""
 
 from __future__ import annotations
 
@@ -36,5 +36,5 @@ def test_a_new_figure_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
 
 
 def test_the_page_has_a_place_for_the_table(root: Path) -> None:
-    rows = rows_of((root / "docs/dialects.md").read_text(encoding="utf-8"))
+    rows = rows_of((root / "docs/accuracy.md").read_text(encoding="utf-8"))
     assert all(float(worst) < 1.0 for cells in rows.values() for worst in cells.values())

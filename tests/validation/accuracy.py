@@ -62,6 +62,10 @@ STUDIES: dict[str, Callable[[argparse.Namespace], str]] = {
 }
 
 
+WRITTEN_ELSEWHERE = ("study", "calibration", "metamorphic")
+"""Tables that `make study` and `make metamorphic` write; they stay."""
+
+
 def marked(name: str, table: str) -> str:
     """A study's part of the page, between marks that are not seen when it is shown."""
     return f"<!-- {name}: begin -->\n{table}\n<!-- {name}: end -->"
@@ -83,7 +87,7 @@ def benchmark(page: str) -> str:
 def assembled(page: str, tables: dict[str, str]) -> str:
     """The new page from the old one and the tables that were worked out."""
     text = TEMPLATE.read_text().replace("<!-- checklists -->\n", CHECKLISTS.read_text())
-    for name in STUDIES:
+    for name in (*STUDIES, *WRITTEN_ELSEWHERE):
         text = text.replace(f"<!-- {name} -->", marked(name, tables.get(name) or kept(page, name)))
     section = benchmark(page)
     return tally.replaced(text, section) if section else text
