@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import combinations
 
 from classes.judging import SETUP, machine
@@ -24,6 +24,10 @@ from ncfix.text.reader import read
 
 MACHINE = machine()
 WORDS_AT_ONCE = 4
+STRAY = 0.1
+"""Of the statements of a language with a table of what its codes take, how many have one word that theirs does not."""
+THERE = 0.6
+"""How likely a word that a code takes is there, one that it needs nearly always."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +38,8 @@ class Family:
     words   what may stand behind; of one address only one
     before  the programs before it, several modes; after: what follows
     leads   (head, words, mode) whether the manuals say that the block moves axes, or that the control stops at it
+    takes   head -> the addresses that it takes, those that it needs in capitals; a control that stops at all others
+            would hardly ever be asked for more without it
     """
 
     dialect: str
@@ -42,6 +48,7 @@ class Family:
     before: tuple[str, ...]
     after: str
     leads: Callable[[str, Sequence[str], int], bool]
+    takes: Mapping[str, str] = field(default_factory=dict)
 
     def cases(self) -> Iterator[Case]:
         """Every head with every subset of the words, behind every mode."""
@@ -54,17 +61,33 @@ class Family:
 
     def some(self, count: int, seed: int) -> list[Case]:
         """So many of them at random; all for none."""
+        dice = random.Random(seed)
+        if count and self.takes:
+            return [self.taken(dice) for _ in range(count)]
         found = list(self.cases())
-        return found if not count else random.Random(seed).sample(found, min(count, len(found)))
+        return found if not count else dice.sample(found, min(count, len(found)))
+
+    def taken(self, dice: random.Random) -> Case:
+        """A head with some of the words that it takes, and now and then one that it does not."""
+        head, mode = dice.choice(self.heads), dice.randrange(len(self.before))
+        takes = self.takes.get(head) or self.takes[f"mode {mode}"]
+        by_address: dict[str, list[str]] = {}
+        for word in self.words:
+            by_address.setdefault(address(word), []).append(word)
+        chosen = [
+            dice.choice(forms)
+            for letter, forms in by_address.items()
+            if dice.random() < (0.95 if letter in takes else THERE if letter.lower() in takes else 0.0)
+        ]
+        if dice.random() < STRAY:
+            others = [word for word in self.words if address(word).lower() not in takes.lower()]
+            chosen.append(dice.choice(others))
+        return Case(self, head, tuple(chosen), mode)
 
 
 def address(word: str) -> str:
-    """What a word says: its axis or address, however it says it."""
-    return (
-        re.match(r"I?([A-Z]+\d?(?:\[.\])?)", word)[1]
-        if word[:1] == "I" and word[1:2].isalpha()
-        else re.match(r"[A-Z]+\d?(?:\[.\])?", word)[0]
-    )
+    """What a word says: its axis or address, as increment or not; `I1=` is one, `X10` says X."""
+    return re.match(r"(?:I(?=[A-Z]))?([A-Z]+(?:\d(?==))?(?:\[.\])?)", word)[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +185,40 @@ KLARTEXT = Family(
 
 # -- ISO, Fanuc, LinuxCNC ---------------------------------------------------------------------------------------------
 
-TAKING = ("G4", "G92", "G52", "G10 L2 P1", "G43", "G17", "G90", "G40", "M3")
-"""What takes the words of its block for itself, or has no use for them."""
+TAKING = ("G4", "G92", "G52", "G10 L2 P1", "G10 L20 P1", "G43.1", "G64", "M3 S500")
+"""What takes axis words of its block for itself, or no words but its own; other modes leave them to the motion."""
+SETTLING = ("G17", "G90", "G40", "G43", "M3", "G61", "G54", "G94")
+"""Modes, with which a block leads where its axis words say."""
+CYCLES = ("G73", "G81", "G82", "G83", "G85", "G86", "G89")
+LINUXCNC_TAKES = {
+    **dict.fromkeys(("G0", "G1", "G91 G1", "G91 G0"), "xyzf"),
+    **dict.fromkeys(("G2", "G3"), "xyzijrfp"),
+    **dict.fromkeys(("G18 G2", "G18 G3"), "xyzikrf"),
+    **dict.fromkeys(("G28", "G30"), "xyz"),
+    **dict.fromkeys(("G53 G0", "G53 G1"), "XYzf"),
+    **dict.fromkeys(("G81", "G85", "G86"), "xyZRlf"),
+    **dict.fromkeys(("G82", "G89"), "xyZRlPf"),
+    **dict.fromkeys(("G73", "G83"), "xyZRQlf"),
+    **dict.fromkeys(("G93 G1",), "xyzF"),
+    "G33": "ZK",
+    "G38.2": "xyZf",
+    "G31": "xyZf",
+    "G4": "P",
+    "G92": "Xyz",
+    "G52": "xyz",
+    "G10 L2 P1": "xyz",
+    "G10 L20 P1": "xyz",
+    "G43.1": "Z",
+    "G41 D1": "Xy",
+    "G43": "hxyzf",
+    "M3 S500": "f",
+    "G64": "p",
+    "mode 0": "xyzf",
+    "mode 1": "xyzijrfp",
+    "mode 2": "xyzrlf",
+    **dict.fromkeys(("G17", "G90", "G40", "M3", "G61", "G54", "G94"), ""),
+}
+"""Of each code the addresses that LinuxCNC takes with it; what is not here takes those of the mode."""
 
 
 def iso_leads(head: str, words: Sequence[str], mode: int) -> bool:
@@ -172,39 +227,30 @@ def iso_leads(head: str, words: Sequence[str], mode: int) -> bool:
         return True
     if head in TAKING:
         return False
-    arc = head in ("G2", "G3") or (mode == 1 and head == "")
+    arc = head.endswith(("G2", "G3")) or (mode == 1 and head in ("", *SETTLING))
     return any(word[0] in "XYZ" for word in words) or (arc and any(word[0] in "IJ" for word in words))
 
 
 def iso(dialect: str) -> Family:
     """The statements of a dialect of RS274."""
-    heads = ("", "G0", "G1", "G2", "G3", "G28", "G30", "G53 G0", "G53 G1", "G73", "G81", "G82", "G83", "G85", "G33")
+    heads = ("", "G0", "G1", "G2", "G3", "G28", "G30", "G53 G0", "G53 G1", *CYCLES, "G33", "G91 G1", "G93 G1")
+    strict = ("G18 G2", "G18 G3", "G38.2", "G43.1", "G64", "G61", "G94", "G54", "G10 L20 P1", "G41 D1", "M3 S500")
+    fanuc = ("G31", "G52") if dialect == "fanuc" else ()
+    taking = ("G4", "G92", "G10 L2 P1", "G17", "G90", "G40", "G43", "M3")
     return Family(
         dialect=dialect,
-        heads=(*heads, "G91 G1", "G38.2" if dialect == "linuxcnc" else "G31", *TAKING),
+        heads=(*heads, *taking, *(strict if dialect != "fanuc" else fanuc)),
         words=(
-            "X30.",
-            "X10.",
-            "Y40.",
-            "Y20.",
-            "Z5.",
-            "I20.",
-            "J0.",
-            "J10.",
-            "K1.",
-            "R25.",
-            "P1",
-            "Q2.",
-            "L2",
-            "F100.",
-            "H1",
+            *("X30.", "X50.", "X10.", "Y40.", "Y20.", "Z5.", "I20.", "J0.", "J10.", "K1.", "R25."),
+            *("P1", "Q3.", "L2", "F100.", "H1"),
         ),
         before=tuple(
-            f"G21 G17 G90 G40 G49 G80 G94\nG54 G0 X0. Y10. Z3.\nF200. S100 M3\n{each}"
-            for each in ("G1 X10. Y20.\n", "G2 X10. Y20. I5. J5.\n", "G81 X10. Y20. Z-5. R2.\n")
+            f"G21 G17 G90 G40 G49 G80 G94 G98\nT1 M6\nG54 G43 H1 G0 X0. Y10. Z40.\nF200. S100 M3\n{each}"
+            for each in ("G1 X10. Y20.\n", "G2 X10. Y20. I5. J5.\n", "G81 X10. Y20. Z-5. R26.\n")
         ),
-        after="G80\nG90 G1 X1. Y2. Z30. F100.\nX3.\nM30\n",
+        after="G80\nG40 G90 G94 G17 G1 X1. Y2. Z30. F100.\nX3.\nM30\n",
         leads=iso_leads,
+        takes=LINUXCNC_TAKES if dialect != "fanuc" else {},
     )
 
 
@@ -235,7 +281,7 @@ SIEMENS = Family(
         *("POS[X]=30", "PO[X]=(30,2)"),
     ),
     before=tuple(
-        f"G17 G90 G40 G71 G94 G54\nT1 D1 S100 M3\nG0 X0 Y10 Z3 F200\nG111 X30 Y20\n{each}"
+        f"G17 G90 G40 G71 G94 G54\nT1 D1 M6\nS100 M3\nG0 X0 Y10 Z3 F200\nG111 X30 Y20\n{each}"
         for each in ("G1 X10 Y20\n", "G1 X0\nG2 X10 Y20 I=AC(10) J=AC(10)\n", "CIP X10 Y20 I1=4 J1=17\n")
     ),
     after="G1 G90 X1 Y2 Z30 F100\nX3\nM30\n",

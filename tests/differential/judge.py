@@ -239,7 +239,10 @@ class _Judge:
     def along(self, segments: Segments) -> None:
         """The tip along every piece of a sample of the compensated motions."""
         kinds = (FEED, ARC, RAPID) if self.terms.rapids else (FEED, ARC)
-        chosen = np.flatnonzero((segments.fate == Fate.COMPENSATED) & np.isin(self.original.kind, kinds))
+        said = np.isin(
+            self.original.line, list(self.terms.refused)
+        )  # a full circle ends where it begins, refused or not
+        chosen = np.flatnonzero((segments.fate == Fate.COMPENSATED) & ~said & np.isin(self.original.kind, kinds))
         chosen = chosen[:: max(1, len(chosen) // MOST_DENSE)]
         owner = segments.owner(len(self.fixed))
         pieces = np.flatnonzero(np.isin(owner, chosen))
@@ -327,17 +330,17 @@ class _Judge:
             if fate == Fate.CYCLE:
                 bottom = _bottoms(self.original, rows) & ~refused
                 self.verdict.note("cycle bottoms", linear[bottom], half[bottom], lines[bottom])
-            near = half + (self.variation(rows) if fate == Fate.CYCLE else self.offset_change(rows))
+            near = half + (self.variation(segments, rows) if fate == Fate.CYCLE else self.offset_change(rows))
             self.verdict.note(what, linear[~refused], near[~refused], lines[~refused])
             self.verdict.refused += int(refused.sum())
             self.verdict.compensated -= int(refused.sum())
             self.verdict.reasons.update(self.terms.refused[int(line)] for line in lines[refused])
 
-    def variation(self, rows: NDArray[np.int64]) -> Floats:
+    def variation(self, segments: Segments, rows: NDArray[np.int64]) -> Floats:
         """How much the correction differs over the holes of one cycle and the way to the first of them.
 
         The height to which a cycle returns is that from which it was called, and R may not sink below where the
-        control stands: there the correction of an earlier hole holds.
+        control stands: there the correction of an earlier hole holds, or what a refused motion before has left.
         """
         spread = np.zeros(len(rows))
         for group in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) > 1) + 1):
@@ -345,6 +348,10 @@ class _Judge:
             length = _lengths(self.original, self.terms)[rows[group[0]]]
             some = (self.machine.corrected(places, length) - places)[:, self.machine.linear]
             spread[group] = np.ptp(some, axis=0).max()
+            first = rows[group[0]]
+            if first and int(self.original.line[first - 1]) in self.terms.refused:
+                off = self.started[segments.first[first]] - self.original.start[first]
+                spread[group] += np.abs(off[self.machine.linear]).max()
         return spread
 
     def offset_change(self, rows: NDArray[np.int64]) -> Floats:

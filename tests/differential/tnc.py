@@ -194,6 +194,8 @@ class Tnc:
     def motion(self, block: str) -> bool:
         m = re.match(r"(LP|L|CC|CP|CR|CTP|CT|C|RND|CHF|CYCL CALL POS|CYCL CALL|APPR LCT|DEP LCT)(?=\s|$)", block)
         name = m[1] if m else ""
+        if re.match(r"(APPR|DEP|LN)\b", block) and not name:
+            raise UnknownError(block)
         words = self.words(block[len(name) :]) if name not in ("RND", "CHF") else {}
         codes = {int(code) for code in re.findall(r"(?<![A-Z])M(\d+)", block)}
         axes = {k: v for k, v in words.items() if k[-1] in "XYZ" and k not in ("F", "R")}

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from differential import errors, fanuc, sinumerik, test_fanuc_control, test_siemens, test_tnc_swivel
+from differential import errors, fanuc, sinumerik, test_fanuc_control, test_siemens, test_tnc_swivel, unsaid_rs274
 from differential.sinumerik_frames import Floats
 from differential.sinumerik_motions import Path as Way
 from differential.test_siemens import apart
@@ -32,7 +32,7 @@ from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.compensate.following import follow
 from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.passing import Pass
-from ncfix.control.setup import Setup
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
 from ncfix.text.reader import read
@@ -43,8 +43,6 @@ FRAMES = ("plane", "swivel", "rotation", "tcp")
 EVENTS = ("cycle", "side", "machine", "tool")
 NAMED = ("one", "all")
 STRATEGIES = ("position", "rotary-then-linear", "full")
-ON_THE_WAY = 1.8e-3
-"""mm: the tolerance asked for, rounding, and the chords of the samples."""
 
 
 class Step(NamedTuple):
@@ -61,6 +59,8 @@ class Language:
     """How programs of a language are made, and followed by the second control, as meant or as a machine does it.
 
     at_ends  mm: rounding of three linear axes, and what half a step of a rotary axis moves the tip by
+    frames   the frames that the language has
+    on_the_way  mm: the tolerance asked for, rounding, and the chords of the samples
     """
 
     write: Callable[[str, str, str, random.Random], list[str]]
@@ -70,6 +70,8 @@ class Language:
     marked: Callable[[str], str]
     tolerance_um: float
     at_ends: float
+    frames: tuple[str, ...] = FRAMES
+    on_the_way: float = 1.8e-3
 
 
 # -- programs ---------------------------------------------------------------------------------------------------------
@@ -221,6 +223,19 @@ def by_tnc(text: str, actual: bool) -> list[Step]:
     ]
 
 
+def by_linuxcnc(text: str, actual: bool) -> list[Step]:
+    """What LinuxCNC makes of a program; the radius of the cutter is zero."""
+    found = unsaid_rs274.steps(TRUNNION_MODEL, re.sub(r"G4[12] D\d", "", text), actual)
+    return [Step(*motion) for motion in found]
+
+
+TRUNNION = Path(__file__).parent / "machines" / "five_ac.toml"
+TRUNNION_MODEL = errors.load(TRUNNION)
+LINUXCNC_SETUP = Setup(
+    work_offsets={name: dict(zip("XYZ", shift, strict=True)) for name, shift in unsaid_rs274.OFFSETS.items()},
+    tools={number: Tool(length, 0.0) for number, length in unsaid_rs274.LENGTHS.items()},
+    initial=dict(zip("XYZAC", (0.0, 0.0, 250.0, 0.0, 0.0), strict=True)),
+)
 CRADLE = errors.load(ROOT / test_siemens.MACHINE)
 TABLES = test_tnc_swivel.MODEL
 LANGUAGES = {
@@ -243,7 +258,19 @@ LANGUAGES = {
         0.4e-3,
     ),
     "heidenhain": Language(klartext, test_tnc_swivel.SETUP, test_tnc_swivel.FILE, by_tnc, str, 2000.0, 1e-3),
+    "linuxcnc": Language(
+        unsaid_rs274.text,
+        LINUXCNC_SETUP,
+        TRUNNION,
+        by_linuxcnc,
+        fanuc.marked,
+        1.0,
+        1e-3,
+        unsaid_rs274.FRAMES,
+        1.95e-3,
+    ),
 }
+LANGUAGES["iso"] = LANGUAGES["fanuc"]
 
 
 # -- the verdict ------------------------------------------------------------------------------------------------------
@@ -262,7 +289,7 @@ class Found:
 def texts(dialect: str, seeds: range) -> Iterator[tuple[str, str]]:
     """Names and texts of programs: all that meets all, for each seed."""
     language = LANGUAGES[dialect]
-    for seed, frame, event, many in product(seeds, FRAMES, EVENTS, NAMED):
+    for seed, frame, event, many in product(seeds, language.frames, EVENTS, NAMED):
         name = f"{frame}, {event}, {many}, {seed}"
         yield name, language.marked("\n".join(language.write(frame, event, many, random.Random(name))) + "\n")
 
@@ -271,9 +298,9 @@ def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> No
     """Correct a program, follow it before and after, and note what became of its motions."""
     language = LANGUAGES[dialect]
     machine = load(str(language.file))
-    program = read(text.encode(), name, dialect)
     options = FixOptions(strategy=strategy, tolerance_um=language.tolerance_um)
     try:
+        program = read(text.encode(), name, dialect)
         fixed = fix_program(program, machine, language.setup, options)
     except NcfixError as error:
         found.stopped[f"{error.messages[0].code} {error.messages[0].text}"] += 1
@@ -294,7 +321,7 @@ def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> No
             language.at_ends + claims.left.get(wanted.line, 0.0),
         )
         if wanted.sort == "cut" and not fresh and language.tolerance_um < 10 and wanted.line not in claims.whole:
-            allowed_along = ON_THE_WAY + claims.left.get(wanted.line, 0.0)
+            allowed_along = language.on_the_way + claims.left.get(wanted.line, 0.0)
             along = max(apart(wanted.tip, made.tip[1:]), apart(made.tip, wanted.tip[1:]))
             off = max(off, allowed * along / allowed_along)
         found.worst = max(found.worst, off - allowed + language.at_ends)

@@ -31,6 +31,7 @@ OF_ARCS = frozenset({*CENTRE_LETTERS, "CR", "AR", "TURN"})
 OF_CIP = frozenset({*VIA, "TURN"})
 NOT_TAKEN = "{} takes no word {}: the control would stop, or makes a path of it that is not followed"
 TWICE = "{} says by {} and {} where the arc lies: which of them counts is not sure"
+ACROSS = "{} says by {} where its centre lies across the plane, and by {} where the arc lies: what counts is not sure"
 NO_END = "CIP without an end point: no circle is given by two points"
 FLAT = 1e-9
 """A triangle of a smaller height, relative, has no circle."""
@@ -40,7 +41,7 @@ Triple = tuple[float, float, float]
 
 def misled(control: Sinumerik, words: BlockWordValues, name: str, taken: frozenset[str]) -> str:
     """Why a motion is refused that has words of arcs beyond those that it takes, or more than say an arc; or empty."""
-    named = words.values.keys() & (OF_ARCS | OF_CIP)
+    named = words.values.keys() & (OF_ARCS | OF_CIP | {"ANG"})
     if not named:
         return ""
     stray = sorted(named - taken)
@@ -48,6 +49,10 @@ def misled(control: Sinumerik, words: BlockWordValues, name: str, taken: frozens
         return NOT_TAKEN.format(name, stray[0])
     plane = control.modal.plane
     centre = sorted({CENTRE_LETTERS[index] for index in (plane.first, plane.second)} & named)
+    across = sorted(set(CENTRE_LETTERS) & named - set(centre))
+    otherwise = sorted({"CR", "AR"} & named)
+    if across and not centre and otherwise:
+        return ACROSS.format(name, across[0], otherwise[0])
     ended = any(words.axes >> index & 1 for index in (plane.first, plane.second))
     if "CR" in named and (centre or "AR" in named):
         return TWICE.format(name, "CR", (centre or ["AR"])[0])

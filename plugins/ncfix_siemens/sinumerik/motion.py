@@ -102,7 +102,7 @@ def is_one_piece(control: Sinumerik, words: BlockWordValues) -> bool:
 
 def as_coded(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """The motion that the code in force makes of the words."""
-    name, taken = TAKING.get(code, (f"G{code // 10}", frozenset(CENTRE_LETTERS)))
+    name, taken = TAKING.get(code, (f"G{code // 10}", frozenset({*CENTRE_LETTERS, "ANG"})))
     why = "" if code in UNFOLLOWED_MOTIONS else misled(control, words, name, taken)
     if why:
         refused(control, words, code, why)
