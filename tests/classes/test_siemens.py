@@ -60,7 +60,7 @@ ARCS = [
     case("arc with a radius", "G2 X11 Y12 CR=10 F100", L3=R),
     case("arc with an opening angle and an end", "G3 X11 Y12 AR=90 F100", L3=R),
     case("arc with an opening angle and a centre", "G3 I0 J10 AR=90 F100", L3=R),
-    case("arc with an opening angle, and a centre across the plane", "G3 X11 Y12 K1 AR=90 F100\nG0 X5 Y5 Z5", L3=N, L4=R),
+    case("arc with an opening angle, centre across the plane", "G3 X11 Y12 K1 AR=90 F100\nG0 X5 Y5 Z5", L3=N, L4=R),
     case("arc with the angle of a contour", "G2 X11 Y12 I10 J0 ANG=45 F100\nG0 X5 Y5 Z5", L3=N, L4=R),
     case("full circle", "G3 I10 J0 F100", L3=R),
     case("several turns", "G3 I10 J0 Z40 TURN=2 F100", L3=R),

@@ -61,6 +61,7 @@ class Language:
     at_ends  mm: rounding of three linear axes, and what half a step of a rotary axis moves the tip by
     frames   the frames that the language has
     on_the_way  mm: the tolerance asked for, rounding, and the chords of the samples
+    turned   mm: what half a step of a rotary axis that the strategy moves comes to
     """
 
     write: Callable[[str, str, str, random.Random], list[str]]
@@ -72,6 +73,7 @@ class Language:
     at_ends: float
     frames: tuple[str, ...] = FRAMES
     on_the_way: float = 1.8e-3
+    turned: float = 0.0
 
 
 # -- programs ---------------------------------------------------------------------------------------------------------
@@ -268,6 +270,7 @@ LANGUAGES = {
         1e-3,
         unsaid_rs274.FRAMES,
         1.95e-3,
+        1e-3,
     ),
 }
 LANGUAGES["iso"] = LANGUAGES["fanuc"]
@@ -316,12 +319,11 @@ def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> No
         if fate != "corrected":
             fresh = True
             continue
-        off, allowed = (
-            float(np.linalg.norm(wanted.tip[-1] - made.tip[-1])),
-            language.at_ends + claims.left.get(wanted.line, 0.0),
-        )
+        off = float(np.linalg.norm(wanted.tip[-1] - made.tip[-1]))
+        turned = language.turned if strategy == "full" else 0.0
+        allowed = language.at_ends + turned + claims.left.get(wanted.line, 0.0)
         if wanted.sort == "cut" and not fresh and language.tolerance_um < 10 and wanted.line not in claims.whole:
-            allowed_along = language.on_the_way + claims.left.get(wanted.line, 0.0)
+            allowed_along = language.on_the_way + turned + claims.left.get(wanted.line, 0.0)
             along = max(apart(wanted.tip, made.tip[1:]), apart(made.tip, wanted.tip[1:]))
             off = max(off, allowed * along / allowed_along)
         found.worst = max(found.worst, off - allowed + language.at_ends)
