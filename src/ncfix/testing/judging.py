@@ -1,0 +1,136 @@
+"""What became of each line of a short program, judged by reading the result again.
+
+The machine is off by a constant shift, so a block that is corrected ends exactly by that much beside where it ended
+before, in whatever frame it is written; a block that is passed or refused keeps its bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import Fixed, fix_program
+from ncfix.compensate.following import follow
+from ncfix.control.moves import MotionKind, Moves, Rule
+from ncfix.control.setup import Setup, Tool
+from ncfix.diagnostics import NcfixError
+from ncfix.machine import Machine, loads
+from ncfix.text.dialect import Dialect
+from ncfix.text.reader import read
+from ncfix.text.stamp import find
+
+SHIFT = {"X": -0.0124, "Y": 0.0213, "Z": 0.0085}
+"""mm, added to commands: minus the errors of the machine."""
+STEP = 0.0011
+"""mm: a word is right to its last digit."""
+
+AXIS = """
+[axis.{0}]
+type = "linear"
+direction = [{1}]
+range = [-5000, 5000]
+[[effect]]
+name = "E{0}{0}"
+basis = "constant"
+coefficients = [{2}]
+"""
+LINEAR = (("X", "1, 0, 0"), ("Y", "0, 1, 0"), ("Z", "0, 0, 1"))
+OPTIONS = FixOptions(tolerance_um=60.0, verify=False)
+
+SYSTEMS = ("G54", "G55", "G54.1P1", "G54.1P2", "G500", "preset")
+SETUP = Setup(
+    work_offsets={name: {"X": 10.0 * n, "Y": -5.0 * n, "Z": 3.0 * n} for n, name in enumerate(SYSTEMS)},
+    tools={n: Tool(20.0 * n, 3.0) for n in range(10)},
+    initial={"X": 0.0, "Y": 0.0, "Z": 200.0},
+    references={"G28": {"X": 0.0, "Y": 0.0, "Z": 300.0}, "G30": {"X": 1.0, "Y": 1.0, "Z": 290.0}},
+    no_point="calculator",
+)
+
+
+def shifted_machine(share: float = 1.0) -> Machine:
+    """Three axes, each off by its share of the shift."""
+    text = 'name = "shifted"\ntopology = "w F X Y Z t"\n' + "".join(
+        AXIS.format(axis, direction, -SHIFT[axis] * share) for axis, direction in LINEAR
+    )
+    return loads(text + "\n[tool]\ndirection = [0, 0, 1]\npoint = [0, 0, 0]\n")
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What became of a program.
+
+    lines    line -> "right", "passed", "refused", or what is wrong with it; lines without a motion are not in it
+    stopped  the line at which the program stops, with the message; None if it does not
+    text     the corrected program
+    places   line -> where it led as programmed, commands of all axes, mm and rad
+    """
+
+    lines: dict[int, str]
+    stopped: tuple[int, str] | None = None
+    text: str = ""
+    places: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def wrong(self) -> dict[int, str]:
+        """The lines that are neither right, nor passed by a rule, nor refused."""
+        return {line: what for line, what in self.lines.items() if what not in ("right", "passed", "refused")}
+
+
+def judged(
+    lines: Sequence[str], dialect: Dialect, machine: Machine, setup: Setup = SETUP, skipped: bool | None = None
+) -> Judged:
+    """Correct a program of one block a line and look at every line of it.
+
+    skipped  how the switch of block delete stands when the result is looked at; None: nothing is known of it
+
+    Raises whatever is raised that has no code.
+    """
+    source = "".join(f"{line}\n" for line in lines).encode("latin-1")
+    known = setup if skipped is None else replace(setup, block_skip=skipped)
+    try:
+        program = read(source, "part", dialect)
+        before = follow(program, machine, known).trace.moves
+        fixed = fix_program(program, machine, setup, OPTIONS)
+    except NcfixError as error:
+        place = error.messages[0].place
+        return Judged({}, (place.line if place else 0, str(error.messages[0])))
+    again = read(fixed.text, "part", dialect)
+    after = follow(again, machine, known).trace.moves
+    assert not fixed.changed or find(again) is not None, "a corrected program has no stamp"
+    places = {int(block) + 1: tuple(end) for block, end in zip(before.block, before.end.tolist(), strict=True)}
+    return Judged(_by_line(lines, fixed, before, after), None, fixed.text.decode("latin-1"), places)
+
+
+def _by_line(lines: Sequence[str], fixed: Fixed, before: Moves, after: Moves) -> dict[int, str]:
+    """Motion by motion: the tolerance is so wide that none is split; blocks that are put in have none."""
+    new = fixed.text.decode("latin-1").splitlines()
+    rows, others = (np.flatnonzero(moves.kind != MotionKind.DWELL) for moves in (before, after))
+    if len(rows) != len(others):
+        return {0: f"{len(rows)} motions became {len(others)}"}
+    found, refused = {}, {each.line for each in fixed.report.refused}
+    blocks = before.block[rows]
+    for block in dict.fromkeys(blocks.tolist()):
+        own = np.flatnonzero(blocks == block)
+        end = after.end[others[own[-1]]] - before.end[rows[own[-1]]]
+        off = np.abs(end - _shift(before, fixed, block))
+        most = float(np.nanmax(off, initial=0.0))
+        same = lines[block] == new[after.block[others[own[-1]]]]
+        if block + 1 in refused:
+            found[block + 1] = "refused" if same else "refused and changed"
+        elif most <= STEP:
+            found[block + 1] = "right"
+        elif same and (before.rule[rows[own]] == Rule.PASS).all():
+            found[block + 1] = "passed"
+        else:
+            found[block + 1] = f"off by {most:.4f} mm"
+    return found
+
+
+def _shift(moves: Moves, fixed: Fixed, block: int) -> np.typing.NDArray[np.float64]:
+    """By how much the motions of a block shall be moved: not along axes that are said to be left where they stand."""
+    line = block + 1
+    left = {each.axis for each in fixed.report.left if any(low <= line <= high for low, high in each.stretches)}
+    return np.array([np.nan if axis in left else SHIFT.get(axis, 0.0) for axis in moves.axes])

@@ -1,0 +1,315 @@
+"""The contract that any language must pass: `check_language(dialect)` in the tests of its plugin.
+
+Programs are put together from what the language writes (`Statements`), corrected for a machine whose error is known,
+and read again. What is looked for in every line: it is a motion that is right, it passes by a rule, or it is refused
+with a reason. Nothing that leads somewhere is passed over in silence, and nothing fails without a message.
+"""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, product
+
+from ncfix.compensate.driver import fix_program
+from ncfix.control.setup import Setup
+from ncfix.machine import Machine
+from ncfix.testing.judging import OPTIONS, SETUP, Judged, judged, shifted_machine
+from ncfix.text.dialect import Dialect
+from ncfix.text.dialects import get
+from ncfix.text.reader import read
+
+NUMBERS: dict[str, float] = {
+    "5.": 5.0,
+    "5.0": 5.0,
+    ".5": 0.5,
+    "-0.5": -0.5,
+    "+5.25": 5.25,
+    "0.": 0.0,
+    "12.3456": 12.3456,
+    "007.": 7.0,
+}
+"""Ways to write a number in G code, with what they mean."""
+WORDS_AT_ONCE = 4
+SIZES = (0, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4)
+"""How many words a block has that is put together at random."""
+TOLD = 5
+"""Faults that are told, of all that are found."""
+
+Leads = Callable[[str, Sequence[str], int], bool]
+"""(head, words, index of the mode) -> whether the manual says that the block moves axes, or that the control stops."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """What puts something in force, and what ends it: a line each, or several."""
+
+    on: tuple[str, ...] = ()
+    off: tuple[str, ...] = ()
+
+
+NOTHING = Pair()
+
+
+@dataclass(frozen=True, slots=True)
+class Statements:
+    """How a language writes what `check_language` puts together; a block a line.
+
+    begin     before everything: all axes are brought to places, absolute, with tool, feed and work offset
+    end       after everything: the first block names X, Y and Z absolutely; the last ends the program
+    heads     what a block may begin with: codes, or nothing
+    words     what may stand behind; of words with the same address a block has one
+    modes     lines before the statement that put another motion code or cycle in force
+    leads     see `Leads`
+    frames    rotations, tilted planes, shifts, with their ends
+    offsets   cutter compensation on, with a motion, and off
+    cycles    lines that drill holes, with what ends the cycle
+    places    lines in machine coordinates and to reference points
+    motions   plain motions, absolute
+    number    a motion with `{}` for a number of X
+    numbers   how numbers may be written, with what they mean
+    skip      the sign of block delete; empty where the language has none
+    setup     offsets and tools that the programs use
+    """
+
+    begin: tuple[str, ...]
+    end: tuple[str, ...]
+    heads: tuple[str, ...]
+    words: tuple[str, ...]
+    modes: tuple[tuple[str, ...], ...]
+    leads: Leads
+    motions: tuple[str, ...]
+    number: str
+    frames: tuple[Pair, ...] = ()
+    offsets: tuple[Pair, ...] = ()
+    cycles: tuple[Pair, ...] = ()
+    places: tuple[str, ...] = ()
+    numbers: dict[str, float] = field(default_factory=lambda: dict(NUMBERS))
+    skip: str = "/"
+    setup: Setup = SETUP
+
+
+TAKES = ("G4", "G92", "G52", "G10 L2 P1", "G43", "G17", "G90", "G40", "M3")
+"""What takes the words of its block for itself, or has no use for them."""
+REFERENCE = ("G28", "G30")
+
+
+def gcode_leads(head: str, words: Sequence[str], mode: int) -> bool:
+    """Axis words lead somewhere unless a code takes them; arcs about a centre need none."""
+    if head in REFERENCE:
+        return True
+    if head in TAKES:
+        return False
+    arc = head in ("G2", "G3") or (mode == 1 and head == "")
+    return any(word[0] in "XYZ" for word in words) or (arc and any(word[0] in "IJ" for word in words))
+
+
+def gcode_statements(dialect: Dialect) -> Statements:
+    """Those of a dialect of G code (RS274, Fanuc and their like), with the codes and cycles of its own."""
+    own = tuple(code for code, _ in dialect.codes)
+    drills = {code: f"{code} X10. Y20. Z-5. {table.level}2." for code, table in dialect.cycles}
+    for code, table in dialect.cycles:
+        drills[code] += "".join(f" {address}1." for address in table.needs)
+    levels = tuple(f"{table.level}2.5" for _, table in dialect.cycles if table.level != "R")
+    begin = ("G21 G17 G90 G40 G49 G80 G94", "G54 G0 X0. Y10. Z3.", "T1 M6", "G0 X0. Y10. Z3.", "F200. S100 M3")
+    return Statements(
+        begin=begin,
+        end=("G80", "G90 G40 G1 X1. Y2. Z30. F100.", "X3.", "M30"),
+        heads=(
+            *("", "G0", "G1", "G2", "G3", "G28", "G30", "G53 G0", "G53 G1", "G81", "G83", "G85", "G91 G1"),
+            *(*TAKES, *own, *drills),
+        ),
+        words=(
+            *("X30.", "X10.", "Y40.", "Y20.", "Z5.", "I20.", "J0.", "J10.", "K1.", "R25.", "P1", "Q2.", "L2", "F100."),
+            *("H1", *levels),
+        ),
+        modes=(
+            ("G1 X10. Y20.",),
+            ("G2 X10. Y20. I5. J5.",),
+            ("G81 X10. Y20. Z-5. R2.",),
+            *((line,) for line in drills.values()),
+        ),
+        leads=gcode_leads,
+        motions=("G1 X12. Y13.", "G0 X30. Y31. Z20.", "G2 X40. Y41. R30.", "G1 Z2."),
+        number="G1 X{}",
+        frames=(Pair(("G52 X3.",), ("G52 X0.",)), Pair(("G55",), ("G54",)), Pair(("G92 X7.",), ("G92.1",))),
+        offsets=(Pair(("G1 G41 D1 X8. Y9.",), ("G1 G40 X60. Y61.",)),),
+        cycles=tuple(
+            Pair((f"G98 {line}", "X14. Y15."), ("G80",))
+            for line in ("G81 X10. Y20. Z-5. R2.", "G83 X10. Y20. Z-5. R2. Q1.", *drills.values())
+        ),
+        places=("G53 G0 Z100.", "G28 Z20.", "G30 Z20."),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A program; `statement`: the line of the block that is asked for, `leads`: it must not come to nothing."""
+
+    lines: tuple[str, ...]
+    statement: int = 0
+    leads: bool = False
+    skipped: bool | None = None
+
+
+def check_language(
+    dialect: Dialect | str, statements: Statements | None = None, count: int = 60, seed: int = 1
+) -> dict[str, int]:
+    """Raise AssertionError where a language breaks the contract; what became of the lines of all programs, counted.
+
+    statements  how it writes things; None: it is a dialect of G code, see `gcode_statements`
+    count       programs at random of each sort; 0: all there are, which takes long
+
+    Bytes are kept: a program is what it was read from; a machine with no error to speak of changes nothing; comments
+    stay and mean nothing; numbers mean what they say however they are written. Every statement with every subset of
+    its words, behind every mode, with block delete on and off; and frames, cutter compensation, cycles and machine
+    coordinates across one another: each line is right, passed by a rule, or refused.
+    """
+    dialect = get(dialect) if isinstance(dialect, str) else dialect
+    sample = gcode_statements(dialect) if statements is None else statements
+    check_bytes(dialect, sample)
+    check_numbers(dialect, sample)
+    found: dict[str, int] = {}
+    faults: list[str] = []
+    machine = shifted_machine()
+    chosen = random.Random(seed)
+    crosses = list(_crosses(sample))
+    programs = [
+        *_statements(sample, _blocks(sample, count, chosen)),
+        *_deletable(sample, _blocks(sample, count // 2, chosen) if count else _blocks(sample, 0, chosen)),
+        *(crosses if not count or count >= len(crosses) else chosen.sample(crosses, count)),
+    ]
+    for each in programs:
+        faults += look(each, dialect, machine, sample.setup, found)
+    shown = "\n\n".join(faults[:TOLD])
+    assert not faults, f"{dialect.name}: {len(faults)} programs are not as they must be:\n\n{shown}"
+    return found
+
+
+def look(each: Sample, dialect: Dialect, machine: Machine, setup: Setup, found: dict[str, int]) -> list[str]:
+    """What is wrong with the result of one program; counts what became of its lines."""
+    try:
+        result = judged(each.lines, dialect, machine, setup, each.skipped)
+    except Exception as error:
+        return [told(each, f"fails: {type(error).__name__}: {error}")]
+    for what in ["stopped"] if result.stopped else result.lines.values():
+        word = what.partition(" ")[0]
+        found[word] = found.get(word, 0) + 1
+    return [told(each, why) for why in wrongs(each, result)]
+
+
+def wrongs(each: Sample, result: Judged) -> Iterator[str]:
+    """What is wrong with a program."""
+    if result.stopped is not None:
+        if each.statement and result.stopped[0] < each.statement:
+            yield f"stops before the statement: {result.stopped[1]}"
+        return
+    for line, what in result.wrong.items():
+        yield f"line {line}, {each.lines[line - 1] if line else ''!r}: {what}\n-- written:\n{result.text}"
+    if each.leads and each.statement not in result.lines:
+        yield f"line {each.statement}, {each.lines[each.statement - 1]!r}: leads somewhere, and nothing came of it"
+
+
+def told(each: Sample, why: str) -> str:
+    """A fault with its program."""
+    return f"{why}\n-- program:\n" + "\n".join(each.lines)
+
+
+# -- bytes, comments, numbers -----------------------------------------------------------------------------------------
+
+
+def check_bytes(dialect: Dialect, sample: Statements) -> None:
+    """Whatever is not corrected stays as it is, byte for byte."""
+    lines = (*sample.begin, *sample.motions, *sample.end)
+    remark = dialect.comment.format("G0 X999 WORDS")
+    for end, between in product(("\n", "\r\n"), ("", f" {remark}")):
+        source = "".join(f"{line}{between}{end}" for line in lines).encode("latin-1")
+        program = read(source, "part", dialect)
+        assert program.source == source, f"{dialect.name}: a program that is read is not what was read"
+        same = fix_program(program, shifted_machine(1e-9), sample.setup, OPTIONS)
+        assert same.text == source, f"{dialect.name}: a machine without errors to speak of changes a program"
+    plain, remarked = (
+        judged(each, dialect, shifted_machine(), sample.setup) for each in (lines, _remarked(lines, remark))
+    )
+    for result in (plain, remarked):
+        assert result.stopped is None, f"{dialect.name}: its own plain motions stop: {result.stopped}"
+        assert not result.wrong, f"{dialect.name}: its own plain motions: {result.wrong}"
+    kept = remarked.text.count(remark)
+    assert kept == len(lines), f"{dialect.name}: {len(lines)} comments became {kept}:\n{remarked.text}"
+    assert list(plain.lines.values()) == list(remarked.lines.values()), f"{dialect.name}: comments mean something"
+
+
+def _remarked(lines: Sequence[str], remark: str) -> tuple[str, ...]:
+    return tuple(f"{line} {remark}" for line in lines)
+
+
+def check_numbers(dialect: Dialect, sample: Statements) -> None:
+    """Numbers mean what they say in every way of writing, and what is written for them is right."""
+    line, places = len(sample.begin) + 1, {}
+    for text, value in sample.numbers.items():
+        lines = (*sample.begin, sample.number.format(text), *sample.end)
+        result = judged(lines, dialect, shifted_machine(), sample.setup)
+        fate = result.lines.get(line, "nothing")
+        assert fate == "right", f"{dialect.name}: the number {text!r}: {result.stopped or fate}"
+        places[text] = result.places[line][0] - value
+    first = next(iter(places))
+    for text, place in places.items():
+        assert abs(place - places[first]) < 1e-9, f"{dialect.name}: {text!r} and {first!r} do not mean what they say"
+
+
+# -- statements -------------------------------------------------------------------------------------------------------
+
+Block = tuple[int, str, tuple[str, ...]]
+"""Index of the mode, head, words."""
+
+
+def address(word: str) -> str:
+    """What a word says: its axis or address, however it says it."""
+    rest = word[1:] if re.match(r"I(?=[A-Z])", word) else word
+    named = re.match(r"[A-Z]+\d?(?:\[.\])?", rest)
+    return named[0] if named else word
+
+
+def agree(words: Sequence[str]) -> bool:
+    """Whether words may stand in one block: no two have the same address."""
+    return len({address(word) for word in words}) == len(words)
+
+
+def _blocks(sample: Statements, count: int, chosen: random.Random) -> Iterator[Block]:
+    """So many blocks at random: any head, with any subset of the words, behind any mode; all for none."""
+    if not count:
+        for mode, head, size in product(range(len(sample.modes)), sample.heads, range(WORDS_AT_ONCE + 1)):
+            yield from ((mode, head, words) for words in combinations(sample.words, size) if agree(words))
+    while count:
+        words = tuple(chosen.sample(sample.words, chosen.choice(SIZES)))
+        if agree(words):
+            yield chosen.randrange(len(sample.modes)), chosen.choice(sample.heads), words
+            count -= 1
+
+
+def _statements(sample: Statements, blocks: Iterable[Block]) -> Iterator[Sample]:
+    for mode, head, words in blocks:
+        before = (*sample.begin, *sample.modes[mode])
+        block = " ".join((head, *words)).strip()
+        yield Sample((*before, block, *sample.end), len(before) + 1, sample.leads(head, words, mode))
+
+
+def _deletable(sample: Statements, blocks: Iterable[Block]) -> Iterator[Sample]:
+    """Blocks behind the sign of block delete, whichever way its switch stands."""
+    for mode, head, words in blocks if sample.skip else ():
+        before = (*sample.begin, *sample.modes[mode])
+        block = f"{sample.skip}{' '.join((head, *words)).strip()}"
+        for skipped in (False, True):
+            yield Sample((*before, block, *sample.end), len(before) + 1, False, skipped)
+
+
+def _crosses(sample: Statements) -> Iterator[Sample]:
+    """Frames, compensation, cycles and machine coordinates across one another."""
+    frames, offsets, cycles = ((NOTHING, *each) for each in (sample.frames, sample.offsets, sample.cycles))
+    for frame, offset, cycle, place in product(frames, offsets, cycles, ("", *sample.places)):
+        for motion in sample.motions:
+            inner = (*offset.on, motion, *cycle.on, *cycle.off, *([place] if place else []), motion, *offset.off)
+            lines = (*sample.begin, *frame.on, *inner, *frame.off, *sample.end)
+            yield Sample(lines, len(sample.begin) + 1)
