@@ -200,7 +200,7 @@ def main() -> None:
         text.append("")
         if given.long:
             text += long_file(given.long, folder)
-        text += stages(folder)
+        print(*stages(folder), sep="\n")
     page = PAGE.read_text()
     PAGE.write_text(page[: page.index(MARK) + len(MARK)] + "\n\n" + "\n".join(text).rstrip() + "\n")
 
@@ -266,8 +266,13 @@ def stages(folder: Path) -> list[str]:
         command, capture_output=True, text=True, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}
     )
     said = "Without the start of the process, imports and compiling. `without it`: how much faster the whole would be"
-    title = "### Share of time of each stage, 200 000 blocks, full words"
-    head = [title, "", said, "if the stage took no time at all.", ""]
+    head = [
+        "Share of time of each stage, 200 000 blocks, full words",
+        "",
+        said,
+        "if the stage took no time at all.",
+        "",
+    ]
     return [*head, *found.stdout.splitlines(), ""]
 
 

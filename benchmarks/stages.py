@@ -1,4 +1,4 @@
-"""Where the time of `fix` goes on one long program, from inside. Prints tables for docs/performance.md.
+"""Where the time of `fix` goes on one long program, from inside. Prints tables.
 
 Called with the program's name; with `--profile` behind it the functions that take most are shown, too.
 """
