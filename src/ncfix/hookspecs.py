@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ncfix.machine.basis import Basis
     from ncfix.machine.effects import PluginEffect
     from ncfix.measure.measurement import Measurement
-    from ncfix.report.document import Document
+    from ncfix.reports.document import Document
     from ncfix.tables.control import Control
     from ncfix.text.dialect import Dialect
 

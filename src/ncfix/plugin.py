@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from ncfix.machine import State as State
     from ncfix.machine.basis import Basis as Basis
     from ncfix.measure.measurement import Measurement as Measurement
-    from ncfix.report.document import Document as Document
+    from ncfix.reports.document import Document as Document
     from ncfix.tables.axis_tables import Reversal as Reversal
     from ncfix.tables.axis_tables import positioning as positioning
     from ncfix.tables.axis_tables import reversal_note as reversal_note
@@ -98,7 +98,7 @@ ELSEWHERE = {
     "ncfix.machine": ("Effect", "Machine", "State"),
     "ncfix.machine.basis": ("Basis",),
     "ncfix.measure.measurement": ("Measurement",),
-    "ncfix.report.document": ("Document",),
+    "ncfix.reports.document": ("Document",),
     "ncfix.tables.axis_tables": ("Reversal", "positioning", "reversal_note", "reversals"),
     "ncfix.tables.compensation": ("Compensation", "Tables", "Term", "own_terms"),
     "ncfix.tables.control": (

@@ -9,7 +9,7 @@ import pytest
 FAMILIES = {"ncfix_iso.rs274", "ncfix_fanuc.macro", "ncfix_siemens.sinumerik", "ncfix_heidenhain.klartext"}
 ELSEWHERE = {
     "scipy", "rich", "sympy", "numba", "llvmlite", "multiprocessing", "concurrent.futures", "numpy.ma",
-    "ncfix.diagnose", "ncfix.measure", "ncfix.report", "ncfix.machine.symbolic", "ncfix.kernel",
+    "ncfix.diagnosis", "ncfix.measure", "ncfix.reports", "ncfix.machine.symbolic", "ncfix.kernel",
     "ncfix_iso.rs274.flatten",
     "ncfix.control.setup_file", "ncfix.control.tool_table",
 }  # fmt: skip

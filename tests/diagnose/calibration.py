@@ -19,11 +19,11 @@ import numpy as np
 from diagnose.study import FAMILIES, Scene, drawn
 from diagnose.tables import put
 from diagnose.worlds import World
-from ncfix.diagnose import diagnosis, evidence, joint_fit
-from ncfix.diagnose.diagnosis import Diagnosis, concluded, diagnose
-from ncfix.diagnose.evidence import Comparison, Members
-from ncfix.diagnose.joint_fit import passing
-from ncfix.diagnose.selection import Selected, select, with_alternatives, with_constants, with_constants_free
+from ncfix.diagnosis import diagnosis, evidence, joint_fit
+from ncfix.diagnosis.diagnosis import Diagnosis, concluded, diagnose
+from ncfix.diagnosis.evidence import Comparison, Members
+from ncfix.diagnosis.joint_fit import passing
+from ncfix.diagnosis.selection import Selected, select, with_alternatives, with_constants, with_constants_free
 
 TRIED: tuple[tuple[str, ModuleType, tuple[float, ...]], ...] = (
     ("UNNAMED", evidence, (0.0, 6.0)),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ncfix.diagnose.diagnosis import Diagnosis, diagnose
+from ncfix.diagnosis.diagnosis import Diagnosis, diagnose
 from ncfix.machine import Machine, loads
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.reader import reads

@@ -20,7 +20,7 @@ from numpy.random import Generator
 
 from diagnose.tables import put
 from diagnose.worlds import FOREIGN, THERMAL, World
-from ncfix.diagnose.diagnosis import NOTHING, UNKNOWN, Diagnosis, diagnose
+from ncfix.diagnosis.diagnosis import NOTHING, UNKNOWN, Diagnosis, diagnose
 from ncfix.measure.measurement import Array
 
 WORLDS = (
@@ -235,7 +235,7 @@ def main() -> None:
     for each in given.set:
         place, value = each.split("=")
         module, name = place.rsplit(".", 1)
-        setattr(importlib.import_module(f"ncfix.diagnose.{module}"), name, float(value))
+        setattr(importlib.import_module(f"ncfix.diagnosis.{module}"), name, float(value))
     found = [each for path in given.read for each in read(path)]
     for argument in given.families:
         family, count = argument.split("=")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ncfix.diagnose.assessment import carriers
+from ncfix.diagnosis.assessment import carriers
 from ncfix.machine import loads
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import ranges_of

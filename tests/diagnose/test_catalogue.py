@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from diagnose.worlds import World
-from ncfix.diagnose.diagnosis import diagnose
-from ncfix.diagnose.selection import TOLD_APART, act_alike
+from ncfix.diagnosis.diagnosis import diagnose
+from ncfix.diagnosis.selection import TOLD_APART, act_alike
 from ncfix.machine import Effect
 from ncfix.machine.basis import Fourier
 from ncfix.measure.least_squares import orthonormal, without

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, perfect, plan
-from ncfix.diagnose.assessment import ALONG
-from ncfix.diagnose.catalogue import catalogue, without
-from ncfix.diagnose.checks import remarks
-from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
-from ncfix.diagnose.noise import estimated_background
-from ncfix.diagnose.presentation import as_dict, text, with_provenance
-from ncfix.diagnose.residual_data import residual_data
-from ncfix.diagnose.residual_patterns import patterns
+from ncfix.diagnosis.assessment import ALONG
+from ncfix.diagnosis.catalogue import catalogue, without
+from ncfix.diagnosis.checks import remarks
+from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
+from ncfix.diagnosis.noise import estimated_background
+from ncfix.diagnosis.presentation import as_dict, text, with_provenance
+from ncfix.diagnosis.residual_data import residual_data
+from ncfix.diagnosis.residual_patterns import patterns
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Backlash
 from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.reader import reads
-from ncfix.report.diagnosis import document
-from ncfix.report.rendering import html, markdown
+from ncfix.reports.diagnosis import document
+from ncfix.reports.rendering import html, markdown
 
 NOISE_UM = 2.0
 

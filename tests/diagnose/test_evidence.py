@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import multivariate_normal
 
-from ncfix.diagnose.evidence import SIZES, log_odds
-from ncfix.diagnose.forms import principal_rotation
-from ncfix.diagnose.joint_fit import pose_regions
-from ncfix.diagnose.residual_data import damped
+from ncfix.diagnosis.evidence import SIZES, log_odds
+from ncfix.diagnosis.forms import principal_rotation
+from ncfix.diagnosis.joint_fit import pose_regions
+from ncfix.diagnosis.residual_data import damped
 
 ROUNDING = 1e-9
 

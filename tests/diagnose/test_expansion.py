@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.diagnose.forms import HOLD_POINTS, HOLD_SPREAD, expansion_loadings
+from ncfix.diagnosis.forms import HOLD_POINTS, HOLD_SPREAD, expansion_loadings
 
 
 def test_what_grows_moves_all_ways_by_one_course() -> None:

@@ -7,8 +7,8 @@ import pytest
 
 from machine.chains import four_kinds
 from measure.poses import plan
-from ncfix.diagnose.forms import tip_frames
-from ncfix.diagnose.residual_data import residual_data
+from ncfix.diagnosis.forms import tip_frames
+from ncfix.diagnosis.residual_data import residual_data
 from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE
 from ncfix.measure.instruments import Faults, simulate

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from diagnose.worlds import World
-from ncfix.diagnose.evidence import Evidence, Member
-from ncfix.diagnose.joint_fit import FOLDS, WIDE, held_out
-from ncfix.diagnose.noise import estimated_background, everything_covariance
-from ncfix.diagnose.residual_data import residual_data
+from ncfix.diagnosis.evidence import Evidence, Member
+from ncfix.diagnosis.joint_fit import FOLDS, WIDE, held_out
+from ncfix.diagnosis.noise import estimated_background, everything_covariance
+from ncfix.diagnosis.residual_data import residual_data
 from ncfix.measure.measurement import Array
 
 ROUNDING_UM = 1e-4

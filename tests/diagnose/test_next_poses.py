@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, plan
-from ncfix.diagnose.discrimination import COUNT, TOLD_APART, Discrimination, chance, climbed, exchanged, worst
-from ncfix.diagnose.next_poses import (
+from ncfix.diagnosis.discrimination import COUNT, TOLD_APART, Discrimination, chance, climbed, exchanged, worst
+from ncfix.diagnosis.next_poses import (
     SURE,
     SURELY,
     Proposal,
@@ -19,7 +19,7 @@ from ncfix.diagnose.next_poses import (
     stays_where_it_was,
     travels_of,
 )
-from ncfix.diagnose.residual_data import residual_data
+from ncfix.diagnosis.residual_data import residual_data
 from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import dumps
 from ncfix.measure.plan import skeleton

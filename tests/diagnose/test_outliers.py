@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from diagnose.worlds import World
-from ncfix.diagnose.forms import unnamed_alternatives, visible_forms
-from ncfix.diagnose.noise import FAILED, downweighted, everything_covariance
-from ncfix.diagnose.residual_data import residual_data
+from ncfix.diagnosis.forms import unnamed_alternatives, visible_forms
+from ncfix.diagnosis.noise import FAILED, downweighted, everything_covariance
+from ncfix.diagnosis.residual_data import residual_data
 from ncfix.measure.measurement import Array
 
 POSES, SIGMA_UM = 48, 3.0

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from diagnose.plates import PLATES, mill, plain, plate
-from ncfix.diagnose.diagnosis import NOTHING, UNKNOWN, diagnose
-from ncfix.diagnose.presentation import text
+from ncfix.diagnosis.diagnosis import NOTHING, UNKNOWN, diagnose
+from ncfix.diagnosis.presentation import text
 
 README = {
     "D2130A1": (5.4, 4.3, 4.1),

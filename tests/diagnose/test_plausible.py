@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from measure.poses import machine, plan
-from ncfix.diagnose.assessment import BOUNDS, carriers, catalogue_row, conditions, plausibility
-from ncfix.diagnose.catalogue import Candidate, catalogue
-from ncfix.diagnose.residual_data import ResidualData, residual_data
+from ncfix.diagnosis.assessment import BOUNDS, carriers, catalogue_row, conditions, plausibility
+from ncfix.diagnosis.catalogue import Candidate, catalogue
+from ncfix.diagnosis.residual_data import ResidualData, residual_data
 from ncfix.machine import Effect
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.measure.instruments import Faults, simulate

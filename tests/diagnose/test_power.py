@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from ncfix.diagnose.selection import findable_in_words, mean_odds, shows_hardly_anything
+from ncfix.diagnosis.selection import findable_in_words, mean_odds, shows_hardly_anything
 
 DRAWS = 4000
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from diagnose.worlds import SIGMA_UM, World
-from ncfix.diagnose.forms import EffectForm
-from ncfix.diagnose.noise import DRIFT_TIME, estimated_background, everything_covariance
-from ncfix.diagnose.residual_data import residual_data
+from ncfix.diagnosis.forms import EffectForm
+from ncfix.diagnosis.noise import DRIFT_TIME, estimated_background, everything_covariance
+from ncfix.diagnosis.residual_data import residual_data
 from ncfix.measure.measurement import Array
 
 

@@ -9,8 +9,8 @@ import pytest
 from scipy.special import logsumexp
 
 from diagnose.worlds import World
-from ncfix.diagnose.diagnosis import FOUND, UNKNOWN, diagnose
-from ncfix.diagnose.evidence import (
+from ncfix.diagnosis.diagnosis import FOUND, UNKNOWN, diagnose
+from ncfix.diagnosis.evidence import (
     FALSE_ALARM,
     FURTHER,
     PRIOR,
@@ -23,10 +23,10 @@ from ncfix.diagnose.evidence import (
     entry_price,
     marginal,
 )
-from ncfix.diagnose.forms import unnamed_alternatives
-from ncfix.diagnose.noise import estimated_background, everything_covariance
-from ncfix.diagnose.residual_data import residual_data
-from ncfix.diagnose.selection import likeliest, select, with_alternatives
+from ncfix.diagnosis.forms import unnamed_alternatives
+from ncfix.diagnosis.noise import estimated_background, everything_covariance
+from ncfix.diagnosis.residual_data import residual_data
+from ncfix.diagnosis.selection import likeliest, select, with_alternatives
 from ncfix.measure.measurement import Array
 
 DRAWS = 150

@@ -17,9 +17,9 @@ from numpy.random import Generator
 
 from diagnose.warmth import Warmth
 from measure.poses import machine
-from ncfix.diagnose.catalogue import Candidate, catalogue
-from ncfix.diagnose.forms import VisibleForms, visible_forms
-from ncfix.diagnose.residual_data import ResidualData, residual_data
+from ncfix.diagnosis.catalogue import Candidate, catalogue
+from ncfix.diagnosis.forms import VisibleForms, visible_forms
+from ncfix.diagnosis.residual_data import ResidualData, residual_data
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import ConstantBasis
 from ncfix.measure.candidates import Room, candidates

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ncfix.diagnostics import UsageError
-from ncfix.report.document import Document, Dots, Line, Paragraph, Plot, ReportSection, Table
-from ncfix.report.rendering import HEIGHT, UP, WIDTH, PlotAxes, form_of, html, markdown, ticks
+from ncfix.reports.document import Document, Dots, Line, Paragraph, Plot, ReportSection, Table
+from ncfix.reports.rendering import HEIGHT, UP, WIDTH, PlotAxes, form_of, html, markdown, ticks
 
 X = np.linspace(-10.0, 10.0, 5)
 NASTY = "<script>alert('a|b')</script> & \"EXX\""

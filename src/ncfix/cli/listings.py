@@ -24,8 +24,8 @@ PARTS = (("understands", "corrected"), ("passes", "passed by rule"), ("refuses",
 """Fields of `Dialect`, and what they are called for people."""
 FLOORS = (
     "cli",
-    "report",
-    "diagnose",
+    "reports",
+    "diagnosis",
     "batch",
     "compensate",
     "tables",

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from ncfix.cli.targets import OutputTarget
-    from ncfix.diagnose.diagnosis import Diagnosis
+    from ncfix.diagnosis.diagnosis import Diagnosis
     from ncfix.machine import Machine
     from ncfix.measure.calibrate import Prediction
     from ncfix.measure.candidates import Room
@@ -387,14 +387,14 @@ def diagnose(
 ) -> int:
     """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
-    from ncfix.diagnose.checks import remarks
-    from ncfix.diagnose.diagnosis import NOTHING
-    from ncfix.diagnose.diagnosis import diagnose as diagnosed
-    from ncfix.diagnose.presentation import as_dict, text, with_provenance
+    from ncfix.diagnosis.checks import remarks
+    from ncfix.diagnosis.diagnosis import NOTHING
+    from ncfix.diagnosis.diagnosis import diagnose as diagnosed
+    from ncfix.diagnosis.presentation import as_dict, text, with_provenance
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
-    from ncfix.report.diagnosis import document
-    from ncfix.report.rendering import form_of
+    from ncfix.reports.diagnosis import document
+    from ncfix.reports.rendering import form_of
 
     each_once(measured)
     inputs = (*measured, machine_path)

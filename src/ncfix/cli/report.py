@@ -14,7 +14,7 @@ from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 from ncfix.diagnostics import Place, SourceError
 
 if TYPE_CHECKING:
-    from ncfix.report.document import ReportSection
+    from ncfix.reports.document import ReportSection
 
 DEEPEST = 64
 """How deep the lists and objects of a result lie in one another at most."""
@@ -30,8 +30,8 @@ def report(sources: tuple[str, ...], output: str, force: bool) -> None:
     Of a machine: its chain, its errors with their curves and uncertainty, and how far they lead the tool tip. Of a
     result: its tables.
     """
-    from ncfix.report.document import Document
-    from ncfix.report.rendering import form_of
+    from ncfix.reports.document import Document
+    from ncfix.reports.rendering import form_of
 
     target = targets([STREAM], Outputs(output, force=force), sources)[0]
     form = form_of(output)
@@ -45,11 +45,11 @@ def _sections(path: str) -> list[ReportSection]:
     """What one file has to say: a machine if it is TOML, a result if it is JSON."""
     text = read(path)
     if text.lstrip().startswith(b"{"):
-        from ncfix.report.content import result_sections as of_result
+        from ncfix.reports.content import result_sections as of_result
 
         return of_result(_result(text, path), shown(path))
     from ncfix.machine import loads
-    from ncfix.report.content import machine_sections as of_machine
+    from ncfix.reports.content import machine_sections as of_machine
 
     return of_machine(loads(text, shown(path)), shown(path))
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.diagnose.catalogue import Candidate
-from ncfix.diagnose.residual_data import ResidualData
+from ncfix.diagnosis.catalogue import Candidate
+from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import SPINDLE
 from ncfix.machine.basis import Backlash

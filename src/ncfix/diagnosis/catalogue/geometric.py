@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.diagnose.catalogue.candidate import (
+from ncfix.diagnosis.catalogue.candidate import (
     LETTERS,
     LOST,
     SMOOTH,

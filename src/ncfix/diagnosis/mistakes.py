@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.diagnose.catalogue import plain
-from ncfix.diagnose.residual_data import Misfit, ResidualData, misfit, residual_data
+from ncfix.diagnosis.catalogue import plain
+from ncfix.diagnosis.residual_data import Misfit, ResidualData, misfit, residual_data
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
 from ncfix.measure.least_squares import orthonormal, without

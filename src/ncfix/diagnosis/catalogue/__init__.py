@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from ncfix.diagnose.catalogue.candidate import Candidate, MeasuredRange
-from ncfix.diagnose.catalogue.geometric import linear_candidates, location_candidates, rotary_candidates
-from ncfix.diagnose.catalogue.thermal import thermal_candidates
-from ncfix.diagnose.catalogue.weight import weight_candidates
+from ncfix.diagnosis.catalogue.candidate import Candidate, MeasuredRange
+from ncfix.diagnosis.catalogue.geometric import linear_candidates, location_candidates, rotary_candidates
+from ncfix.diagnosis.catalogue.thermal import thermal_candidates
+from ncfix.diagnosis.catalogue.weight import weight_candidates
 from ncfix.plugins import called, handed, registry
 
 __all__ = ["Candidate", "MeasuredRange", "catalogue", "plain", "without"]

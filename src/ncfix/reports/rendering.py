@@ -17,7 +17,7 @@ import numpy as np
 from ncfix.diagnostics import Place, UsageError
 from ncfix.machine.se3 import Array
 from ncfix.plugins import called, registry
-from ncfix.report.document import Document, Dots, Line, Paragraph, Part, Plot, Table
+from ncfix.reports.document import Document, Dots, Line, Paragraph, Part, Plot, Table
 
 WIDTH, HEIGHT = 520, 190
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 10, 24

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnose import checks
-from ncfix.diagnose.assessment import Plausibility, plausibility
-from ncfix.diagnose.catalogue import Candidate, catalogue, without
-from ncfix.diagnose.evidence import Comparison, Evidence, Member
-from ncfix.diagnose.forms import VisibleForms, scaled_axes, unnamed_alternatives, visible_forms
-from ncfix.diagnose.joint_fit import (
+from ncfix.diagnosis import checks
+from ncfix.diagnosis.assessment import Plausibility, plausibility
+from ncfix.diagnosis.catalogue import Candidate, catalogue, without
+from ncfix.diagnosis.evidence import Comparison, Evidence, Member
+from ncfix.diagnosis.forms import VisibleForms, scaled_axes, unnamed_alternatives, visible_forms
+from ncfix.diagnosis.joint_fit import (
     JointFit,
     MovedConstant,
     fitted,
@@ -32,9 +32,9 @@ from ncfix.diagnose.joint_fit import (
     visible_um,
     with_firm_constants,
 )
-from ncfix.diagnose.mistakes import Mistake, find
-from ncfix.diagnose.next_poses import Proposal, proposed
-from ncfix.diagnose.noise import (
+from ncfix.diagnosis.mistakes import Mistake, find
+from ncfix.diagnosis.next_poses import Proposal, proposed
+from ncfix.diagnosis.noise import (
     NoiseFloor,
     beyond_noise,
     downweighted,
@@ -43,9 +43,9 @@ from ncfix.diagnose.noise import (
     lack_of_fit,
     noise_floor,
 )
-from ncfix.diagnose.residual_data import ResidualData, residual_data
-from ncfix.diagnose.residual_patterns import ResidualPattern, clustering, patterns
-from ncfix.diagnose.selection import (
+from ncfix.diagnosis.residual_data import ResidualData, residual_data
+from ncfix.diagnosis.residual_patterns import ResidualPattern, clustering, patterns
+from ncfix.diagnosis.selection import (
     Selected,
     aliases,
     findable_sizes,

@@ -14,11 +14,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnose.evidence import Background, Comparison, Evidence, Member
-from ncfix.diagnose.forms import EffectForm, scaled_axes
-from ncfix.diagnose.noise import ASIDE
-from ncfix.diagnose.residual_data import ResidualData
-from ncfix.diagnose.selection import Selected, with_alternatives
+from ncfix.diagnosis.evidence import Background, Comparison, Evidence, Member
+from ncfix.diagnosis.forms import EffectForm, scaled_axes
+from ncfix.diagnosis.noise import ASIDE
+from ncfix.diagnosis.residual_data import ResidualData
+from ncfix.diagnosis.selection import Selected, with_alternatives
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis, Fourier, Polynomial
 from ncfix.machine.effects import Unit, units

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from ncfix.diagnose.evidence import Background
-from ncfix.diagnose.residual_data import ResidualData
+from ncfix.diagnosis.evidence import Background
+from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
 

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import ndtr
 
-from ncfix.diagnose.evidence import Evidence
-from ncfix.diagnose.forms import EffectForm
-from ncfix.diagnose.selection import ALIKE
+from ncfix.diagnosis.evidence import Evidence
+from ncfix.diagnosis.forms import EffectForm
+from ncfix.diagnosis.selection import ALIKE
 from ncfix.measure.instruments import observe
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnose.catalogue.candidate import MeasuredRange
+from ncfix.diagnosis.catalogue.candidate import MeasuredRange
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import SPINDLE, Axis
 from ncfix.machine.basis import ConstantBasis, Polynomial

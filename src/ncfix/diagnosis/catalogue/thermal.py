@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ncfix.diagnose.catalogue.candidate import (
+from ncfix.diagnosis.catalogue.candidate import (
     LETTERS,
     TURNS,
     Candidate,
@@ -28,7 +28,7 @@ from ncfix.diagnose.catalogue.candidate import (
     weighed,
     zero,
 )
-from ncfix.diagnose.catalogue.weight import by_foundation
+from ncfix.diagnosis.catalogue.weight import by_foundation
 from ncfix.machine import Axis, Effect
 from ncfix.machine.axes import SPINDLE
 from ncfix.machine.basis import Polynomial

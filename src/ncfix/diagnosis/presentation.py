@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ncfix.diagnose.assessment import carriers, conditions
-from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, EffectFinding
-from ncfix.diagnose.joint_fit import MovedConstant
-from ncfix.diagnose.next_poses import Proposal, as_objects
-from ncfix.diagnose.selection import findable_in_words, shows_hardly_anything
+from ncfix.diagnosis.assessment import carriers, conditions
+from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, EffectFinding
+from ncfix.diagnosis.joint_fit import MovedConstant
+from ncfix.diagnosis.next_poses import Proposal, as_objects
+from ncfix.diagnosis.selection import findable_in_words, shows_hardly_anything
 from ncfix.machine import Machine
 
 SHOWN = 0.05

@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, eigh, lapack, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
-from ncfix.diagnose.evidence import MISSHAPEN, SIZES, Background, entry_price, in_noise, log_odds, marginal
-from ncfix.diagnose.forms import EffectForm, shape_variations, without_lacking_constants
-from ncfix.diagnose.residual_data import ResidualData
+from ncfix.diagnosis.evidence import MISSHAPEN, SIZES, Background, entry_price, in_noise, log_odds, marginal
+from ncfix.diagnosis.forms import EffectForm, shape_variations, without_lacking_constants
+from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import orthonormal
 from ncfix.measure.measurement import Array, groups
 

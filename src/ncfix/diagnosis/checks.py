@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import chdtrc
 
-from ncfix.diagnose.noise import ENOUGH_REPEATS, repeat_scatter
-from ncfix.diagnose.residual_data import ResidualData, misfit
+from ncfix.diagnosis.noise import ENOUGH_REPEATS, repeat_scatter
+from ncfix.diagnosis.residual_data import ResidualData, misfit
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.measure.estimate import Problem

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ncfix.diagnose.evidence import SIZES, Comparison, Evidence, Member, Members, entry_price
+from ncfix.diagnosis.evidence import SIZES, Comparison, Evidence, Member, Members, entry_price
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ncfix.diagnose.catalogue.candidate import (
+from ncfix.diagnosis.catalogue.candidate import (
     LETTERS,
     TURNS,
     Candidate,

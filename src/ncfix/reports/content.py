@@ -19,7 +19,7 @@ from ncfix.machine.effects import (
     vector,
     with_unit,
 )
-from ncfix.report.document import Line, Paragraph, Part, Plot, ReportSection, Table
+from ncfix.reports.document import Line, Paragraph, Part, Plot, ReportSection, Table
 
 WAYS = {1: "upwards", -1: "downwards", 0: ""}
 Result = Mapping[str, Any]

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.diagnose.discrimination import Hypothesis, HypothesisPairs, chance, exchanged, worst
-from ncfix.diagnose.evidence import Comparison, Evidence, Members
-from ncfix.diagnose.forms import EffectForm
-from ncfix.diagnose.joint_fit import Mask
-from ncfix.diagnose.residual_data import ResidualData
-from ncfix.diagnose.selection import Selected, aliases
+from ncfix.diagnosis.discrimination import Hypothesis, HypothesisPairs, chance, exchanged, worst
+from ncfix.diagnosis.evidence import Comparison, Evidence, Members
+from ncfix.diagnosis.forms import EffectForm
+from ncfix.diagnosis.joint_fit import Mask
+from ncfix.diagnosis.residual_data import ResidualData
+from ncfix.diagnosis.selection import Selected, aliases
 from ncfix.machine import Machine
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import STATES, Array, Measurement

@@ -40,8 +40,8 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
-from ncfix.diagnose.forms import EffectForm, shape_variations
-from ncfix.diagnose.residual_data import ResidualData
+from ncfix.diagnosis.forms import EffectForm, shape_variations
+from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.measurement import Array, Index
 
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)

@@ -26,8 +26,8 @@ from typing import Any
 
 import numpy as np
 
-from ncfix.diagnose.catalogue import Candidate
-from ncfix.diagnose.catalogue.candidate import (
+from ncfix.diagnosis.catalogue import Candidate
+from ncfix.diagnosis.catalogue.candidate import (
     LETTERS,
     TURNS,
     MeasuredRange,
@@ -38,7 +38,7 @@ from ncfix.diagnose.catalogue.candidate import (
     weighed,
     zero,
 )
-from ncfix.diagnose.residual_data import UNTELLABLE, ResidualData
+from ncfix.diagnosis.residual_data import UNTELLABLE, ResidualData
 from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE, Axis
 from ncfix.machine.basis import Backlash, Fourier, Polynomial

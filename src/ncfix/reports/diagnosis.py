@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ncfix.diagnose.diagnosis import NOTHING, Diagnosis, EffectFinding
-from ncfix.diagnose.presentation import (
+from ncfix.diagnosis.diagnosis import NOTHING, Diagnosis, EffectFinding
+from ncfix.diagnosis.presentation import (
     NOISE,
     anew,
     carried,
@@ -25,7 +25,7 @@ from ncfix.diagnose.presentation import (
 from ncfix.machine import Effect
 from ncfix.machine.effects import with_unit
 from ncfix.measure.measurement import Array
-from ncfix.report.document import Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
+from ncfix.reports.document import Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
 
 HOUR = 3600.0
 CURVES = 4
