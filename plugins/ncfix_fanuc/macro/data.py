@@ -138,7 +138,7 @@ def set_length(control: RS274Control, block: Block) -> None:
 
 def keep_length(control: RS274Control, number: int, length: float, *, runtime: bool) -> None:
     """The program sets the length of a tool, mm; `runtime`: it is known at run time only."""
-    if control.tools.offset == number and (runtime or length != control.offsets.tool[Z]):
+    if control.tools.offset == number and (runtime or length != control.tools.vector[Z]):
         control.suspended[CHANGED] = CHANGED
     control.tools.lengths[number] = length
     if runtime:

@@ -215,12 +215,12 @@ class MacroInterpreter(RS274Interpreter):
 
     def settings(self, codes: Codes, block: Block) -> None:
         """What a block sets before its motion; H alone sets something, too."""
-        before = self.control.offsets.tool[Z]
+        before = self.control.tools.vector[Z]
         super().settings(codes, block)
         lone_number(self.control, block, codes)
         if self.control.vectors and codes.takes and block.values.keys() & {*vectors.COMPONENTS}:
             self.control.lose(self.control.turning, vectors.AFTER_VECTOR)
-        changed = self.control.offsets.tool[Z] != before and not codes.takes
+        changed = self.control.tools.vector[Z] != before and not codes.takes
         if changed and self.control.modal.incremental and "Z" in block.values:
             self.control.lose((Z,), LENGTH_IN_STEPS)
 

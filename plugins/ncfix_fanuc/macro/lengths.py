@@ -49,7 +49,7 @@ MOVING = frozenset("XYABCUVWIJKRP")
 
 def tool_offset(control: MacroControl, block: Block, code: int) -> None:
     """G43 to G49. Without a Z word the axis moves by the change of the length, or only its coordinate does."""
-    before = control.offsets.tool[Z]
+    before = control.tools.vector[Z]
     control.suspended.pop(CHANGED, None)
     direct(control, block, code)
     if code in CANCEL:
@@ -60,7 +60,7 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
         if code in TIP_CONTROL:
             note_turned(control)
     lengths.tool_offset(control, block, SAME.get(code, code))
-    if control.offsets.tool[Z] != before and "Z" not in block.values and not settled(control):
+    if control.tools.vector[Z] != before and "Z" not in block.values and not settled(control):
         control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
 
 

@@ -5,11 +5,13 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable mirror ima
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ncfix.control.coordinates import IDENTITY, LETTERS, X, Y, Z, as_rotation, zeros
+from ncfix.control.coordinates import LETTERS, X, Y, Z, zeros
+from ncfix.control.frames import WORLD, handed, mirrored, turned_about
 from ncfix_iso.rs274.settings import unfollowed
-from ncfix_iso.rs274.systems import turned_back, words_of
+from ncfix_iso.rs274.systems import is_turned, turned_back, words_of
 
 if TYPE_CHECKING:
     from ncfix_fanuc.macro.control import MacroControl
@@ -37,7 +39,7 @@ def mirror(control: MacroControl, block: Block, code: int) -> None:
 
 def turned(control: MacroControl) -> bool:
     """Whether coordinates are turned (G68, G68.2)."""
-    return control.tilted or (not control.mirrored and control.offsets.rotation != IDENTITY)
+    return control.tilted or (not control.mirrored and is_turned(control))
 
 
 def put_up(control: MacroControl) -> None:
@@ -45,10 +47,8 @@ def put_up(control: MacroControl) -> None:
     centre = zeros()
     for index, place in control.mirrored.items():
         centre[index] = place
-    signs = [-1.0 if index in control.mirrored else 1.0 for index in SPATIAL]
-    rows = [[signs[i] if i == k else 0.0 for k in SPATIAL] for i in SPATIAL]
-    control.offsets.rotation = as_rotation(rows) if control.mirrored else IDENTITY
-    control.offsets.centre = centre
-    control.handedness = signs[0] * signs[1] * signs[2]
+    rotation = mirrored("".join(LETTERS[index] for index in control.mirrored))
+    control.frames = replace(control.frames, mirror=turned_about(rotation, centre) if control.mirrored else WORLD)
+    control.handedness = handed(rotation)
     turned_back(control)
     control.refresh()

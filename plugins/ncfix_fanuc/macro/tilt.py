@@ -2,23 +2,27 @@
 
 X Y Z are then those of the tool tip in a frame that turns with the workpiece, whatever the rotary axes do: the control
 computes the linear axes from the tip as it does under tool-centre-point control.
-Source: Fanuc 30i operator's manual (machining centre), "Tilted working plane indexing".
+Sources: Fanuc 30i operator's manual (machining centre), "Tilted working plane indexing"; Mazak, "Inclined-plane
+machining" (roll, pitch and yaw). That the first of three points is the origin, and that the block Q0 shifts it from
+there, is what programs for these controls say of themselves.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ncfix.control.coordinates import IDENTITY, LETTERS, Rotation, Vector, X, Y, Z, angles_in_words, zeros
+from ncfix.control.coordinates import LETTERS, PLANES, Rotation, Vector, X, Y, Z, about, angles_in_words, dot, product
+from ncfix.control.faults import Fault
+from ncfix.control.frames import WORLD, euler, from_points, from_vectors, shifted, spatial
 from ncfix.control.motion import Motion
 from ncfix.control.moves import MotionKind, TcpState
 from ncfix.control.passing import Pass, Passing
+from ncfix.control.pointing import Triple
 from ncfix.control.posture import normal_of, postures
 from ncfix.control.tcp import switch
-from ncfix_fanuc.macro.planes import are_square, by_axes, by_points, euler, in_order
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.settings import unfollowed
 from ncfix_iso.rs274.shifts import rotate_system
@@ -37,6 +41,13 @@ LAST = {POINTS: 3, VECTORS: 2}
 """Q of the last of the blocks that together say how the plane lies."""
 
 DEFINING = "a tilted plane (G68.2) is begun, and the blocks that say how it lies are not all there"
+BAD_PLANE = "NCF221"
+LEAST = 1e-6
+"""Shorter vectors, and such that have a smaller sine of the angle between them, do not say how a plane lies."""
+
+NEARLY_SQUARE = 2e-3
+"""rad. So far from square two vectors may be that are written with three decimals."""
+
 NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane is not known"
 TURNED_TO = "NCF243"
 SQUARED = "the control's parameters decide; state the rotary axes in the program if they are others"
@@ -58,7 +69,11 @@ def tilt(control: MacroControl, block: Block, code: int) -> None:
         define(control, block, form)
         return
     angles = block.get("I"), block.get("J"), block.get("K")
-    begin(control, euler(*angles) if form == EULER else in_order(order_of(block), angles), block)
+    if form == EULER:
+        begin(control, euler(*angles), block)
+    else:
+        order = "".join("XYZ"[int(axis) - 1] for axis in order_of(block))
+        begin(control, spatial(dict(zip("XYZ", angles, strict=True)), order), block)
 
 
 def is_followed(block: Block, form: int) -> bool:
@@ -91,27 +106,33 @@ def define(control: MacroControl, block: Block, form: int) -> None:
     control.definition = {}
     control.suspended.pop(DEFINING, None)
     if form == POINTS:
-        first, second, third = (np.array([given[n].get(letter) for letter in "XYZ"]) for n in (1, 2, 3))
+        first, second, third = (components(given[number], "XYZ") for number in (1, 2, 3))
+        plane = from_points(first, second, third, LEAST)
         turn = given[0].get("R") if 0 in given else 0.0
-        begin(control, by_points(first, second, third, turn), given[1])
-        return
-    x, z = (np.array([given[n].get(letter) for letter in "IJK"]) for n in (1, 2))
-    if are_square(x, z):
-        begin(control, by_axes(x, z), given[1])
     else:
-        unfollowed(control, block, TILT)
+        x, z = (components(given[number], "IJK") for number in (1, 2))
+        if abs(dot(x, z)) > NEARLY_SQUARE * math.hypot(*x) * math.hypot(*z):
+            unfollowed(control, block, TILT)
+            return
+        plane, turn = from_vectors(x, z, LEAST), 0.0
+    if plane is None:
+        raise Fault(BAD_PLANE, "the points or vectors of the tilted plane (G68.2) do not say how it lies")
+    begin(control, product(plane, about(PLANES[170], turn)), given[1])
+
+
+def components(block: Block, letters: str) -> Triple:
+    """Three words of a block."""
+    x, y, z = (block.get(letter) for letter in letters)
+    return x, y, z
 
 
 def begin(control: MacroControl, rotation: Rotation, origin: Block) -> None:
     """Into the tilted plane whose origin a block names."""
     end(control)
-    control.offsets.rotation = rotation
-    feature = zeros()
-    for index in (X, Y, Z):
-        feature[index] = control.modal.unit * origin.get(LETTERS[index])
-    control.offsets.feature = feature
+    feature = shifted({index: control.modal.unit * origin.get(LETTERS[index]) for index in (X, Y, Z)})
+    control.frames = replace(control.frames, plane=replace(feature, rotation=rotation), rotation=WORLD)
     control.tilted, control.said = True, None
-    switch(control, control.offsets.tool, True)
+    switch(control, control.tools.vector, True)
     control.refresh()
 
 
@@ -135,8 +156,8 @@ def end(control: MacroControl) -> None:
     if not control.tilted:
         return
     control.tilted, control.said = False, None
-    control.offsets.rotation, control.offsets.feature = IDENTITY, zeros()
-    switch(control, control.offsets.tool, control.setup.tcp or control.tip_control)
+    control.frames = replace(control.frames, plane=WORLD, rotation=WORLD)
+    switch(control, control.tools.vector, control.setup.tcp or control.tip_control)
     turned_back(control)
     control.refresh()
 
@@ -173,7 +194,7 @@ def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: boo
     if about_tip:
         return [angles.get(index, value) for index, value in enumerate(control.position)]
     assert control.kinematics is not None, "they have shown how the tool is pointed"
-    on, off = TcpState(True, control.offsets.tool[Z]), TcpState(False, control.offsets.tool[Z])
+    on, off = TcpState(True, control.tools.vector[Z]), TcpState(False, control.tools.vector[Z])
     still = control.kinematics([control.position[index] for index in control.machine], on, off)
     command = [angles.get(index, value) for index, value in zip(control.machine, still, strict=True)]
     target = control.position[:]

@@ -117,7 +117,7 @@ def end_of(control: KlartextControl, arc: ArcBlock, begin: Point) -> Point:
     if arc.pole is None:
         raise Fault(BAD_ARC, ODD)
     away = begin[0] - arc.pole[0], begin[1] - arc.pole[1]
-    radius, angle = arm({"IPA": arc.value}, away, control.modal.unit)
+    radius, angle = arm({"IPA": arc.value}, away, control.stretch)
     return arc.pole[0] + radius * math.cos(angle), arc.pole[1] + radius * math.sin(angle)
 
 
@@ -125,7 +125,7 @@ def circle(control: KlartextControl, arc: ArcBlock, begin: Point, end: Point) ->
     """The centre of an arc from its start, and its sweep; raises `Fault` where the interpreter has more to say."""
     away, clockwise = (end[0] - begin[0], end[1] - begin[1]), arc.clockwise
     if arc.name == "cr":
-        centre = centre_from_radius(away, control.modal.unit * arc.value, clockwise=clockwise)
+        centre = centre_from_radius(away, control.stretch * arc.value, clockwise=clockwise)
         return centre, sweep_angle(centre, away, 1, clockwise=clockwise)
     if arc.pole is None:
         raise Fault(BAD_ARC, ODD)

@@ -11,6 +11,7 @@ from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_clo
 from ncfix.control.builder import Arc
 from ncfix.control.coordinates import IDENTITY, Plane, Vector, dot, rotated
 from ncfix.control.faults import Fault
+from ncfix.control.frames import handed
 from ncfix.control.motion import Motion
 from ncfix.control.moves import MotionKind
 from ncfix_heidenhain.klartext.control import KlartextControl
@@ -81,7 +82,7 @@ def circular_by_radius(control: KlartextControl, step: Step) -> None:
     plane = plane_of(control, step.words)
     start, end = points(control, where, plane)
     away = end[0] - start[0], end[1] - start[1]
-    radius = control.modal.unit * step.words.values["R"]
+    radius = control.stretch * step.words.values["R"]
     try:
         centre = centre_from_radius(away, radius, clockwise=turning == CLOCKWISE)
     except Fault as fault:
@@ -147,7 +148,7 @@ def swing(control: KlartextControl, step: Step, where: Where, circle: PlaneArc) 
     local = [0.0, 0.0, 0.0]
     local[plane.first], local[plane.second] = circle.centre
     outward = rotated(control.rotation, local) if control.is_rotated else local
-    hand = mirrored(control)
+    hand = handed(control.frames.mirror.rotation)
     centre = tuple(p + o for p, o in zip(control.position[:3], outward, strict=True))
     normal = tuple(dot(row, IDENTITY[plane.across]) for row in control.rotation)
     sweep = hand * circle.sweep
@@ -168,11 +169,6 @@ def direction_at_end(end: Vector, arc: Arc) -> tuple[float, float, float]:
     way = sign * (b * z - c * y), sign * (c * x - a * z), sign * (a * y - b * x)
     length = math.hypot(*way)
     return way[0] / length, way[1] / length, way[2] / length
-
-
-def mirrored(control: KlartextControl) -> float:
-    """-1 where the frame is mirrored: what turns left in the program turns right in the workpiece."""
-    return -1.0 if len(control.transformations.mirror) % 2 else 1.0
 
 
 def sense(step: Step) -> int:

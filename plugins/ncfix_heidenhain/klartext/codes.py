@@ -39,7 +39,7 @@ def before_motion(control: KlartextControl, step: Step) -> None:
         elif code in ENDING:
             control.suspended.pop(f"M{ENDING[code]}", None)
     control.suspended.pop("M130", None)
-    if 130 in step.codes and control.transformations.tilted:
+    if 130 in step.codes and control.plane_tilted:
         control.suspended["M130"] = UNTILTED
     if step.codes & {126, 127}:
         end_of_short_ways(control, 127 in step.codes)

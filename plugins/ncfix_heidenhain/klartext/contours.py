@@ -82,7 +82,7 @@ def worked_out(
     known = [element for element in elements if element is not None]
     begin = here(control).inner
     start = complex(begin[X] / control.scale[X], begin[Y] / control.scale[Y])
-    legs = solved(known, start, heading_of(control), NEAR / control.modal.unit) if len(known) == len(blocks) else None
+    legs = solved(known, start, heading_of(control), NEAR / control.stretch) if len(known) == len(blocks) else None
     return dict.fromkeys(keys) if legs is None else dict(zip(keys, legs, strict=True))
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ncfix.control import control as base
-from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, mask_of, rotated, zeros
+from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, X, Y, Z, mask_of, zeros
+from ncfix.control.frames import shifted
 from ncfix.control.motion import AT_START, Motion, UnknownAxes, first_reason
 from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
@@ -19,7 +20,6 @@ from ncfix_heidenhain.klartext.calculate import FormulaScope, QParameters
 from ncfix_heidenhain.klartext.free import ContourElement
 from ncfix_heidenhain.klartext.patterns import HolePosition
 from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING
-from ncfix_heidenhain.klartext.transformations import Transformations
 
 START = "PRESET"
 """The name in the setup of the preset that is active when the program starts; G54 is taken for it."""
@@ -59,7 +59,6 @@ class PathFunctionState:
     corner   the block before was a corner (RND, CHF)
     ahead    the block that follows is one
     spatial  A B C are spatial angles, not positions of axes (FUNCTION TCPM AXIS SPAT)
-    said     what words of a turned frame have said of where the tool stands (`targets.Said`)
     by_vector  the tool turns in a plane (PATHCTRL VECTOR), not its axes at even speed
     free     elements of the free contour (FK) that is being made: program and block -> what it is, None: not certain
     """
@@ -72,7 +71,6 @@ class PathFunctionState:
     ahead: bool = False
     by_vector: bool = False
     spatial: bool = False
-    said: object = None
     free: dict[tuple[str, int], ContourElement | None] = field(default_factory=dict)
 
 
@@ -93,20 +91,28 @@ class CycleInForce:
 
 
 class KlartextControl(base.ProgramControl):
-    """A TNC: its transformations, Q parameters, path functions and cycles."""
+    """A TNC: its transformations, Q parameters, path functions and cycles.
+
+    plane_tilted  PLANE or cycle 19 has tilted the plane
+    turn          rotation in the working plane (cycle 10), degrees
+    doubtful      why the transformations in force are not sure; empty while they are
+    functions     the transformations that a TRANS function has set, and no cycle
+    """
+
+    frame_order = ("datum", "programmable", "plane", "local", "rotation", "mirror", "scaling")
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
         super().__init__(run, dialect)
-        self.transformations = Transformations()
+        self.plane_tilted = False
+        self.turn = 0.0
+        self.doubtful = ""
         self.functions: frozenset[str] = frozenset()
         self.scope = FormulaScope(parameters=QParameters(dict(q_parameters(run.setup))))
         self.path = PathFunctionState()
         self.cycle = CycleInForce()
-        self.unit = 1.0
         self.m128 = run.setup.tcp
         self.shortest = False
         self.auto_feed = math.nan
-        self.preset = ""
         self.preset_checked = False
         self.tool_called = False
         self.defined_tools: dict[int, Tool] = {}
@@ -117,63 +123,58 @@ class KlartextControl(base.ProgramControl):
     def load_preset(self, name: str) -> None:
         """Make a preset of the setup the active one; what is not given counts as zero, and is asked for when used."""
         given = self.setup.work_offsets.get(name)
-        self.preset, self.preset_checked = name, given is not None
+        self.preset_checked = given is not None
         self.places.shift(mask_of(self.machine))
-        self.transformations.preset = zeros()
-        for letter, value in (given or {}).items():
-            index = INDEX[letter]
-            self.transformations.preset[index] = value * (DEGREE if self.rotary[index] else 1.0)
+        turning = {letter: self.rotary[INDEX[letter]] for letter in given or {}}
+        datum = shifted({INDEX[a]: value * (DEGREE if turning[a] else 1.0) for a, value in (given or {}).items()})
+        self.frames = replace(self.frames, name=name, datum=datum)
         self.recompose()
 
     def recompose(self) -> None:
-        """Make the frame of the transformations; to be called after any of them has changed."""
-        trans = self.transformations
-        self.offsets.origin = trans.preset
-        self.offsets.shift = trans.whole_shift
-        self.offsets.rotation = trans.rotation
-        self.modal.unit = self.unit * trans.scale
+        """Take frames into force, and what is doubtful of them; to be called after any of them has changed."""
         self.doubt_turned_datum()
-        if trans.doubtful:
-            self.suspended[DOUBTFUL] = trans.doubtful
+        if self.doubtful:
+            self.suspended[DOUBTFUL] = self.doubtful
         else:
             self.suspended.pop(DOUBTFUL, None)
         self.refresh()
 
     def switch_tip(self) -> None:
         """Whether X Y Z are tool-tip coordinates may have changed."""
-        on = self.m128 or self.transformations.tilted
+        on = self.m128 or self.plane_tilted
         self.doubt_turned_datum()
         if on != self.tcp:
             self.ask_for_tool()
             why = next(iter(self.unknown.values())) if self.is_led(self.unknown) else TURNED
-            switch(self, self.offsets.tool, on)
+            switch(self, self.tools.vector, on)
             self.unknown = {i: why if reason is TURNED else reason for i, reason in self.unknown.items()}
         self.refresh()
 
     def doubt_turned_datum(self) -> None:
         """Rotary axes with a datum of their own: it may turn the coordinates in which the tip is led."""
         self.suspended.pop(TURNED_DATUM, None)
-        datum = [a + b for a, b in zip(self.transformations.preset, self.transformations.shift, strict=True)]
+        datum = [a + b for a, b in zip(self.frames.datum.shift, self.frames.programmable.shift, strict=True)]
         turned = next((i for i in self.turning if datum[i]), None)
-        if turned is not None and (self.m128 or self.transformations.tilted):
+        if turned is not None and (self.m128 or self.plane_tilted):
             self.suspended[TURNED_DATUM] = WHICH_WAY.format(LETTERS[turned])
 
     def anchors(self) -> list[Hashable]:
         """As of every control; shift, rotation, mirror and scale are stated by the program in numbers."""
-        trans, tool = self.transformations, zeros() if self.tcp else self.offsets.tool
-        stated = self.tcp, trans.tilt if trans.tilted else None
+        frames, tool = self.frames, zeros() if self.tcp else self.tools.vector
+        stated = self.tcp, frames.plane.rotation if self.plane_tilted else None
         length = [self.tools.offset if self.tcp or index == Z else None for index in (X, Y, Z)]
         return [
-            (self.preset, preset, tool[i], (*stated, length[i]) if i in (X, Y, Z) else None)
-            for i, preset in enumerate(trans.preset)
+            (frames.name, datum, tool[i], (*stated, length[i]) if i in (X, Y, Z) else None)
+            for i, datum in enumerate(frames.datum.shift)
         ]
 
     def use(self) -> None:
         """A motion in workpiece coordinates: preset and tool length matter."""
         if not self.preset_checked:
             self.preset_checked = True
-            name = "the active preset" if self.preset in (START, "G54") else f"preset {self.preset[6:]}"
-            option = START if self.preset in (START, "G54") else self.preset
+            preset = self.frames.name
+            name = "the active preset" if preset in (START, "G54") else f"preset {preset[6:]}"
+            option = START if preset in (START, "G54") else preset
             self.knowledge.lack(WORK_OFFSET, name, "is used", f"--offset {option}=x,y,z")
         self.ask_for_tool()
 
@@ -181,17 +182,8 @@ class KlartextControl(base.ProgramControl):
         """Before the first TOOL CALL it matters which tool is in the spindle."""
         if not self.tool_called:
             self.tool_called = True
-            self.offsets.tool[Z] = self.knowledge.tool_length(0)
+            self.tools.vector[Z] = self.knowledge.tool_length(0)
             self.refresh()
-
-    def inner(self) -> Vector:
-        """Where the control stands along the axes of the program's frame, mm and rad."""
-        return self.program_position()
-
-    def outer(self, inner: Vector) -> Vector:
-        """The command of a position along the axes of the program's frame."""
-        turned = rotated(self.rotation, inner) if self.is_rotated else inner
-        return [a + b for a, b in zip(turned, self.offset, strict=True)]
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
@@ -205,11 +197,11 @@ class KlartextControl(base.ProgramControl):
         if motion.kind == MotionKind.RAPID and not motion.refusal and AT_START in motion.unknown.values():
             motion = motion._replace(passing=motion.passing or Passing(Pass.UNSAID, first_reason(motion.unknown)))
         whole = self.whole
-        self.tilted = self.transformations.tilted and not self.m128
+        self.tilted = self.plane_tilted and not self.m128
         turns = any(motion.axes >> index & 1 for index in self.turning)
         if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
             self.whole = True
-        if motion.axes & mask_of(self.shaky):
+        if motion.axes & mask_of(self.composed.unknown):
             self.whole = True
         super().make(motion)
         if self.is_rotated:

@@ -14,11 +14,12 @@ from ncfix.control.expressions import numbers
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion
 from ncfix.control.moves import MotionKind
-from ncfix_heidenhain.klartext import trans_cycles
+from ncfix_heidenhain.klartext import transformations
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, KlartextControl
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, HolePosition, pattern_of_cycle
 from ncfix_heidenhain.klartext.step import Step, refuse
 from ncfix_heidenhain.klartext.targets import MotionWords, Where, command_of, led, polar, polar_axes
+from ncfix_heidenhain.klartext.tilting import cycle_19
 
 NO_CYCLE = "NCF272"
 DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
@@ -41,6 +42,7 @@ ADJUSTING = frozenset({291, 800, 801, 880, *range(1000, 1100)})
 ADJUSTED = "cycle {} may change coordinates, for turning or grinding, in a way that is not followed"
 BUILDERS = range(300, 400)
 MEASURING = 238
+TILT = 19
 OF_BUILDER = "cycle {} is the machine builder's; what it does where it is defined is not known"
 BY_ITSELF = "cycle {} moves the axes by itself where it is defined"
 CALLING = 12
@@ -63,8 +65,12 @@ def define(control: KlartextControl, name: str, words: MotionWords, text: str) -
     """A CYCL DEF block: `name` is `200`, or `7.1`."""
     number, _, part = name.partition(".")
     cycle = int(number)
-    if cycle in trans_cycles.ACTS:
-        trans_cycles.transform(control, cycle, part, words, text)
+    if cycle in transformations.ACTS:
+        transformations.transform(control, cycle, part, words, text)
+        return
+    if cycle == TILT:
+        if part == "1":
+            cycle_19(control, words)
         return
     if cycle in HARMLESS:
         return
@@ -170,7 +176,7 @@ def drill(control: KlartextControl, where: Where, axes: int, heights: tuple[floa
 
 def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
     """Bottom and clearance of the cycle in force along the tool axis of the frame, mm; and why they are not known."""
-    cycle, unit = control.cycle, control.modal.unit
+    cycle, unit = control.cycle, control.stretch
     if cycle.number in OLD_DRILLING:
         depth, gap = said(cycle.steps, DEPTH_WORDS), said(cycle.steps, GAP_WORDS)
         if depth is None or gap is None or any(key.endswith(":?") for key in cycle.steps):

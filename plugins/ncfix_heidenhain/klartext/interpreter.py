@@ -21,7 +21,7 @@ from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
 from ncfix.text.reach import UNREAD
 from ncfix.text.tree import Command, Opaque, Program, Template
-from ncfix_heidenhain.klartext import cycles, lines, tilting, trans_cycles
+from ncfix_heidenhain.klartext import cycles, lines, tilting, transformations
 from ncfix_heidenhain.klartext.codes import after_motion, before_motion
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.flow import PROGRAM, KlartextFlow
@@ -88,7 +88,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             raise SourceError.of(fault.code, fault.text, control.locate(), fault.hint) from None
         self.flow = KlartextFlow(control, self.main, self.find)
         control.locate = self.place
-        control.unit = self.main.mm
+        control.modal.unit = self.main.mm
         control.recompose()
 
     def spellings(self, name: str) -> Iterable[str]:
@@ -216,10 +216,8 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     def shift_datum(self, name: str, words: MotionWords) -> None:
         """TRANS DATUM."""
         if name.endswith("reset"):
-            self.control.transformations.reset_shift()
-            self.control.shaky.clear()
-        trans_cycles.shift(self.control, words, "")
-        self.control.recompose()
+            transformations.reset_datum(self.control)
+        transformations.shift(self.control, words, "")
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
@@ -258,7 +256,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         for address, mode in (("F", 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
             if address in words.values:
                 known = address not in words.runtime and address in ("F", "FU")
-                modal.feed = words.values[address] * self.control.unit if known else math.nan
+                modal.feed = words.values[address] * self.control.modal.unit if known else math.nan
                 modal.feed_mode = mode
         if "fauto" in plan.flags:
             modal.feed = self.control.auto_feed

@@ -93,8 +93,8 @@ def before_corner(unit: KlartextUnit, block: int, stop: int) -> int:
 def is_open(control: KlartextControl) -> bool:
     """Whether the state allows the fast lane at all."""
     modal, path = control.modal, control.path
-    known = not (control.unknown or control.shaky) and control.preset_checked and control.tool_called
-    turned = control.is_rotated or control.transformations.tilted
+    known = not (control.unknown or control.composed.unknown) and control.preset_checked and control.tool_called
+    turned = control.is_rotated or control.plane_tilted
     special = path.corner or path.by_vector or path.spatial or control.cycle.modal or control.ends is not None
     plain = modal.feed_mode == FeedMode.PER_MINUTE and not (modal.incremental or modal.arc_absolute)
     return known and plain and not (turned or special)
@@ -105,7 +105,9 @@ def stage_of(control: KlartextControl, unit: KlartextUnit, start: int, stop: int
     program, tables = unit.program, unit.lanes
     shapes, first = program.template[start:stop], program.first_number[start:stop]
     follow = followed_compiled if fast.engaged() else followed
-    found = follow(control, program.numbers, first, shapes, tables.words, (control.unit, control.modal.feed, RAPID))
+    found = follow(
+        control, program.numbers, first, shapes, tables.words, (control.modal.unit, control.modal.feed, RAPID)
+    )
     own = tables.side[shapes]
     side = filled(own.astype(np.float64), own >= 0, control.modal.compensated).astype(np.int64)
     return KlartextBlockRows(found.path, found.feed, tables.words.motion[shapes], side, found.mask)

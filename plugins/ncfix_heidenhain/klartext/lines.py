@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 
 from ncfix.control.coordinates import LETTERS, Vector, dot, mask_of
+from ncfix.control.frames import unit
 from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
@@ -25,7 +26,6 @@ from ncfix_heidenhain.klartext.targets import (
     polar_axes,
 )
 from ncfix_heidenhain.klartext.tilting import check_normal
-from ncfix_heidenhain.klartext.transformations import unit
 
 MACHINE_COORDINATES = "machine coordinates ({})"
 NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"
@@ -96,7 +96,7 @@ def run(
     """A straight motion to a command."""
     turned = [index for index in control.turning if axes >> index & 1]
     positioning = turned and (not axes & IN_SPACE or turns(control, turned, target, unknown))
-    if positioning and control.transformations.tilted and not control.m128:
+    if positioning and control.plane_tilted and not control.m128:
         turn_under_tilt(control, step, target, unknown, axes)
         return
     way = take_short_way(control, step, target, axes) if control.shortest else ""
@@ -145,9 +145,8 @@ def take_short_way(control: KlartextControl, step: Step, target: Vector, axes: i
 def turn_under_tilt(control: KlartextControl, step: Step, target: Vector, unknown: UnknownAxes, axes: int) -> None:
     """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
     linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
-    switch(control, control.offsets.tool, False)
+    switch(control, control.tools.vector, False)
     control.refresh()
-    control.path.said = None
     for index in control.machine:
         if not control.rotary[index]:
             target[index] = control.position[index]
@@ -174,7 +173,7 @@ def at_machine(control: KlartextControl, step: Step) -> None:
         unknown |= {i: NOT_GIVEN for i in control.machine if step.words.axes >> i & 1}
     was = control.tcp
     if was:
-        switch(control, control.offsets.tool, False)
+        switch(control, control.tools.vector, False)
         control.refresh()
         target, unknown = in_machine(control, step.words)
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
@@ -219,7 +218,7 @@ def departure(control: KlartextControl, step: Step) -> None:
     target = control.position[:]
     straight_on = step.name == "dep lt" and "LEN" in step.words.values and not (beside or step.words.runtime)
     if straight_on and tangent is not None:
-        length = control.modal.unit * step.words.values["LEN"]
+        length = control.stretch * step.words.values["LEN"]
         target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]
         lost = {}
     axes = 1 << plane.first | 1 << plane.second

@@ -12,7 +12,7 @@ from ncfix_heidenhain.klartext.contours import follow_free
 from ncfix_heidenhain.klartext.control import AFTER_PROBING, PRESET, KlartextControl
 from ncfix_heidenhain.klartext.flow import KlartextFlow
 from ncfix_heidenhain.klartext.patterns import pattern_of
-from ncfix_heidenhain.klartext.trans import transform
+from ncfix_heidenhain.klartext.transformations import is_plain, trans
 
 PROBING = Passing(Pass.PROBING, "probing")
 MEASURED = "TCH PROBE {} makes what it measures the datum, a rotation or the kinematics: that is known only at run time"
@@ -118,14 +118,14 @@ def holes(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) ->
 
 def change_coordinates(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """TRANS."""
-    transform(control, match[0])
+    trans(control, match[0])
 
 
 def select_preset(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some."""
-    trans = control.transformations
     control.suspended.pop(PRESET, None)
-    if match["rest"].strip() or trans.tilted or not trans.plain or any(trans.shift) or trans.doubtful:
+    plain = is_plain(control) and not (control.plane_tilted or any(control.frames.programmable.shift))
+    if match["rest"].strip() or control.doubtful or not plain:
         control.suspended[PRESET] = SELECTED
         return
     control.load_preset(f"PRESET{int(match['row'])}")

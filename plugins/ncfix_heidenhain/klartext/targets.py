@@ -15,7 +15,6 @@ from ncfix.control.control import ADRIFT
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z, mask_of
 from ncfix.control.faults import Fault
 from ncfix.control.motion import AT_START, UnknownAxes
-from ncfix.control.tcp import along_frame, mixed_into
 from ncfix_heidenhain.klartext.control import SPATIAL, KlartextControl
 from ncfix_heidenhain.klartext.plans import MOVING
 
@@ -79,31 +78,9 @@ class Where:
     unknown: UnknownAxes
 
 
-@dataclass(frozen=True, slots=True)
-class Said:
-    """What words of a turned frame have said of a position, of which the machine's axes alone do not tell as much."""
-
-    where: Where
-    target: Vector
-    frame: tuple[object, ...]
-
-
 def here(control: KlartextControl) -> Where:
     """Where the control stands."""
-    said = control.path.said
-    if isinstance(said, Said) and control.unknown and said.target is control.position and said.frame == frame(control):
-        return Where(said.where.inner[:], dict(said.where.unknown))
-    return Where(control.inner(), inner_unknown(control, control.unknown))
-
-
-def frame(control: KlartextControl) -> tuple[object, ...]:
-    """What the words of a program mean."""
-    return control.rotation, tuple(control.offset), control.modal.unit, control.tcp
-
-
-def inner_unknown(control: KlartextControl, unknown: UnknownAxes) -> UnknownAxes:
-    """What is not known along the axes of the frame."""
-    return dict(along_frame(control, unknown))
+    return Where(control.program_position(), dict(control.lost_in_frame()))
 
 
 def destination(control: KlartextControl, words: MotionWords) -> tuple[Vector, UnknownAxes]:
@@ -124,8 +101,8 @@ def led(control: KlartextControl, words: MotionWords) -> Where:
         if address[0] != "I":
             where.inner[index] = 0.0
             where.unknown.pop(index, None)
-            if index in control.shaky:
-                where.unknown[index] = control.shaky[index]
+            if index in control.composed.unknown:
+                where.unknown[index] = control.composed.unknown[index]
         where.inner[index] += control.scale[index] * value
         if address in words.runtime:
             where.unknown[index] = RUNTIME
@@ -166,19 +143,9 @@ def settle(control: KlartextControl, words: MotionWords) -> None:
 
 def command_of(control: KlartextControl, where: Where, axes: int) -> tuple[Vector, UnknownAxes]:
     """A position as a command; axes without a word stay exactly where they are."""
-    target = control.outer(where.inner)
-    turned = control.is_rotated and axes & 7
-    for index, position in enumerate(control.position):
-        spatial = turned and index < 3 and any(control.rotation[index][k] and axes >> k & 1 for k in range(3))
-        if not spatial and not axes >> index & 1:
-            target[index] = position
-    unknown = where.unknown
-    if control.is_rotated and unknown:
-        unknown = mixed_into(unknown, control.rotation)
-        control.path.said = Said(Where(where.inner[:], dict(where.unknown)), target, frame(control))
-    found = {index: why for index, why in unknown.items() if index in control.machine}
+    found = control.axes_of(where.unknown)
     control.saying = found, where.unknown
-    return target, found
+    return control.command(where.inner, axes), found
 
 
 def in_machine(control: KlartextControl, words: MotionWords) -> tuple[Vector, UnknownAxes]:
@@ -189,7 +156,7 @@ def in_machine(control: KlartextControl, words: MotionWords) -> tuple[Vector, Un
         if index is not None and address[0] == "I":
             unknown[index] = COUNTED_FROM
         elif index is not None:
-            target[index] = value * (DEGREE if control.rotary[index] else control.unit)
+            target[index] = value * (DEGREE if control.rotary[index] else control.modal.unit)
             unknown.pop(index, None)
             if address in words.runtime:
                 unknown[index] = RUNTIME
@@ -221,7 +188,7 @@ def set_pole(control: KlartextControl, words: MotionWords) -> None:
 def pole_frame(control: KlartextControl) -> object:
     """What the numbers of a pole mean: datum along the axes of its plane, rotation, unit."""
     plane = control.path.plane
-    return control.offset[plane.first], control.offset[plane.second], control.rotation, control.modal.unit
+    return control.offset[plane.first], control.offset[plane.second], control.rotation, control.stretch
 
 
 def polar(control: KlartextControl, words: MotionWords) -> tuple[Where, float | None]:
@@ -234,7 +201,7 @@ def polar(control: KlartextControl, words: MotionWords) -> tuple[Where, float | 
     start = here(control)
     where = led(control, words)
     away = start.inner[plane.first] - first, start.inner[plane.second] - second
-    radius, angle = arm(words.values, away, control.modal.unit)
+    radius, angle = arm(words.values, away, control.stretch)
     where.inner[plane.first] = first + radius * math.cos(angle)
     where.inner[plane.second] = second + radius * math.sin(angle)
     why = doubt(control, words, start)

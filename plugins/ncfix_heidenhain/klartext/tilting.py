@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 
 from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
 from ncfix.control.faults import Fault
+from ncfix.control.frames import euler, from_points, from_vectors, projected, spatial
 from ncfix.control.motion import AT_START, Motion
 from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
@@ -18,7 +19,7 @@ from ncfix.control.posture import WayRules, machine_directions, normal_of, postu
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import MOVED_ALONG, TILTED, KlartextControl
 from ncfix_heidenhain.klartext.targets import MotionWords
-from ncfix_heidenhain.klartext.transformations import euler, from_points, from_vectors, projected, spatial
+from ncfix_heidenhain.klartext.transformations import put, with_plane
 
 BAD_PLANE = "NCF273"
 RETRACTING = "mb max"
@@ -57,12 +58,18 @@ def by_points(values: Values) -> Rotation | None:
 
 def by_angles(values: Values) -> Rotation:
     """PLANE SPATIAL."""
-    return spatial(values.get("SPA", 0.0), values.get("SPB", 0.0), values.get("SPC", 0.0))
+    return spatial({letter: values.get(f"SP{word}", 0.0) for letter, word in zip("XYZ", "ABC", strict=True)})
+
+
+def by_projection(values: Values) -> Rotation | None:
+    """PLANE PROJECTED."""
+    first, second = values.get("PROPR", 0.0), values.get("PROMIN", 0.0)
+    return None if max(abs(first), abs(second)) >= 90 else projected(first, second, values.get("ROT", 0.0))
 
 
 FORMS: Mapping[str, Callable[[Values], Rotation | None]] = {
     "spatial": by_angles,
-    "projected": lambda v: projected(v.get("PROPR", 0.0), v.get("PROMIN", 0.0), v.get("ROT", 0.0)),
+    "projected": by_projection,
     "euler": lambda v: euler(v.get("EULPR", 0.0), v.get("EULNU", 0.0), v.get("EULROT", 0.0)),
     "vector": by_vectors,
     "points": by_points,
@@ -81,10 +88,9 @@ def plane(control: KlartextControl, form: str, words: MotionWords, flags: frozen
         tilt_to(control, None, flags)
         return
     if words.runtime:
-        tilt_to(control, control.transformations.tilt, flags, RUNTIME)
+        tilt_to(control, control.frames.plane.rotation, flags, RUNTIME)
     elif form.startswith("relativ"):
-        turn = spatial(values.get("SPA", 0.0), values.get("SPB", 0.0), values.get("SPC", 0.0))
-        tilt_to(control, product(control.transformations.tilt, turn), flags)
+        tilt_to(control, product(control.frames.plane.rotation, by_angles(values)), flags)
     elif form == "axial":
         by_axes(control, values, flags)
     else:
@@ -101,7 +107,7 @@ def is_idle(control: KlartextControl, flags: frozenset[str]) -> bool:
     """
     asked = any(control.rotary[index] and why is AT_START for index, why in control.unknown.items())
     turns = flags & {"turn", "move", RETRACTING}
-    idle = asked and not turns and not control.transformations.tilted and TILTED not in control.suspended
+    idle = asked and not turns and not control.plane_tilted and TILTED not in control.suspended
     if idle:
         for name in CALCULATED:
             control.scope.parameters.assign(name, 0.0, runtime=True)
@@ -116,14 +122,14 @@ def by_axes(control: KlartextControl, values: Values, flags: frozenset[str]) -> 
             turned[INDEX[letter]] = values[letter] * DEGREE
     found = machine_directions(control, turned)
     if found is None or math.dist(found.tool, normal_of(found.axes)) > 1e-6:
-        tilt_to(control, control.transformations.tilt, flags, NO_KINEMATICS)
+        tilt_to(control, control.frames.plane.rotation, flags, NO_KINEMATICS)
         return
     tilt_to(control, found.axes, flags)
 
 
 def tilt_to(control: KlartextControl, tilt: Rotation | None, flags: frozenset[str], refusal: str = "") -> None:
     """Make a tilted plane the frame; None: none."""
-    control.transformations.tilt_to(tilt)
+    frames, control.plane_tilted = with_plane(control, tilt), tilt is not None
     control.suspended.pop(TILTED, None)
     if refusal:
         control.suspended[TILTED] = refusal
@@ -137,6 +143,7 @@ def tilt_to(control: KlartextControl, tilt: Rotation | None, flags: frozenset[st
         turn_axes(control, way)
     if flags & {"move", RETRACTING}:
         control.lose(range(3), MOVED_ALONG)
+    put(control, frames)
     control.recompose()
     control.switch_tip()
     control.path.tangent = None
@@ -181,7 +188,7 @@ def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
         control.pass_here(TURNED, POSITIONED, rotary_letters(control))
         return
     if control.tcp:
-        switch(control, control.offsets.tool, False)
+        switch(control, control.tools.vector, False)
         control.refresh()
     target, unknown = control.position[:], {k: why for k, why in control.unknown.items() if k not in way}
     for index, angle in way.items():
@@ -207,9 +214,9 @@ def cycle_19(control: KlartextControl, words: MotionWords) -> None:
         tilt_to(control, None, frozenset())
         return
     if words.runtime:
-        tilt_to(control, control.transformations.tilt, frozenset(), RUNTIME)
+        tilt_to(control, control.frames.plane.rotation, frozenset(), RUNTIME)
         return
-    meant = spatial(values.get("A", 0.0), values.get("B", 0.0), values.get("C", 0.0))
+    meant = by_angles({f"SP{letter}": value for letter, value in values.items()})
     standing = all(
         INDEX[letter] in control.machine
         and INDEX[letter] not in control.unknown
@@ -224,7 +231,6 @@ def cycle_19(control: KlartextControl, words: MotionWords) -> None:
 
 def check_normal(control: KlartextControl) -> str:
     """Why a motion in the tilted plane is refused: the tool does not stand normal to it."""
-    trans = control.transformations
-    if not trans.tilted or control.m128 or TILTED in control.suspended:
+    if not control.plane_tilted or control.m128 or TILTED in control.suspended:
         return ""
-    return NOT_NORMAL if stands_square(control, trans.tilt) is False else ""
+    return NOT_NORMAL if stands_square(control, control.frames.plane.rotation) is False else ""

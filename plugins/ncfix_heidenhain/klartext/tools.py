@@ -24,14 +24,14 @@ def define_tool(control: KlartextControl, tool: str | float | None, words: Motio
     """TOOL DEF: the length of a tool, where the program brings it."""
     if isinstance(tool, float) and "L" in words.values:
         radius = words.values.get("R")
-        length = words.values["L"] * control.unit
-        control.defined_tools[int(tool)] = Tool(length, None if radius is None else radius * control.unit)
+        length = words.values["L"] * control.modal.unit
+        control.defined_tools[int(tool)] = Tool(length, None if radius is None else radius * control.modal.unit)
 
 
 def call_tool(control: KlartextControl, tool: str | float | None, words: MotionWords, flags: frozenset[str]) -> None:
     """TOOL CALL: without a number only speed, feed or oversizes are new."""
     if "F" in words.values:
-        control.auto_feed = words.values["F"] * control.unit
+        control.auto_feed = words.values["F"] * control.modal.unit
     if tool is None and "DR" in words.values:
         control.tools.cutter = math.nan
     if tool is None and "DL" not in words.values:
@@ -55,9 +55,9 @@ def call_tool(control: KlartextControl, tool: str | float | None, words: MotionW
     tell_radius(control, words.values.get("DR", 0.0))
     named = control.setup.named_tools.get(tool.upper()) if isinstance(tool, str) else None
     if named is not None and named.radius is not None:
-        control.tools.cutter = named.radius + words.values.get("DR", 0.0) * control.unit
+        control.tools.cutter = named.radius + words.values.get("DR", 0.0) * control.modal.unit
     length = length_by_name(control, tool) if isinstance(tool, str) else length_of(control, int(control.tools.spindle))
-    set_length(control, length + words.values.get("DL", 0.0) * control.unit)
+    set_length(control, length + words.values.get("DL", 0.0) * control.modal.unit)
 
 
 def tell_radius(control: KlartextControl, oversize: float) -> None:
@@ -66,8 +66,8 @@ def tell_radius(control: KlartextControl, oversize: float) -> None:
     defined = control.defined_tools.get(number, Tool())
     radius = control.knowledge.known_tool_radius(number)
     radius = defined.radius if radius is None else radius
-    control.tools.cutter = math.nan if radius is None else radius + oversize * control.unit
-    control.scope.parameters.assign("Q108", (radius or 0.0) / control.unit + oversize, runtime=radius is None)
+    control.tools.cutter = math.nan if radius is None else radius + oversize * control.modal.unit
+    control.scope.parameters.assign("Q108", (radius or 0.0) / control.modal.unit + oversize, runtime=radius is None)
 
 
 def set_length(control: KlartextControl, length: float) -> None:
@@ -76,7 +76,7 @@ def set_length(control: KlartextControl, length: float) -> None:
     tool[Z] = length
     if control.tcp:
         switch(control, tool, True)
-    control.offsets.tool = tool
+    control.tools.vector = tool
     control.refresh()
 
 

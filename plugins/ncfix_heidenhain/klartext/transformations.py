@@ -1,193 +1,263 @@
-"""What lies between the numbers of a Klartext program and commands: preset, shift, tilt, mirror, rotation, scale.
+"""Coordinate transformations of a program: datum, mirror, rotation, scale and preset, by cycles and by TRANS.
 
-Source: TNC 640, "Coordinate systems" and "Cycles: coordinate transformations". Mirror, rotation and scale act about the
-datum that is in force when they are programmed. A shift that follows a tilt is counted along the tilted axes. What
-the manuals leave open, or make depend on the order, is `doubtful`: nothing is corrected until it has been reset.
+Mirror, rotation and scale act about the datum that is in force when they are programmed. A shift that follows a tilt is
+counted along the tilted axes. What the manuals leave open, or make depend on the order, is `doubtful`: nothing is
+corrected until it has been reset. So it is where a function (TRANS MIRROR, ROTATION, SCALE of the TNC7) and a cycle of
+the same kind (8, 10, 11) are used at once: how they act upon each other is left open.
+Sources: TNC 640, "Coordinate systems" and "Cycles: coordinate transformations"; TNC7, "NC functions for coordinate
+transformation".
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
-from ncfix.control.coordinates import (
-    IDENTITY,
-    INDEX,
-    PLANES,
-    Rotation,
-    Vector,
-    about,
-    as_rotation,
-    product,
-    rotated,
-    zeros,
-)
+from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, LETTERS, PLANES, Rotation
+from ncfix.control.expressions import Unknown
+from ncfix.control.frames import WORLD, Affine, FrameStack, mirrored, turned_in
+from ncfix_heidenhain.klartext.control import PRESET, KlartextControl
+from ncfix_heidenhain.klartext.targets import MotionWords
 
 SHIFT_IN_ROTATION = "a datum shift while mirror, rotation or scale is active: whether it turns along is not sure"
 SHIFT_UNDER_TILT = "a datum shift on both sides of a tilted plane: how the control adds them up is not sure"
 MIRROR_AND_ROTATION = "mirror and rotation together: their order is not sure"
 MIRRORED_ROTARY = "a mirrored rotary axis"
 
+FORM = re.compile(r"TRANS\s+(?P<kind>MIRROR|ROTATION|SCALE|DATUM)\s*(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
+NUMBER = re.compile(r"(?P<word>IROT|ROT|SCL)\s*(?P<value>[+-]?\s*(\d+([.,]\d*)?|[.,]\d+))\Z", re.IGNORECASE)
+AXES = re.compile(r"AXIS(\s+[XYZ])+\Z", re.IGNORECASE)
+FROM_TABLE = "the datum of the axis {} comes from a table that is not given"
+AT_RUN_TIME = "the datum of the axis {} is known only at run time"
+NOT_FOLLOWED = "TRANS {} with words that are not followed"
+BOTH = "TRANS {} and a cycle of the same kind at once: how they add up is not sure"
+BY_FUNCTION = {8: "MIRROR", 10: "ROTATION", 11: "SCALE"}
+"""What a TRANS function can do, too."""
 
-@dataclass(slots=True)
-class Transformations:
-    """The transformations in force, mm and rad.
+NO_PRESET = "the number of the preset is known only at run time"
 
-    preset    (9,) the active preset
-    shift     (9,) datum shift before the tilt
-    inner     (3,) datum shift along the tilted axes
-    tilt      the tilted plane, columns its axes in the workpiece; IDENTITY with `tilted` False while there is none
-    mirror    letters that are mirrored
-    turn      rotation in the working plane, degrees
-    scale     factor
-    doubtful  why what is in force is not sure; empty while it is
-    """
 
-    preset: Vector = field(default_factory=zeros)
-    shift: Vector = field(default_factory=zeros)
-    inner: Vector = field(default_factory=zeros)
-    tilt: Rotation = IDENTITY
-    tilted: bool = False
-    mirror: frozenset[str] = frozenset()
-    turn: float = 0.0
-    scale: float = 1.0
-    doubtful: str = ""
+# -- what is in force -------------------------------------------------------------------------------------------------
 
-    @property
-    def plain(self) -> bool:
-        """Neither mirror nor rotation nor scale is active."""
-        return not self.mirror and self.turn == 0.0 and self.scale == 1.0
 
-    @property
-    def rotation(self) -> Rotation:
-        """What acts on X Y Z of the program, before the shift."""
-        signs = [-1.0 if letter in self.mirror else 1.0 for letter in "XYZ"]
-        mirror = as_rotation([[signs[i] if i == j else 0.0 for j in range(3)] for i in range(3)])
-        inside = about(PLANES[170], self.turn) if self.turn else mirror
-        if not self.tilted:
-            return IDENTITY if inside == IDENTITY else inside
-        return product(self.tilt, inside)
+def is_plain(control: KlartextControl) -> bool:
+    """Neither mirror nor rotation nor scale is active."""
+    frames = control.frames
+    return frames.mirror.rotation == IDENTITY and control.turn == 0.0 and frames.scaling.scale == 1.0
 
-    @property
-    def whole_shift(self) -> Vector:
-        """The datum in the coordinates of the preset."""
-        turned = rotated(self.tilt, self.inner) if self.tilted else self.inner
-        return [a + b for a, b in zip(self.shift, turned, strict=True)]
 
-    # -- what a program does to them ----------------------------------------------------------------------------------
+def put_turned(control: KlartextControl, frames: FrameStack) -> None:
+    """Take another mirror, rotation or scale into force: mirror and rotation do not commute."""
+    if frames.mirror.rotation != IDENTITY and control.turn:
+        control.doubtful = MIRROR_AND_ROTATION
+    put(control, frames)
 
-    def shift_axis(self, letter: str, value: float, *, incremental: bool) -> None:
-        """Cycle 7, or TRANS DATUM, for one axis; mm or rad."""
+
+def put(control: KlartextControl, frames: FrameStack) -> None:
+    """Take frames into force; with everything reset nothing is doubtful."""
+    control.frames = frames
+    shifted = any(frames.programmable.shift) or any(frames.local.shift)
+    if is_plain(control) and not control.plane_tilted and not shifted:
+        control.doubtful = ""
+
+
+def shift_axis(control: KlartextControl, letter: str, value: float, *, incremental: bool) -> None:
+    """Cycle 7, or TRANS DATUM, for one axis; mm or rad."""
+    index, frames = INDEX[letter], control.frames
+    along_plane = control.plane_tilted and index < 3
+    here = frames.local if along_plane else frames.programmable
+    now = here.shift[index] + value if incremental else value
+    if now != here.shift[index] and not is_plain(control):
+        control.doubtful = SHIFT_IN_ROTATION
+    here = here.shifted_to({index: now})
+    frames = replace(frames, local=here) if along_plane else replace(frames, programmable=here)
+    if control.plane_tilted and any(frames.programmable.shift[:3]):
+        control.doubtful = SHIFT_UNDER_TILT
+        if not incremental and value == 0.0:
+            frames = replace(frames, programmable=frames.programmable.shifted_to({index: 0.0}))
+    put(control, frames)
+
+
+def mirror_axes(control: KlartextControl, letters: frozenset[str]) -> None:
+    """Cycle 8: these axes are mirrored; none ends it."""
+    if letters & frozenset("ABC"):
+        control.doubtful = MIRRORED_ROTARY
+    rotation = mirrored("".join(letters))
+    put_turned(control, replace(control.frames, mirror=Affine(rotation=rotation)))
+
+
+def rotate_by(control: KlartextControl, degrees: float, *, incremental: bool) -> None:
+    """Cycle 10."""
+    control.turn = (control.turn if incremental else 0.0) + degrees
+    rotation = turned_in(PLANES[170], control.turn) if control.turn else WORLD
+    put_turned(control, replace(control.frames, rotation=rotation))
+
+
+def scale_by(control: KlartextControl, factor: float) -> None:
+    """Cycle 11."""
+    put_turned(control, replace(control.frames, scaling=Affine(scale=factor)))
+
+
+def with_plane(control: KlartextControl, tilt: Rotation | None) -> FrameStack:
+    """The frames with a tilted plane, None for none; shifts along the axes of one that is left become plain ones."""
+    frames = control.frames
+    if any(frames.local.shift):
+        control.doubtful = SHIFT_UNDER_TILT
+        if tilt is None:
+            own, inner = frames.programmable.shift, frames.local.shift
+            together = frames.programmable.shifted_to({index: own[index] + inner[index] for index in range(3)})
+            frames = replace(frames, programmable=together, local=WORLD)
+    return replace(frames, plane=WORLD if tilt is None else Affine(rotation=tilt))
+
+
+# -- TRANS ------------------------------------------------------------------------------------------------------------
+
+
+def trans(control: KlartextControl, text: str) -> None:
+    """A TRANS function but DATUM AXIS and DATUM RESET."""
+    found = FORM.match(text)
+    assert found is not None, "the grammar asks for one of these"
+    kind, rest = found["kind"].upper(), found["rest"].strip()
+    if kind == "DATUM":
+        from_table(control)
+        return
+    note_source(control, kind, by_function=True)
+    control.suspended.pop(kind, None)
+    if not put_in_force(control, kind, rest):
+        control.suspended[kind] = NOT_FOLLOWED.format(kind)
+    control.recompose()
+
+
+def reset_datum(control: KlartextControl) -> None:
+    """TRANS DATUM RESET."""
+    for letter in LETTERS:
+        shift_axis(control, letter, 0.0, incremental=False)
+    datum_unknown(control, {})
+
+
+def from_table(control: KlartextControl) -> None:
+    """The datum comes from a table."""
+    datum_unknown(control, dict.fromkeys(range(len(LETTERS)), FROM_TABLE))
+
+
+def datum_unknown(control: KlartextControl, why: dict[int, str]) -> None:
+    """Along which letters the datum is not known, and why."""
+    control.frames = replace(control.frames, programmable=replace(control.frames.programmable, unknown=why))
+    control.recompose()
+
+
+def note_source(control: KlartextControl, kind: str, *, by_function: bool) -> None:
+    """A transformation is about to be set: notice if the one in force came from the other of cycle and function."""
+    frames = control.frames
+    in_force = {
+        "MIRROR": frames.mirror.rotation != IDENTITY,
+        "ROTATION": control.turn != 0.0,
+        "SCALE": frames.scaling.scale != 1.0,
+    }
+    if in_force[kind] and by_function != (kind in control.functions):
+        control.suspended["both"] = BOTH.format(kind)
+    control.functions = control.functions | {kind} if by_function else control.functions - {kind}
+
+
+def put_in_force(control: KlartextControl, kind: str, rest: str) -> bool:
+    """Do what the words of a function say; False if they are not its own."""
+    reset, number = rest.upper() == "RESET", NUMBER.match(rest)
+    word = "RESET" if reset else number["word"].upper() if number else ""
+    value = float("".join(number["value"].split()).replace(",", ".")) if number else 0.0
+    if kind == "MIRROR" and (reset or AXES.match(rest)):
+        mirror_axes(control, frozenset(rest.upper().split()[1:]))
+    elif kind == "ROTATION" and word in ("RESET", "ROT", "IROT"):
+        rotate_by(control, value, incremental=word == "IROT")
+    elif kind == "SCALE" and word in ("RESET", "SCL"):
+        scale_by(control, value if number else 1.0)
+    else:
+        return False
+    return True
+
+
+# -- cycles -----------------------------------------------------------------------------------------------------------
+
+
+def transform(control: KlartextControl, cycle: int, part: str, words: MotionWords, text: str) -> None:
+    """A part of one of the cycles `ACTS`, `part` 1 of `CYCL DEF 10.1 ROT+35`, with its words and its text."""
+    says = part == "1" if cycle in (8, 10, 11) else cycle != 26 or part not in ("", "0")
+    if says:
+        if cycle in BY_FUNCTION:
+            note_source(control, BY_FUNCTION[cycle], by_function=False)
+        ACTS[cycle](control, words, text)
+    control.recompose()
+
+
+def shift(control: KlartextControl, words: MotionWords, text: str) -> None:
+    """Cycle 7: `7.1 X+10`, `7.2 IY5`, `7.1 #5` for a row of the datum table."""
+    if "#" in text:
+        from_table(control)
+        return
+    why = dict(control.frames.programmable.unknown)
+    for address, value in words.values.items():
+        letter = address.removeprefix("I")
+        if letter not in INDEX:
+            continue
         index = INDEX[letter]
-        here = self.inner if self.tilted and index < 3 else self.shift
-        before = here[index]
-        here[index] = before + value if incremental else value
-        if here[index] != before and not self.plain:
-            self.doubtful = SHIFT_IN_ROTATION
-        if self.tilted and any(self.shift[:3]):
-            self.doubtful = SHIFT_UNDER_TILT
-            if not incremental and value == 0.0:
-                self.shift[index] = 0.0
-        self.settle()
-
-    def reset_shift(self) -> None:
-        """TRANS DATUM RESET."""
-        for letter in "XYZABCUVW":
-            self.shift_axis(letter, 0.0, incremental=False)
-
-    def mirror_axes(self, letters: frozenset[str]) -> None:
-        """Cycle 8: these axes are mirrored; none ends it."""
-        self.mirror = letters & frozenset("XYZ")
-        if letters & frozenset("ABC"):
-            self.doubtful = MIRRORED_ROTARY
-        self.check()
-
-    def rotate(self, degrees: float, *, incremental: bool) -> None:
-        """Cycle 10."""
-        self.turn = (self.turn if incremental else 0.0) + degrees
-        self.check()
-
-    def scale_by(self, factor: float) -> None:
-        """Cycle 11."""
-        self.scale = factor
-        self.check()
-
-    def tilt_to(self, tilt: Rotation | None) -> None:
-        """A tilted plane, None for none."""
-        if any(self.inner):
-            self.doubtful = SHIFT_UNDER_TILT
-            if tilt is None:
-                self.shift[:3] = [a + b for a, b in zip(self.shift[:3], self.inner[:3], strict=True)]
-                self.inner = zeros()
-        self.tilt, self.tilted = (IDENTITY, False) if tilt is None else (tilt, True)
-        self.settle()
-
-    def check(self) -> None:
-        """Mirror and rotation do not commute."""
-        if self.mirror and self.turn:
-            self.doubtful = MIRROR_AND_ROTATION
-        self.settle()
-
-    def settle(self) -> None:
-        """With everything reset nothing is doubtful."""
-        if self.plain and not self.tilted and not any(self.shift) and not any(self.inner):
-            self.doubtful = ""
+        scale = DEGREE if control.rotary[index] else control.modal.unit
+        shift_axis(control, letter, scale * value, incremental=address[0] == "I")
+        why.pop(index, None)
+        if address in words.runtime:
+            why[index] = AT_RUN_TIME
+    datum_unknown(control, why)
 
 
-def spatial(a: float, b: float, c: float) -> Rotation:
-    """Spatial angles, degrees: about the machine's X by `a`, then about its Y by `b`, then about its Z by `c`."""
-    return product(about(PLANES[170], c), product(about(PLANES[180], b), about(PLANES[190], a)))
+def mirror(control: KlartextControl, words: MotionWords, text: str) -> None:
+    """Cycle 8: `8.1 X Y`, the axes that are mirrored; none ends it."""
+    mirror_axes(control, frozenset(text.upper()) & frozenset("XYZABC"))
 
 
-def euler(precession: float, nutation: float, rotation: float) -> Rotation:
-    """Euler angles, degrees: about Z, about the turned X, about the tilted Z (EULPR, EULNU, EULROT)."""
-    return product(about(PLANES[170], precession), product(about(PLANES[190], nutation), about(PLANES[170], rotation)))
+def rotate(control: KlartextControl, words: MotionWords, text: str) -> None:
+    """Cycle 10: `10.1 ROT+35` or `IROT+5`, degrees."""
+    rotation = words.values.get("ROT", words.values.get("IROT"))
+    suspend(control, words, "rotation")
+    rotate_by(control, rotation or 0.0, incremental="IROT" in words.values)
 
 
-def projected(first: float, second: float, turn: float) -> Rotation | None:
-    """Projection angles, degrees: the tilt as it shows in the Z/X and in the Y/Z plane, and a turn in the plane.
-
-    `first` (PROPR) turns the X axis towards Z as seen in the Z/X plane, as a spatial angle about Y does; `second`
-    (PROMIN) turns Y towards Z as seen in the Y/Z plane, as one about X does. None where there is no such plane.
-    """
-    if abs(first) >= 90 or abs(second) >= 90:
-        return None
-    along_x = (1.0, 0.0, -math.tan(math.radians(first)))
-    along_y = (0.0, 1.0, math.tan(math.radians(second)))
-    found = from_vectors(along_x, cross(along_x, along_y))
-    return None if found is None else product(found, about(PLANES[170], turn))
+def scale(control: KlartextControl, words: MotionWords, text: str) -> None:
+    """Cycle 11: `11.1 SCL 0.9`."""
+    suspend(control, words, "scale")
+    factor = words.values.get("SCL", 1.0)
+    if factor <= 0.0:
+        control.suspended["scale"] = "a scale that is not above zero (cycle 11)"
+    scale_by(control, factor if factor > 0.0 else 1.0)
 
 
-Triple = tuple[float, float, float]
+def scale_axes(control: KlartextControl, words: MotionWords, text: str) -> None:
+    """Cycle 26: `26.1 X1.4 Y0.6`: nothing is corrected while an axis has a scale of its own."""
+    control.suspended.pop("scales", None)
+    if any(factor != 1.0 for key, factor in words.values.items() if key in "XYZ"):
+        control.suspended["scales"] = "a scale of single axes (cycle 26)"
 
 
-def from_vectors(base: Triple, normal: Triple) -> Rotation | None:
-    """The plane with a normal and an X axis that lies in the direction of `base`; None if they are parallel or zero."""
-    z = unit(normal)
-    y = None if z is None else unit(cross(z, base))
-    if z is None or y is None:
-        return None
-    x = cross(y, z)
-    return as_rotation(list(zip(x, y, z, strict=True)))
+def preset(control: KlartextControl, words: MotionWords, text: str) -> None:
+    """Cycle 247: the preset of the row Q339."""
+    number = control.scope.parameters.get("Q339")
+    control.suspended.pop(PRESET, None)
+    if isinstance(number, Unknown):
+        control.suspended[PRESET] = NO_PRESET
+        return
+    control.load_preset(f"PRESET{number:g}")
 
 
-def from_points(first: Triple, second: Triple, third: Triple) -> Rotation | None:
-    """The plane through three points: X from the first to the second, the third on the side of +Y."""
-    along, other = minus(second, first), minus(third, first)
-    return from_vectors(along, cross(along, other))
+def suspend(control: KlartextControl, words: MotionWords, what: str) -> None:
+    """Nothing is corrected while a transformation depends on what is known only at run time."""
+    control.suspended.pop(what, None)
+    if words.runtime:
+        control.suspended[what] = f"the {what} of the coordinates is known only at run time"
 
 
-def minus(a: Triple, b: Triple) -> Triple:
-    """`a - b`."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def cross(a: Triple, b: Triple) -> Triple:
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def unit(a: Triple) -> Triple | None:
-    """A vector of length one; None for the zero vector."""
-    length = math.hypot(*a)
-    return None if length < 1e-12 else (a[0] / length, a[1] / length, a[2] / length)
+ACTS: Mapping[int, Callable[[KlartextControl, MotionWords, str], None]] = {
+    7: shift,
+    8: mirror,
+    10: rotate,
+    11: scale,
+    26: scale_axes,
+    247: preset,
+}

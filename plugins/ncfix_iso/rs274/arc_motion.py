@@ -31,7 +31,7 @@ def arc(control: RS274Control, block: Block, code: int) -> None:
     target, unknown = destination(control, block)
     step = control.in_frame([b - a for a, b in zip(control.position, target, strict=True)])
     end = step[plane.first], step[plane.second]
-    doubtful = bool(unknown or control.unknown or block.runtime or control.shaky)
+    doubtful = bool(unknown or control.unknown or block.runtime or control.composed.unknown)
     clockwise = code == CLOCKWISE
     try:
         centre = centre_of(control, block, plane, end, clockwise=clockwise)

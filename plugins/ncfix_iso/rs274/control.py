@@ -71,6 +71,8 @@ class RS274Control(shared.ProgramControl):
     saved      the modal states that M70 saved, one place for each call level
     """
 
+    frame_order = ("datum", "additive", "local", "plane", "rotation", "mirror")
+
     def __init__(self, run: Run, dialect: Dialect, rules: Rules | None = None) -> None:
         super().__init__(run, dialect)
         self.rules: Rules = with_own_codes(rules or RULES[dialect.semantics], dialect)
@@ -130,8 +132,8 @@ class RS274Control(shared.ProgramControl):
 
     def anchors(self) -> list[Hashable]:
         """As of every control; the parameters of the work offset and of G92 are not the program's numbers."""
-        offsets, tool = self.offsets, zeros() if self.tcp else self.offsets.tool
-        own = [a + b for a, b in zip(offsets.origin, offsets.shift, strict=True)]
+        frames, tool = self.frames, zeros() if self.tcp else self.tools.vector
+        own = [a + b for a, b in zip(frames.datum.shift, frames.additive.shift, strict=True)]
         system = self.modal.system, self.extended_name
         return [
             (system, own[i], tool[i], self.spatial_anchor(i) if i < len(self.rotation) else None)
@@ -154,4 +156,4 @@ class RS274Control(shared.ProgramControl):
         """Where an axis stands in program units, X not as a diameter; marked where it is known only at run time."""
         self.settle((index,))
         value = self.program_position()[index] / self.unit_of(index)
-        return Unknown(LETTERS[index], value) if index in self.unknown or index in self.shaky else value
+        return Unknown(LETTERS[index], value) if index in self.unknown or index in self.composed.unknown else value

@@ -12,7 +12,6 @@ from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot, mask_of
 from ncfix.control.faults import Fault
 from ncfix.control.motion import Motion, UnknownAxes
 from ncfix.control.moves import FeedMode, MotionKind
-from ncfix.control.tcp import lost_in_frame, lost_of_axes
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.systems import check_system, words_of
@@ -130,7 +129,7 @@ def drill(
     across = control.modal.plane.across
     unknown = hole_unknown(control, block)
     refusal = "a word of the cycle is known only at run time" if control.modal.cycle.runtime else ""
-    height = lost_in_frame(control).get(across)
+    height = control.lost_in_frame().get(across)
     if not control.modal.incremental and not unknown and not control.modal.diameter:
         program[across] = r
         control.builder.approach(command(control, block, program))
@@ -146,17 +145,17 @@ def drill(
     program[across] = clear
     control.position = command(control, block, program)
     if height is not None and not at_level:
-        control.unknown = lost_of_axes(control, {**unknown, across: height})
+        control.unknown = control.axes_of({**unknown, across: height})
 
 
 def hole_unknown(control: RS274Control, block: Block) -> UnknownAxes:
     """Which axes are not known at the bottom of a hole."""
     modal = control.modal
-    unknown = dict(unknown_after(control, block, modal.incremental, lost_in_frame(control)))
+    unknown = dict(unknown_after(control, block, modal.incremental, control.lost_in_frame()))
     if not modal.incremental:
         unknown.pop(modal.plane.across, None)
-        if modal.plane.across in control.shaky:
-            unknown[modal.plane.across] = control.shaky[modal.plane.across]
+        if modal.plane.across in control.composed.unknown:
+            unknown[modal.plane.across] = control.composed.unknown[modal.plane.across]
     if control.unnamed:
         unknown |= unnamed(control, block)
     if control.is_rotated and unknown.keys() & {0, 1, 2}:

@@ -59,7 +59,7 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     if on or control.tcp:
         switch(control, tool, on)
     control.places.shift(mask_of((*across, Z)))
-    control.offsets.tool, control.tools.offset = tool, number if on or any(tool) or lacking else None
+    control.tools.vector, control.tools.offset = tool, number if on or any(tool) or lacking else None
     control.modal.tool_code = 490 if number is None else 430
     control.refresh()
 
@@ -77,7 +77,7 @@ def offset_of(control: RS274Control, block: Block, code: int) -> tuple[Vector, i
 
 def offset_by_words(control: RS274Control, block: Block, *, added: bool) -> tuple[Vector, int]:
     """G43.1: the axis words are the offset; G43.2: they, or the length of tool H, are added to it."""
-    tool = control.offsets.tool[:]
+    tool = control.tools.vector[:]
     number = control.tools.spindle if control.tools.offset is None else control.tools.offset
     if added and "H" in block.values:
         tool[Z] += length_of(control, numbered_tool(control, block))
@@ -147,7 +147,7 @@ def set_tool(control: RS274Control, block: Block, kind: int) -> None:
     if kind != 1:
         control.settle((Z,))
         system = control.modal.system if kind == 10 else len(SYSTEM_NAMES)
-        shift = control.offsets.shift[Z] + control.offsets.local[Z] if kind == 10 else 0.0
+        shift = control.frames.additive.shift[Z] + control.frames.local.shift[Z] if kind == 10 else 0.0
         length = control.position[Z] - stored(control, first_parameter(system))[Z] - shift - length
     control.tools.lengths[number] = length
     if "Z" in block.runtime or (kind != 1 and Z in control.unknown):

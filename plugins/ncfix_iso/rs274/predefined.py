@@ -64,7 +64,7 @@ def modes(control: RS274Control) -> dict[str, Getter]:
         "_units_per_minute": flag("feed_mode", 94),
         "_units_per_rev": flag("feed_mode", 95),
         "_coord_system": lambda: float(system_code(control.modal.system)),
-        "_tool_offset": lambda: float(any(control.offsets.tool)),
+        "_tool_offset": lambda: float(any(control.tools.vector)),
         "_retract_r_plane": flag("retract_to_r", True),
         "_retract_old_z": flag("retract_to_r", False),
         "_ijk_absolute_mode": flag("arc_absolute", True),

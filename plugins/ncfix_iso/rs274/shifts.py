@@ -6,13 +6,17 @@ and for G68 and G69 the Fanuc 30i programming manual.
 
 from __future__ import annotations
 
-from ncfix.control.coordinates import IDENTITY, LETTERS, N_LETTERS, about, mask_of, product, zeros
+from dataclasses import replace
+
+from ncfix.control.coordinates import IDENTITY, LETTERS, N_LETTERS, Rotation, about, mask_of, product
 from ncfix.control.faults import Fault
+from ncfix.control.frames import WORLD, Affine, turned_about
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.settings import ENDS, unfollowed
 from ncfix_iso.rs274.systems import (
+    RUNTIME_OFFSET,
     SHIFT,
-    mark_shaky,
+    compose,
     moved_while_turned,
     store,
     stored,
@@ -34,64 +38,66 @@ def shift_system(control: RS274Control, block: Block, code: int) -> None:
         set_local(control, block, cancelled=code == 920)
     if code == 520 and not control.rules.strict:
         return
-    before, doubtful = control.offsets.shift, set(control.shaky)
+    before, doubtful = control.frames.additive.shift, {*control.composed.unknown}
     if code in (520, 920):
         set_shift(control, block, from_position=code == 920)
     else:
-        control.offsets.shift = stored(control, SHIFT) if code == 923 else zeros()
+        control.frames = replace(
+            control.frames, additive=Affine(tuple(stored(control, SHIFT))) if code == 923 else WORLD
+        )
     if code == 921:
         for index in range(N_LETTERS):
             store(control, SHIFT, index, 0.0, runtime=False)
     control.parameters.assign(SHIFT_ACTIVE, float(code in (520, 920, 923)))
-    mark_shaky(control)
-    control.refresh()
+    compose(control)
     if code == 920:
         control.places.settle(mask_of(words_of(block)))
     elif code == 520:
         control.places.shift(mask_of(words_of(block)))
     else:
-        after, doubtful = control.offsets.shift, doubtful | set(control.shaky)
+        after, doubtful = control.frames.additive.shift, doubtful | {*control.composed.unknown}
         control.places.shift(mask_of(i for i in control.machine if before[i] != after[i] or i in doubtful))
 
 
 def set_local(control: RS274Control, block: Block, *, cancelled: bool) -> None:
     """G52 of ISO controls, which is not the shift of G92; G92 takes it away along the axes that it names."""
-    offsets, local = control.offsets, control.offsets.local[:]
+    local, unknown = [*control.frames.local.shift], dict(control.frames.local.unknown)
     for index in words_of(block):
         local[index] = 0.0 if cancelled else control.scale[index] * block.values[LETTERS[index]]
-    runtime = set() if cancelled else {index for index in words_of(block) if LETTERS[index] in block.runtime}
-    offsets.local, offsets.doubtful = local, (offsets.doubtful - set(words_of(block))) | runtime
-    mark_shaky(control)
-    control.refresh()
+        unknown.pop(index, None)
+        runtime = LETTERS[index] in block.runtime and not cancelled and not control.probes_nominally
+        if runtime and index in control.machine:
+            unknown[index] = RUNTIME_OFFSET
+    control.frames = replace(control.frames, local=Affine(tuple(local), unknown=unknown))
+    compose(control)
 
 
 def set_shift(control: RS274Control, block: Block, *, from_position: bool) -> None:
     """The shift that the words ask for."""
-    shift = control.offsets.shift[:]
+    shift = [*control.frames.additive.shift]
     if from_position:
         control.settle(tuple(control.unknown) if control.is_rotated else words_of(block))
     position = control.program_position()
-    doubtful = {*control.unknown, *control.shaky} if from_position else set()
+    doubtful = {*control.unknown, *control.composed.unknown} if from_position else set()
     for index in words_of(block):
         value = control.scale[index] * block.values[LETTERS[index]]
         shift[index] = position[index] + shift[index] - value if from_position else value
         store(control, SHIFT, index, shift[index], index in doubtful or LETTERS[index] in block.runtime)
-    control.offsets.shift = shift
+    control.frames = replace(control.frames, additive=Affine(tuple(shift)))
 
 
 def rotate_system(control: RS274Control, block: Block, code: int) -> None:
     """G68 X Y R turns the coordinates of the plane about a point, G69 ends it."""
-    before = control.offsets.rotation
+    before = control.frames.rotation.rotation
     if code == 680 and (why := uncertain(control, block)):
         control.suspended[ENDS[690]] = why
         return
-    control.offsets.rotation = IDENTITY
+    control.frames = replace(control.frames, rotation=WORLD)
     if code == 680:
         turn_about_point(control, block, before if control.modal.incremental else IDENTITY)
     else:
-        control.offsets.centre = zeros()
         unfollowed(control, block, code)
-    if control.offsets.rotation != before:
+    if control.frames.rotation.rotation != before:
         control.unnamed = frozenset((control.modal.plane.first, control.modal.plane.second))
     turned_back(control)
     control.refresh()
@@ -103,13 +109,13 @@ def uncertain(control: RS274Control, block: Block) -> str:
     if "R" not in block.values:
         return "the angle of the rotation (G68) is not in the program"
     centred = any(LETTERS[index] in block.values for index in (control.modal.plane.first, control.modal.plane.second))
-    again = control.offsets.rotation != IDENTITY and not control.rules.adds_rotations
+    again = control.frames.rotation.rotation != IDENTITY and not control.rules.adds_rotations
     if control.modal.incremental and (centred or again):
         return "what the words of a rotation (G68) count from in G91 differs from control to control"
     return ""
 
 
-def turn_about_point(control: RS274Control, block: Block, before: tuple[tuple[float, float, float], ...]) -> None:
+def turn_about_point(control: RS274Control, block: Block, before: Rotation) -> None:
     """Put a rotation by R about the words of the plane into force, on top of another."""
     plane = control.modal.plane
     centre = control.program_position()
@@ -122,5 +128,5 @@ def turn_about_point(control: RS274Control, block: Block, before: tuple[tuple[fl
             control.settle((index,))
     if block.runtime or control.unknown.keys() & {plane.first, plane.second}:
         control.refusal = control.refusal or "the centre or angle of a rotation (G68) is known only at run time"
-    control.offsets.rotation = product(before, about(plane, block.get("R")))  # type: ignore[arg-type]
-    control.offsets.centre = centre
+    turned = turned_about(product(before, about(plane, block.get("R"))), centre)
+    control.frames = replace(control.frames, rotation=turned)

@@ -6,6 +6,8 @@ Source: LinuxCNC documentation, "Coordinate systems", "G10 L2", "G10 L20". Param
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ncfix.control.coordinates import (
     DEGREE,
     IDENTITY,
@@ -24,6 +26,7 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.expressions import nominal
 from ncfix.control.faults import Fault
+from ncfix.control.frames import Affine
 from ncfix.control.motion import UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
@@ -98,13 +101,19 @@ def moved_while_turned(control: RS274Control, what: str) -> None:
 
     LinuxCNC knows only turns of the work offset itself, and what they do.
     """
-    if not control.rules.strict and (control.offsets.rotation != IDENTITY or control.tilted):
+    if not control.rules.strict and (is_turned(control) or control.tilted):
         control.suspended[TURNED] = MOVED_WHILE_TURNED.format(what)
+
+
+def is_turned(control: RS274Control) -> bool:
+    """Whether the program has turned or mirrored coordinates, besides the turn of the work offset."""
+    frames = control.frames
+    return not frames.plane.rotation == frames.rotation.rotation == frames.mirror.rotation == IDENTITY
 
 
 def turned_back(control: RS274Control) -> None:
     """Coordinates are no longer turned: where the axes stand after an origin that was moved is not known."""
-    if control.offsets.rotation == IDENTITY and not control.tilted and control.suspended.pop(TURNED, ""):
+    if not (is_turned(control) or control.tilted) and control.suspended.pop(TURNED, ""):
         control.lose(control.machine, AFTER_TURNED)
 
 
@@ -130,14 +139,13 @@ def take_system(control: RS274Control, block: Block, code: int) -> None:
 def activate(control: RS274Control, system: int) -> None:
     """Take a coordinate system's offset and rotation into force."""
     control.modal.system = system
-    control.offsets.origin = stored(control, first_parameter(system))
-    turn = turn_of(control, system)
-    if turn != control.offsets.turn and (any(control.offsets.shift[:2]) or any(control.offsets.local[:2])):
+    turn, frames = turn_of(control, system), control.frames
+    if turn != frames.datum.rotation and (any(frames.additive.shift[:2]) or any(frames.local.shift[:2])):
         control.lose((X, Y), TURNED_WITH_SHIFT)
-    control.offsets.turn = turn
     control.offset_checked = False
-    mark_shaky(control)
-    control.refresh()
+    origin = tuple(stored(control, first_parameter(system)))
+    control.frames = replace(frames, datum=Affine(origin, turn, unknown=frames.datum.unknown))
+    compose(control)
 
 
 def turn_of(control: RS274Control, system: int) -> Rotation:
@@ -146,18 +154,18 @@ def turn_of(control: RS274Control, system: int) -> Rotation:
     return about(PLANES[170], angle) if angle else IDENTITY
 
 
-def mark_shaky(control: RS274Control) -> None:
-    """Note which letters have an offset that is known only at run time."""
-    if control.probes_nominally:
-        return
-    unknown = control.parameters.is_unknown
-    first = first_parameter(control.modal.system)
-    marked = {index for index in control.machine if unknown(first + index) or unknown(SHIFT + index)}
-    marked |= control.offsets.doubtful & set(control.machine)
-    turned = control.offsets.turn is not IDENTITY
-    if turned and (marked & {X, Y} or unknown(first + 9)):
-        marked |= {X, Y} & set(control.machine)
-    control.shaky = dict.fromkeys(sorted(marked), RUNTIME_OFFSET)
+def compose(control: RS274Control) -> None:
+    """Take frames into force, and note along which letters work offset and G92 are known only at run time."""
+    frames = control.frames
+    if not control.probes_nominally:
+        is_unknown, first = control.parameters.is_unknown, first_parameter(control.modal.system)
+        unknown = {index for index in control.machine if is_unknown(first + index) or is_unknown(SHIFT + index)}
+        own = frames.local.unknown.keys()
+        if frames.datum.rotation is not IDENTITY and ((unknown | own) & {X, Y} or is_unknown(first + 9)):
+            unknown |= {X, Y} & {*control.machine}
+        datum = replace(frames.datum, unknown=dict.fromkeys(sorted(unknown), RUNTIME_OFFSET))
+        control.frames = replace(frames, datum=datum)
+    control.refresh()
 
 
 def extended_system(control: RS274Control, block: Block) -> None:
@@ -167,14 +175,12 @@ def extended_system(control: RS274Control, block: Block) -> None:
     control.extended_name = name
     if given is None:
         control.knowledge.work_offset(name)
-    for index, letter in enumerate(LETTERS):
-        value = (given or {}).get(letter, 0.0)
-        control.offsets.origin[index] = value * DEGREE if control.rotary[index] else value
+    values = ((given or {}).get(letter, 0.0) for letter in LETTERS)
+    origin = tuple(value * DEGREE if turning else value for value, turning in zip(values, control.rotary, strict=True))
     control.modal.system = 0
-    control.offsets.turn = IDENTITY
     control.offset_checked = True
-    mark_shaky(control)
-    control.refresh()
+    control.frames = replace(control.frames, datum=Affine(origin, unknown=control.frames.datum.unknown))
+    compose(control)
 
 
 # -- what has to be given ---------------------------------------------------------------------------------------------
@@ -237,8 +243,8 @@ def origin_for_position(control: RS274Control, block: Block, system: int, origin
     turn = turn_of(control, system)
     involved = {*words_of(block), *((X, Y) if turn is not IDENTITY and block.axes & 3 else ())}
     control.settle(tuple(involved))
-    outer = [p - o - t for p, o, t in zip(control.position, origin, control.offsets.tool, strict=True)]
-    shifts = zip(control.offsets.shift, control.offsets.local, strict=True)
+    outer = [p - o - t for p, o, t in zip(control.position, origin, control.tools.vector, strict=True)]
+    shifts = zip(control.frames.additive.shift, control.frames.local.shift, strict=True)
     now = [a - s - local for a, (s, local) in zip(rotated(transposed(turn), outer), shifts, strict=True)]
     wanted = now[:]
     for index in words_of(block):

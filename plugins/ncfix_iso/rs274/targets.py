@@ -1,18 +1,18 @@
 """Where the axis words of a block lead, as commands, and which of the axes are then known.
 
-Source: LinuxCNC documentation, "G-code overview" and "G90, G91", "G53"; the composition of offsets is that of
-`Offsets`. A word that is absent leaves its axis where it is.
+Source: LinuxCNC documentation, "G-code overview" and "G90, G91", "G53". A word that is absent leaves its axis
+where it is.
 """
 
 from __future__ import annotations
 
 import math
 
-from ncfix.control.coordinates import INDEX, LETTERS, Vector, X, Y, rotated
+from ncfix.control.coordinates import INDEX, LETTERS, Vector, X, Y
 from ncfix.control.expressions import nominal
 from ncfix.control.faults import Fault
 from ncfix.control.motion import UnknownAxes
-from ncfix.control.tcp import from_machine, lost_in_frame, lost_of_axes
+from ncfix.control.tcp import from_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import check_system
 
@@ -65,7 +65,7 @@ def words_destination(control: RS274Control, block: Block) -> tuple[Vector, Unkn
 
 def unknown_after(control: RS274Control, block: Block, incremental: bool, before: UnknownAxes) -> UnknownAxes:
     """Which axes are not known where the motion ends, of those that were not `before`."""
-    if not (before or control.shaky or block.runtime):
+    if not (before or control.composed.unknown or block.runtime):
         return before
     unknown = dict(before)
     for index, letter in enumerate(LETTERS):
@@ -73,8 +73,8 @@ def unknown_after(control: RS274Control, block: Block, incremental: bool, before
             continue
         if not incremental:
             unknown.pop(index, None)
-            if index in control.shaky:
-                unknown[index] = control.shaky[index]
+            if index in control.composed.unknown:
+                unknown[index] = control.composed.unknown[index]
         if letter in block.runtime:
             unknown[index] = RUNTIME
     return unknown
@@ -87,19 +87,13 @@ def rotated_destination(control: RS274Control, block: Block, incremental: bool) 
         if letter in INDEX:
             index = INDEX[letter]
             program[index] = control.scale[index] * value + (program[index] if incremental else 0.0)
-    outer = rotated(control.rotation, program)
-    target = [a + b for a, b in zip(outer, control.offset, strict=True)]
-    for index in range(len(LETTERS)):
-        mixed = index < 3 and any(control.rotation[index][k] != 0.0 and block.axes >> k & 1 for k in range(3))
-        if not mixed and not block.axes >> index & 1:
-            target[index] = control.position[index]
-    return target, rotated_unknown(control, block, incremental)
+    return control.command(program, block.axes), rotated_unknown(control, block, incremental)
 
 
 def rotated_unknown(control: RS274Control, block: Block, incremental: bool) -> UnknownAxes:
     """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
-    own = unknown_after(control, block, incremental, lost_in_frame(control))
-    unknown = lost_of_axes(control, own) if own else {}
+    own = unknown_after(control, block, incremental, control.lost_in_frame())
+    unknown = control.axes_of(own)
     control.saying = unknown, own
     return unknown
 

@@ -8,8 +8,8 @@ from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, 
 from ncfix.control.builder import Arc
 from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
 from ncfix.control.faults import Fault
+from ncfix.control.frames import handed
 from ncfix.control.moves import MotionKind
-from ncfix_siemens.sinumerik.affine import handed
 from ncfix_siemens.sinumerik.destination import (
     NO_POLE,
     BlockWordValues,

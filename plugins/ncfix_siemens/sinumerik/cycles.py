@@ -150,7 +150,7 @@ def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
         words, over, refusal = lead_to(control, block, point, name)
         drill(control, words, over, drilling, refusal=refusal, modal=True)
     control.lost = dict(control.lost) | dict.fromkeys((plane.first, plane.second), AFTER_PATTERN)
-    control.unknown = control.unknown_for(control.lost)
+    control.unknown = control.axes_of(control.lost)
 
 
 def hole_after(control: Sinumerik, words: BlockWordValues) -> None:
@@ -183,7 +183,7 @@ def drill(
     control.heading = None
     if clear is None or depth is None:
         up = End(control.position, control.unknown, dict(control.lost) | {across: AFTER_CYCLE})
-        up = End(up.target, control.unknown_for(up.lost), up.lost)
+        up = End(up.target, control.axes_of(up.lost), up.lost)
     else:
         up = at_height(control, End(control.position, dict(control.unknown), dict(control.lost)), clear)
         stand(control, 1 << across, by_machine=False)
@@ -202,7 +202,7 @@ def at_height(control: Sinumerik, over: End, height: float) -> End:
     for index in mixed:
         target[index] = back[index] + control.offset[index]
     lost = {index: why for index, why in over.lost.items() if index != across}
-    return End(target, control.unknown_for(lost), lost)
+    return End(target, control.axes_of(lost), lost)
 
 
 def refuse(control: Sinumerik, block: int, why: str) -> None:
@@ -210,5 +210,5 @@ def refuse(control: Sinumerik, block: int, why: str) -> None:
     gone = [index for index in GEOMETRY if index in control.machine]
     lost = dict(control.lost) | dict.fromkeys(gone, AFTER_CYCLE)
     words = BlockWordValues(block, {}, {}, sum(1 << index for index in gone))
-    end = End(control.position[:], control.unknown_for(lost), lost)
+    end = End(control.position[:], control.axes_of(lost), lost)
     control.go(ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, refusal=why))

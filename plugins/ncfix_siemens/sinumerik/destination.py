@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ncfix.control.builder import Arc
-from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of, rotated
+from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of
 from ncfix.control.faults import Fault
 from ncfix.control.motion import UnknownAxes
 from ncfix.control.moves import MotionKind
@@ -103,16 +103,16 @@ def destination(control: Sinumerik, words: BlockWordValues) -> End:
     """The command at which a motion of this block ends; refused where a word of X that is added would be a radius."""
     program = control.program_position()
     lost = dict(control.lost)
-    moved = set()
+    moved = 0
     if control.modal.incremental and control.modes.diameter == "DIAM90":
         words.refusal = words.refusal or RADIUS
     for letter in LETTERS:
         if letter in words.values:
             place(control, words, letter, program, lost)
-            moved.add(INDEX[letter])
+            moved |= 1 << INDEX[letter]
     if POLAR_WORDS & words.values.keys():
         moved |= polar(control, words, program, lost)
-    return End(command(control, program, moved), control.unknown_for(lost), lost)
+    return End(control.command(program, moved), control.axes_of(lost), lost)
 
 
 def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vector, lost: UnknownAxes) -> None:
@@ -126,8 +126,8 @@ def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vect
     if not incremental:
         control.check_offset()
         lost.pop(index, None)
-        if index in control.shaky:
-            lost[index] = control.shaky[index]
+        if index in control.composed.unknown:
+            lost[index] = control.composed.unknown[index]
     if value is None:
         lost[index] = RUNTIME
         return
@@ -161,23 +161,11 @@ def turned(form: str, here: float, angle: float, *, known: bool) -> float:
     return here + step if form == "acp" or step <= STILL else here + step - TURN
 
 
-def command(control: Sinumerik, program: Vector, moved: set[int]) -> Vector:
-    """The command of a point in the program's frame; axes that are not moved stay exactly where they are."""
-    inner = rotated(control.rotation, program) if control.is_rotated else program
-    result = [a + b for a, b in zip(inner, control.offset, strict=True)]
-    turning = moved & set(GEOMETRY)
-    for index in range(len(LETTERS)):
-        mixed = index in GEOMETRY and any(control.rotation[index][k] != 0.0 for k in turning)
-        if index not in moved and not mixed:
-            result[index] = control.position[index]
-    return result
-
-
 # -- polar coordinates ------------------------------------------------------------------------------------------------
 
 
-def polar(control: Sinumerik, words: BlockWordValues, program: Vector, lost: UnknownAxes) -> set[int]:
-    """Take AP and RP, about the pole, in the plane; the coordinates that they move."""
+def polar(control: Sinumerik, words: BlockWordValues, program: Vector, lost: UnknownAxes) -> int:
+    """Take AP and RP, about the pole, in the plane; the coordinates that they move, as bits."""
     plane, pole = control.modal.plane, control.modes.pole
     angle, radius = (polar_word(control, words, address) for address in ("AP", "RP"))
     why = doubtful_polar_word(control, words, program, radius)
@@ -185,12 +173,12 @@ def polar(control: Sinumerik, words: BlockWordValues, program: Vector, lost: Unk
     control.check_offset()
     if pole is None or angle is None or radius is None or why:
         lost |= dict.fromkeys((plane.first, plane.second), why or (RUNTIME if pole else NO_POLE))
-        return {plane.first, plane.second}
+        return mask_of((plane.first, plane.second))
     program[plane.first] = pole[0] + radius * math.cos(angle)
     program[plane.second] = pole[1] + radius * math.sin(angle)
     for index in (plane.first, plane.second):
         lost.pop(index, None)
-    return {plane.first, plane.second}
+    return mask_of((plane.first, plane.second))
 
 
 def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector, radius: float | None) -> str:
@@ -296,7 +284,7 @@ def place_at_machine(
         if why := unsteady(control, index, by_machine=True):
             unknown[index] = why
     else:
-        tool = 0.0 if control.tcp else control.offsets.tool[index]
+        tool = 0.0 if control.tcp else control.tools.vector[index]
         target[index] = tool + control.of_setup(letter) * control_unit(control, index) * (value or 0.0)
         unknown.pop(index, None)
     if value is None:

@@ -219,7 +219,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
             key = self.key_of(written[place]) if given else None
             if parameter.by_reference and key is not None:
                 results[parameter.name] = key
-        kept = (copy.copy(control.modal), copy.copy(control.modes), copy.copy(control.frames)) if unit.saves else None
+        kept = (copy.copy(control.modal), copy.copy(control.modes), control.frames) if unit.saves else None
 
         def leave() -> None:
             control.variables.scopes.pop()

@@ -6,10 +6,11 @@ Source: Siemens, "SINUMERIK 840D sl, NC programming": frames, CYCLE800, tool off
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from ncfix.control.coordinates import INCH, INDEX, PLANES, Vector, mask_of, zeros
 from ncfix.control.expressions import Unknown
-from ncfix_siemens.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
+from ncfix.control.frames import WORLD, ZEROS, Affine, mirrored, shifted, turned, turned_in
 from ncfix_siemens.sinumerik.destination import BlockWordValues
 from ncfix_siemens.sinumerik.increments import had_from_the_start
 from ncfix_siemens.sinumerik.state import RESET_OF_DIAMETER, Sinumerik
@@ -50,28 +51,22 @@ def programmable(control: Sinumerik, name: str, words: BlockWordValues) -> None:
         control.suspended["frame"] = fault
     elif name == kind:
         control.suspended.pop("frame", None)
-    frames = control.frames
-    before = frames.program if name != kind else WORLD
+    modes = control.modes
+    before = control.frames.programmable if name != kind else WORLD
     if name == kind:
         over_fine(control, name, words)
     elif name == "atrans":
-        plain = frames.added is not None and before.rotation == WORLD.rotation and before.scale == 1.0
-        frames.added = total(frames.added or WORLD.shift, frame.shift) if plain else None
-    frames.program = before.then(frame)
+        plain = modes.added is not None and before.rotation == WORLD.rotation and before.scale == 1.0
+        modes.added = Affine(modes.added or ZEROS).then(frame).shift if plain else None
+    control.frames = replace(control.frames, programmable=before.then(frame))
     control.refresh()
 
 
 def over_fine(control: Sinumerik, name: str, words: BlockWordValues) -> None:
     """A frame is programmed anew; whether what G59 has set goes with the one before is told in two ways."""
-    frames = control.frames
-    if frames.fine and axis_values(words):
+    if control.modes.fine and axis_values(words):
         control.suspended["frame"] = FINE_STAYS.format(name.upper())
-    frames.added, frames.fine = WORLD.shift, False
-
-
-def total(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, ...]:
-    """Two shifts as one."""
-    return tuple(a + b for a, b in zip(first, second, strict=True))
+    control.modes.added, control.modes.fine = ZEROS, False
 
 
 def translation(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
@@ -95,7 +90,7 @@ def scaling(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
     if not plain:
         return WORLD, ""
     if set(plain) >= {"X", "Y", "Z"} and len(set(plain.values())) == 1 and len(plain) == 3:
-        return scaled(plain["X"]), ""
+        return Affine(scale=plain["X"]), ""
     return WORLD, UNEQUAL.format("SCALE") + " is in force, which ncfix does not follow"
 
 
@@ -104,7 +99,7 @@ def mirroring(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
     letters = "".join(axis_values(words))
     if set(letters) - set("XYZ"):
         return WORLD, ROTARY_FRAME.format("mirroring (MIRROR)") + " is in force, which ncfix does not follow"
-    return mirrored(letters), ""
+    return Affine(rotation=mirrored(letters)), ""
 
 
 FRAMES: dict[str, Callable[[Sinumerik, BlockWordValues], tuple[Affine, str]]] = {
@@ -132,18 +127,17 @@ def programmed_shift(control: Sinumerik, words: BlockWordValues, code: int) -> N
     if any(value is None for value in words.values.values()):
         control.refusal = control.refusal or FRAME_AT_RUNTIME.format(f"G{code // 10}")
         return
-    frames = control.frames
-    shift, added = frames.program.shift, frames.added
+    frame, added = control.frames.programmable, control.modes.added
     if added is None:
         control.suspended["frame"] = MIXED_SHIFTS.format(code // 10)
         return
     if code == 590:
-        frames.added = with_shift(Affine(added), values).shift
-        values = {index: shift[index] - added[index] + value for index, value in values.items()}
-        frames.fine = True
+        control.modes.added = Affine(added).shifted_to(values).shift
+        values = {index: frame.shift[index] - added[index] + value for index, value in values.items()}
+        control.modes.fine = True
     else:
         values = {index: value + added[index] for index, value in values.items()}
-    frames.program = with_shift(frames.program, values)
+    control.frames = replace(control.frames, programmable=frame.shifted_to(values))
     control.refresh()
 
 
@@ -174,7 +168,7 @@ def mind_carried(control: Sinumerik) -> None:
     """The first motion after TRAORI or TRAFOOF: say it if the work offset has not been programmed anew."""
     frames, name = control.frames, control.modes.carried
     control.modes.carried = ""
-    if name and any(frames.settable.shift):
+    if name and any(frames.datum.shift):
         text = f"{frames.name} is taken to stay in force over {name}: where machine data take it out, nothing is right"
         control.warn(CARRIED, text, f"program {frames.name} anew after {name}")
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS
-from ncfix_siemens.sinumerik.affine import WORLD, Affine
+from ncfix.control.frames import WORLD, Affine
 
 if TYPE_CHECKING:
     from ncfix_siemens.sinumerik.state import Sinumerik
@@ -28,7 +28,7 @@ Footing = tuple[tuple[object, ...], tuple[object, ...]]
 
 def footings(control: Sinumerik, whole: Affine) -> list[Footing]:
     """The footing of every letter while these frames are in force."""
-    tool = control.offsets.tool
+    tool = control.tools.vector
     return [
         (frame_of(whole, index), (control.tcp, tuple(tool[:3])) if control.tcp and index < 3 else (tool[index],))
         for index in range(len(LETTERS))
@@ -40,7 +40,7 @@ def frame_of(whole: Affine, index: int) -> tuple[object, ...]:
     if index >= 3:
         return (whole.shift[index],)
     turned = whole.rotation != WORLD.rotation
-    return (whole.shift[:3] if turned else whole.shift[index], whole.rotation, whole.scale)
+    return (tuple(whole.shift[:3]) if turned else whole.shift[index], whole.rotation, whole.scale)
 
 
 def unsteady(control: Sinumerik, index: int, *, by_machine: bool = False) -> str:

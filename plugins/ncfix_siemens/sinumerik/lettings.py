@@ -48,7 +48,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
         lost = dict(control.lost) | dict.fromkeys(gone, AFTER_POSITIONING)
         control.go(
             ProgrammedMotion(
-                MotionKind.RAPID, still, End(control.position[:], control.unknown_for(lost), lost), 0, refusal=why
+                MotionKind.RAPID, still, End(control.position[:], control.axes_of(lost), lost), 0, refusal=why
             )
         )
     else:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ncfix_siemens.sinumerik.affine import WORLD, Affine
+from ncfix.control.frames import ZEROS
 
 if TYPE_CHECKING:
     from ncfix_siemens.sinumerik.cycles import Drilling
@@ -15,34 +16,12 @@ NO_SYSTEM = "G500"
 
 
 @dataclass(slots=True)
-class Frames:
-    """The chain of frames in force.
-
-    name      of the settable frame, G54 ... G599 or G500
-    settable  its shift
-    swivel    the plane of CYCLE800
-    program   TRANS, ROT, SCALE, MIRROR
-    added     what of its shift is the additive part (ATRANS, G59), mm and rad; None where nobody can say
-    fine      G59 has set that part
-    """
-
-    name: str = NO_SYSTEM
-    settable: Affine = WORLD
-    swivel: Affine = WORLD
-    program: Affine = WORLD
-    added: tuple[float, ...] | None = WORLD.shift
-    fine: bool = False
-
-    @property
-    def whole(self) -> Affine:
-        """All of them."""
-        return self.settable.then(self.swivel).then(self.program)
-
-
-@dataclass(slots=True)
 class Modes:
     """What is in force besides the modal state that all controls have.
 
+    added        what of the shift of the programmable frame is the additive part (ATRANS, G59), mm and rad; None where
+                 nobody can say
+    fine         G59 has set that part
     diameter     "", "DIAMON" or "DIAM90"
     said         the program or the setup has said whether X is a diameter
     pole         of polar coordinates in the frame of the program, mm; None until one is programmed
@@ -58,6 +37,8 @@ class Modes:
     angles       ORIEULER, ORIRPY or ORIRPY2, lower case: what A2 B2 C2 are
     """
 
+    added: Sequence[float] | None = ZEROS
+    fine: bool = False
     diameter: str = ""
     said: bool = False
     pole: tuple[float, float] | None = None

@@ -14,9 +14,9 @@ from functools import reduce
 from ncfix.control.coordinates import DEGREE, LETTERS, mask_of, product
 from ncfix.control.expressions import number
 from ncfix.control.faults import Fault
+from ncfix.control.frames import turned
 from ncfix.control.pointing import Triple, dot
 from ncfix.control.posture import postures
-from ncfix_siemens.sinumerik.affine import turned
 from ncfix_siemens.sinumerik.destination import BlockWordValues
 from ncfix_siemens.sinumerik.directions import NO_LENGTH
 from ncfix_siemens.sinumerik.state import Sinumerik

@@ -11,8 +11,9 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ncfix.control.coordinates import mask_of
 from ncfix.control.expressions import number
-from ncfix_siemens.sinumerik.destination import BlockWordValues, End, command
+from ncfix_siemens.sinumerik.destination import BlockWordValues, End
 
 if TYPE_CHECKING:
     from ncfix_siemens.sinumerik.plans import Calling
@@ -80,9 +81,9 @@ def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float,
 def lead_to(control: Sinumerik, block: int, point: tuple[float, float], name: str) -> tuple[BlockWordValues, End, str]:
     """The words that lead to a place, where that is, and why its hole is not corrected."""
     plane, program, lost = control.modal.plane, control.program_position(), dict(control.lost)
-    moved = {plane.first, plane.second}
+    axes = mask_of((plane.first, plane.second))
     for index, value in zip((plane.first, plane.second), point, strict=True):
         program[index] = control.stretch * value
         lost.pop(index, None)
-    end = End(command(control, program, moved), control.unknown_for(lost), lost)
-    return BlockWordValues(block, {}, {}, 1 << plane.first | 1 << plane.second), end, WRITE_OUT.format(name)
+    end = End(control.command(program, axes), control.axes_of(lost), lost)
+    return BlockWordValues(block, {}, {}, axes), end, WRITE_OUT.format(name)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,10 +25,10 @@ from ncfix.control.coordinates import (
     Y,
     Z,
     mask_of,
-    transposed,
     zeros,
 )
 from ncfix.control.expressions import Unknown, Value
+from ncfix.control.frames import FrameStack, shifted
 from ncfix.control.modal import Modal
 from ncfix.control.motion import AT_START, Motion, UnknownAxes
 from ncfix.control.moves import MotionKind, Rule
@@ -38,9 +39,8 @@ from ncfix.control.turns import Winding, watch
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_siemens.sinumerik import heading
-from ncfix_siemens.sinumerik.affine import WORLD, shifted
 from ncfix_siemens.sinumerik.increments import Footing, footings, stand
-from ncfix_siemens.sinumerik.modes import Frames, Modes, Named
+from ncfix_siemens.sinumerik.modes import NO_SYSTEM, Modes, Named
 from ncfix_siemens.sinumerik.variables import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.vocabulary import MOTIONS, PATH_WORDS, TURNING
 
@@ -79,9 +79,11 @@ class Sinumerik(ProgramControl):
     heading     in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
     """
 
+    frame_order = ("datum", "plane", "programmable")
+
     def __init__(self, run: Run, dialect: Dialect) -> None:
         super().__init__(run, dialect)
-        self.frames = Frames()
+        self.frames = replace(self.frames, name=NO_SYSTEM)
         self.modes = Modes()
         self.lost: UnknownAxes = {}
         self.over: tuple[int, ...] = ()
@@ -115,29 +117,18 @@ class Sinumerik(ProgramControl):
     # -- frames -------------------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Compose the frames; to be called after any of them, the unit, the tool or the diameter mode has changed."""
-        whole = self.frames.whole
+        """As of every control; coordinates that are not known are kept along the axes of the program's frame."""
         before = self.rotation
-        tool = zeros() if self.tcp else self.offsets.tool
-        self.offset: Vector = [a + b for a, b in zip(whole.shift, tool, strict=True)]
-        self.rotation = whole.rotation
-        self.is_rotated = self.rotation != WORLD.rotation
-        self.inverse = transposed(self.rotation)
-        self.stretch = self.modal.unit * whole.scale
-        self.scale = [DEGREE if turning else self.stretch for turning in self.rotary]
-        if self.modal.diameter:
-            self.scale[0] /= 2
-        self._frame = -1
-        self.footing = footings(self, whole)
+        super().refresh()
+        self.footing = footings(self, self.composed)
         if self.rotation != before:
             self.hide_in_turned_frame()
-        self.places.watch(self.anchors(), self.rotation)
 
     def anchors(self) -> list[Hashable]:
         """As for all controls, but shifts of the programmable frame (TRANS) are stated by the program."""
-        frames, tool = self.frames, zeros() if self.tcp else self.offsets.tool
+        frames, tool = self.frames, zeros() if self.tcp else self.tools.vector
         return [
-            (frames.name, frames.settable.shift[i], frames.swivel.shift[i], tool[i], self.spatial_anchor(i))
+            (frames.name, frames.datum.shift[i], frames.plane.shift[i], tool[i], self.spatial_anchor(i))
             for i in range(len(LETTERS))
         ]
 
@@ -156,32 +147,21 @@ class Sinumerik(ProgramControl):
         else:
             self.lost = mine | {index: self.unknown[index] for index in hidden}
 
-    @property
-    def frame(self) -> int:
-        """The index of the frame that is in force."""
-        if self._frame < 0:
-            self._frame = self.builder.frame(self.offset, self.rotation, self.stretch, self.modal.diameter)
-        return self._frame
-
-    def unit_of(self, index: int) -> float:
-        """mm or rad per program unit of an axis, X not as a diameter."""
-        return DEGREE if self.rotary[index] else self.stretch
-
     def select(self, name: str) -> None:
         """A settable frame comes into force."""
-        self.frames.name = name
         given = self.setup.work_offsets.get(name, {})
         stored = {INDEX[letter]: value * self.of_setup(letter) for letter, value in given.items()}
-        self.frames.settable = shifted(stored)
+        unknown = dict(self.frames.datum.unknown)
         for index, letter in enumerate(LETTERS):
             key = f"$p_uifr_{name.lower()}", (float(index),)
             value = self.variables.shared.get(key, 0.0)
             if key in self.variables.shared:
                 self.places.shift(1 << index)
             if isinstance(value, Unknown) and index in self.machine:
-                self.shaky[index] = RUNTIME_OFFSET
+                unknown[index] = RUNTIME_OFFSET
             elif letter in given:
-                self.shaky.pop(index, None)
+                unknown.pop(index, None)
+        self.frames = replace(self.frames, name=name, datum=replace(shifted(stored), unknown=unknown))
         self.offset_checked = False
         self.refresh()
 
@@ -197,7 +177,7 @@ class Sinumerik(ProgramControl):
         if self.frames.name not in self.setup.work_offsets:
             self.knowledge.work_offset(self.frames.name)
 
-    def restore(self, modal: Modal, modes: Modes, frames: Frames) -> None:
+    def restore(self, modal: Modal, modes: Modes, frames: FrameStack) -> None:
         """Bring back what was in force before a subprogram that says SAVE."""
         motion, straight, feed = self.modal.motion, self.modal.straight, self.modal.feed
         self.modal, self.frames = modal, frames
@@ -212,13 +192,13 @@ class Sinumerik(ProgramControl):
     def switch_tcp(self, tool: Vector | None = None) -> None:
         """Take TRAORI, a swivelled plane or another tool into force: the machine stands still, its tip may not."""
         on = self.setup.tcp or self.modes.transformed or self.modes.swivelled
-        new = self.offsets.tool if tool is None else tool
+        new = self.tools.vector if tool is None else tool
         if on or self.tcp:
             known = dict(self.unknown)
             switch(self, new, on)
             self.lost |= {index: why for index, why in self.unknown.items() if index not in known}
         self.tcp = on
-        self.offsets.tool = new
+        self.tools.vector = new
         self.refresh()
 
     # -- what is known ------------------------------------------------------------------------------------------------
@@ -259,17 +239,6 @@ class Sinumerik(ProgramControl):
     def forget_settled(self) -> None:
         """Coordinates whose start position has been asked for are known."""
         self.lost = {index: why for index, why in self.lost.items() if why is not AT_START or index in self.unknown}
-
-    def unknown_for(self, lost: UnknownAxes) -> UnknownAxes:
-        """Which axes are not known where these coordinates of the program's frame are not."""
-        if not lost:
-            return {}
-        unknown = {index: why for index, why in lost.items() if index not in GEOMETRY}
-        for index in GEOMETRY:
-            mixed = [k for k in GEOMETRY if self.rotation[index][k] != 0.0 and k in lost]
-            if mixed and index in self.machine:
-                unknown[index] = lost[mixed[0]]
-        return unknown
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
@@ -380,7 +349,7 @@ class Sinumerik(ProgramControl):
         With D0 a transformation leads the point where a tool of no length has its tip.
         """
         if self.tools.offset is not None:
-            return self.tools.offset, self.offsets.tool[2]
+            return self.tools.offset, self.tools.vector[2]
         if self.tcp:
             return self.tools.spindle, 0.0
         known = self.given_length(self.tools.spindle)

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from ncfix.control.coordinates import INDEX
 from ncfix.control.expressions import Evaluate, number
 from ncfix.control.faults import Fault
+from ncfix.control.frames import WORLD
 from ncfix.text.tree import Expression, FunctionCall, NamedParameter
 from ncfix_siemens.sinumerik import framing, motion
-from ncfix_siemens.sinumerik.affine import WORLD
 from ncfix_siemens.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
 from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import BlockWordValues, set_pole
@@ -171,7 +171,7 @@ def tolerance(control: Sinumerik, step: Calling) -> None:
 
 def mind_frame(control: Sinumerik, step: Calling) -> None:
     """A programmed frame is in force while a transformation goes on or off: machine data say whether it stays."""
-    if control.frames.program != WORLD and control.variables.value(FRAMES_STAY) != 1.0:
+    if control.frames.programmable != WORLD and control.variables.value(FRAMES_STAY) != 1.0:
         control.suspended["frame"] = FRAME_OVER.format(step.name.upper())
     control.modes.carried = step.name.upper()
 

@@ -10,17 +10,16 @@ Source: Siemens, "SINUMERIK Operate, milling": CYCLE800, external programming (_
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-import numpy as np
-
-from ncfix.control.coordinates import X, Y, Z, as_rotation, mask_of
+from ncfix.control.coordinates import X, Y, Z, mask_of
 from ncfix.control.expressions import number
+from ncfix.control.frames import WORLD, Affine, projected, shifted, turned
 from ncfix.control.moves import MotionKind
 from ncfix.control.passing import Pass, Passing
 from ncfix.control.posture import WayRules, normal_of, postures
 from ncfix.control.tcp import rotary_at_zero
 from ncfix.text.tree import StringLiteral
-from ncfix_siemens.sinumerik.affine import WORLD, Affine, shifted, turned
 from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.orientation import WAY
 from ncfix_siemens.sinumerik.plans import Calling, plain_text
@@ -32,7 +31,6 @@ ORDER = {1: "X", 2: "Y", 3: "Z"}
 AXIS_BY_AXIS, SOLID, PROJECTED = 0, 1, 2
 """The kinds of angles in its bits 6 and 7."""
 
-FLAT = 1e-9
 DESELECTED = "0"
 """The name of a swivel data set with which swivelling is deselected; the rotary axes stand where they stand."""
 
@@ -52,7 +50,7 @@ AFTER_SWIVEL = "where the axis {} stands after swivelling (CYCLE800) is not foll
 def swivel(control: Sinumerik, block: int, step: Calling) -> None:
     """CYCLE800: without arguments it takes the tilt away, with them it tilts the plane."""
     control.suspended.pop("tilt", None)
-    if control.frames.program != WORLD:
+    if control.frames.programmable != WORLD:
         control.suspended["frame"] = OVER_FRAME
     if all(part is None or isinstance(part, StringLiteral) for part in step.written):
         untilted(control)
@@ -121,39 +119,21 @@ def turn_of(mode: int, angles: Sequence[float]) -> Affine | None:
     by_axis = dict(zip(order, angles, strict=False))
     if kind == AXIS_BY_AXIS:
         return turned(by_axis, order)
-    return projected(by_axis) if order.endswith("Z") else None
-
-
-def projected(angles: dict[str, float]) -> Affine | None:
-    """The new X lies in the old plane ZX, turned by the angle about Y; the plane cuts YZ at the angle about X; then it
-    turns about the new Z. None where the two lines do not span a plane.
-    """
-    x, trace = np.array(column(turned(angles, "Y"), 0)), np.array(column(turned(angles, "X"), 1))
-    normal = np.cross(x, trace)
-    size = float(np.linalg.norm(normal))
-    if size < FLAT:
-        return None
-    normal /= size
-    frame = np.stack([x, np.cross(normal, x), normal], axis=-1)
-    return Affine(rotation=as_rotation(frame.tolist())).then(turned(angles, "Z"))
-
-
-def column(frame: Affine, axis: int) -> list[float]:
-    """Where an axis of the frame points."""
-    return [row[axis] for row in frame.rotation]
+    plane = projected(by_axis["Y"], by_axis["X"], by_axis["Z"]) if order.endswith("Z") else None
+    return None if plane is None else Affine(rotation=plane)
 
 
 def untilted(control: Sinumerik) -> None:
     """Out of the tilted plane; the rotary axes stand where they stood."""
-    control.frames.swivel = WORLD
+    control.frames = replace(control.frames, plane=WORLD)
     control.modes.swivelled = False
     control.switch_tcp()
 
 
 def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
     """Into a tilted plane: the frame, then the turn of the rotary axes."""
-    control.frames.swivel = control.frames.swivel.then(plane.frame) if plane.adds else plane.frame
-    control.frames.program = WORLD
+    whole = control.frames.plane.then(plane.frame) if plane.adds else plane.frame
+    control.frames = replace(control.frames, plane=whole, programmable=WORLD)
     control.modes.swivelled = True
     control.switch_tcp()
     axes = turn_square(control, plane)
@@ -165,7 +145,7 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
     lost = dict(control.lost) | dict.fromkeys(gone, AFTER_SWIVEL)
     lost = {index: why for index, why in lost.items() if index not in axes}
     mask = mask_of(control.turning)
-    end = End(target, control.unknown_for(lost), lost)
+    end = End(target, control.axes_of(lost), lost)
     control.go(
         ProgrammedMotion(
             MotionKind.RAPID, BlockWordValues(block, {}, {}, mask), end, control.modal.motion, passing=SWIVEL
@@ -176,12 +156,12 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
 def level(control: Sinumerik, plane: SwivelPlane) -> None:
     """A plane that is not turned, while the rotary axes stand still: as they stand, the tool has to be square to it."""
     control.settle(control.turning)
-    whole = control.frames.swivel.then(plane.frame) if plane.adds else plane.frame
+    whole = control.frames.plane.then(plane.frame) if plane.adds else plane.frame
     if whole.rotation != WORLD.rotation or not rotary_at_zero(control, control.position, control.unknown):
         control.suspended["tilt"] = UNFOLLOWED.format(STILL)
         control.lose_all(AFTER_SWIVEL)
         return
-    control.frames.swivel, control.frames.program = whole, WORLD
+    control.frames = replace(control.frames, plane=whole, programmable=WORLD)
     control.modes.swivelled = True
     control.switch_tcp()
     if plane.retracts:

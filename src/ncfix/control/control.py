@@ -19,7 +19,6 @@ from ncfix.control.passing import Pass, Passing, may_pass
 from ncfix.control.pointing import Pointing
 from ncfix.control.posture import MachineDirections, pointing_of
 from ncfix.control.standing import ControlState
-from ncfix.control.tcp import along_frame, lost_in_frame
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
@@ -160,7 +159,7 @@ class ProgramControl(ControlState):
         """The index of the frame that is in force."""
         if self._frame < 0:
             self._frame = self.builder.frame(
-                self.offset, self.rotation, self.modal.unit, self.modal.diameter, self.increments
+                self.offset, self.rotation, self.stretch, self.modal.diameter, self.increments
             )
         return self._frame
 
@@ -168,8 +167,8 @@ class ProgramControl(ControlState):
         """Make a motion, and keep the book of what is known behind it. All motions that come singly come by here."""
         if not motion.passing:
             self._ask_for_start(motion)
-        if self.shaky:
-            self.places.lose(mask_of(self.shaky))
+        if self.composed.unknown:
+            self.places.lose(mask_of(self.composed.unknown))
         settles = self._settles(motion)
         adrift = self._adrift(settles) | self.still_beside(motion.axes)
         self._note_increments(motion, settles)
@@ -227,7 +226,7 @@ class ProgramControl(ControlState):
         """What is not known at the end of a motion, along the axes of the program's frame."""
         if self.saying is not None and self.saying[0] is motion.unknown:
             return self.saying[1]
-        return lost_in_frame(self) if motion.kind == MotionKind.DWELL else along_frame(self, motion.unknown)
+        return self.lost_in_frame() if motion.kind == MotionKind.DWELL else self.along_frame(motion.unknown)
 
     def ends_in_hole(self, motion: Motion) -> bool:
         """Whether there is a hole where the motion ends: then it matters where that is, as in a cut."""
@@ -243,7 +242,7 @@ class ProgramControl(ControlState):
         """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
         if not rapid.unknown or rapid.kind != MotionKind.RAPID or rapid.refusal or self.refusal or self.suspended:
             return False
-        before = {*self.unknown.values(), *lost_in_frame(self).values()}
+        before = {*self.unknown.values(), *self.lost_in_frame().values()}
         return leaves_unknown(rapid, before, self._lost_at_end(rapid))
 
     def _adrift(self, settled: int) -> int:

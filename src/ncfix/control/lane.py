@@ -80,7 +80,7 @@ def is_open(control: ProgramControl, unit: LaneText, block: int) -> bool:
     modal = control.modal
     lane = unit.plan(block).lane
     begun = modal.motion in (0, 10) or (lane is not None and (lane.motion >= 0 or lane.turns))
-    known = not (control.unknown or control.shaky or control.is_rotated)
+    known = not (control.unknown or control.composed.unknown or control.is_rotated)
     return begun and known and (modal.incremental or control.offset_checked)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from ncfix.control.coordinates import IDENTITY, PLANES, Plane, Rotation, Vector, zeros
+from ncfix.control.coordinates import PLANES, Plane, Vector, zeros
 
 NO_MOTION = 800
 """G80: no motion code is in force; the state at the start of a program."""
@@ -79,29 +79,10 @@ class Saved:
 
 
 @dataclass(slots=True)
-class Offsets:
-    """What lies between a program's numbers and commands, mm and rad, each a position in the order of `LETTERS`.
-
-    `command = origin + tool + turn @ (shift + local + feature + centre + rotation @ (program - centre))`, `turn` that
-    of the work offset (G10 R), `shift` that of G92, `local` that of G52 where it is another, `rotation` that of G68, or
-    of the tilted plane (G68.2) whose origin is `feature`. `doubtful`: letters whose `local` is known at run time only.
-    """
-
-    origin: Vector = field(default_factory=zeros)
-    turn: Rotation = IDENTITY
-    shift: Vector = field(default_factory=zeros)
-    local: Vector = field(default_factory=zeros)
-    doubtful: frozenset[int] = frozenset()
-    tool: Vector = field(default_factory=zeros)
-    centre: Vector = field(default_factory=zeros)
-    feature: Vector = field(default_factory=zeros)
-    rotation: Rotation = IDENTITY
-
-
-@dataclass(slots=True)
 class Tools:
     """Tool numbers: prepared with T, in the spindle, and of the length offset in force.
 
+    vector    the length offset in force, mm along each axis (rad)
     register  the number by which contours get their radius (D), where that is not the tool's
     cutter    the radius by which contours are offset, mm, where the program says it; NaN where it does not
     lengths   lengths that the program has set (G10 L1), mm
@@ -111,6 +92,7 @@ class Tools:
     selected: int = 0
     spindle: int = 0
     offset: int | None = None
+    vector: Vector = field(default_factory=zeros)
     register: int | None = None
     cutter: float = math.nan
     lengths: dict[int, float] = field(default_factory=dict)

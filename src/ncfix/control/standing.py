@@ -15,14 +15,17 @@ from ncfix.control.coordinates import (
     Places,
     Rotation,
     Vector,
+    X,
+    Y,
     Z,
     dot,
-    product,
+    mask_of,
     rotated,
     transposed,
     zeros,
 )
-from ncfix.control.modal import Modal, Offsets, Tools
+from ncfix.control.frames import WORLD, FrameStack
+from ncfix.control.modal import Modal, Tools
 from ncfix.control.motion import AT_START, UnknownAxes
 from ncfix.control.setup import Knowledge
 from ncfix.diagnostics import Message, Place
@@ -31,6 +34,8 @@ from ncfix.text.language import Run
 from ncfix.text.reach import Deletable
 
 BLOCK_DELETE = "NCF235"
+XYZ = (X, Y, Z)
+SPATIAL = 1 << X | 1 << Y | 1 << Z
 
 
 def named_switches(switches: Collection[int]) -> str:
@@ -38,15 +43,27 @@ def named_switches(switches: Collection[int]) -> str:
     return " ".join(f"/{number}" for number in sorted(switches))
 
 
+def mixed_into(unknown: UnknownAxes, rotation: Rotation) -> UnknownAxes:
+    """What is not known of turned axes, each of which is made of those in its row: of one of them it is enough."""
+    mixed = {index: why for index, why in unknown.items() if index > Z}
+    for index in XYZ:
+        why = next((unknown[k] for k in XYZ if rotation[index][k] != 0.0 and k in unknown), None)
+        if why is not None:
+            mixed[index] = why
+    return mixed
+
+
 class ControlState(ABC):
     """Where the axes stand, in commands and in the coordinates of the program.
 
     machine    letter indices of the machine's axes, in the order of its columns
     rotary     for each letter whether it turns; `turning`: the letter indices of the machine's rotary axes
-    modal      what is in force of modal codes; `offsets` and `tools` likewise
+    modal      what is in force of modal codes; `tools` likewise
+    frames     the frames in force, in `frame_order`; `composed`: all of them as one
+    offset     what is added to the numbers of the program, turned and scaled: that of `composed`, and the tool length
+    stretch    mm per program unit of length in the frames in force
     position   the command of every letter, mm and rad; a nominal value where `unknown` has the letter's index
     unknown    letter index -> why the position is not known
-    shaky      letter index -> why the offset of the letter is not known
     said       what is not known along the axes of a turned frame, where its words have said more than the machine's
                axes alone tell; None: they tell all. `saying`: what of the machine's axes is not known where the words
                of this block lead, and with it the same along those of the frame
@@ -61,6 +78,8 @@ class ControlState(ABC):
                axes that may roll over, which come behind them
     """
 
+    frame_order: tuple[str, ...] = ("datum",)
+
     def __init__(self, run: Run, dialect: Dialect) -> None:
         self.setup = run.setup
         self.kinematics = run.kinematics
@@ -71,7 +90,8 @@ class ControlState(ABC):
         )
         self.turning = tuple(index for index in self.machine if self.rotary[index])
         self.modal = Modal()
-        self.offsets = Offsets()
+        self.frames = FrameStack(self.frame_order)
+        self.composed = WORLD
         self.tools = Tools()
         self.knowledge = Knowledge(run.setup, self.place)
         self.messages: dict[str, Message] = {}
@@ -82,7 +102,6 @@ class ControlState(ABC):
         self.tcp = run.setup.tcp
         self.said: UnknownAxes | None = None
         self.saying: tuple[UnknownAxes, UnknownAxes] | None = None
-        self.shaky: UnknownAxes = {}
         self.locate: Callable[[], Place] = lambda: Place("")
         self.offset_checked = False
         self._frame = -1
@@ -126,25 +145,17 @@ class ControlState(ABC):
     # -- frames -------------------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Compose the offsets; to be called after any of them, the unit or the diameter mode has changed."""
-        offsets = self.offsets
-        centre = offsets.centre
-        if offsets.rotation is not IDENTITY:
-            turned = rotated(offsets.rotation, centre)
-            parts = zip(offsets.shift, offsets.local, centre, turned, offsets.feature, strict=True)
-            inner = [shift + own + c - t + f for shift, own, c, t, f in parts]
-        else:
-            shifts = zip(offsets.shift, offsets.local, offsets.feature, strict=True)
-            inner = [shift + own + f for shift, own, f in shifts]
-        outer = inner if offsets.turn is IDENTITY else rotated(offsets.turn, inner)
-        tool = zeros() if self.tcp else offsets.tool
-        self.offset: Vector = [a + b + c for a, b, c in zip(offsets.origin, outer, tool, strict=True)]
-        before, self.rotation = self.rotation, product(offsets.turn, offsets.rotation)
-        if self.rotation != before:
+        """Compose the frames; to be called after any of them, the tool, the unit or the diameter mode has changed."""
+        whole = self.composed = self.frames.whole
+        tool = zeros() if self.tcp else self.tools.vector
+        self.offset: Vector = [a + b for a, b in zip(whole.shift, tool, strict=True)]
+        if self.rotation != whole.rotation:
             self.said = None
+        self.rotation = whole.rotation
         self.is_rotated = self.rotation != IDENTITY
         self.inverse = transposed(self.rotation)
-        self.scale = [DEGREE if turning else self.modal.unit for turning in self.rotary]
+        self.stretch = self.modal.unit * whole.scale
+        self.scale = [DEGREE if turning else self.stretch for turning in self.rotary]
         if self.modal.diameter:
             self.scale[0] /= 2
         self._frame = -1
@@ -169,9 +180,20 @@ class ControlState(ABC):
             return step
         return [dot(row, step) for row in self.inverse] + step[3:]
 
+    def command(self, program: Vector, axes: int) -> Vector:
+        """The command of a position in the program's frame; axes that no word of `axes` moves stay where they are.
+
+        axes  bits of the axes of the frame that have a word
+        """
+        if self.is_rotated:
+            program, turned = rotated(self.rotation, program), axes & SPATIAL
+            axes |= mask_of(i for i, row in enumerate(self.rotation) if mask_of(k for k in XYZ if row[k]) & turned)
+        places = enumerate(zip(program, self.offset, self.position, strict=True))
+        return [value + offset if axes >> index & 1 else here for index, (value, offset, here) in places]
+
     def unit_of(self, index: int) -> float:
         """mm or rad per program unit of an axis, X not as a diameter."""
-        return DEGREE if self.rotary[index] else self.modal.unit
+        return DEGREE if self.rotary[index] else self.stretch
 
     # -- what is known ------------------------------------------------------------------------------------------------
 
@@ -189,6 +211,21 @@ class ControlState(ABC):
             if index in self.machine:
                 self.unknown[index] = reason
 
+    def lost_in_frame(self) -> UnknownAxes:
+        """What is not known along the axes of the program's frame."""
+        if self.said is not None and self.unknown:
+            return self.said
+        return self.along_frame(self.unknown)
+
+    def along_frame(self, unknown: UnknownAxes) -> UnknownAxes:
+        """The axes of the program's frame that have a part in one of these of the machine."""
+        return mixed_into(unknown, self.inverse) if unknown and self.is_rotated else unknown
+
+    def axes_of(self, lost: UnknownAxes) -> UnknownAxes:
+        """Which axes of the machine are not known where this is not known along those of the program's frame."""
+        mixed = mixed_into(lost, self.rotation) if lost and self.is_rotated else lost
+        return {index: why for index, why in mixed.items() if index in self.machine}
+
     def stands_square(self) -> bool:
         """Whether the tool is known to lie along Z of a tilted plane that is in force."""
         return False
@@ -196,7 +233,7 @@ class ControlState(ABC):
     def tool_length(self) -> tuple[int, float]:
         """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
         if self.tools.offset is not None:
-            return self.tools.offset, self.offsets.tool[2]
+            return self.tools.offset, self.tools.vector[2]
         known = self.tools.lengths.get(self.tools.spindle, self.knowledge.known_tool_length(self.tools.spindle))
         return self.tools.spindle, math.nan if known is None else known
 

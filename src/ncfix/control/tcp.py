@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.coordinates import Rotation, Vector, X, Y, Z
+from ncfix.control.coordinates import Vector, X, Y, Z
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def rotary_at_zero(control: ProgramControl, position: Vector, unknown: UnknownAx
 
 def from_machine(control: ProgramControl, target: Vector, unknown: UnknownAxes) -> None:
     """Make a position of the axes one of tool-centre-point control, in place."""
-    if not converted(control, target, unknown, TcpState(False, 0.0), TcpState(True, control.offsets.tool[Z])):
+    if not converted(control, target, unknown, TcpState(False, 0.0), TcpState(True, control.tools.vector[Z])):
         unknown |= {index: TURNED for index in (X, Y, Z) if index in control.machine}
 
 
@@ -53,40 +53,13 @@ def converted(
     return True
 
 
-def lost_in_frame(control: ProgramControl) -> UnknownAxes:
-    """What is not known along the axes of the program's frame."""
-    if control.said is not None and control.unknown:
-        return control.said
-    return along_frame(control, control.unknown)
-
-
-def along_frame(control: ProgramControl, unknown: UnknownAxes) -> UnknownAxes:
-    """The axes of the program's frame that have a part in one of these of the machine."""
-    return mixed_into(unknown, control.inverse) if unknown and control.is_rotated else unknown
-
-
-def lost_of_axes(control: ProgramControl, lost: UnknownAxes) -> UnknownAxes:
-    """Which axes of the machine are not known where this is not known along those of the program's frame."""
-    return {index: why for index, why in mixed_into(lost, control.rotation).items() if index in control.machine}
-
-
-def mixed_into(unknown: UnknownAxes, rotation: Rotation) -> UnknownAxes:
-    """What is not known of turned axes, each of which is made of those in its row: of one of them it is enough."""
-    mixed = {index: why for index, why in unknown.items() if index > Z}
-    for index in (X, Y, Z):
-        why = next((unknown[k] for k in (X, Y, Z) if rotation[index][k] != 0.0 and k in unknown), None)
-        if why is not None:
-            mixed[index] = why
-    return mixed
-
-
 def switch(control: ProgramControl, tool: Vector, on: bool) -> None:
     """Another tool length, and tool-centre-point control on or off: the machine stands still, the tip may not.
 
     Where the tool lies along Z of a tilted plane, another length moves the tip along that only.
     """
-    lost = {**lost_in_frame(control), Z: TURNED} if on and control.tcp and control.stands_square() else None
-    before = TcpState(control.tcp, control.offsets.tool[Z])
+    lost = {**control.lost_in_frame(), Z: TURNED} if on and control.tcp and control.stands_square() else None
+    before = TcpState(control.tcp, control.tools.vector[Z])
     after = TcpState(on, tool[Z])
     if (before.shift != after.shift or control.tcp != on) and not converted(
         control, control.position, control.unknown, before, after
