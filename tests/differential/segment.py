@@ -81,7 +81,7 @@ class _Matcher:
     def run(self) -> Segments:
         k = 0
         while k < len(self.original):
-            if int(self.original.mode[k]) in CYCLES:
+            if int(self.original.mode[k]) in CYCLES and not self.by_rule[k]:  # G28 leaves the mode as it is
                 k = self.block(k, Fate.CYCLE)
             elif self.original.side[k] in (410, 420):
                 k = self.block(k, Fate.CONTOUR)

@@ -21,7 +21,7 @@ from differential.errors import LETTERS, Machine
 from differential.generated import MACHINES, SETUP, terms_of
 from differential.judge import judge
 
-COUNT = int(os.environ.get("NCFIX_STATEMENTS", "12"))
+COUNT = int(os.environ.get("NCFIX_STATEMENTS", "8"))
 SEED = int(os.environ.get("NCFIX_STATEMENTS_SEED", "1"))
 BY_LINUXCNC = [family for family in FAMILIES if family.dialect in ("linuxcnc", "iso")]
 BY_SECOND_CONTROLS = [family for family in FAMILIES if family not in BY_LINUXCNC]
