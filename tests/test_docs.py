@@ -18,9 +18,6 @@ from ncfix.control.setup_file import loads
 
 DOCUMENTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "docs/guide/*.md", "examples/stories/*/*.md")
 
-COLUMN = 72
-"""Where README.md says at the latest what a command does."""
-
 LINK = re.compile(r"\[[^]]*\]\(([^)#\s]*)(#[^)\s]*)?\)")
 
 
@@ -64,21 +61,31 @@ def test_every_verb_and_option_has_help(verb: str) -> None:
             assert parameter.help, parameter.opts
 
 
-def shown_commands(root: Path) -> Iterator[list[str]]:
-    """The command lines of README.md, as arguments; what they do stands behind them in a column of its own."""
-    lines = [line for line in (root / "README.md").read_text().splitlines() if line.startswith("    ncfix ")]
-    for line in lines:
-        command, *said = re.split(r"\s{2,}", line.strip())
-        yield shlex.split(command if said else line[:COLUMN])[1:]
+def shown_commands(page: Path) -> Iterator[list[str]]:
+    """The command lines of a page, as arguments; what they do stands two blanks behind them.
+
+    Patterns, as `ncfix VERB ...`, are none.
+    """
+    text = re.sub(r"\\\n\s*", "", page.read_text())
+    for line in re.findall(r"^    (ncfix .*)", text, re.MULTILINE):
+        command = re.split(r"\s{2,}", line)[0]
+        if not re.search(r"\[|\.\.\.", command):
+            yield shlex.split(command)[1:]
 
 
-def test_the_commands_of_the_readme_are_understood(root: Path) -> None:
-    found = list(shown_commands(root))
-    assert len(found) >= 10
+@pytest.mark.parametrize(
+    ("pages", "fewest"), [("README.md", 12), ("docs/*.md", 8), ("docs/guide/*.md", 1), ("examples/stories/*/*.md", 3)]
+)
+def test_the_commands_of_the_documents_are_understood(root: Path, pages: str, fewest: int) -> None:
+    found = [command for page in sorted(root.glob(pages)) for command in shown_commands(page)]
+    assert len(found) >= fewest
     context = click.Context(cli, info_name="ncfix")
     for verb, *arguments in found:
         command = cli.get_command(context, verb)
         assert command is not None, verb
+        if isinstance(command, click.Group):
+            verb, *arguments = arguments
+            command = command.commands[verb]
         command.make_context(verb, arguments, parent=context)
 
 
