@@ -22,7 +22,7 @@ from ncfix.text.spelling import NumberStyle
 from ncfix.text.tree import Program
 from ncfix.text.writer import Edit, Splices, apply, spliced
 from ncfix.writer import bulk
-from ncfix.writer.bulk import Stretch
+from ncfix.writer.bulk import WrittenStretch
 from ncfix.writer.bulk_arcs import CentreWords
 from ncfix.writer.emit import Emission, emit
 from ncfix.writer.pieces import Pieces
@@ -149,7 +149,7 @@ def test_long_stretches(modal: bool) -> None:
         lines.append(" ".join(["N1", "G1", *(word for word in words if not modal or rng.random() < 0.6), "F100."]))
     program, moves = followed("\n".join(["G90 G21 G94", *lines, "M2\n"]).encode())
     pieces = moved(moves, 3, 0.01)
-    with mock.patch.object(Stretch, "splices", autospec=True, side_effect=Stretch.splices) as written:
+    with mock.patch.object(WrittenStretch, "splices", autospec=True, side_effect=WrittenStretch.splices) as written:
         emit(program, moves, pieces, STEPS)
     assert sum(len(call.args[0].block) for call in written.call_args_list) > 1500
     assert_same(program, moves, pieces)

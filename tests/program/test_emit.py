@@ -8,9 +8,9 @@ from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.text.reader import read
 from ncfix.text.writer import apply
+from ncfix.writer.block import NO_TIME
 from ncfix.writer.emit import SEVERAL_STATES, emit
 from ncfix.writer.pieces import Pieces
-from ncfix.writer.render import NO_TIME
 
 AXES = ("X", "Y", "Z")
 STEP = np.full(3, 0.001)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ncfix.text.spelling import NumberStyle, decimals_for
+from ncfix.text.spelling import NumberStyle, Spelling, decimals_for, value_of
 
 
 @pytest.mark.parametrize(
@@ -31,6 +31,37 @@ from ncfix.text.spelling import NumberStyle, decimals_for
 )
 def test_a_value_is_written_in_the_style_of_the_number_it_replaces(written, value, decimals, expected):
     assert NumberStyle.of(written).write(value, decimals) == expected
+
+
+KLARTEXT = Spelling(signed=True, comma=True, point=False, trimmed=False)
+
+
+@pytest.mark.parametrize(
+    ("spelling", "value", "new", "short", "instead"),
+    [
+        (Spelling(), 12.34, "12.3400", "12.34", "12.34"),
+        (Spelling(), -12.0, "-12.0000", "-12.", "-12."),
+        (Spelling(point=False), -1e-9, "-0.0000", "0", "0"),
+        (KLARTEXT, 12.34, "+12,3400", "+12,34", "+12,3400"),
+        (KLARTEXT, -1e-9, "+0,0000", "+0", "+0,0000"),
+    ],
+)
+def test_a_control_spells_new_numbers_in_its_own_way(spelling, value, new, short, instead):
+    assert (spelling.number(value, 4), spelling.short(value, 4), spelling.instead(value, 4)) == (new, short, instead)
+
+
+@pytest.mark.parametrize(
+    ("spelling", "was", "value", "expected"),
+    [
+        (Spelling(), "-3.5", 3.5, "3.5"),
+        (KLARTEXT, "-3,5", 3.5, "+3,5"),
+        (KLARTEXT, "3.5", -3.512, "-3.512"),
+        (KLARTEXT, "+3", 3.25, "+3,25"),
+    ],
+)
+def test_what_had_a_sign_or_a_comma_keeps_it(spelling, was, value, expected):
+    assert spelling.like(was, value, 3) == expected
+    assert value_of(expected) == value
 
 
 @pytest.mark.parametrize(("step", "decimals"), [(0.001, 3), (0.0001, 4), (0.0005, 4), (0.001 / 25.4, 5), (1.0, 0)])

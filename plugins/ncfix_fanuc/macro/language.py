@@ -12,19 +12,22 @@ from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import CENTRE_LETTERS, Layout
 from ncfix.text.shapes import Scan, scan
+from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Literal, OWordLine, Program, Template
 from ncfix.writer.pieces import Pieces
 from ncfix_fanuc.macro.blocks import parse_block
 from ncfix_fanuc.macro.control import MacroControl
 from ncfix_fanuc.macro.corners import CORNER, axes_of_corner, has_corners, letters_of
 from ncfix_fanuc.macro.interpreter import MacroInterpreter
-from ncfix_fanuc.macro.render import render
 from ncfix_fanuc.macro.rules import RULES
 from ncfix_iso.rs274.language import RS274, writable
 
 if TYPE_CHECKING:
     from ncfix.text.language import Language
 
+
+SPELLING = Spelling(vector=CENTRE_LETTERS, vector_length=True)
+"""I J K of G43.5, in the length that the program gives them."""
 
 ELSEWHERE = frozenset({970, 990})
 """M97 calls what stands in the text, M99 would end a subprogram in it."""
@@ -73,7 +76,7 @@ FANUC: Language = replace(
     interpreter=MacroInterpreter,
     layout=layout,
     alike=False,
-    render=render,
+    spelling=lambda _program: SPELLING,
     bulk=in_bulk,
     one_by_one=one_by_one,
     straight=runs_straight_on,

@@ -22,8 +22,7 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix.writer.pieces import Pieces
-from ncfix_heidenhain.klartext.layout import CORNERS, KlartextLayout, is_between, layout_of
-from ncfix_heidenhain.klartext.turns import FULL
+from ncfix_heidenhain.klartext.layout import CORNERS, FULL, KlartextLayout, is_between, layout_of
 
 Mask = NDArray[np.bool_]
 
@@ -44,19 +43,17 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     if not (layout.axes if layout.name in STRAIGHT else layout.name in ARCS and layout.axes.keys() >= {"X", "Y"}):
         return None
     slots = {letter: w.value.slot for letter, w in layout.axes.items() if isinstance(w.value, Literal)}
-    if len(slots) < len(layout.axes) or any(word.address[0] == "I" for word in layout.axes.values()):
+    if len(slots) < len(layout.axes) or layout.forms:
         return None
     return BulkLayout(
         slots,
         layout.words_at,
         layout.blank,
         lower=False,
-        further=not layout.late,
+        further=not layout.after,
         lead=lead_of(program, block, layout),
         opening="L",
-        closing=f"{layout.blank}FMAX" if layout.rapid else "",
-        signed=True,
-        comma=layout.comma,
+        closing=layout.closing and layout.blank + layout.closing,
         turns_named=True,
         arc=ArcLayout({}, alone=True) if layout.name in ARCS else None,
     )
@@ -66,7 +63,7 @@ def lead_of(program: Program, block: int, layout: KlartextLayout) -> Anchor:
     """Up to where lines of further pieces repeat the beginning of the block: its number, unless they get none."""
     numbers = [item for item in program.items_of(block) if isinstance(item, Word) and item.address == "N"]
     if program.dialect.block_numbers != "none" or not numbers:
-        return layout.starts_at
+        return layout.code_at
     start = int(program.blocks[block, 0])
     text = program.source[start : program.position(block, numbers[0].span.start) + 1]
     return Anchor(START, len(text) - len(text.lstrip(b" \t")))

@@ -26,7 +26,7 @@ from ncfix_heidenhain.klartext.codes import after_motion, before_motion
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.flow import PROGRAM, KlartextFlow
 from ncfix_heidenhain.klartext.lane import run_lane
-from ncfix_heidenhain.klartext.layout import CORNERS, axis_numbers, poles_move
+from ncfix_heidenhain.klartext.layout import CORNERS, FULL, axis_numbers, poles_move
 from ncfix_heidenhain.klartext.paths import PATHS, astray
 from ncfix_heidenhain.klartext.plans import KlartextPlan
 from ncfix_heidenhain.klartext.poles import relies_at_once
@@ -34,7 +34,6 @@ from ncfix_heidenhain.klartext.statements import statement
 from ncfix_heidenhain.klartext.step import Step, refuse
 from ncfix_heidenhain.klartext.targets import MotionWords, axis_letters, set_pole
 from ncfix_heidenhain.klartext.tools import call_tool, define_tool
-from ncfix_heidenhain.klartext.turns import FULL
 from ncfix_heidenhain.klartext.units import KlartextUnit
 from ncfix_heidenhain.klartext.unread import unread_line
 

@@ -10,9 +10,8 @@ from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.flatten import unrolled
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import layout_of
-from ncfix_heidenhain.klartext.numbering import renumbered
-from ncfix_heidenhain.klartext.render import render
-from ncfix_heidenhain.klartext.shapes import scan, split
+from ncfix_heidenhain.klartext.shapes import renumbered, scan, split
+from ncfix_heidenhain.klartext.writing import KlartextWriter, spelling_of
 
 KLARTEXT = Language(
     split=split,
@@ -22,7 +21,8 @@ KLARTEXT = Language(
     control=KlartextControl,
     interpreter=KlartextInterpreter,
     layout=layout_of,
-    render=render,
+    writer=KlartextWriter,
+    spelling=spelling_of,
     arc_pieces=True,
     bulk=in_bulk,
     one_by_one=one_by_one,

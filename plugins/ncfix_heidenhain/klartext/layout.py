@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from ncfix.text.layout import AXIS_LETTERS
+from ncfix.text.layout import AXIS_LETTERS, INCREMENT, Layout
 from ncfix.text.tree import (
     Anchor,
     Command,
@@ -29,6 +28,8 @@ from ncfix_heidenhain.klartext.poles import in_lines
 CORNERS = frozenset({"rnd", "chf"})
 """Corners that the control makes of the end of one motion and the beginning of the next."""
 
+FULL = 360.0
+
 POLAR = frozenset({"PR", "PA", "IPR", "IPA"})
 VECTOR = frozenset({"TX", "TY", "TZ"})
 AXIS_WORDS = frozenset({*AXIS_LETTERS, *(f"I{letter}" for letter in AXIS_LETTERS)})
@@ -42,52 +43,24 @@ RELATIVE_POLE = re.compile(rb"(?im)\n[ \t]*/?[ \t]*\d*[ \t]*CC(?![A-Z])(?:[^\r\n
 """A pole that counts from where the tool stands."""
 
 
-@dataclass(frozen=True, slots=True)
-class KlartextLayout:
-    """The writable parts of a motion block.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KlartextLayout(Layout):
+    """The writable parts of a motion block; the words of its axes may be increments (IX), its R is that of CR.
 
     name      its path function, as in `KlartextPlan.name`
     function  where that is written, None in a block of words alone
-    axes      axis -> its word, absolute or incremental
     polar     PR, PA, IPR, IPA words
-    radius    the R word of CR
     sense     DR+ or DR-
-    vector    TX TY TZ words
-    late      M codes that act at the end of the block
-    words_at  where missing words go: after the last word that leads somewhere
-    starts_at where the function stands, or the first word
-    blank     what separates words in this block
-    comma     numbers have a decimal comma
-    rapid     FMAX
     corner    the block before or after it is a corner that the control makes (RND, CHF)
+    motion    the block says itself which kind of motion it is
     """
 
     name: str
     function: Span | None
-    axes: dict[str, Word]
     polar: tuple[Word, ...]
-    radius: Word | None
     sense: Span | None
-    vector: dict[str, Word]
-    late: tuple[Word, ...]
-    words_at: Anchor
-    starts_at: Anchor
-    blank: str
-    comma: bool
-    rapid: bool
-    corner: bool
-
-    @property
-    def motion(self) -> Word | None:
-        """The block says itself which kind of motion it is."""
-        return FALLBACK
-
-    def turn(self, program: Program, block: int) -> float | None:
-        """The angle of a CP in rad, if it is given by IPA."""
-        word = next((word for word in self.polar if word.address == "IPA"), None)
-        if self.name != "cp" or word is None or not isinstance(word.value, Literal):
-            return None
-        return math.radians(float(program.values_of(block)[word.value.slot]))
+    corner: bool = False
+    motion: Word = FALLBACK
 
 
 def layout_of(program: Program, block: int) -> KlartextLayout | None:
@@ -97,7 +70,7 @@ def layout_of(program: Program, block: int) -> KlartextLayout | None:
     if found is None:
         return None
     corner = is_corner(program, block, -1) or is_corner(program, block, 1)
-    return _in_place(shape, separator(program, block, found[1]), uses_comma(program.source), corner)
+    return _in_place(shape, separator(program, block, found[1]), corner)
 
 
 class Shape:
@@ -116,10 +89,10 @@ class Shape:
 
 
 @lru_cache(maxsize=4096)
-def _in_place(shape: Shape, blank: str, comma: bool, corner: bool) -> KlartextLayout | None:
+def _in_place(shape: Shape, blank: str, corner: bool) -> KlartextLayout | None:
     """The layout of blocks of a shape that have the rest in common, too."""
     found = _of_shape(shape)
-    return None if found is None else replace(found[0], blank=blank, comma=comma, corner=corner)
+    return None if found is None else replace(found[0], blank=blank, corner=corner)
 
 
 @lru_cache(maxsize=4096)
@@ -138,17 +111,17 @@ def _of_shape(shape: Shape) -> tuple[KlartextLayout, Word | None] | None:
         name=function.name if function else "",
         function=function.span if function else None,
         axes=axes,
+        forms={word.address: INCREMENT for word in axes.values() if word.address[0] == "I"},
         polar=polar,
         radius=next(iter(among(words, {"R"})), None),
         sense=next((command.span for command in commands if command.name in ("dr+", "dr-")), None),
         vector=vector,
-        late=tuple(filter(acts_late, words)),
+        after=tuple(filter(acts_late, words)),
         words_at=Anchor(-1, 0) if end is None else end.span.stop,
-        starts_at=start_of(items),
+        code_at=start_of(items),
         blank=" ",
-        comma=False,
-        rapid=any(command.name == "fmax" for command in commands),
-        corner=False,
+        prefix=None,
+        closing="FMAX" if any(command.name == "fmax" for command in commands) else "",
     )
     return layout, last
 

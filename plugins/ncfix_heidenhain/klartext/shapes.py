@@ -98,3 +98,22 @@ def of_several_lines(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list
     places = np.flatnonzero(text == COMMAS[ord("\n")])
     owner = block_of(blocks, places)
     return list(map(int, owner[places < blocks[owner, 1]]))
+
+
+# -- block numbers: nothing refers to them, jumps go to labels ---------------------------------------------------------
+
+NUMBERED = re.compile(rb"(?P<skip>[ \t]*/)?[ \t]*(?:\d+(?![\d.,])[ \t]*)?")
+"""The block number, block skip before it, and blanks."""
+
+
+def renumbered(source: bytes) -> bytes:
+    """A program with its blocks numbered from 0; the lines that `~` joins are one block, empty lines none."""
+    pieces, done, count = [], 0, 0
+    for start, stop in split(source).tolist():
+        if not source[start:stop].strip():
+            continue
+        found = NUMBERED.match(source, start, stop)
+        assert found is not None, "it matches nothing, too"
+        pieces += [source[done:start], found["skip"].strip() if found["skip"] else b"", b"%d " % count]
+        done, count = found.end(), count + 1
+    return b"".join([*pieces, source[done:]])

@@ -10,9 +10,9 @@ from ncfix.text.language import BulkLayout, Language
 from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
 from ncfix.text.reach import tape_end
 from ncfix.text.shapes import scan, split_blocks
+from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Program, Word
-from ncfix.writer.render import BlockRenderer
-from ncfix.writer.target import Rendered, Target
+from ncfix.writer.block import BlockWriter
 from ncfix_iso.rs274.blocks import parse_block
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.groups import RULES
@@ -27,9 +27,9 @@ def writable(program: Program, block: int) -> Layout | None:
     return None if has_free_text(program, block) else layout_of(program, block)
 
 
-def render(program: Program, block: int, layout: Layout, target: Target) -> Rendered:
-    """The text of a corrected motion."""
-    return BlockRenderer(program, block, layout, target).render()
+def plain(_program: Program) -> Spelling:
+    """Numbers as they come, with a point in the place of formulas."""
+    return Spelling()
 
 
 def words_of(program: Program, block: int) -> tuple[Word, ...]:
@@ -62,7 +62,8 @@ RS274 = Language(
     interpreter=RS274Interpreter,
     layout=writable,
     alike=True,
-    render=render,
+    writer=BlockWriter,
+    spelling=plain,
     lenient=True,
     unroll=unroll,
     arc_pieces=True,

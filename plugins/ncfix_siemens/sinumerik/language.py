@@ -12,14 +12,13 @@ from ncfix.control.flatten import FlatLine
 from ncfix.control.moves import Moves
 from ncfix.text import reach
 from ncfix.text.language import ArcLayout, BulkLayout, Language
-from ncfix.text.layout import arc_layout, bulk_layout
+from ncfix.text.layout import CENTRE_LETTERS, arc_layout, bulk_layout
 from ncfix.text.reach import whole_text
 from ncfix.text.shapes import split_blocks
 from ncfix.text.tree import Program, Template, Word
 from ncfix.writer.pieces import Pieces
 from ncfix_siemens.sinumerik.blocks import parse_block
 from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
-from ncfix_siemens.sinumerik.hole_text import render
 from ncfix_siemens.sinumerik.interpreter import SinumerikInterpreter
 from ncfix_siemens.sinumerik.layout import SinumerikLayout, layout_of
 from ncfix_siemens.sinumerik.numbering import renumbered
@@ -28,6 +27,7 @@ from ncfix_siemens.sinumerik.poles import polar_words
 from ncfix_siemens.sinumerik.scanning import scan
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import VECTOR
+from ncfix_siemens.sinumerik.writing import SPELLING, SinumerikWriter
 
 SPATIAL = frozenset("XYZ")
 
@@ -50,7 +50,8 @@ def unroll(interpreter: SinumerikInterpreter, steps: Mapping[str, float], limit:
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
     layout = layout_of(program, block)
-    if layout is None or not layout.axes or layout.polar or layout.angles:
+    formed = layout is not None and not layout.forms.keys().isdisjoint(layout.axes)
+    if layout is None or not layout.axes or layout.polar or layout.angles or formed:
         return None
     if layout.points and not layout.axes.keys() <= SPATIAL:
         return None
@@ -62,7 +63,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 def arc_in_bulk(program: Program, block: int, layout: SinumerikLayout) -> ArcLayout | None:
     """The same of the words of an arc."""
     fixed = fixed_centre(program.templates[int(program.template[block])])
-    if layout.via or layout.angle is not None:
+    if layout.via or layout.angle is not None or layout.forms.keys() & set(CENTRE_LETTERS) - fixed.keys():
         return None
     found = arc_layout(program, block, replace(layout, centre=without(layout.centre, fixed)))
     return found and replace(found, centre={**found.centre, **fixed}, fixed=frozenset(fixed))
@@ -96,7 +97,8 @@ SINUMERIK = Language(
     control=Sinumerik,
     interpreter=SinumerikInterpreter,
     layout=layout_of,
-    render=render,
+    writer=SinumerikWriter,
+    spelling=lambda _program: SPELLING,
     arc_pieces=True,
     unroll=unroll,
     bulk=in_bulk,

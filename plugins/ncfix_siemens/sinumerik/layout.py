@@ -13,10 +13,12 @@ from ncfix.text.layout import (
     Layout,
 )
 from ncfix.text.tree import (
+    START,
     Anchor,
     Command,
     Comment,
     Constant,
+    FunctionCall,
     Item,
     Opaque,
     OWordLine,
@@ -28,7 +30,7 @@ from ncfix.text.tree import (
 )
 from ncfix_siemens.sinumerik.circles import VIA
 from ncfix_siemens.sinumerik.poles import has_partial
-from ncfix_siemens.sinumerik.vocabulary import ANGLES, DRILLING, HARMLESS, MOTIONS, POLAR, VECTOR
+from ncfix_siemens.sinumerik.vocabulary import ANGLES, DRILLING, FORM, FORMS, HARMLESS, MOTIONS, POLAR, VECTOR
 
 END_OF_SUBPROGRAM = frozenset({17.0})
 """M17."""
@@ -38,22 +40,20 @@ END_OF_SUBPROGRAM = frozenset({17.0})
 class SinumerikLayout(Layout):
     """The writable parts of a motion block.
 
+    formed  the values of words with a form, brackets and all
     via     I1 J1 K1 by address
     angle   AR
     polar   AP and RP by address
     partial_polar  blocks of the program rely on such a word of a block before
-    vector  A3 B3 C3 by address
-    angles  A2 B2 C2 by address
     cycle   the call of a drilling cycle, where the block holds nothing else
     begins  where its words begin, behind block skip, number and label
     """
 
+    formed: dict[str, Span]
     via: dict[str, Word]
     angle: Word | None
     polar: dict[str, Word]
     partial_polar: bool
-    vector: dict[str, Word]
-    angles: dict[str, Word]
     cycle: Span | None
     begins: Anchor
 
@@ -78,9 +78,16 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
         return None
     words_at, code_at, blank = words.beside(anchors) if anchors else (content[0].stop, content[0].start, " ")
     polar = words.some(sorted(POLAR))
+    formed = {word.address: word for word in words.words if form_of(word)}
+
+    def bare(some: dict[str, Word]) -> dict[str, Word]:
+        return {address: without_form(program, block, word) for address, word in some.items()}
+
     return SinumerikLayout(
-        axes=words.axes,
-        centre=words.some(CENTRE_LETTERS),
+        axes=bare(words.axes),
+        forms={address: form_of(word) for address, word in formed.items()},
+        formed={address: word.value_span for address, word in formed.items()},
+        centre=bare(words.some(CENTRE_LETTERS)),
         radius=words.by_address.get("CR"),
         turns=words.by_address.get("TURN"),
         feed=words.by_address.get("F"),
@@ -91,7 +98,7 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
         code_at=code_at,
         blank=blank,
         prefix=words.skip,
-        via=words.some(VIA),
+        via=bare(words.some(VIA)),
         angle=words.by_address.get("AR"),
         polar=polar,
         partial_polar=bool(polar) and has_partial(program),
@@ -100,6 +107,23 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
         cycle=cycle,
         begins=min((span.start for span in content), key=lambda anchor: program.position(block, anchor)),
     )
+
+
+def form_of(word: Word) -> str:
+    """How a word is meant, if it says so: `ac`, `ic`, `dc`, ..."""
+    return word.value.name if isinstance(word.value, FunctionCall) and word.value.name in FORMS else ""
+
+
+def without_form(program: Program, block: int, word: Word) -> Word:
+    """A word whose value is what stands in the brackets of its form: `X=IC(10)` as `X=10`."""
+    start, stop = program.span(block, word.value_span)
+    found = FORM.match(program.source[start:stop].decode("latin-1")) if form_of(word) else None
+    if found is None or not isinstance(word.value, FunctionCall):
+        return word
+    first, last = (start - int(program.blocks[block, 0]) + place for place in found.span("value"))
+    value = word.value.arguments[0] if word.value.arguments else None
+    span = Span(Anchor(START, first), Anchor(START, last))
+    return word if value is None else Word(word.address, value, word.span, span)
 
 
 def drilling_call(words: BlockWords) -> Span | None:

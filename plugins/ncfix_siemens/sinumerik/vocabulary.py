@@ -34,6 +34,7 @@ ABSOLUTE, INCREMENTAL = "ac", "ic"
 TURNING = frozenset({"dc", "acp", "acn"})
 FORMS = TURNING | {ABSOLUTE, INCREMENTAL}
 """How one word is meant, `X=IC(10)`: absolutely, incrementally, or to an angle on the shortest way or in a sense."""
+FORM = re.compile(r"\s*(?P<form>[A-Z]+)\s*\(\s*(?P<value>.*?)\s*\)\s*\Z", re.IGNORECASE | re.DOTALL)
 
 MOTIONS = {"cip": 1000, "ct": 1010, "poly": 1020, "aspline": 1030, "bspline": 1040, "cspline": 1050}
 MOTIONS |= dict.fromkeys(("invcw", "invccw"), 1060)

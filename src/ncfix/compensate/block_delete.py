@@ -29,7 +29,7 @@ from ncfix.machine import Machine
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Skip
 from ncfix.text.writer import Edit, Splices
-from ncfix.writer.second_reading import SecondReading
+from ncfix.writer.pieces import SecondReading
 
 DIFFERS = "NCF451"
 TOO_MANY = "NCF452"

@@ -37,8 +37,8 @@ from ncfix.text.dialect import Dialect
 from ncfix.text.language import language_of
 from ncfix.text.tree import Program
 from ncfix.writer.emit import Emission, emit
+from ncfix.writer.pieces import SecondReading
 from ncfix.writer.pinning import LED, PINNED, closure_of_refusals
-from ncfix.writer.second_reading import SecondReading
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ncfix.text.build import Parsed
     from ncfix.text.dialect import Dialect
     from ncfix.text.shapes import Scan
+    from ncfix.text.spelling import Spelling
     from ncfix.text.tree import Anchor, Program, Span, Template, Word
     from ncfix.writer.pieces import Pieces
     from ncfix.writer.target import Rendered, Target
@@ -41,6 +42,13 @@ class BlockLayout(Protocol):
     @property
     def motion(self) -> Word | None:
         """The word that says which kind of motion it is, if the block has one."""
+
+
+class Writer(Protocol):
+    """Writes one motion into one block."""
+
+    def write(self) -> Rendered:
+        """What is written; called once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +79,6 @@ class BulkLayout:
     lead      of languages in which such lines begin with more than that: what of the block's own beginning they repeat
     opening   what stands on such lines before the axis words
     closing   what stands on them behind these
-    signed    numbers are written with their sign
-    comma     numbers are written with a decimal comma
     turns_named  a rotary axis that has no word gets none
     led       rotary axes go where other words of the block lead them, exactly; they have none of their own
     arc       what there is of arcs; None where these are written one by one
@@ -86,8 +92,6 @@ class BulkLayout:
     lead: Anchor | None = None
     opening: str = ""
     closing: str = ""
-    signed: bool = False
-    comma: bool = False
     turns_named: bool = False
     led: bool = False
     arc: ArcLayout | None = None
@@ -122,11 +126,13 @@ class Language:
     interpreter  (control, program, run) -> the walk through a program; `in_parts`: this is the first of its parts
     layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
     alike     those of all blocks of a shape are the same
-    render    (program, block, layout, target) -> its edits, and the lines that come after it
-    arc_pieces  `render` can write an arc as several (`Target.arcs`)
-    bulk      (program, block) -> what `render` would need to know to write motions like this one many at a time; None
+    writer    (program, block, layout, target, spelling) -> what writes the motion of a block: `BlockWriter`, or a
+              class of its kind with what no other control has
+    spelling  program -> how what is put into it is spelled
+    arc_pieces  `writer` can write an arc as several (`Target.arcs`)
+    bulk      (program, block) -> what `writer` would need to know to write motions like this one many at a time; None
               for blocks that it has to write one by one
-    one_by_one  (program, moves, pieces, first piece of each motion) -> (n,) motions that `render` has to write one by
+    one_by_one  (program, moves, pieces, first piece of each motion) -> (n,) motions that `writer` has to write one by
               one for what else there is about them; None: none
     renumber  a text with its blocks numbered anew; None where blocks need no numbers
     unroll    (interpreter, least increments, limit) -> the blocks of a program as they are executed, see `flatten`;
@@ -143,7 +149,8 @@ class Language:
     control: Callable[[Run, Dialect], ProgramControl]
     interpreter: Callable[..., Interpreter[Any]]
     layout: Callable[[Program, int], BlockLayout | None]
-    render: Callable[[Program, int, Any, Target], Rendered]
+    writer: Callable[[Program, int, Any, Target, Spelling], Writer]
+    spelling: Callable[[Program], Spelling]
     alike: bool = False
     lenient: bool = False
     arc_pieces: bool = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ncfix.text.language import ArcLayout, BulkLayout
@@ -13,45 +13,57 @@ AXIS_LETTERS = "XYZABCUVW"
 MOTION_CODES = frozenset((0.0, 1.0, 2.0, 3.0))
 CONTROL_CHARACTER = "control character"
 """The kind of an `Opaque` that moves nothing and may stand anywhere (DC1, Grbl's `?`)."""
+ABSOLUTE, INCREMENT = "ac", "ic"
+"""Forms of words, see `Layout.forms`."""
+
 FEED_MODES = frozenset((93.0, 94.0))
 CENTRE_LETTERS = ("I", "J", "K")
 #: M codes that act after the motion of their block: they belong on its last piece.
 CODES_AFTER_MOTION = frozenset((0.0, 1.0, 2.0, 30.0, 60.0, 99.0))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """The writable parts of a motion block. Same for all blocks of a shape.
+    """The writable parts of a motion block; what a control does not have is empty.
 
     axes      axis words by letter
+    forms     how such a word is meant, if the word itself says so, by address: "ac" an absolute value, "ic" an
+              increment, others an angle to which a rotary axis turns in a sense, whole turns left out
     centre    I J K words by letter
-    radius    the R word of an arc
-    turns     its P word
+    radius    the word of an arc's radius
+    turns     that of its number of turns
     feed      the F word
     motion    the G0..G3 word
     feed_mode the G93 or G94 word
+    vector    words of the direction of the tool, by address
+    angles    those that give it as angles: they give way to a vector
     after     words that act after the motion (M0, M1, M2, M30, M60, M99)
     words_at  where a missing axis word goes: after the last axis word
     code_at   where a missing motion code goes: before the first axis word
     blank     what separates words in this block
     prefix    the span of the block skip, which further pieces repeat
     levels    words that may give the level of a canned cycle, by their address
+    closing   what further pieces end with besides
     allowed   axes that may get a word where they have none; None: all
     """
 
     axes: dict[str, Word]
-    centre: dict[str, Word]
-    radius: Word | None
-    turns: Word | None
-    feed: Word | None
-    motion: Word | None
-    feed_mode: Word | None
-    after: tuple[Word, ...]
     words_at: Anchor
     code_at: Anchor
     blank: str
     prefix: Span | None
+    forms: Mapping[str, str] = field(default_factory=dict)
+    centre: dict[str, Word] = field(default_factory=dict)
+    radius: Word | None = None
+    turns: Word | None = None
+    feed: Word | None = None
+    motion: Word | None = None
+    feed_mode: Word | None = None
+    vector: dict[str, Word] = field(default_factory=dict)
+    angles: dict[str, Word] = field(default_factory=dict)
+    after: tuple[Word, ...] = ()
     levels: dict[str, Word] = field(default_factory=dict)
+    closing: str = ""
     allowed: frozenset[str] | None = None
 
 

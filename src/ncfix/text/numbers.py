@@ -102,14 +102,14 @@ def fill(cells: NDArray[Any], spans: NDArray[np.int64], value: int) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Before:
+class LastBefore:
     """The last character before each of some places that is no blank: where it is, and what; 0 at the text's start."""
 
     places: NDArray[np.int64]
     characters: NDArray[np.uint8]
 
 
-def last_before(text: NDArray[np.uint8], places: NDArray[np.int64]) -> Before:
+def last_before(text: NDArray[np.uint8], places: NDArray[np.int64]) -> LastBefore:
     """What stands before `places`, up to `BLANKS` blanks left out (a blank, if there are more)."""
     at = places - 1
     characters = text[np.maximum(at, 0)]
@@ -120,7 +120,7 @@ def last_before(text: NDArray[np.uint8], places: NDArray[np.int64]) -> Before:
         at[rows] -= 1
         characters[rows] = text[at[rows]]
     characters[at < 0] = 0
-    return Before(at, characters)
+    return LastBefore(at, characters)
 
 
 def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:

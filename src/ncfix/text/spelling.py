@@ -79,11 +79,23 @@ class Spelling:
     signed  numbers have a sign, plus as well
     comma   numbers have a decimal comma
     point   a number in the place of a formula has a point even when it is whole
+    trimmed  such a number has no zeros at its end
+    modal   whether axis words are increments is a mode; else only a word itself says so
+    all_blanks  a word that is taken out takes all blanks before it along, not one
+    vector  the addresses of the direction of the tool, each with what stands before its number; empty: it has none
+    vector_digits  digits behind the point of a component of a unit vector, at least: 1e-6 rad is 6e-5 degrees
+    vector_length  a direction keeps the length that it was programmed with; else it is a unit vector
     """
 
     signed: bool = False
     comma: bool = False
     point: bool = True
+    trimmed: bool = True
+    modal: bool = True
+    all_blanks: bool = False
+    vector: tuple[str, ...] = ()
+    vector_digits: int = 6
+    vector_length: bool = False
 
     def number(self, value: float, decimals: int) -> str:
         """A new number, with all its decimals: `12.340`, `+12.340`."""
@@ -95,6 +107,10 @@ class Spelling:
     def short(self, value: float, decimals: int) -> str:
         """A number without zeros at its end: `12.34`, `12.`."""
         return self._marked(NumberStyle(point=self.point, plus=self.signed).write(value, decimals), comma=self.comma)
+
+    def instead(self, value: float, decimals: int) -> str:
+        """A number in the place of a formula."""
+        return self.short(value, decimals) if self.trimmed else self.number(value, decimals)
 
     def like(self, was: str, value: float, decimals: int) -> str:
         """A number in place of another one, in its manner; where numbers are signed, what had a sign keeps one."""

@@ -8,6 +8,7 @@ not on the digits) ends a stretch, and the emitter takes it by itself.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,14 +17,22 @@ from numpy.typing import NDArray
 from ncfix import fast
 from ncfix.control.moves import Frame, MotionKind, Moves
 from ncfix.text.language import Language
-from ncfix.text.number_text import NumberColumns, Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
+from ncfix.text.number_text import (
+    ROUNDED,
+    NumberColumns,
+    Styles,
+    in_style,
+    is_plain,
+    laid_out,
+    plain,
+    rounded,
+    styles_of,
+)
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
-from ncfix.writer.bulk_arcs import CentreWords, Manner, whole_arcs
+from ncfix.writer.bulk_arcs import CentreWords, OutputSteps, whole_arcs
 from ncfix.writer.bulk_fit import qualified, sound, with_dwells
-from ncfix.writer.bulk_layouts import CLOSING, NONE, OPENING, Layouts
-from ncfix.writer.bulk_lines import lines_of, with_lines
-from ncfix.writer.bulk_missing import last_told, missing, with_those_before
+from ncfix.writer.bulk_layouts import CLOSING, NONE, OPENING, Layouts, lines_of, with_lines
 from ncfix.writer.frames import FrameMap
 from ncfix.writer.pieces import Pieces
 
@@ -85,12 +94,12 @@ class Bulk:
     @property
     def text(self) -> NDArray[np.uint8]:
         """The source, with decimal points where it has commas."""
-        comma, source = self.layouts.manner.comma, self.program.source
+        comma, source = self.layouts.spelling.comma, self.program.source
         return np.frombuffer(source.translate(SWAPPED) if comma else source, dtype=np.uint8)
 
     def put(self, splices: Splices) -> None:
         """Take in what changes, with commas if the program has such."""
-        comma = self.layouts.manner.comma
+        comma = self.layouts.spelling.comma
         self.parts.append(replace(splices, data=splices.data.translate(SWAPPED)) if comma else splices)
 
     @classmethod
@@ -132,7 +141,7 @@ class Bulk:
         if self.stop[row] == row:
             return None
         write = self._compiled if fast.engaged() else self._in_columns
-        found = write(row, position, frame, self._manner(decimals))
+        found = write(row, position, frame, self._steps_for(decimals))
         if found is None:
             return None
         ends, splices = found
@@ -149,14 +158,14 @@ class Bulk:
 
         Returns which are clear, (k,), and the centres of these, (c, 3), command coordinates, mm.
         """
-        manner, centre = self._manner(decimals), self.pieces.centre[self.first_piece[rows]]
-        words = CentreWords.of(self.program, self.layouts, self.moves, rows, ends, centre, frame, manner)
+        steps, centre = self._steps_for(decimals), self.pieces.centre[self.first_piece[rows]]
+        words = CentreWords.of(self.program, self.layouts, self.moves, rows, ends, centre, frame, steps)
         clear = words.clear
         if not clear.all():
             spans = self.program.blocks[words.block[~clear]]
             self.parts[:] = [part.outside(spans) for part in self.parts]
             words = words.rows(clear)
-        self.put(words.splices(self.program, self.layouts, manner))
+        self.put(words.splices(self.program, self.layouts, steps))
         return clear, words.centre
 
     def alone(self, row: int, stop: int) -> list[int]:
@@ -173,21 +182,21 @@ class Bulk:
             self.parts[-1] = self.parts[-1].outside(self.program.blocks[self.moves.block[rows]])
             self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
 
-    def _manner(self, decimals: IntArray) -> Manner:
-        return Manner(self.text, decimals, _halves(decimals), self.layouts.manner.signed)
+    def _steps_for(self, decimals: IntArray) -> OutputSteps:
+        return OutputSteps(self.text, decimals, _halves(decimals), self.layouts.spelling.signed)
 
     def _in_columns(
-        self, row: int, position: FloatArray, frame: FrameMap, manner: Manner
+        self, row: int, position: FloatArray, frame: FrameMap, steps: OutputSteps
     ) -> tuple[FloatArray, Splices] | None:
         """The commands at the ends of the pieces of a stretch, (k, n_axes), and what changes in the words of axes."""
         stop = min(int(self.stop[row]), row + LONGEST)
         if stop - row < SHORTEST:
             return None
-        stretch = Stretch.of(self, row, stop, position, frame, manner).clear_head()
+        stretch = WrittenStretch.of(self, row, stop, position, frame, steps).clear_head()
         return (stretch.commands(), stretch.splices()) if len(stretch.block) else None
 
     def _compiled(
-        self, row: int, position: FloatArray, frame: FrameMap, manner: Manner
+        self, row: int, position: FloatArray, frame: FrameMap, steps: OutputSteps
     ) -> tuple[FloatArray, Splices] | None:
         """As `_in_columns`, compiled."""
         from ncfix.text.number_kernels import ROOM
@@ -202,7 +211,7 @@ class Bulk:
         start, end, length = (np.empty(edits, dtype=np.int64) for _ in range(3))
         counts = np.zeros(2, dtype=np.int64)
         done = writing_kernels.write(
-            manner.text,
+            steps.text,
             (program.blocks, blocks, program.first_number, program.template),
             (program.numbers, program.number_spans),
             (layouts.slots, layouts.by_place, layouts.by_letter, layouts.anchors, layouts.heads),
@@ -210,7 +219,7 @@ class Bulk:
             pieces - pieces[0],
             here,
             (frame.frame.offset, frame.scale),
-            (manner.decimals, manner.half, int(manner.signed)),
+            (steps.decimals, steps.half, int(steps.signed)),
             (np.frombuffer(end_of_line, dtype=np.uint8), layouts.leads, layouts.openings, layouts.closings),
             (commands, start, end, length, data),
             (np.empty(axes), np.empty(axes), np.empty(axes, dtype=np.bool_), counts),
@@ -223,7 +232,7 @@ class Bulk:
     def _room(self, pieces: IntArray, blocks: NDArray[np.int32], words: int) -> int:
         """Bytes that the words and lines of some motions take at most; `words`: those of a piece."""
         lines, line = int(pieces[-1] - pieces[0]), words + len(b"\r\n") + OPENING + CLOSING
-        if not self.layouts.manner.lined:
+        if not self.layouts.lined:
             return lines * line
         several = np.diff(pieces) - 1
         rows = blocks[several > 0].astype(np.int64)
@@ -250,7 +259,7 @@ def _is_plain(frame: Frame) -> bool:
 
 
 @dataclass(slots=True)
-class Stretch:
+class WrittenStretch:
     """One stretch while it is written; k pieces of its motions, columns by axis.
 
     block     (k,) the block of the motion
@@ -278,9 +287,11 @@ class Stretch:
     clear: Mask
 
     @classmethod
-    def of(cls, bulk: Bulk, row: int, stop: int, position: FloatArray, frame: FrameMap, manner: Manner) -> Stretch:
+    def of(
+        cls, bulk: Bulk, row: int, stop: int, position: FloatArray, frame: FrameMap, steps: OutputSteps
+    ) -> WrittenStretch:
         """Work out which words change."""
-        program, decimals = bulk.program, manner.decimals
+        program, decimals = bulk.program, steps.decimals
         rows = slice(bulk.first_piece[row], bulk.first_piece[stop])
         move = bulk.pieces.move[rows]
         block = bulk.moves.block.take(move).astype(np.int64)
@@ -288,14 +299,14 @@ class Stretch:
         words = _words(bulk, block, further)
         worded, present = words >= 0, words != NONE
         wanted = frame.program(bulk.pieces.end[rows])
-        half, digits = np.tile(manner.half, (len(block), 1)), np.tile(decimals, (len(block), 1))
+        half, digits = np.tile(steps.half, (len(block), 1)), np.tile(decimals, (len(block), 1))
         original = np.where(worded, program.numbers.take(words, mode="clip"), wanted)
         rewrite = np.abs(wanted - original) >= half
         rewrite[np.flatnonzero(further[1:])] = True
         rewrite &= present
         anew = np.flatnonzero(worded & rewrite)
         spans = program.number_spans.take(words.ravel().take(anew), axis=0)
-        styles = styles_of(manner.text, spans, signed=manner.signed)
+        styles = styles_of(steps.text, spans, signed=steps.signed)
         digits.ravel()[anew] = np.maximum(digits.ravel().take(anew), styles.decimals)
         kept = present & ~rewrite
         clear = is_plain(wanted, digits) | kept
@@ -317,7 +328,7 @@ class Stretch:
             add[still], clear[still] = False, True
         return cls(bulk, block, further, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
 
-    def clear_head(self) -> Stretch:
+    def clear_head(self) -> WrittenStretch:
         """The motions up to the first one that is not clear in all its pieces."""
         if self.clear.all():
             return self
@@ -346,7 +357,7 @@ class Stretch:
         order = np.argsort(2 * start + (stop > start), kind="stable")
         texts = laid_out(new.and_then(added, order))
         words = Splices(start.take(order), stop.take(order), texts.length, texts.data)
-        lined = self.bulk.layouts.manner.lined and self.further.any()
+        lined = self.bulk.layouts.lined and self.further.any()
         return self._in_lines(words, rows, np.argsort(order)[len(spans) :]) if lined else words
 
     def _rewritten(self) -> tuple[IntArray, NumberColumns]:
@@ -368,11 +379,11 @@ class Stretch:
         at = np.where(further, program.blocks[blocks, 1], layouts.places(program, blocks))
         heads = np.zeros((len(rows), 4), dtype=np.uint8)
         heads[:, 2:] = layouts.heads[program.template[blocks], columns]
-        if not layouts.manner.lined:
+        if not layouts.lined:
             begins = further & (np.diff(rows, prepend=-1) != 0)
             heads[begins, :3] = np.frombuffer(program.line_end.rjust(2, b"\0") + b"\0", dtype=np.uint8)
         values, decimals = self.wanted[rows, columns], self.decimals.take(columns)
-        return rows, at, plain(values, decimals, heads, signed=layouts.manner.signed)
+        return rows, at, plain(values, decimals, heads, signed=layouts.spelling.signed)
 
     def _in_lines(self, words: Splices, rows: IntArray, places: IntArray) -> Splices:
         """Words with what else stands on lines of further pieces; added ones are of `rows`, at `places` among all."""
@@ -390,3 +401,75 @@ def _words(bulk: Bulk, block: IntArray, further: Mask) -> IntArray:
     first = np.repeat(bulk.program.first_number.take(block), found.shape[1]).reshape(found.shape)
     words: IntArray = np.where(found >= 0, first + found, found)
     return words
+
+
+# -- words that axes lack which have to stand elsewhere than where the program leaves them -----------------------------
+
+
+def with_those_before(rows: IntArray, n: int) -> IntArray | slice:
+    """Rows and those just before them, of n; all, if they are many."""
+    if 4 * len(rows) > n:
+        return slice(None)
+    return np.flatnonzero(np.bincount(np.concatenate((rows, np.maximum(rows - 1, 0)))))
+
+
+def last_told(values: FloatArray, told: Mask, start: float) -> FloatArray:
+    """What was told last in each row (k,), `start` before the first time."""
+    last = np.maximum.accumulate(np.where(told, np.arange(len(told)), -1))
+    found: FloatArray = np.where(last >= 0, values[last], start)
+    return found
+
+
+def missing(
+    start: float, values: FloatArray, present: Mask, wanted: FloatArray, clear: Mask, stays: Mask, half: float
+) -> tuple[Mask, Mask]:
+    """Where an axis without a word must stand elsewhere by half an output step, (k,), and what is `clear` then.
+
+    start   program number of where the control stands before the stretch
+    values  program numbers of where it stands behind each piece, if that tells it to go there
+    rows of pieces that have a word may be left out, unless one that lacks it comes next
+    stays  it gets no word; where it must stand elsewhere by more than what rounding does to it, that is not clear
+
+    After its last word an axis is left there until it is off by half a step; from then on it is on the digits, and gets
+    a word whenever the nearest digits change.
+    """
+    rows = np.arange(len(values))
+    last_word = np.maximum.accumulate(np.where(present, rows, -1))
+    left_at = last_told(values, present, start)
+    away = ~(np.abs(wanted - left_at) < half)
+    last_away = np.maximum.accumulate(np.where(away & ~present, rows, -1))
+    held = np.append(-1, last_away[:-1]) <= last_word
+    before = np.where(held, left_at, np.append(start, values[:-1]))
+    add = ~present & ~(np.abs(wanted - before) < half) & ~stays
+    clear = clear | (~present & held & ~away)
+    clear[stays] = (np.abs(wanted - left_at) <= ROUNDED * half)[stays]
+    return add, clear
+
+
+# -- arcs in a stretch that are written by themselves all the same -----------------------------------------------------
+# While a stretch is written they count as straight: their words of axes say where the motions behind them begin. Some
+# end elsewhere, by some digits; what behind one relies on that, having no word for an axis, is written by itself, too.
+
+
+def write_alone(
+    arcs: Sequence[int], stop: int, start: FloatArray, named: Mask, write: Callable[[int], FloatArray]
+) -> list[int]:
+    """Write arcs of a stretch that ends before motion `stop`, in order, and what relies on where they end.
+
+    start  (n, n_axes) the commands at which motions begin; put right
+    named  (n, n_axes) axes for which a motion has a word
+    write  writes a motion from its start on; returns the command at its end
+
+    Returns the motions that were written.
+    """
+    rows: list[int] = []
+    for arc in arcs:
+        row, relies = arc, not rows or arc > rows[-1]
+        while relies:
+            end = write(row)
+            rows.append(row)
+            row += 1
+            relies = row < stop and bool(((end != start[row]) & ~named[row]).any())
+            if row < stop:
+                start[row] = end
+    return rows

@@ -1,6 +1,6 @@
 """Arcs among motions written all at once: their centre words, as soon as those of their axes are known.
 
-What the renderer does arc by arc (`render.BlockRenderer._kept_arc`), done as columns, byte for byte; a test holds the
+What `BlockWriter` does arc by arc (`block.BlockWriter._kept_arc`), done as columns, byte for byte; a test holds the
 two together. An arc qualifies if it stays one, by G2 or G3, and has a plain R or plain I J K; a full circle does not.
 """
 
@@ -67,7 +67,7 @@ def _spatial(moves: Moves) -> IntArray:
 
 
 @dataclass(frozen=True, slots=True)
-class Manner:
+class OutputSteps:
     """How numbers are written: the text they stand in, digits that the least increment needs, half output steps.
 
     decimals, half  (n_axes,)
@@ -117,7 +117,7 @@ class CentreWords:
         ends: tuple[FloatArray, FloatArray],
         centre: FloatArray,
         frame: FrameMap,
-        manner: Manner,
+        steps: OutputSteps,
     ) -> CentreWords:
         """Work out which words of arcs `rows` change.
 
@@ -127,7 +127,7 @@ class CentreWords:
         block = moves.block.take(rows).astype(np.int64)
         shape, plane, each = program.template.take(block), _planes(moves, rows), np.arange(len(rows))[:, None]
         columns, first = _spatial(moves)[plane], program.first_number.take(block)[:, None]
-        half, decimals = manner.half[columns], manner.decimals[columns]
+        half, decimals = steps.half[columns], steps.decimals[columns]
         start, end = (frame.program(each_end)[each, columns] for each_end in ends)
         point = frame.program_point(centre)
         slots, radius = layouts.centre[shape[:, None], plane], layouts.radius[shape]
@@ -143,7 +143,7 @@ class CentreWords:
         rewrite, digits = changes & (words >= 0), decimals.copy()
         anew = np.flatnonzero(rewrite)
         spans = program.number_spans.take(words.ravel().take(anew), axis=0)
-        styles = styles_of(manner.text, spans, signed=manner.signed)
+        styles = styles_of(steps.text, spans, signed=steps.signed)
         digits.ravel()[anew] = np.maximum(digits.ravel().take(anew), styles.decimals)
         clear = is_plain(wanted, digits) | ~changes
         clear.ravel()[anew] &= styles.clear
@@ -170,7 +170,7 @@ class CentreWords:
         columns = {each.name: getattr(self, each.name)[chosen] for each in fields(self) if each.name != "styles"}
         return CentreWords(styles=styles, **columns)
 
-    def splices(self, program: Program, layouts: Layouts, manner: Manner) -> Splices:
+    def splices(self, program: Program, layouts: Layouts, steps: OutputSteps) -> Splices:
         """What changes in the source."""
         shape = program.template.take(self.block)
         old, rows = np.flatnonzero(self.rewrite), np.flatnonzero(self.given_up)
@@ -181,7 +181,7 @@ class CentreWords:
         heads = np.zeros((len(lacking), 4), dtype=np.uint8)
         heads[:, 2:] = layouts.centre_heads[shape.take(owner), self.plane.ravel().take(lacking)]
         wanted, decimals = self.wanted.ravel().take(lacking), self.decimals.ravel().take(lacking)
-        added = plain(wanted, decimals, heads, signed=manner.signed)
+        added = plain(wanted, decimals, heads, signed=steps.signed)
         at = layouts.places(program, self.block.take(owner))
         start, stop = np.concatenate((spans[:, 0], at)), np.concatenate((spans[:, 1], at))
         order = np.argsort(2 * start + (stop > start), kind="stable")
@@ -196,7 +196,7 @@ def _nearest_centre(
 ) -> tuple[FloatArray, FloatArray]:
     """The centre (k, 2) that a radius means, of the two the one nearer to `wanted`, and how far off it is, (k,).
 
-    As `render.BlockRenderer._centre_by_radius`. Infinitely far where there is no radius (NaN), or none that reaches.
+    As `block.BlockWriter._centre_by_radius`. Infinitely far where there is no radius (NaN), or none that reaches.
     """
     way = end - start
     half_chord = np.hypot(way[:, 0], way[:, 1]) / 2

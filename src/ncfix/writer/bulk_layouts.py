@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from ncfix.control.moves import Moves
 from ncfix.text.language import ArcLayout, BulkLayout, Language
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
+from ncfix.text.spelling import Spelling
 from ncfix.text.tree import START, Program
+from ncfix.text.writer import Splices
 
 IntArray = NDArray[np.int64]
 
@@ -18,26 +20,6 @@ OPENING, CLOSING = 4, 8
 """Bytes that stand at most before and behind the axis words of a further piece."""
 
 
-@dataclass(frozen=True, slots=True)
-class Manner:
-    """How a program writes its numbers, and lines of further pieces.
-
-    signed  with a sign
-    comma   with a decimal comma
-    lined   such lines begin with more than axis words
-    """
-
-    signed: bool = False
-    comma: bool = False
-    lined: bool = False
-
-    @classmethod
-    def of(cls, layout: BulkLayout) -> Manner:
-        """That of a shape, and so of all shapes of the program."""
-        return cls(layout.signed, layout.comma, layout.lead is not None)
-
-
-NOTHING_SPECIAL = Manner()
 NONE, LED = -1, -2
 """The slots of axes that have no word, and of those that other words of the block lead to where they shall be."""
 LED_HEAD = 1
@@ -66,7 +48,8 @@ class Layouts:
     radius     (s,) which of them is R, or `NONE`
     alone      (s,) the renderer writes them
     taken      (s, 2, 2) slot and offset of where that word begins, with the blank before it, and of its end
-    manner     how numbers and lines are written
+    spelling   how numbers are written
+    lined      lines of further pieces begin with more than axis words
     """
 
     known: NDArray[np.bool_]
@@ -86,7 +69,8 @@ class Layouts:
     radius: IntArray
     taken: IntArray
     alone: NDArray[np.bool_]
-    manner: Manner = NOTHING_SPECIAL
+    spelling: Spelling
+    lined: bool = False
 
     @classmethod
     def of(cls, language: Language, program: Program, moves: Moves) -> Layouts:
@@ -111,6 +95,7 @@ class Layouts:
             np.full(n, NONE),
             np.zeros((n, 2, 2), np.int64),
             np.zeros(n, np.bool_),
+            language.spelling(program),
         )
         if language.bulk is not None and len(moves):
             shapes = program.template.take(moves.block)
@@ -118,7 +103,7 @@ class Layouts:
                 layout = language.bulk(program, int(moves.block[np.argmax(shapes == shape)]))
                 if layout is not None:
                     table.enter(shape, layout, moves)
-                    table = replace(table, manner=Manner.of(layout))
+                    table = replace(table, lined=layout.lead is not None)
         return table
 
     def enter(self, shape: int, layout: BulkLayout, moves: Moves) -> None:
@@ -174,3 +159,38 @@ def places_of(program: Program, blocks: IntArray, anchors: IntArray) -> IntArray
     edges[behind] = program.number_spans[program.first_number[blocks[behind]] + slot[behind], 1]
     places: IntArray = edges + offset
     return places
+
+
+# -- lines of further pieces that are more than axis words: the block number, `L`, FMAX -------------------------------
+
+
+def lines_of(
+    program: Program, layouts: Layouts, blocks: IntArray, end_of_line: bytes
+) -> tuple[list[bytes], list[bytes]]:
+    """What stands before and behind the axis words of the lines of further pieces of `blocks` (k,)."""
+    shapes, begins = program.template[blocks].tolist(), program.blocks[blocks, 0].tolist()
+    stops = layouts.lead_ends(program, blocks).tolist()
+    openings, closings = (
+        [row.tobytes().rstrip(b"\0") for row in table] for table in (layouts.openings, layouts.closings)
+    )
+    before = [
+        end_of_line + program.source[begin:stop] + openings[shape]
+        for begin, stop, shape in zip(begins, stops, shapes, strict=True)
+    ]
+    return before, [closings[shape] for shape in shapes]
+
+
+def with_lines(words: Splices, before: list[bytes], behind: list[bytes], places: tuple[IntArray, IntArray]) -> Splices:
+    """Words, of which some are the first and the last of a line, with what stands before and behind them there."""
+    first, last = places
+    length, ends = words.length.copy(), np.cumsum(words.length)
+    pieces: list[bytes] = []
+    done = 0
+    for begin, stop, head, tail in zip(
+        (ends - words.length)[first].tolist(), ends[last].tolist(), before, behind, strict=True
+    ):
+        pieces += (words.data[done:begin], head, words.data[begin:stop], tail)
+        done = stop
+    np.add.at(length, first, [len(each) for each in before])
+    np.add.at(length, last, [len(each) for each in behind])
+    return Splices(words.start, words.stop, length, b"".join([*pieces, words.data[done:]]))

@@ -20,13 +20,11 @@ from ncfix.control.turns import UNTIMED, at_their_pace, is_dragged, minutes, tur
 from ncfix.text.language import BlockLayout, language_of
 from ncfix.text.tree import Program, view
 from ncfix.text.writer import Edit, Splices, overlong
-from ncfix.writer.bulk import Bulk
-from ncfix.writer.bulk_alone import write_alone
+from ncfix.writer.block import STRAIGHT_AND_ARCS
+from ncfix.writer.bulk import Bulk, write_alone
 from ncfix.writer.frames import FrameMap
 from ncfix.writer.levels import LevelBook
-from ncfix.writer.pieces import Pieces
-from ncfix.writer.render import STRAIGHT_AND_ARCS
-from ncfix.writer.second_reading import SecondReading
+from ncfix.writer.pieces import Pieces, SecondReading
 from ncfix.writer.target import TANGENTIAL, Rendered, Target, plane_across
 
 FloatArray = NDArray[np.float64]
@@ -112,6 +110,7 @@ class _Emitter:
         bulk: Bulk | None,
     ) -> None:
         self.program, self.language, self.kinematics = program, language_of(program.dialect), kinematics
+        self.spelling = self.language.spelling(program)
         self.moves, self.pieces, self.reading = moves, pieces, reading
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
         self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
@@ -291,7 +290,7 @@ class _Emitter:
             target = at_their_pace(target)
         if math.isinf(target.turn_minutes) and is_dragged(target):
             self.conflicts.setdefault(block, UNTIMED)
-        rendered = self.language.render(self.program, block, layout, target)
+        rendered = self.language.writer(self.program, block, layout, target, self.spelling).write()
         if rendered.conflict:
             self.conflicts.setdefault(block, rendered.conflict)
         ends, frame = np.array(rendered.ends), self.frames[self.reading.frame[row]]

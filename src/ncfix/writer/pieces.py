@@ -1,4 +1,5 @@
-"""Corrected motions as columns: what shall be commanded instead, one row per block piece to be written."""
+"""Corrected motions as columns: what shall be commanded instead, one row per block piece to be written; and what a
+control made of an earlier attempt to write them, which the next one has to know."""
 
 from __future__ import annotations
 
@@ -6,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ncfix.control.moves import Frame, Moves
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,3 +45,26 @@ class Pieces:
         """(m,) the command at the end is known in all axes."""
         finite = np.isfinite(self.end)
         return np.ones(len(self), dtype=np.bool_) if finite.all() else np.asarray(finite.all(axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class SecondReading:
+    """What a control made of an earlier attempt, one row per motion of the original.
+
+    A program may set its frames where the machine stands (G92, G10 L20): then they move with the corrections.
+
+    frame, frames  (n,) index into `frames`: the frame in which each motion is really read
+    start, end     (n, n_axes) where motions that are kept really start and end; None before any attempt
+    """
+
+    frame: NDArray[np.int32]
+    frames: tuple[Frame, ...]
+    start: NDArray[np.float64] | None = None
+    end: NDArray[np.float64] | None = None
+
+    @classmethod
+    def of(cls, moves: Moves, pieces: Pieces) -> SecondReading:
+        """From the motions that were read where `pieces` were written (same rows)."""
+        last = np.flatnonzero(np.append(pieces.move[1:] != pieces.move[:-1], True))
+        first = np.append(0, last[:-1] + 1)
+        return cls(moves.frame[last], moves.frames, moves.start[first], moves.end[last])

@@ -12,7 +12,7 @@ from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
 from ncfix.machine import load
 from ncfix.text.reader import read
-from ncfix_heidenhain.klartext.turns import extremes, on_its_side
+from ncfix_heidenhain.klartext.writing import extremes, on_its_side
 from program.klartext.tnc import program
 
 SETUP = Setup(work_offsets={"PRESET": {"Z": 120.0}}, initial=dict.fromkeys("XYZBC", 0.0), assume_zero=True)

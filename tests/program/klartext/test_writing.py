@@ -16,7 +16,7 @@ from ncfix.text.spelling import Spelling
 from ncfix.text.writer import apply
 from ncfix_heidenhain.klartext.arc_text import PieceOfArc, arc_text
 from ncfix_heidenhain.klartext.poles import pole_in_force
-from ncfix_heidenhain.klartext.render import NOT_CLOSED
+from ncfix_heidenhain.klartext.writing import NOT_CLOSED
 from program.klartext.tnc import KNOWN, THREE, fixed, follow, program
 
 
@@ -79,7 +79,7 @@ def test_after_an_arc_without_a_pole_the_one_in_force_comes_back() -> None:
 
 
 def test_a_refused_block_that_would_lead_elsewhere_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ncfix_heidenhain.klartext.render.pole_in_force", lambda source, at: "X+50 Y+50")
+    monkeypatch.setattr("ncfix_heidenhain.klartext.writing.pole_in_force", lambda source, at: "X+50 Y+50")
     with pytest.raises(SelfCheckError, match="would lead to"):
         fixed(AFTER_CR)
 

@@ -1,0 +1,394 @@
+"""What Klartext adds to the writer of blocks: path functions and poles, sides of rotary words, and holes.
+
+What relies on a pole or on the element before it (LP, CP, CT) is said anew in Cartesian words; arcs are put into words
+by `arc_text`. Cycles of the 200s count their depth from a surface, Q203, which is moved for one hole. The old ones
+count it from where the tool stands, so that gets a word.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.arcs import CLOCKWISE
+from ncfix.text.number_text import ROUNDED
+from ncfix.text.spelling import Spelling, value_of
+from ncfix.text.tree import Literal, Program, Word
+from ncfix.writer.block import EXACT, BlockWriter
+from ncfix.writer.target import Target
+from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text
+from ncfix_heidenhain.klartext.control import BY_DEPTH, FROM_START
+from ncfix_heidenhain.klartext.layout import FULL, VECTOR, KlartextLayout, poles_move, tilts, uses_comma
+from ncfix_heidenhain.klartext.poles import is_relied_on, pole_in_force
+
+FloatArray = NDArray[np.float64]
+
+STRAIGHT = frozenset({"", "l", "ln", "lp"})
+BY_PATH = frozenset({"c", "ct", "ctp", "cp", "lp"})
+"""Functions whose meaning depends on where the tool stands or comes from, or on a pole."""
+
+SAID_BY_WORDS = ("", "l", "ln", "ct", "ctp")
+"""Functions that are always gone through: by their words alone, or by the direction that they come from."""
+
+WHICH_POLE = "the arc needs a pole of its own, and which one was in force before it the text does not tell"
+NOT_CLOSED = "the full circle begins at a place that its own words have too few digits to name"
+
+SURFACE = "Q203"
+
+UNCORRECTED = 1e-9
+"""Degrees: what an angle is off for nothing but the rounding of doubles."""
+
+
+def spelling_of(program: Program) -> Spelling:
+    """Numbers with their sign, with a comma where the program has commas. A control takes eight digits of TX TY TZ."""
+    return Spelling(
+        signed=True,
+        comma=uses_comma(program.source),
+        trimmed=False,
+        modal=False,
+        all_blanks=True,
+        vector=tuple(sorted(VECTOR)),
+        vector_digits=7,
+    )
+
+
+class KlartextWriter(BlockWriter):
+    """Writes one motion into one block.
+
+    named     columns of axes that get a word in any case, as those do that polar words stood for
+    own_pole  a pole has been put before the block or one of its pieces
+    """
+
+    layout: KlartextLayout
+
+    def __init__(
+        self, program: Program, block: int, layout: KlartextLayout, target: Target, spelling: Spelling
+    ) -> None:
+        super().__init__(program, block, layout, target, spelling)
+        self.in_plane = tuple(target.spatial[index] for index in target.plane[:2])
+        self.named = self.in_plane if layout.polar else ()
+        self.own_pole = False
+
+    def _write(self) -> None:
+        target = self.target
+        if target.code in (BY_DEPTH, FROM_START):
+            self._over_the_hole()
+            return
+        if self._as_it_is():
+            self.out.ends.append(np.where(np.isnan(target.nominal), target.start, target.nominal))
+            self.out.centre = target.original_centre
+            return
+        super()._write()
+        if self.own_pole and is_relied_on(self.program.source, int(self.program.blocks[self.block, 1])):
+            old_pole = self._old_pole()
+            if old_pole is None:
+                self.out.conflict = WHICH_POLE
+            elif old_pole:
+                self.out.lines.append(self.prefix + old_pole)
+
+    def _as_it_is(self) -> bool:
+        """The block says well enough what is wanted, and nothing that it relies on has moved."""
+        target, name = self.target, self.layout.name
+        if name in SAID_BY_WORDS or name.startswith(("appr", "dep")) or len(target.ends) > 1 or any(target.spelled):
+            return False
+        arc = name not in STRAIGHT
+        if arc != target.arc or (np.abs(target.ends[0] - target.nominal) >= self.half).any():
+            return False
+        if arc and (np.abs(target.centre - target.original_centre) >= self.half[target.spatial[0]]).any():
+            return False
+        began = np.array([target.start[column] if column >= 0 else 0.0 for column in target.spatial])
+        if (np.abs(began - target.origin) >= EXACT).any():
+            return False
+        return name not in BY_PATH or not poles_move(self.program.source)
+
+    # -- words --------------------------------------------------------------------------------------------------------
+
+    def _cased(self, address: str) -> str:
+        return address
+
+    @cached_property
+    def prefix(self) -> str:
+        """What stands before the function: the block number, which inserted blocks repeat, and its blanks."""
+        start = int(self.program.blocks[self.block, 0])
+        at = self.program.position(self.block, self.layout.code_at)
+        text = self.program.source[start:at].decode("latin-1")
+        if self.program.dialect.block_numbers == "none":
+            text = re.sub(r"\d+[ \t]*", "", text)
+        return "" if "\n" in text else text
+
+    def _must_name(self, column: int) -> bool:
+        return column in self.named or super()._must_name(column)
+
+    def _may_add(self, column: int) -> bool:
+        """Not a rotary axis that is not corrected and stands where it should, but for the digits of its last word.
+
+        Not one in a program with tilted planes: the control would not keep the tip where it is; nor on paths that are
+        made in a plane, or lead to or away from one. Not the tool axis beside a corner that the control makes, which
+        lies in the working plane, or in a departure.
+        """
+        layout = self.layout
+        if self._is_rotary(column):
+            turned = any(letter in layout.axes for letter in "ABC")
+            bare = layout.corner or layout.name not in ("", "l", "ln", "lp")
+            if self._stands(column) or (not turned and (bare or tilts(self.program.source))):
+                return False
+        elif (layout.corner or layout.name.startswith("dep")) and column == self.target.spatial[2]:
+            return False
+        return super()._may_add(column)
+
+    def _is_rotary(self, column: int) -> bool:
+        return bool(self.target.rotary) and self.target.rotary[column]
+
+    def _stands(self, column: int) -> bool:
+        """A rotary axis stands where it should in all pieces, but for rounding."""
+        target = self.target
+        ends, nominal = target.ends[:, column].tolist(), float(target.nominal[column])
+        here = abs(ends[0] - float(target.start[column]))
+        return here <= ROUNDED * self.half[column] and all(abs(end - nominal) < UNCORRECTED for end in ends)
+
+    def _reachable(self, column: int, end: float, piece: int = 0) -> float:
+        """The end of a piece, of a rotary axis on its side of zero and of a full turn."""
+        target = self.target
+        if not self._is_rotary(column) or not np.isfinite(end):
+            return end
+        nominal = float(target.nominal[column])
+        if piece < len(target.ends) - 1:
+            done = float(target.shares[: piece + 1].sum())
+            nominal = float(target.start[column]) * (1 - done) + nominal * done
+        step = 10.0 ** -float(target.decimals[column])
+        return on_its_side(self.program.source, target.letters[column], nominal, end, step)
+
+    def _function(self, name: str) -> None:
+        span = self.layout.function
+        if span is not None and self.program.slice(self.block, span).upper() != name:
+            self.out.edits.append((*self.program.span(self.block, span), name))
+
+    def _motion_code(self) -> None:
+        """What is not straight by its words becomes an L, an approach or departure in polar words a Cartesian one."""
+        layout, name = self.layout, self.layout.name
+        if name in ("", "l", "ln") and not layout.polar:
+            return
+        leads = name.startswith(("appr", "dep"))
+        self._function(name.upper().replace(" P", " ") if leads else "L")
+        for word in (*layout.polar, None if leads else layout.radius):
+            self._remove(word)
+        if layout.sense is not None:
+            self._remove_span(layout.sense)
+
+    def _arc_words(self, start: FloatArray, end: FloatArray) -> None:
+        """Arcs are written by `_first_piece`."""
+
+    def _opening(self, wanted: int) -> list[str]:
+        return ["LN" if self.layout.vector else "L"]
+
+    def _direction_words(self, end: FloatArray) -> list[str]:
+        """TX TY TZ of a further piece; its normal is that of the block."""
+        normals = [w for w in self.program.items_of(self.block) if isinstance(w, Word) and w.address[0] == "N"]
+        kept = [self.program.slice(self.block, word.span) for word in normals if len(word.address) == 2]
+        return kept + super()._direction_words(end)
+
+    # -- arcs ---------------------------------------------------------------------------------------------------------
+
+    def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
+        """The block itself, if it is an arc: in the words and with the pole that it needs."""
+        target, layout = self.target, self.layout
+        if not target.arc:
+            return super()._first_piece(position, end)
+        closed = self._closed(position, end)[self.in_plane[0]]
+        arc = self._piece_of_arc(position, 0, target.centre)
+        if closed:
+            arc.end[arc.columns] = target.start[arc.columns]
+        found = arc_text(arc, self.spelling)
+        self.named = self.in_plane if layout.polar or found.function == "C" else ()
+        if found.function == "CP":
+            self._axis_words(position, found.end, skipped=self.in_plane)
+            for column in self.in_plane:
+                position[column] = found.end[column]
+                self._remove(layout.axes.get(target.letters[column]))
+            self._function(" ".join([found.function, *found.words]))
+        else:
+            self._axis_words(position, found.end)
+            self._function(found.function)
+        if closed and (np.abs(position - target.start)[arc.columns] > EXACT).any():
+            self.out.conflict = NOT_CLOSED
+        for word in layout.polar:
+            self._remove(word)
+        self._radius(found)
+        if layout.sense is None:
+            self.added.append(layout.blank + found.sense)
+        if found.pole:
+            self._line_before(self._pole(found))
+            self.own_pole = True
+        self.out.centre = found.centre
+        return position
+
+    def _further_piece(self, position: FloatArray, piece: int) -> FloatArray:
+        target = self.target
+        if target.arcs is None or not target.arcs[piece]:
+            return super()._further_piece(position, piece)
+        assert target.centres is not None
+        found = arc_text(self._piece_of_arc(position, piece, target.centres[piece]), self.spelling)
+        position, helix = position.copy(), found.function == "CP"
+        words = [found.function, *(found.words if helix else ())]
+        for column, letter in self.columns:
+            if column in self.in_plane and helix:
+                position[column] = found.end[column]
+            elif letter not in self.layout.axes and not self._may_add(column):
+                continue
+            elif column in self.in_plane or abs(found.end[column] - position[column]) >= self.half[column]:
+                words.append(letter + self._step(position, column, float(found.end[column])))
+        if found.pole:
+            self._line([self._pole(found)])
+            self.own_pole = True
+        self._line([*words, *(found.words if found.function == "CR" else ()), found.sense])
+        self.out.centres[piece] = found.centre
+        return position
+
+    def _piece_of_arc(self, begin: FloatArray, piece: int, centre: FloatArray) -> PieceOfArc:
+        target = self.target
+        turn = self._angle_of_helix()
+        return PieceOfArc(
+            begin=begin,
+            end=self._as_written(begin, target.ends[piece], own=piece == 0),
+            centre=centre,
+            plane=target.plane,
+            spatial=target.spatial,
+            clockwise=target.arc_code == CLOCKWISE,
+            turn=None if turn is None else turn * float(target.shares[piece]),
+            decimals=target.decimals,
+        )
+
+    def _angle_of_helix(self) -> float | None:
+        """The angle of a CP in rad, if it is given by IPA."""
+        word = next((word for word in self.layout.polar if word.address == "IPA"), None)
+        angle = math.nan if word is None or self.layout.name != "cp" else self._value(word, math.nan)
+        return math.radians(angle) if math.isfinite(angle) else None
+
+    def _as_written(self, begin: FloatArray, end: FloatArray, *, own: bool) -> FloatArray:
+        """An end on the digits that will be written; `own`: by the words of the block itself."""
+        result, decimals, values = end.tolist(), self.target.decimals.tolist(), self.program.values_of(self.block)
+        for column, letter in self.columns:
+            word = self.layout.axes.get(letter) if own else None
+            base = float(begin[column]) if word is not None and word.address in self.layout.forms else 0.0
+            result[column] = base + round(result[column] - base, decimals[column])
+            if word is not None and isinstance(word.value, Literal):
+                original = base + float(values[word.value.slot])
+                if abs(result[column] - original) < self.half[column]:
+                    result[column] = original
+        return np.array(result)
+
+    def _radius(self, arc: ArcText) -> None:
+        """The R word of CR."""
+        word = self.layout.radius
+        if arc.function != "CR":
+            self._remove(word)
+            return
+        (text,) = arc.words
+        if word is None:
+            self.added.append(self.layout.blank + text)
+        elif self.program.slice(self.block, word.value_span) != text[1:]:
+            self.out.edits.append((*self.program.span(self.block, word.value_span), text[1:]))
+
+    def _pole(self, arc: ArcText) -> str:
+        return "CC" + "".join(self.layout.blank + text for text in arc.pole)
+
+    def _old_pole(self) -> str | None:
+        """The pole that was in force, which later blocks may rely on; empty if there was none, None if nobody knows."""
+        target = self.target
+        if self.layout.name not in ("c", "cp"):
+            words = pole_in_force(self.program.source, int(self.program.blocks[self.block, 0]))
+            return f"CC{self.layout.blank}{words}" if words else words
+        digits = max(POLE_DIGITS, int(target.decimals[target.spatial[target.plane[0]]]))
+        pairs = sorted((index, float(target.original_centre[index])) for index in target.plane[:2])
+        return "CC" + "".join(
+            f"{self.layout.blank}{'XYZ'[index]}{self.spelling.number(value, digits)}" for index, value in pairs
+        )
+
+    def _line_before(self, text: str) -> None:
+        """Put a line before the block."""
+        start = int(self.program.blocks[self.block, 0])
+        self.out.edits.append((start, start, self.prefix + text + self.program.line_end.decode()))
+
+    # -- holes --------------------------------------------------------------------------------------------------------
+
+    def _over_the_hole(self) -> None:
+        """The position over a hole, and its depth."""
+        target, called = self.target, self.layout.name == "cycl call"
+        across, position = target.spatial[2], target.start.copy()
+        rotary = [column for column, _ in self.columns if called and self._is_rotary(column)]
+        self._axis_words(position, target.ends[0], skipped=(across, *rotary))
+        position[across] = self._bottom(across)
+        if self.layout.polar:
+            self._motion_code()
+        if called and self.added:
+            self._positioned()
+        self.out.ends.append(position)
+
+    def _positioned(self) -> None:
+        """CYCL CALL executes the cycle where the block before led to, M99 at the end of a block of its own."""
+        words = [text.strip() for text in self.added]
+        self._function(" ".join(["L", *words, self.layout.closing or "FMAX", "M99"]))
+        self.added.clear()
+
+    def _bottom(self, across: int) -> float:
+        """Where the hole ends, as it is written."""
+        lower = float(self.target.nominal[across])
+        off = float(self.target.ends[0][across]) - lower
+        return lower + (self._sunk if self.target.code == BY_DEPTH else self._lifted)(off, across)
+
+    def _sunk(self, off: float, across: int) -> float:
+        """Move the surface from which the cycle counts its depth, for this hole only; by how much.
+
+        A change of Q203 itself counts for the calls that follow (TNC 640, "Cycle programming": define the parameter of
+        the cycle directly). It is taken back after the block, so other holes and formulas find the value they knew.
+        """
+        if abs(off) < self.half[across] or SURFACE in self.program.text_of(self.block):
+            return 0.0
+        text = self.spelling.number(off, int(self.target.decimals[across]))
+        self._line_before(f"FN 1: {SURFACE} = +{SURFACE} + {text}")
+        self._line([f"FN 2: {SURFACE} = +{SURFACE} - {text}"])
+        return value_of(text)
+
+    def _lifted(self, off: float, across: int) -> float:
+        """Call an old cycle from a height that makes its depth right; by how much that is another height.
+
+        Without a word the height is that of the hole before, which had its own; so it is said each time.
+        """
+        word, decimals = self.layout.axes.get("Z"), int(self.target.decimals[across])
+        if word is None:
+            height = float(self.target.origin[2])
+            return self._add(self.target.letters[across], height + off, decimals) - height
+        if abs(off) < self.half[across]:
+            return 0.0
+        height = self._value(word, self._meant(across, word, increment=word.address in self.layout.forms))
+        return self._rewrite(word, height + off, decimals) - height
+
+
+# -- rotary words -----------------------------------------------------------------------------------------------------
+# A table that counts below 360 degrees takes -0.001 for 359.999, and the next word may then lead it the long way round.
+# So a program that never writes such an angle does not get one from a correction either: the word stays at the limit,
+# and what that leaves at the tip is part of the figures. Rotary words are corrected under `--strategy full` only.
+
+
+@lru_cache(maxsize=16)
+def extremes(source: bytes, letter: str) -> tuple[float, float]:
+    """The smallest and largest angle that a program writes for a rotary axis, degrees; 0 at least is among them."""
+    code = re.sub(rb";[^\r\n]*", b"", source)
+    found = re.findall(rb"(?i)(?<![A-Z0-9])" + letter.encode() + rb"[ \t]*([+-]?[ \t]*[\d.,]*\d)", code)
+    angles = [value_of(text) for text in map(bytes.decode, found) if text.count(".") + text.count(",") < 2]
+    return min(angles, default=0.0), max(angles, default=0.0)
+
+
+def on_its_side(source: bytes, letter: str, nominal: float, angle: float, step: float) -> float:
+    """A corrected angle, degrees; not below zero or past a full turn where the program never is. `step`: one digit."""
+    if abs(angle - nominal) < UNCORRECTED:
+        return angle
+    if nominal >= 0.0 > angle and extremes(source, letter)[0] >= 0.0:
+        return 0.0
+    if nominal < FULL <= angle and extremes(source, letter)[1] < FULL:
+        return FULL - step
+    return angle

@@ -1,0 +1,288 @@
+"""What SINUMERIK adds to the writer of blocks: polar words, senses of rotation, CIP, and calls of drilling cycles.
+
+The call of a hole's cycle with a depth of its own goes in before the motion, in the same place of the flow: number and
+label of the block stay before it. Behind the hole the call of the program comes back, so what is executed next finds
+the depth that it knew. A cycle that is called where the axes stand, and shall drill a little beside, becomes a modal
+one for the motion to there.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.moves import CycleCall
+from ncfix.text.spelling import Spelling
+from ncfix.text.tree import Program, Word
+from ncfix.writer.block import BlockWriter
+from ncfix.writer.target import LINE, TANGENTIAL, Target
+from ncfix_siemens.sinumerik.circles import VIA, circle_through
+from ncfix_siemens.sinumerik.destination import turned
+from ncfix_siemens.sinumerik.flatten import BARE, argument
+from ncfix_siemens.sinumerik.layout import END_OF_SUBPROGRAM, SinumerikLayout
+from ncfix_siemens.sinumerik.vocabulary import INCREMENTAL, MOTIONS, TURNING, VECTOR
+
+FloatArray = NDArray[np.float64]
+
+SPELLING = Spelling(vector=tuple(f"{address}=" for address in VECTOR), vector_digits=7)
+
+CIP = MOTIONS["cip"]
+ARCS = frozenset({20, 30})
+RAPID = 0
+
+PLAIN = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)\s*")
+CYCLE = re.compile(r"(?P<name>\w+)\s*\((?P<arguments>.*)\)", re.DOTALL)
+REFERENCE = 1
+"""The place of the height that the cycle counts from (RFP)."""
+
+ENDS_HERE = "the hole needs a line behind it, and the subprogram ends in its block"
+
+
+class SinumerikWriter(BlockWriter):
+    """Writes one motion into one block, or one hole. `across`: the column along which that is drilled, else -1."""
+
+    layout: SinumerikLayout
+
+    def __init__(
+        self, program: Program, block: int, layout: SinumerikLayout, target: Target, spelling: Spelling
+    ) -> None:
+        super().__init__(program, block, layout, target, spelling)
+        self.across = -1 if target.call is None else target.letters.index(target.call.across)
+        if target.call is not None:  # a word along the tool says where it goes before it drills, and stays
+            self.columns = [each for each in self.columns if each[0] != self.across]
+
+    def _write(self) -> None:
+        if self.target.call is None:
+            super()._write()
+        else:
+            self._hole(self.target.call)
+
+    # -- axes ---------------------------------------------------------------------------------------------------------
+
+    def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
+        if not self.layout.polar:
+            return super()._first_piece(position, end)
+        if self._polar_stays(end):
+            kept = super()._first_piece(position, np.where(self._polar_columns(), position, end))
+            return np.where(self._polar_columns(), self.target.nominal, kept)
+        for word in self.layout.polar.values():
+            self._remove(word)
+        position = super()._first_piece(position, end)
+        if not self.added and not self.layout.axes:
+            self._name_a_place(position)
+        return position
+
+    def _polar_stays(self, end: FloatArray) -> bool:
+        if self.layout.partial_polar or self.target.code in ARCS:
+            return False
+        near = np.abs(end - self.target.nominal) < self.half
+        return len(self.target.ends) == 1 and bool(near[self._polar_columns()].all())
+
+    def _polar_columns(self) -> NDArray[np.bool_]:
+        """The columns that no word of the block names while it has polar coordinates."""
+        free = [column for column, letter in self.columns if letter in "XYZ" and letter not in self.layout.axes]
+        return np.isin(np.arange(len(self.half)), free)
+
+    def _meant(self, column: int, word: Word, *, increment: bool) -> float:
+        """A formula in IC always gives way to a number."""
+        formed = self.layout.forms.get(word.address) == INCREMENTAL
+        return math.nan if formed else super()._meant(column, word, increment=increment)
+
+    def _arrive(self, position: FloatArray, column: int, start: float, end: float, word: Word) -> None:
+        """IC instead of DC, ACP or ACN, where that would lead a rotary axis the other way round."""
+        form = self.layout.forms.get(word.address, "")
+        if form not in TURNING:
+            return
+        angle, known = float(position[column]), math.isfinite(start)
+        arrival = math.degrees(turned(form, math.radians(start), math.radians(angle), known=known))
+        if abs(arrival - angle) > 180.0:
+            whole = self.layout.formed[word.address]
+            self._take_back(whole)
+            text = self.spelling.number(end - start, int(self.target.decimals[column]))
+            name = "".join(map(self._cased, INCREMENTAL.upper()))
+            self.out.edits.append((*self.program.span(self.block, whole), f"{name}({text})"))
+            position[column] = start + float(text)
+
+    # -- codes and arcs -----------------------------------------------------------------------------------------------
+
+    def _motion_code(self) -> None:
+        wanted, word = self.code, self.layout.motion
+        if word is None and wanted != self.target.code:
+            self._put_code(f"{wanted // 10}")
+        elif word is not None and word.address != "G" and wanted != CIP:
+            self.out.edits.append((*self.program.span(self.block, word.span), self._cased("G") + f"{wanted // 10}"))
+        elif wanted == CIP and word is None and self.target.active_code != CIP:
+            at = self.program.position(self.block, self.layout.code_at)
+            self.out.edits.append((at, at, "CIP "))
+        else:
+            super()._motion_code()
+
+    def _arc_words(self, start: FloatArray, end: FloatArray) -> None:
+        if self.target.arc and self.layout.via:
+            self._via(start, end)
+            return
+        for word in (*self.layout.via.values(), self.layout.angle):
+            self._remove(word)
+        super()._arc_words(start, end)
+
+    def _has_centre(self) -> bool:
+        other = self.layout.angle is not None or self.layout.polar or self.target.code in TANGENTIAL
+        return not other and super()._has_centre()
+
+    def _via(self, start: FloatArray, end: FloatArray) -> None:
+        """The intermediate point of CIP, moved as the ends are."""
+        target, words = self.target, self.layout.via
+        begin, finish = self._xyz(start), self._xyz(end)
+        nominal_end, via = self._xyz(target.nominal), target.origin.copy()
+        for index, address in enumerate(VIA):
+            if address in words:
+                from_start = self._is_incremental(words[address])
+                via[index] = self._value(words[address], np.nan) + (target.origin[index] if from_start else 0.0)
+        known = np.where(np.isfinite(via), via, target.origin)
+        before, after = (float(np.linalg.norm(arm)) for arm in (known - target.origin, nominal_end - known))
+        share = before / max(before + after, 1e-9)
+        wanted = known + (1 - share) * (begin - target.origin) + share * (finish - nominal_end)
+        for index, address in enumerate(VIA):
+            if target.spatial[index] >= 0:
+                wanted[index] = self._via_word(address, index, float(wanted[index]), float(begin[index]))
+        circle = circle_through(tuple(begin), tuple(wanted), tuple(finish))
+        self.out.centre = np.array(circle.centre)
+
+    def _via_word(self, address: str, index: int, wanted: float, begin: float) -> float:
+        """One word of the intermediate point; what the control will read."""
+        column, word = self.target.spatial[index], self.layout.via.get(address)
+        digits, half = int(self.target.decimals[column]), self.half[column]
+        base = begin if (self.incremental if word is None else self._is_incremental(word)) else 0.0
+        if word is not None:
+            written = self._value(word, np.nan)
+            near = np.isfinite(written) and abs(written - (wanted - base)) < half
+            return base + (written if near else self._rewrite(word, wanted - base, digits))
+        if abs(wanted - begin) < half:
+            return begin
+        text = self.spelling.number(wanted - base, digits)
+        self.added.append(f"{self.layout.blank or ' '}{address}={text}")
+        return base + float(text)
+
+    def _is_incremental(self, word: Word) -> bool:
+        form = self.layout.forms.get(word.address, "")
+        return form == INCREMENTAL or (not form and self.incremental)
+
+    # -- holes --------------------------------------------------------------------------------------------------------
+
+    def _hole(self, call: CycleCall) -> None:
+        """A hole: the words that lead over it, and a call of its cycle with a depth of its own."""
+        across, target = self.across, self.target
+        off = float(target.ends[0][across] - target.nominal[across])
+        if abs(off) < self.half[across]:
+            off = 0.0
+        arguments, sunk = shifted(call, off, int(target.decimals[across]))
+        if call.bound or self._is_inside_out(call, sunk):
+            arguments, sunk = None, 0.0
+        position = self._led_to(call, arguments) if call.modal else self._called(call, arguments)
+        position[across] = target.nominal[across] + sunk
+        self.out.ends.append(position)
+
+    def _led_to(self, call: CycleCall, arguments: list[str] | None) -> FloatArray:
+        """Behind a motion that leads to it: the words of the motion, and the call before and behind it."""
+        position = self._first_piece(self.target.start.copy(), self.target.ends[0])
+        if arguments is not None:
+            self._check(call)
+            at, line_end = self.program.position(self.block, self.layout.begins), self.program.line_end.decode()
+            opening = f"MCALL {call.name}({','.join(arguments)}){line_end}{self._apart()}"
+            self.out.edits.insert(0, (at, at, opening))
+            self.out.opens = True
+            self.out.closing = f"{self._apart()}MCALL {call.name}({','.join(map(argument, call.arguments))})"
+        return position
+
+    def _check(self, call: CycleCall) -> None:
+        """Whether lines may be put before and behind the block."""
+        codes = (self._value(word, np.nan) for word in self.layout.after)
+        ends = ENDS_HERE if END_OF_SUBPROGRAM.intersection(codes) else ""
+        self.out.conflict = self.out.conflict or call.fixed or ends
+
+    def _is_inside_out(self, call: CycleCall, sunk: float) -> bool:
+        """Whether the hole would end on the other side of the height that its cycle counts from."""
+        reference = call.arguments[REFERENCE] if len(call.arguments) > REFERENCE else None
+        nominal = float(self.target.nominal[self.across])
+        return isinstance(reference, float) and (nominal - reference) * (nominal + sunk - reference) <= 0.0
+
+    def _called(self, call: CycleCall, arguments: list[str] | None) -> FloatArray:
+        """Where the axes stand: the call itself, modal for a motion of its own where the hole is beside that place."""
+        target, position = self.target, self.target.start.copy()
+        for column, _ in self.columns:
+            if self._may_add(column):
+                self._absent_axis(position, column, target.ends[0][column])
+        if arguments is None and not self.added:
+            return position
+        self._check(call)
+        assert self.layout.cycle is not None
+        text = self.program.slice(self.block, self.layout.cycle)
+        if arguments is not None:
+            text = with_depths(text, call, arguments)
+        if self.added:
+            text, led = f"MCALL {text}", "".join(self.added).strip()
+            if target.active_code != RAPID and (target.active_code != LINE or target.inverse_time):
+                led, self.out.code = f"G0 {led}", RAPID
+            self.out.lines += [self._apart() + led, self._apart() + "MCALL"]
+            self.added.clear()
+        self.out.edits.append((*self.program.span(self.block, self.layout.cycle), text))
+        return position
+
+    def _apart(self) -> str:
+        return self.prefix and f"{self.prefix} "
+
+
+def shifted(call: CycleCall, off: float, decimals: int) -> tuple[list[str] | None, float]:
+    """The arguments of a call whose hole ends `off` higher, as written, and by how much it then does.
+
+    None where that changes nothing.
+    """
+    (first, sense), *_ = call.depths
+    value = number_of(call, first)
+    shown = BARE.short(value + sense * off, decimals)
+    sunk = sense * (float(shown) - value) if off else 0.0
+    if sunk == 0.0:
+        return None, 0.0
+    arguments = [argument(value) for value in call.arguments]
+    for place, sense in call.depths:
+        arguments[place] = BARE.short(number_of(call, place) + sense * sunk, decimals)
+    return arguments, sunk
+
+
+def number_of(call: CycleCall, place: int) -> float:
+    """An argument that is a number."""
+    value = call.arguments[place]
+    assert isinstance(value, float)
+    return value
+
+
+def with_depths(text: str, call: CycleCall, arguments: list[str]) -> str:
+    """A call as the program writes it, with the depths of `arguments`, in the style of its numbers where it has any."""
+    found = CYCLE.fullmatch(text)
+    assert found is not None
+    parts = in_parts(found["arguments"])
+    for place, _ in call.depths:
+        part = parts[place]
+        blank = part[: len(part) - len(part.lstrip())]
+        value, decimals = float(arguments[place]), len(arguments[place].partition(".")[2])
+        shown = SPELLING.like(part, value, decimals) if PLAIN.fullmatch(part) else SPELLING.instead(value, decimals)
+        parts[place] = blank + shown
+    start, stop = found.span("arguments")
+    return text[:start] + ",".join(parts) + text[stop:]
+
+
+def in_parts(text: str) -> list[str]:
+    """Arguments as written, parted at the commas that stand in no brackets and no text."""
+    parts, depth, quoted = [""], 0, False
+    for letter in text:
+        quoted ^= letter == '"'
+        if not quoted:
+            depth += (letter in "([") - (letter in ")]")
+        if letter == "," and depth == 0 and not quoted:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return parts

@@ -1,0 +1,494 @@
+"""One corrected motion put into its block: the words that change there, and the lines of the pieces that follow it.
+
+Everything here is in the numbers of the program: its units, its frame, degrees, diameters. A word is rewritten only
+when its value moves by half an output step; a missing word is added only when its axis must stand elsewhere by as
+much. What is returned as emitted is what the control will understand, digits and all. How numbers and words look is
+the control's `Spelling`; where they stand is the block's `Layout`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.turns import is_dragged, number, way
+from ncfix.text.layout import ABSOLUTE, CENTRE_LETTERS, INCREMENT, Layout
+from ncfix.text.spelling import Spelling, value_of
+from ncfix.text.tree import Literal, Program, Word
+from ncfix.writer.block_text import BlockText
+from ncfix.writer.target import LINE, TANGENTIAL, Rendered, Target
+
+FloatArray = NDArray[np.float64]
+
+FEED_DECIMALS = 3
+"""F words of shares of a block in G93 keep the time of the block to this many decimals at least."""
+GRAIN = 1e-6
+"""A number that is so much of an output step above a whole number of them is that number."""
+
+STRAIGHT_AND_ARCS = (0, 10, 20, 30)
+"""Motion codes, in tenths, that may be stated anew: G0 to G3."""
+
+CLOSED, EXACT = 1e-6, 1e-9
+"""Program units: an arc whose ends are nearer is a full circle, and positions that are nearer are the same."""
+NEAR = 3.0
+"""Half output steps: no more lies between the ends of a full circle, which are one point before they are rounded."""
+
+INVERSE_TIME, PER_MINUTE = "93", "94"
+
+FROM_NOWHERE = "an increment in turned coordinates, while where one of their axes stands is not known"
+NO_TIME = "the block would become several, and in G93 no number behind its own F says how long it takes"
+
+
+class BlockWriter(BlockText):
+    """Writes one motion into one block: `write()` is called once. A language adds what no other control has.
+
+    incremental  axis words that do not say how they are meant are increments
+    code     the motion code in force behind what is written so far, tenths
+    dragged  a turn of rotary axes alone whose time has to be stated, since it gets a linear motion
+    turning  columns of the rotary axes that words of the direction of the tool turn: they have no words of their own
+    """
+
+    def __init__(self, program: Program, block: int, layout: Layout, target: Target, spelling: Spelling) -> None:
+        super().__init__(program, block, layout, target, spelling)
+        self.incremental = target.incremental and spelling.modal
+        self.code = TANGENTIAL.get(target.code, target.code)
+        self.dragged = math.isfinite(target.turn_minutes) and is_dragged(target)
+        self.turning = target.pointing.columns if target.pointing is not None and self._says_direction() else ()
+
+    def write(self) -> Rendered:
+        """Write the motion."""
+        self._write()
+        if self.added:
+            at = self.program.position(self.block, self.layout.words_at)
+            self.out.edits.append((at, at, "".join(self.added)))
+        self.out.edits.sort(key=lambda edit: edit[:2])
+        return self.out
+
+    def _write(self) -> None:
+        position = self._first_piece(self.target.start.copy(), self.target.ends[0])
+        self.out.ends.append(position)
+        for piece in range(1, len(self.target.ends)):
+            position = self._further_piece(position, piece)
+            self.out.ends.append(position)
+        if self.dragged:
+            self._feed_as_before()
+        self._move_late_words()
+
+    # -- the block itself ---------------------------------------------------------------------------------------------
+
+    def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
+        self._motion_code()
+        base = position.copy()
+        self._axis_words(position, end, self._closed(position, end))
+        if not (self.target.arc or self.layout.axes or self.added) and np.isfinite(self.target.original_centre).any():
+            self._name_a_place(position)
+        self._arc_words(base, position)
+        self._level()
+        if self.turning:
+            self._point(position, end)
+        if self.dragged:
+            self._time_of_turn(base, position)
+        elif self.target.inverse_time and len(self.target.ends) > 1:
+            self._share_time()
+        return position
+
+    def _motion_code(self) -> None:
+        wanted, word = self.target.code, self.layout.motion
+        if wanted not in STRAIGHT_AND_ARCS:
+            return
+        if word is not None:
+            if round(self._value(word, np.nan) * 10) != wanted:
+                self._rewrite(word, wanted / 10, 0)
+        elif wanted != self.target.active_code:
+            self._put_code(f"{wanted // 10}")
+
+    def _put_code(self, number: str) -> None:
+        """Put a G code before the first axis word."""
+        at = self.program.position(self.block, self.layout.code_at)
+        self.out.edits.append((at, at, self._cased("G") + number + self.layout.blank))
+
+    # -- axis words ---------------------------------------------------------------------------------------------------
+
+    def _axis_words(
+        self,
+        position: FloatArray,
+        end: FloatArray,
+        closed: NDArray[np.bool_] | None = None,
+        skipped: Sequence[int] = (),
+    ) -> None:
+        """Put the words of the axes right, and `position` where they lead; `closed` (n_axes,) stay where they are."""
+        for column, letter in self.columns:
+            if column in skipped:
+                continue
+            word = self.layout.axes.get(letter)
+            if closed is not None and closed[column]:
+                self._stay(position, column, word)
+            elif word is not None:
+                self._present_axis(position, column, end[column], word)
+            elif self._may_add(column):
+                self._absent_axis(position, column, end[column])
+
+    def _present_axis(self, position: FloatArray, column: int, end: float, word: Word) -> None:
+        start, turns = float(position[column]), 0.0
+        form = self.layout.forms.get(word.address, "")
+        increment = form == INCREMENT or (not form and self.incremental)
+        if form not in ("", ABSOLUTE, INCREMENT):
+            turns = float(np.floor(end / 360.0 + 1e-12)) * 360.0
+        base = self._counted_from(position, column) if increment else turns
+        written = self._value(word, self._meant(column, word, increment=increment) - turns)
+        value = (end if increment else self._reachable(column, end)) - base
+        if np.isfinite(value) and not (len(self.target.ends) == 1 and abs(value - written) < self.half[column]):
+            written = self._rewrite(word, value, int(self.target.decimals[column]))
+        position[column] = base + written
+        self._arrive(position, column, start, end, word)
+
+    def _meant(self, column: int, word: Word, *, increment: bool) -> float:
+        """What a word means as programmed where it is no plain number; NaN where that is not known."""
+        target = self.target
+        if target.incremental or not increment:
+            return float(target.original[column] if increment == target.incremental else target.nominal[column])
+        began = target.origin[target.spatial.index(column)] if column in target.spatial else np.nan
+        return float(target.nominal[column] - began)
+
+    def _counted_from(self, position: FloatArray, column: int) -> float:
+        """Where an increment counts from; in turned coordinates one axis that stands nowhere known hides them all."""
+        if not np.isfinite(position[column]):
+            self.out.conflict = self.out.conflict or FROM_NOWHERE
+        return float(position[column])
+
+    def _reachable(self, column: int, end: float, piece: int = 0) -> float:
+        """Where an absolute word may lead an axis that is to go to the end of a piece."""
+        return end
+
+    def _arrive(self, position: FloatArray, column: int, start: float, end: float, word: Word) -> None:
+        """See that the word just written leads the axis to where it says."""
+
+    def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
+        end = self._reachable(column, end)
+        near = abs(end - position[column]) < self.half[column] and not self._must_name(column)
+        if near or not np.isfinite(end):
+            return
+        base = position[column] if self.incremental else 0.0
+        position[column] = base + self._add(self.target.letters[column], end - base, int(self.target.decimals[column]))
+
+    def _step(self, position: FloatArray, column: int, end: float) -> str:
+        """The number of a new axis word that leads to `end`, and `position` there."""
+        base = position[column] if self.incremental else 0.0
+        text = self.spelling.number(end - base, int(self.target.decimals[column]))
+        position[column] = base + value_of(text)
+        return text
+
+    def _may_add(self, column: int) -> bool:
+        """Whether an axis may get a word that has none."""
+        allowed = self.layout.allowed is None or self.target.letters[column] in self.layout.allowed
+        return allowed and column not in self.turning and self.target.may_name(column)
+
+    def _must_name(self, column: int) -> bool:
+        """Whether an axis gets a word even if it stands where that leads it."""
+        return self.target.must_name(column)
+
+    def _name_a_place(self, position: FloatArray) -> None:
+        """A word for where an axis stands: the first line of what was an arc is a motion, even if it goes nowhere."""
+        for column, letter in self.columns:
+            if self._may_add(column) and np.isfinite(position[column]):
+                place = 0.0 if self.incremental else float(position[column])
+                self._add(letter, place, int(self.target.decimals[column]))
+                return
+
+    def _closed(self, position: FloatArray, end: FloatArray) -> NDArray[np.bool_]:
+        """The axes of the plane of a full circle: it has to end where it starts to the last digit.
+
+        An output step beside it, a control would make an arc of a thousandth of a degree of it.
+        """
+        target, closed = self.target, np.zeros(len(position), dtype=bool)
+        if not target.arc or len(target.ends) > 1:
+            return closed
+        plane, nominal = [target.spatial[index] for index in target.plane[:2]], self._xyz(target.nominal)
+        if -1 not in plane and all(abs(nominal[index] - target.origin[index]) < CLOSED for index in target.plane[:2]):
+            closed[plane] = bool((np.abs(end - position)[plane] < NEAR * self.half[plane]).all())
+        return closed
+
+    def _stay(self, position: FloatArray, column: int, word: Word | None) -> None:
+        """An axis that ends where it starts; a word that cannot say so to the last digit is left out."""
+        if word is None:
+            return
+        start = float(position[column])
+        self._present_axis(position, column, start, word)
+        if abs(position[column] - start) > EXACT:
+            self._take_back(word.span)
+            self._remove(word)
+            position[column] = start
+
+    # -- canned cycles ------------------------------------------------------------------------------------------------
+
+    def _level(self) -> None:
+        """The level R of a canned cycle: its word, or one more where another level is in force."""
+        level = self.target.level
+        if level is None:
+            return
+        word = self.layout.levels.get(level.address)
+        decimals, half, wanted = int(self.target.decimals[level.across]), self.half[level.across], level.wanted
+        if wanted < level.least:
+            wanted = float(np.ceil(level.least / (2 * half) - GRAIN) * 2 * half)
+        self.out.level = level.before if word is None else self._value(word, level.nominal)
+        if abs(wanted - self.out.level) < half and not self.out.level < level.least - 2 * GRAIN * half:
+            return
+        if word is None:
+            self.out.level = self._add(level.address, wanted, decimals)
+        else:
+            self.out.level = self._rewrite(word, wanted, decimals)
+
+    # -- arcs ---------------------------------------------------------------------------------------------------------
+
+    def _arc_words(self, start: FloatArray, end: FloatArray) -> None:
+        if self.target.arc:
+            self._kept_arc(start, end)
+        elif np.isfinite(self.target.original_centre).any():
+            for word in (*self.layout.centre.values(), self.layout.radius, self.layout.turns):
+                self._remove(word)
+
+    def _kept_arc(self, start: FloatArray, end: FloatArray) -> None:
+        """Centre words of an arc that stays one; an R that no longer says which centre is meant gives way to I J K."""
+        target = self.target
+        centre = target.centre.copy()
+        word, whole = self.layout.radius, len(target.ends) == 1
+        if not whole:
+            self._remove(self.layout.turns)
+        if word is not None:
+            meant = self._centre_by_radius(word, start, end) if whole else None
+            if meant is not None:
+                self.out.centre = meant
+                return
+            self._remove(word)
+        begin = self._xyz(start)
+        for index in target.plane[:2]:
+            centre[index] = self._centre_word(index, float(begin[index]))
+        self.out.centre = centre
+
+    def _has_centre(self) -> bool:
+        """Whether the arc has its centre in words, of which one that is left out is zero."""
+        return self.layout.radius is None
+
+    def _centre_word(self, index: int, begin: float) -> float:
+        target, letter, had_centre = self.target, CENTRE_LETTERS[index], self._has_centre()
+        column = target.spatial[index]
+        absolute = target.centre_absolute or self.layout.forms.get(letter) == ABSOLUTE
+        base, original_base = (0.0, 0.0) if absolute else (begin, target.origin[index])
+        value = float(target.centre[index]) - base
+        original = float(target.original_centre[index] - original_base)
+        word = self.layout.centre.get(letter)
+        if word is not None:
+            original = self._value(word, original)
+            if abs(value - original) >= self.half[column]:
+                original = self._rewrite(word, value, int(target.decimals[column]))
+        elif abs(value - (original if had_centre else 0.0)) >= self.half[column]:
+            original = self._add(letter, value, int(target.decimals[column]))
+        elif not had_centre:
+            original = 0.0
+        return float(base + original)
+
+    def _centre_by_radius(self, word: Word, start: FloatArray, end: FloatArray) -> FloatArray | None:
+        """The centre that the radius as written means, if that is within an output step of where it belongs."""
+        plane = list(self.target.plane[:2])
+        radius = abs(self._value(word, np.nan))
+        (x, y), (u, v), (a, b) = (
+            point[plane].tolist() for point in (self._xyz(start), self._xyz(end), self.target.centre)
+        )
+        half_chord = float(np.hypot(u - x, v - y)) / 2
+        if not radius > half_chord > 0:
+            return None
+        height = math.sqrt(radius**2 - half_chord**2)
+        rise = height * -(v - y) / (2 * half_chord), height * (u - x) / (2 * half_chord)
+        sides = [((x + u) / 2 + side * rise[0], (y + v) / 2 + side * rise[1]) for side in (1, -1)]
+        off = [float(np.hypot(p - a, q - b)) for p, q in sides]
+        nearest = sides[0] if not off[1] < off[0] else sides[1]
+        if min(off) > 2 * self.half[self.target.spatial[plane[0]]]:
+            return None
+        centre = self.target.centre.copy()
+        centre[plane] = nearest
+        return centre
+
+    def _xyz(self, position: FloatArray) -> FloatArray:
+        """X Y Z of a position in the numbers in which centres are meant."""
+        values = np.array([position[column] if column >= 0 else 0.0 for column in self.target.spatial])
+        if self.target.diameter:
+            values[0] /= 2
+        return values
+
+    # -- the direction of the tool ------------------------------------------------------------------------------------
+
+    def _says_direction(self) -> bool:
+        """Whether words of the block say which way the tool points; I J K do so in straight motions only."""
+        if self.spelling.vector[:1] != CENTRE_LETTERS[:1]:
+            return bool(self.layout.vector or self.layout.angles)
+        is_arc = np.isfinite(self.target.original_centre).any()
+        return self.target.code in (0, LINE) and bool(self.layout.centre) and not is_arc
+
+    def _point(self, position: FloatArray, end: FloatArray) -> None:
+        """Put the words of the direction right, and `position` where they take the rotary axes."""
+        turning, target = list(self.turning), self.target
+        if len(target.ends) == 1 and (np.abs(end - target.nominal)[turning] < self.half[turning]).all():
+            position[turning] = target.nominal[turning]
+            return
+        for angle in self.layout.angles.values():
+            self._remove(angle)
+        words: Mapping[str, Word] = {**self.layout.centre, **self.layout.vector}
+        for address, value in zip(self.spelling.vector, self._vector(end), strict=True):
+            word = words.get(address.rstrip("="))
+            if word is not None:
+                pointless = isinstance(word.value, Literal) and word.value.pointless
+                self._replace(word, value, self.vector_digits, anew=pointless)
+            elif value:
+                self.added.append(self._component(address, value, self.layout.blank or " " * ("=" in address)))
+        self._turn(position, end)
+
+    def _component(self, address: str, value: float, blank: str = "") -> str:
+        return blank + self._cased(address) + self.spelling.number(value, self.vector_digits)
+
+    @cached_property
+    def vector_length(self) -> float:
+        """The length of the direction as it is written."""
+        values = (self._value(word, math.nan) for word in self.layout.centre.values())
+        return (math.hypot(*filter(math.isfinite, values)) if self.spelling.vector_length else 0.0) or 1.0
+
+    @property
+    def vector_digits(self) -> int:
+        """Decimals that say the direction well enough."""
+        return max(self.spelling.vector_digits - math.floor(math.log10(self.vector_length)), 1)
+
+    def _vector(self, end: FloatArray) -> list[float]:
+        """The direction of the tool at an end, in the program's coordinates, as it is written."""
+        target = self.target
+        assert target.pointing is not None
+        assert target.rotation is not None
+        assert target.offset is not None
+        direction = np.linalg.solve(target.rotation, target.pointing.direction(np.radians(end) + target.offset))
+        return [round(float(part) * self.vector_length, self.vector_digits) for part in direction]
+
+    def _direction_words(self, end: FloatArray) -> list[str]:
+        """Those of a further piece."""
+        return list(map(self._component, self.spelling.vector, self._vector(end)))
+
+    def _turn(self, position: FloatArray, end: FloatArray) -> None:
+        """Put the rotary axes of `position` where the direction as written takes them.
+
+        The control takes the posture in which the program has them; an axis that may stand anywhere stays.
+        """
+        target, turning = self.target, list(self.turning)
+        assert target.pointing is not None
+        assert target.rotation is not None
+        assert target.offset is not None
+        vector = target.rotation @ np.array(self._vector(end))
+        here, there = (np.radians(each[turning]) + target.offset[turning] for each in (position, end))
+        ways = target.pointing.angles(vector / np.linalg.norm(vector), (float(here[0]), float(here[1])))
+        found = min(ways, key=lambda way: float(np.abs(np.array(way) - there).sum()))
+        position[turning] = np.degrees(np.array(found) - target.offset[turning])
+
+    # -- further pieces -----------------------------------------------------------------------------------------------
+
+    def _further_piece(self, position: FloatArray, piece: int) -> FloatArray:
+        target = self.target
+        end, begin, position = target.ends[piece], position, position.copy()
+        arc = target.arcs is not None and bool(target.arcs[piece])
+        words = self._opening(target.arc_code if arc else LINE)
+        in_plane = [target.spatial[index] for index in target.plane[:2]] if arc else []
+        for column, letter in self.columns:
+            still = not abs(end[column] - position[column]) >= self.half[column] and column not in in_plane
+            if not still and column not in self.turning and (letter in self.layout.axes or self._may_add(column)):
+                text = self._step(position, column, self._reachable(column, end[column], piece))
+                words.append(self._cased(letter) + text)
+        if self.turning:
+            words += self._direction_words(end)
+            self._turn(position, end)
+        if arc:
+            words += self._centre_of_piece(piece, begin)
+        if self.dragged:
+            words.append(self._cased("F") + self._turn_feed(piece, begin, position))
+        elif target.inverse_time and not self.out.conflict:
+            words.append(self._cased("F") + f"{self._feed_share(piece):.{FEED_DECIMALS}f}")
+        self._line([*words, self.layout.closing] if self.layout.closing else words)
+        return position
+
+    def _opening(self, wanted: int) -> list[str]:
+        """What a further piece begins with: its motion code, where the piece before it had another one."""
+        if self.target.arcs is None or wanted == self.code:
+            return []
+        self.code = wanted
+        return [self._cased("G") + f"{wanted // 10}"]
+
+    def _centre_of_piece(self, piece: int, begin: FloatArray) -> list[str]:
+        """The centre words of a further piece that is an arc."""
+        target, words = self.target, []
+        assert target.centres is not None
+        centre = target.centres[piece].copy()
+        base = np.zeros(3) if target.centre_absolute else self._xyz(begin)
+        for index in target.plane[:2]:
+            digits = int(target.decimals[target.spatial[index]])
+            text = self.spelling.number(float(centre[index] - base[index]), digits)
+            words.append(self._cased(CENTRE_LETTERS[index]) + text)
+            centre[index] = base[index] + value_of(text)
+        self.out.centres[piece] = centre
+        return words
+
+    def _move_late_words(self) -> None:
+        """M0, M1, M2, M30 and their like act after the motion: with several pieces they go to the last."""
+        if not self.out.lines:
+            return
+        for word in self.layout.after:
+            text = self.program.slice(self.block, word.span)
+            self._remove(word)
+            self.out.lines[-1] += self.layout.blank + text
+
+    # -- feeds --------------------------------------------------------------------------------------------------------
+
+    def _share_time(self) -> None:
+        """In G93 the pieces of a block take shares of its time, which its own F has to say in a plain number."""
+        if self.layout.feed is None or not math.isfinite(self._feed_share(0)):
+            self.out.conflict = NO_TIME
+        else:
+            self._rewrite(self.layout.feed, self._feed_share(0), FEED_DECIMALS)
+
+    def _feed_share(self, piece: int) -> float:
+        assert self.layout.feed is not None
+        return self._value(self.layout.feed, np.nan) / float(self.target.shares[piece])
+
+    def _time_of_turn(self, begin: FloatArray, end: FloatArray) -> None:
+        """State the time of a turn of rotary axes alone in its own block; it is taken back behind it."""
+        if not self.target.turn_by_feed:
+            self._feed_mode(INVERSE_TIME)
+        elif self.target.back_to_inverse_time:
+            self._feed_mode(PER_MINUTE)
+        feed, text = self.layout.feed, self._turn_feed(0, begin, end)
+        if feed is None:
+            self.added.append(self.layout.blank + self._cased("F") + text)
+        else:
+            self.out.edits.append((*self.program.span(self.block, feed.value_span), text))
+
+    def _feed_mode(self, number: str) -> None:
+        code = self.layout.feed_mode
+        if code is None:
+            self._put_code(number)
+        else:
+            self.out.edits.append((*self.program.span(self.block, code.value_span), number))
+
+    def _turn_feed(self, piece: int, begin: FloatArray, end: FloatArray) -> str:
+        """The number after F with which a piece of a turn takes its share of the time."""
+        minutes = self.target.turn_minutes * float(self.target.shares[piece])
+        reach = way(self.target.letters, begin, end, self.target.diameter) if self.target.turn_by_feed else 1.0
+        return number(reach / minutes) if reach > 0 else self._feed_in_force()
+
+    def _feed_in_force(self) -> str:
+        feed = self.layout.feed
+        if feed is not None and isinstance(feed.value, Literal):
+            return self.program.slice(self.block, feed.value_span)
+        return f"{self.target.feed:.6f}".rstrip("0")
+
+    def _feed_as_before(self) -> None:
+        """Back to the feed that was in force, for the blocks that follow; in inverse time each has its own."""
+        words = [] if self.target.turn_by_feed else [self._cased("G") + PER_MINUTE]
+        words.append(self._cased("F") + self._feed_in_force())
+        self._line([self._cased("G") + INVERSE_TIME] if self.target.back_to_inverse_time else words)
