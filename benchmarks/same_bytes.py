@@ -30,9 +30,9 @@ from ncfix.cli import console
 from ncfix.cli.batch import FixJob
 from ncfix.cli.targets import OutputTarget
 from ncfix.compensate import FixOptions
-from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
 from ncfix.control.setup_file import load as load_setup
+from ncfix.control.trace import NotInPartsError
 from ncfix.machine import Machine, load
 
 ROOT = Path(__file__).resolve().parent.parent

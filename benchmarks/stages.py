@@ -18,9 +18,9 @@ from typing import Any
 from ncfix import fast
 from ncfix.compensate import FixOptions, driver, plain, solve
 from ncfix.compensate.following import Task
-from ncfix.control import parts
-from ncfix.control.following import Follower
+from ncfix.control import trace
 from ncfix.control.setup import Setup
+from ncfix.control.trace import Follower
 from ncfix.machine import load
 from ncfix.text.dialects import get
 
@@ -32,7 +32,7 @@ SHOWN = 16
 """Functions of the profile that are shown."""
 
 STAGES: tuple[tuple[str, Any, str], ...] = (
-    ("read the text (twice)", parts.PartReader, "read"),
+    ("read the text (twice)", trace.PartReader, "read"),
     ("follow it (twice)", Follower, "follow"),
     ("plan: correct ends, judge the path between them, split", plain.Planner, "plan"),
     ("plan, the long way", driver, "agree"),

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 KERNELS = (
     "ncfix.compensate.kernels",
     "ncfix.machine.kernels",
-    "ncfix.control.lane_kernel",
+    "ncfix.control.lanes.lane_kernel",
     "ncfix.text.kernels",
     "ncfix.writer.writing_kernels",
 )

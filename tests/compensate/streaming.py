@@ -13,8 +13,8 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Stream, Streamed, fix_program
 from ncfix.compensate.following import Task
 from ncfix.compensate.workers import Ground
-from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
+from ncfix.control.trace import NotInPartsError
 from ncfix.machine import Machine
 from ncfix.text.dialects import get
 from ncfix.text.reader import read

@@ -16,7 +16,7 @@ from ncfix.compensate.following import Task
 from ncfix.compensate.parts import Part, Units
 from ncfix.compensate.workers import Passage, ReadAhead, Share
 from ncfix.control.moves import Moves
-from ncfix.control.parts import TABLES
+from ncfix.control.trace import TABLES
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
 from ncfix.text.dialects import get

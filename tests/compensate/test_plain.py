@@ -21,7 +21,7 @@ from ncfix.compensate.parts import ProgramPart
 from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.solve import SelfCheckError
 from ncfix.control.moves import MotionKind
-from ncfix.control.parts import NotInPartsError
+from ncfix.control.trace import NotInPartsError
 from ncfix.machine import Machine, load
 from ncfix.text.writer import Splices, spliced
 

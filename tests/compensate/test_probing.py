@@ -13,8 +13,8 @@ import pytest
 from compensate.streaming import streamed
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Fixed, fix_program
-from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
+from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import load
 from ncfix.text.reader import read

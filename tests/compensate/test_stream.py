@@ -17,8 +17,8 @@ from ncfix.compensate import FixOptions, driver
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import Task
 from ncfix.compensate.solve import SelfCheckError
-from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
+from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import Backlash

@@ -15,7 +15,7 @@ import pytest
 from compensate.streaming import SETUP, compared, streamed, whole
 from ncfix import fast
 from ncfix.compensate.following import traced
-from ncfix.control.lane import take
+from ncfix.control.lanes.lane import take
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import Backlash

@@ -18,8 +18,8 @@ from ncfix.compensate.checking import check_on
 from ncfix.compensate.driver import Fixed, fix_flat, fix_program
 from ncfix.compensate.following import Task, follow
 from ncfix.compensate.plan.intent import Intent
-from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, State, loads
 from ncfix.text.dialects import get

@@ -30,8 +30,7 @@ from differential.tnc_swivel import Swivel
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.compensate.following import follow
-from ncfix.control.moves import MotionKind, Rule
-from ncfix.control.passing import Pass
+from ncfix.control.moves import MotionKind, Pass, Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ncfix.text.reach import UNREAD
-from ncfix.text.reader import AFTER_TAPE
-from ncfix.text.templates import parse_block
+from ncfix.text.reader import AFTER_TAPE, parse_block
 from ncfix.text.tree import Opaque, Program
 from ncfix.text.writer import apply
 

@@ -16,8 +16,7 @@ from ncfix.text.dialect import Dialect
 from ncfix.text.dialects import check_content, get
 from ncfix.text.faults import BlockError
 from ncfix.text.grammar import parser_of
-from ncfix.text.reader import read
-from ncfix.text.templates import parse_block
+from ncfix.text.reader import parse_block, read
 from program.lanes import assert_read_right
 
 unkept = cache(parser_of)

@@ -13,8 +13,7 @@ import pytest
 
 from ncfix import fast
 from ncfix.text.dialects import get
-from ncfix.text.reader import read
-from ncfix.text.templates import shapes_of
+from ncfix.text.reader import read, shapes_of
 from ncfix.text.tree import Literal, Template, Word
 from program.lanes import assert_read_right
 

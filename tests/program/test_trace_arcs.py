@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ncfix.control.arcs import centre_from_radius, check_closure, sweep_angle
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import SourceError
 from program.tracing import follow

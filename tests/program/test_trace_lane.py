@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ncfix import fast
-from ncfix.control import lane
+from ncfix.control.lanes import lane
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError

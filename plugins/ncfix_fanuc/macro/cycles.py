@@ -7,7 +7,7 @@ level and the depth from R, in the block that names them.
 from __future__ import annotations
 
 from ncfix.control.coordinates import LETTERS
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE, drill, place_hole, repeats
 from ncfix_iso.rs274.systems import check_system

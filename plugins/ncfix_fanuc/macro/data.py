@@ -6,8 +6,7 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable data input
 from __future__ import annotations
 
 from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of
-from ncfix.control.motion import Motion
-from ncfix.control.moves import MotionKind
+from ncfix.control.moves import Motion, MotionKind
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.settings import AFTER_UNFOLLOWED

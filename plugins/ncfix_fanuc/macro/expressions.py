@@ -16,6 +16,7 @@ from ncfix.control.expressions import (
     SUMS,
     Evaluate,
     Expressions,
+    Fault,
     Scope,
     Unknown,
     Value,
@@ -24,7 +25,6 @@ from ncfix.control.expressions import (
     remainder,
     signed,
 )
-from ncfix.control.faults import Fault
 from ncfix.text.tree import Expression
 
 VACANT = math.nan

@@ -13,10 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.expressions import Unknown
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault, Unknown
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow, Return
-from ncfix.control.parts import NotInPartsError
+from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
 from ncfix.text.tree import OWordLine as FlowItem
 from ncfix_fanuc.macro import builder

@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z, mask_of
-from ncfix.control.expressions import Unknown, nominal
-from ncfix.control.faults import Fault
-from ncfix.control.parts import NotInPartsError
+from ncfix.control.expressions import Fault, Unknown, nominal
+from ncfix.control.trace import NotInPartsError
 from ncfix.text.language import Run
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import dynamic, polar, scaling, system, vectors

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.control.motion import Motion
-from ncfix.control.moves import MotionKind
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.moves import Motion, MotionKind, Pass, Passing
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.lengths import tool_offset

@@ -12,8 +12,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from ncfix.control.expressions import Unknown, Value, nominal
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault, Unknown, Value, nominal
 from ncfix_fanuc.macro.data import keep_length
 from ncfix_iso.rs274.systems import activate, before_persistent
 

@@ -15,11 +15,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS, PLANES, Rotation, Vector, X, Y, Z, about, angles_in_words, dot, product
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.frames import WORLD, euler, from_points, from_vectors, shifted, spatial
-from ncfix.control.motion import Motion
-from ncfix.control.moves import MotionKind, TcpState
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.moves import Motion, MotionKind, Pass, Passing, TcpState
 from ncfix.control.pointing import Triple
 from ncfix.control.posture import normal_of, postures
 from ncfix.control.tcp import switch

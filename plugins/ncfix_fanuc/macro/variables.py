@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ncfix.control.expressions import Unknown, Value, nominal
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault, Unknown, Value, nominal
 from ncfix_fanuc.macro.expressions import VACANT
 from ncfix_iso.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, NumberedParameters, Store
 

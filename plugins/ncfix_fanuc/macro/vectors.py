@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ncfix.control.coordinates import DEGREE, LETTERS, dot
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.posture import Postures, WayRules, postures
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ncfix.control.arcs import CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
 from ncfix.control.builder import Circles
 from ncfix.control.coordinates import DEGREE, IDENTITY, PLANES, X, Y, Z
-from ncfix.control.faults import Fault
-from ncfix.control.stage import words
+from ncfix.control.expressions import Fault
+from ncfix.control.lanes.block_rows import words
 from ncfix_heidenhain.klartext.arcs import BAD_ARC, FLAT
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.targets import arm, pole_frame

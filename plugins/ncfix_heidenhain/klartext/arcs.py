@@ -8,12 +8,10 @@ import math
 from dataclasses import dataclass
 
 from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
-from ncfix.control.builder import Arc
 from ncfix.control.coordinates import IDENTITY, Plane, Vector, dot, rotated
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
-from ncfix.control.motion import Motion
-from ncfix.control.moves import MotionKind
+from ncfix.control.moves import Arc, Motion, MotionKind
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.step import Step, somewhere, with_increments
 from ncfix_heidenhain.klartext.targets import (

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.moves import Pass, Passing
 from ncfix_heidenhain.klartext.control import RETRACTED, KlartextControl
 from ncfix_heidenhain.klartext.step import Step
 from ncfix_heidenhain.klartext.targets import MotionWords

@@ -9,9 +9,7 @@ from dataclasses import dataclass, field, replace
 from ncfix.control import control as base
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, X, Y, Z, mask_of, zeros
 from ncfix.control.frames import shifted
-from ncfix.control.motion import AT_START, Motion, UnknownAxes, first_reason
-from ncfix.control.moves import MotionKind
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Passing, UnknownAxes, first_reason
 from ncfix.control.setup import WORK_OFFSET, Setup, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect

@@ -10,10 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ncfix.control.coordinates import X, Y, Z, mask_of
-from ncfix.control.expressions import numbers
-from ncfix.control.faults import Fault
-from ncfix.control.motion import Motion
-from ncfix.control.moves import MotionKind
+from ncfix.control.expressions import Fault, numbers
+from ncfix.control.moves import Motion, MotionKind
 from ncfix_heidenhain.klartext import transformations
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, KlartextControl
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, HolePosition, pattern_of_cycle

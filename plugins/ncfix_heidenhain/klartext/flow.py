@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, OpenCall, Operation, ProgramFlow, Repeat, Return
 from ncfix.text.tree import Constant
 from ncfix_heidenhain.klartext.control import KlartextControl

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ncfix.control.coordinates import INDEX, mask_of
-from ncfix.control.expressions import Evaluate, Unknown
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Evaluate, Fault, Unknown
 from ncfix.control.flow import Return
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.control.moves import Moves
-from ncfix.control.parts import NotInPartsError
+from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
 from ncfix.text.reach import UNREAD

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ncfix import fast
 from ncfix.control.arcs import CLOCKWISE, COUNTER, plane_of, resting_of_many
-from ncfix.control.builder import Arc, Circles, MotionColumns
-from ncfix.control.lane import SHORTEST, before_placing
-from ncfix.control.moves import FeedMode, MotionKind
-from ncfix.control.stage import LONGEST, filled, followed, followed_compiled
+from ncfix.control.builder import Circles, MotionColumns
+from ncfix.control.lanes.block_rows import LONGEST, filled, followed, followed_compiled
+from ncfix.control.lanes.lane import SHORTEST, before_placing
+from ncfix.control.moves import Arc, FeedMode, MotionKind
 from ncfix_heidenhain.klartext.arc_lane import keep_pole, turned
 from ncfix_heidenhain.klartext.arcs import direction_at_end
 from ncfix_heidenhain.klartext.control import KlartextControl

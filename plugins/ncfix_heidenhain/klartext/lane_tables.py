@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control import lane_tables as shared
 from ncfix.control.arcs import CLOCKWISE, COUNTER
 from ncfix.control.coordinates import INDEX, mask_of
-from ncfix.control.lane_tables import Lane
+from ncfix.control.lanes import lane_tables as shared
+from ncfix.control.lanes.lane_tables import Lane
 from ncfix.text.tree import Constant, Literal, Template
 from ncfix_heidenhain.klartext.plans import LETTERS, KlartextPlan
 from ncfix_heidenhain.klartext.step import IN_PLANE

@@ -8,9 +8,7 @@ from collections.abc import Sequence
 
 from ncfix.control.coordinates import LETTERS, Vector, dot, mask_of
 from ncfix.control.frames import unit
-from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import MotionKind
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.moves import Motion, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.posture import WayRules, postures
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import DEPARTED, KlartextControl

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from ncfix.control.faults import Fault
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.expressions import Fault
+from ncfix.control.moves import Pass, Passing
 from ncfix_heidenhain.klartext.codes import tip_control
 from ncfix_heidenhain.klartext.contours import follow_free
 from ncfix_heidenhain.klartext.control import AFTER_PROBING, PRESET, KlartextControl

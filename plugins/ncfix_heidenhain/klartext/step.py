@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ncfix.control.builder import Arc
 from ncfix.control.coordinates import Vector, X, Y
-from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import MotionKind
+from ncfix.control.moves import Arc, Motion, MotionKind, UnknownAxes
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.targets import MotionWords
 

@@ -13,8 +13,8 @@ from functools import lru_cache
 
 from ncfix.control.control import ADRIFT
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z, mask_of
-from ncfix.control.faults import Fault
-from ncfix.control.motion import AT_START, UnknownAxes
+from ncfix.control.expressions import Fault
+from ncfix.control.moves import AT_START, UnknownAxes
 from ncfix_heidenhain.klartext.control import SPATIAL, KlartextControl
 from ncfix_heidenhain.klartext.plans import MOVING
 

@@ -10,11 +10,9 @@ import math
 from collections.abc import Callable, Mapping
 
 from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.frames import euler, from_points, from_vectors, projected, spatial
-from ncfix.control.motion import AT_START, Motion
-from ncfix.control.moves import MotionKind
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Passing
 from ncfix.control.posture import WayRules, machine_directions, normal_of, postures, stands_square
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import MOVED_ALONG, TILTED, KlartextControl

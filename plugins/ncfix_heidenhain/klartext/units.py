@@ -7,8 +7,8 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.faults import Fault
-from ncfix.control.unit import TextUnit
+from ncfix.control.expressions import Fault
+from ncfix.control.interpreter import TextUnit
 from ncfix.text.tree import Program
 from ncfix_heidenhain.klartext.lane_tables import KlartextLaneTables
 from ncfix_heidenhain.klartext.plans import KlartextPlan, plan_of

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix_heidenhain.klartext.control import KlartextControl
 
 UNREADABLE = "NCF236"

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 
 from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
-from ncfix.control.builder import Arc
 from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
-from ncfix.control.faults import Fault
-from ncfix.control.motion import Motion
-from ncfix.control.moves import MotionKind
+from ncfix.control.expressions import Fault
+from ncfix.control.moves import Arc, Motion, MotionKind
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.feeds import check_feed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.modal import NO_MOTION
 from ncfix_iso.rs274.control import ARCS, RS274Control
 from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS, LENGTH, TURNING_CYCLES

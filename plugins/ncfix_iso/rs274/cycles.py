@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 
 from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot, mask_of
-from ncfix.control.faults import Fault
-from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import FeedMode, MotionKind
+from ncfix.control.expressions import Fault
+from ncfix.control.moves import FeedMode, Motion, MotionKind, UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.systems import check_system, words_of

@@ -16,13 +16,13 @@ from ncfix.control.expressions import (
     SUMS,
     Evaluate,
     Expressions,
+    Fault,
     Unknown,
     Value,
     nominal,
     power,
     remainder,
 )
-from ncfix.control.faults import Fault
 from ncfix.text.tree import NamedParameter, NumberedParameter
 
 EQUAL = 1e-6

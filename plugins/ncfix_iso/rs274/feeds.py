@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.moves import FeedMode
 from ncfix_iso.rs274.control import Block, RS274Control
 

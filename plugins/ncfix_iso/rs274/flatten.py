@@ -12,10 +12,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, mask_of
-from ncfix.control.expressions import nominal
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault, nominal
 from ncfix.control.flatten import RUNTIME, Change, FlatLine, Flattener
-from ncfix.control.unit import TextUnit
+from ncfix.control.interpreter import TextUnit
 from ncfix.diagnostics import SourceError
 from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Literal, NumberedParameter, Opaque, Word

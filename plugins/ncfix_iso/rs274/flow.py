@@ -13,8 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from ncfix.control.expressions import Evaluate
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Evaluate, Fault
 from ncfix.control.flow import NO_LABEL, NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.expressions import whole

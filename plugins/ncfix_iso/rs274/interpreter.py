@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS, N_LETTERS, mask_of
-from ncfix.control.expressions import Unknown
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault, Unknown
 from ncfix.control.flow import NEVER_ENDS, WAITS, ProgramFlow
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.text.language import Run

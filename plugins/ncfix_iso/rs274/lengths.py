@@ -7,7 +7,7 @@ programming manual.
 from __future__ import annotations
 
 from ncfix.control.coordinates import LETTERS, Vector, X, Y, Z, mask_of, zeros
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.tcp import switch
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from ncfix.control.coordinates import INDEX, N_LETTERS, Vector, mask_of, rotated
-from ncfix.control.faults import Fault
-from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import FeedMode, MotionKind
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.expressions import Fault
+from ncfix.control.moves import FeedMode, Motion, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.tcp import from_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.feeds import check_feed

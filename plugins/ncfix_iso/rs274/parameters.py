@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from ncfix.control.expressions import Unknown, Value, nominal
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault, Unknown, Value, nominal
 
 N_PARAMETERS = 5603
 """Numbered parameters are 1 up to here."""

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import INDEX
-from ncfix.control.expressions import Evaluate
-from ncfix.control.faults import Fault
-from ncfix.control.lane_tables import Lane
+from ncfix.control.expressions import Evaluate, Fault
+from ncfix.control.interpreter import TextUnit
+from ncfix.control.lanes.lane_tables import Lane
 from ncfix.control.modal import NO_MOTION
-from ncfix.control.unit import TextUnit
 from ncfix.text.reach import UNREAD, Deletable, deletable
 from ncfix.text.tree import (
     Assignment,

@@ -9,7 +9,7 @@ import copy
 import math
 
 from ncfix.control.coordinates import INCH, PLANES
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.modal import Modal, Saved
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import activate

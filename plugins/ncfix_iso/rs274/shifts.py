@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ncfix.control.coordinates import IDENTITY, LETTERS, N_LETTERS, Rotation, about, mask_of, product
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.frames import WORLD, Affine, turned_about
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.settings import ENDS, unfollowed

@@ -24,10 +24,9 @@ from ncfix.control.coordinates import (
     rotated,
     transposed,
 )
-from ncfix.control.expressions import nominal
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault, nominal
 from ncfix.control.frames import Affine
-from ncfix.control.motion import UnknownAxes
+from ncfix.control.moves import UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 

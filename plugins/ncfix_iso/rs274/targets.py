@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, X, Y
-from ncfix.control.expressions import nominal
-from ncfix.control.faults import Fault
-from ncfix.control.motion import UnknownAxes
+from ncfix.control.expressions import Fault, nominal
+from ncfix.control.moves import UnknownAxes
 from ncfix.control.tcp import from_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import check_system

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import dataclass
 
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix_iso.rs274.control import ARCS, RS274Control
 from ncfix_iso.rs274.groups import CYCLES, TURNING_CYCLES
 from ncfix_iso.rs274.plans import Codes, RS274Plan

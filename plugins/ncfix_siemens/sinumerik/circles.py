@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
-from ncfix.control.builder import Arc
 from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
-from ncfix.control.moves import MotionKind
+from ncfix.control.moves import Arc, MotionKind
 from ncfix_siemens.sinumerik.destination import (
     NO_POLE,
     BlockWordValues,

@@ -7,12 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from ncfix.control.builder import Arc
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of
-from ncfix.control.faults import Fault
-from ncfix.control.motion import UnknownAxes
-from ncfix.control.moves import MotionKind
-from ncfix.control.passing import Passing
+from ncfix.control.expressions import Fault
+from ncfix.control.moves import Arc, MotionKind, Passing, UnknownAxes
 from ncfix_siemens.sinumerik.increments import unsteady
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING

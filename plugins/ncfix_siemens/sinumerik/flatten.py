@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ncfix.control.coordinates import LETTERS
-from ncfix.control.expressions import Unknown, number
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault, Unknown, number
 from ncfix.control.flatten import RUNTIME, Change, Flattener
 from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import (

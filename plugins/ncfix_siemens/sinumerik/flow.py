@@ -6,8 +6,7 @@ import copy
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from ncfix.control.expressions import Evaluate, Unknown, Value, number
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Evaluate, Fault, Unknown, Value, number
 from ncfix.control.flow import NO_LABEL, Jump, Let, OpenCall, Operation, ProgramFlow, Repeat
 from ncfix.text.tree import Expression, NamedParameter, NumberedParameter
 from ncfix_siemens.sinumerik.expressions import Key, compiled

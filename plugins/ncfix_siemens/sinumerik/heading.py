@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.control.builder import Arc
 from ncfix.control.coordinates import Vector, X, Y, Z
-from ncfix.control.moves import MotionKind
+from ncfix.control.moves import Arc, MotionKind
 
 if TYPE_CHECKING:
     from ncfix_siemens.sinumerik.destination import ProgrammedMotion

@@ -15,7 +15,7 @@ from ncfix.control.flatten import RUNTIME
 from ncfix.control.flow import Call
 from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Moves
-from ncfix.control.parts import NotInPartsError
+from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.language import Run
 from ncfix.text.tree import Program

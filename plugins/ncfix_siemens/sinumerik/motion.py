@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
-from ncfix.control.moves import MotionKind
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.moves import MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, through_point
 from ncfix_siemens.sinumerik.cycles import TO_A_HOLE, drill, hole_after
 from ncfix_siemens.sinumerik.destination import (

@@ -12,8 +12,7 @@ import math
 from functools import reduce
 
 from ncfix.control.coordinates import DEGREE, LETTERS, mask_of, product
-from ncfix.control.expressions import number
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault, number
 from ncfix.control.frames import turned
 from ncfix.control.pointing import Triple, dot
 from ncfix.control.posture import postures

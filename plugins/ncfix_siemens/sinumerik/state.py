@@ -30,9 +30,7 @@ from ncfix.control.coordinates import (
 from ncfix.control.expressions import Unknown, Value
 from ncfix.control.frames import FrameStack, shifted
 from ncfix.control.modal import Modal
-from ncfix.control.motion import AT_START, Motion, UnknownAxes
-from ncfix.control.moves import MotionKind, Rule
-from ncfix.control.passing import Pass
+from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Rule, UnknownAxes
 from ncfix.control.setup import Tool
 from ncfix.control.tcp import switch
 from ncfix.control.turns import Winding, watch

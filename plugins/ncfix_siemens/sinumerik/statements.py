@@ -7,8 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ncfix.control.coordinates import INDEX
-from ncfix.control.expressions import Evaluate, number
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Evaluate, Fault, number
 from ncfix.control.frames import WORLD
 from ncfix.text.tree import Expression, FunctionCall, NamedParameter
 from ncfix_siemens.sinumerik import framing, motion

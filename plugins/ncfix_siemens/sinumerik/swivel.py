@@ -15,8 +15,7 @@ from dataclasses import replace
 from ncfix.control.coordinates import X, Y, Z, mask_of
 from ncfix.control.expressions import number
 from ncfix.control.frames import WORLD, Affine, projected, shifted, turned
-from ncfix.control.moves import MotionKind
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.moves import MotionKind, Pass, Passing
 from ncfix.control.posture import WayRules, normal_of, postures
 from ncfix.control.tcp import rotary_at_zero
 from ncfix.text.tree import StringLiteral

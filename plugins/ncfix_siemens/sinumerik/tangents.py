@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from ncfix.control.arcs import ARC_FAULT
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.moves import MotionKind
 from ncfix_siemens.sinumerik.circles import POLAR_ARC, circle_of
 from ncfix_siemens.sinumerik.destination import BlockWordValues, ProgrammedMotion, destination

@@ -12,8 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.control.passing import Pass, Passing
+from ncfix.control.moves import MotionKind, Moves, Pass, Passing, Rule
 from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.flow import SinumerikFlow
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE

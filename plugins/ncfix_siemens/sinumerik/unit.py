@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.faults import Fault
-from ncfix.control.unit import TextUnit
+from ncfix.control.expressions import Fault
+from ncfix.control.interpreter import TextUnit
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.text.tree import StringLiteral as Label
 from ncfix_siemens.sinumerik.directions import Directions

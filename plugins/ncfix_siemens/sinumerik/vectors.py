@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.control.coordinates import DEGREE
-from ncfix.control.lane import SHORTEST, before_placing, is_open, take
+from ncfix.control.lanes.block_rows import BlockRows, IntArray, stage_of
+from ncfix.control.lanes.lane import SHORTEST, before_placing, is_open, take
 from ncfix.control.moves import FeedMode
 from ncfix.control.pointing import Pointing, Ways, nearest
 from ncfix.control.posture import FAR
-from ncfix.control.stage import BlockRows, IntArray, stage_of
 from ncfix_siemens.sinumerik.orientation import BY_AXES, ON_CURVES
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit

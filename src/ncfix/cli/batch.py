@@ -136,7 +136,7 @@ class FixJob:
 
     def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find) -> FixedText:
         from ncfix.compensate.workers import GoneError
-        from ncfix.control.parts import NotInPartsError
+        from ncfix.control.trace import NotInPartsError
 
         _let_stay()
         try:

@@ -117,7 +117,7 @@ def through(sources: Sequence[Source], in_parts: Callable[[], Found], as_wholes:
     """
     long = [source.looked_into() for source in sources]
     if any(long):
-        from ncfix.control.parts import NotInPartsError
+        from ncfix.control.trace import NotInPartsError
 
         fast.engage(console.forewarn)
         try:
@@ -162,7 +162,7 @@ def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Pa
     from ncfix.compensate.checking import OPTIONS
     from ncfix.compensate.following import follower_of
     from ncfix.compensate.parts import Parts
-    from ncfix.control.parts import NotInPartsError, PartReader
+    from ncfix.control.trace import NotInPartsError, PartReader
     from ncfix.text.language import Run
 
     reader = PartReader(shown(source.path), dialect, source.head)

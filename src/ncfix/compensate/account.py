@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask
-from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.control.passing import PASS_RULES, Pass
+from ncfix.control.moves import PASS_RULES, MotionKind, Moves, Pass, Rule
 from ncfix.diagnostics import Message, Place
 from ncfix.text.tree import Program
 

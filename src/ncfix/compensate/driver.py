@@ -57,8 +57,8 @@ from ncfix.compensate.solve import Agreed, PrecedingMotion, Settled, agree, incr
 from ncfix.compensate.workers import Ground, Read, Share, crew
 from ncfix.control.flatten import flatten
 from ncfix.control.moves import Moves, Trace
-from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import Setup
+from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Message, Place
 from ncfix.files import put_at
 from ncfix.machine import Machine, State

@@ -25,11 +25,9 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.plan.arrays import Array, Mask
 from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.control.following import Follower
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState, Trace
-from ncfix.control.parts import NotInPartsError
 from ncfix.control.setup import PROBED, Setup
-from ncfix.control.trace import trace
+from ncfix.control.trace import Follower, NotInPartsError, trace
 from ncfix.diagnostics import Message, Place, RefusedError, UsageError
 from ncfix.machine import Machine
 from ncfix.text import stamp

@@ -21,10 +21,9 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.solve import SelfCheckError, Settled, differences
 from ncfix.compensate.workers import Passage, Read, Share
-from ncfix.control.following import Follower
 from ncfix.control.moves import MotionKind, Moves, Rule, Trace
-from ncfix.control.parts import NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
 from ncfix.control.setup import Setup
+from ncfix.control.trace import Follower, NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
 from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program

@@ -51,7 +51,7 @@ from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding
 from ncfix.compensate.solve import Settled, agree
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
-from ncfix.control.parts import taken
+from ncfix.control.trace import taken
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import MORE

@@ -25,7 +25,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from ncfix.compensate.solve import PrecedingMotion
-from ncfix.control.following import Checkpoint
+from ncfix.control.trace import Checkpoint
 from ncfix.host import tie
 from ncfix.plugins import blamed
 

@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import mask_of, rotated
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 
 if TYPE_CHECKING:
     from ncfix.control.control import ProgramControl
-    from ncfix.control.motion import Motion
+    from ncfix.control.moves import Motion
 
 
 Point = tuple[float, float]

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
-from ncfix.control.moves import CycleCall, Frame, MotionKind, Moves, Rule
-from ncfix.control.passing import Pass
+from ncfix.control.moves import Arc, CycleCall, Frame, MotionKind, Moves, Pass, Rule
 from ncfix.control.turns import Winding, doubtful, extremes, overturned
 
 FloatArray = NDArray[np.float64]
@@ -55,18 +54,6 @@ DTYPES: dict[str, type[np.generic]] = {
     "across": np.int8,
 }
 """The types of the columns of `Moves` that styles hold; the others are flags."""
-
-
-class Arc(NamedTuple):
-    """The circle of an arc in command coordinates: centre (3), unit normal (3), signed sweep.
-
-    fixed  a word says where its centre is, not how far that is from the start
-    """
-
-    centre: tuple[float, float, float]
-    normal: tuple[float, float, float]
-    sweep: float
-    fixed: bool = False
 
 
 class Circles(NamedTuple):

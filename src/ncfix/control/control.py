@@ -13,9 +13,20 @@ from ncfix.control.arcs import plane_of, resting
 from ncfix.control.builder import MotionBuilder, MotionStyle
 from ncfix.control.coordinates import LETTERS, Vector, mask_of
 from ncfix.control.flow import Budget
-from ncfix.control.motion import AT_START, Motion, UnknownAxes, blanked, first_reason, leaves_unknown
-from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.control.passing import Pass, Passing, may_pass
+from ncfix.control.moves import (
+    AT_START,
+    Motion,
+    MotionKind,
+    Moves,
+    Pass,
+    Passing,
+    Rule,
+    UnknownAxes,
+    blanked,
+    first_reason,
+    leaves_unknown,
+    may_pass,
+)
 from ncfix.control.pointing import Pointing
 from ncfix.control.posture import MachineDirections, pointing_of
 from ncfix.control.standing import ControlState

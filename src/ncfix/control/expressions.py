@@ -5,6 +5,8 @@ A function reads the numbers of the block that is executed from a `Scope` and gi
 `Unknown`, which nobody knows before the machine runs (a probed position, an input, a variable that an earlier program
 has left). What is computed from it is unknown, too, for the same reason. What operators and functions a language has,
 and what it counts as a number, is in its own `Expressions`. Angles are degrees.
+
+What stops the control is a `Fault`: raised where it is found, it gets its place in the file on its way out.
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol
 
-from ncfix.control.faults import Fault
 from ncfix.text.tree import (
     Binary,
     Constant,
@@ -23,9 +24,34 @@ from ncfix.text.tree import (
     Literal,
     NamedParameter,
     NumberedParameter,
+    Span,
     StringLiteral,
     Unary,
 )
+
+
+class Fault(Exception):  # noqa: N818 - a fault of the program that is followed, not of ncfix
+    """The control would stop here, or cannot be followed further.
+
+    code  the coded error
+    text  what is the matter, plain words
+    hint  what to do about it
+    span  where in the block, None for the whole block
+    """
+
+    def __init__(self, code: str, text: str, hint: str = "", span: Span | None = None) -> None:
+        super().__init__(code, text)
+        self.code = code
+        self.text = text
+        self.hint = hint
+        self.span = span
+
+    def at(self, span: Span | None) -> Fault:
+        """The same fault at a place in the block, if it has none yet."""
+        if self.span is None:
+            self.span = span
+        return self
+
 
 ARITHMETIC = "NCF210"
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ncfix.control.faults import Fault
+from ncfix.control.expressions import Fault
 from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule
 from ncfix.control.trace import interpreter_of, trace
 from ncfix.diagnostics import RefusedError, SourceError
@@ -22,8 +22,8 @@ from ncfix.text.reader import read
 from ncfix.text.tree import Assignment, Command, Item, Opaque, OWordLine, Program, Span, Word
 
 if TYPE_CHECKING:
+    from ncfix.control.interpreter import TextUnit
     from ncfix.control.setup import Setup
-    from ncfix.control.unit import TextUnit
 
 RUNTIME, TOO_LONG, NOT_FLAT = "NCF237", "NCF238", "NCF239"
 LINES = 500_000

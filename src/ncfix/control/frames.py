@@ -23,7 +23,7 @@ from ncfix.control.coordinates import (
     product,
     rotated,
 )
-from ncfix.control.motion import UnknownAxes
+from ncfix.control.moves import UnknownAxes
 from ncfix.control.pointing import Triple, cross
 
 ZEROS = (0.0,) * N_LETTERS

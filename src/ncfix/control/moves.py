@@ -4,20 +4,33 @@ Positions are *commands*: what the control is told in its own coordinate system 
 tool offsets added. Without tool-centre-point control a command is the machine's axis positions. With it (`tcp`), X Y
 Z of the command are the coordinates of the tool tip in the workpiece, turned with it; the machine floor knows how to
 make axis positions of that, this floor does not.
+
+The rules by which a motion passes as it is: all there are, what each may pass, and why that is right.
+
+A motion that is neither corrected nor refused has one of these rules, whatever the language of its program, and the
+reports count it by that rule. What no rule here may pass is corrected or refused: a feed, say, is never passed because
+nobody has said where an axis stands.
+
+A motion as a block means it, and what is not known of where it leads.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.control.coordinates import LETTERS, Vector
 from ncfix.control.pointing import Pointing
 from ncfix.diagnostics import Message
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 class MotionKind(IntEnum):
@@ -271,3 +284,164 @@ class Trace:
     """The text of the stamp comment if the program carries one."""
     switches: frozenset[int] = frozenset()
     """The switches of block delete that were asked: blocks with `/`, `/2`, ... stand where the control got to."""
+
+
+class Pass(IntEnum):
+    """A rule by which a motion passes, as columns hold it; `NONE` for all that do not pass."""
+
+    NONE = 0
+    DWELL = 1
+    MACHINE_COORDINATES = 2
+    REFERENCE_POINT = 3
+    PROBING = 4
+    UNSAID = 5
+    LED = 6
+    ALIGNMENT = 7
+    ROTARY_ALONE = 8
+    RETRACTION = 9
+    DEPARTURE = 10
+
+
+class PassRule(NamedTuple):
+    """What a rule may pass.
+
+    name   in reports
+    kinds  of motions; all others are refused instead
+    cuts   at feed they may cut something, and the program is not known to cut right there
+    why    it is right to leave them alone
+    """
+
+    name: str
+    kinds: frozenset[MotionKind]
+    cuts: bool
+    why: str
+
+
+class Passing(NamedTuple):
+    """Why one motion passes: the rule, and that in the words of its program."""
+
+    rule: Pass
+    words: str
+
+
+RAPIDS = frozenset({MotionKind.RAPID})
+STRAIGHT = frozenset({MotionKind.RAPID, MotionKind.FEED})
+
+PASS_RULES: Mapping[Pass, PassRule] = {
+    Pass.DWELL: PassRule("dwell", frozenset({MotionKind.DWELL}), False, "Nothing moves."),
+    Pass.MACHINE_COORDINATES: PassRule(
+        "machine coordinates",
+        STRAIGHT | {MotionKind.ARC},
+        True,
+        "The program means places of the machine's axes (a tool changer, a limit), not places on the workpiece.",
+    ),
+    Pass.REFERENCE_POINT: PassRule(
+        "reference point", RAPIDS, False, "The machine goes to a place of its own, and cuts nothing."
+    ),
+    Pass.PROBING: PassRule(
+        "probing", STRAIGHT, False, "It ends where the probe switches, and what it measures must stay comparable."
+    ),
+    Pass.UNSAID: PassRule(
+        "rapid while an axis has not been said",
+        RAPIDS,
+        False,
+        "Its correction would need a word for an axis of which nobody has said where it stands. It cuts nothing, and "
+        "the first block that names the axis is corrected.",
+    ),
+    Pass.LED: PassRule(
+        "rapid from where the control has led the tool",
+        RAPIDS,
+        False,
+        "Only the control knows where it begins. It cuts nothing, and the next block that names the axes is corrected.",
+    ),
+    Pass.ALIGNMENT: PassRule(
+        "rotary axes positioned by the control",
+        RAPIDS,
+        False,
+        "The control works out the angles (PLANE, CYCLE800, G53.1); the tip is corrected where it moves next.",
+    ),
+    Pass.ROTARY_ALONE: PassRule(
+        "rotary axes alone in a tilted plane",
+        STRAIGHT,
+        True,
+        "Linear axes stand still, and words for them would mean the plane; the tip is corrected where it moves next.",
+    ),
+    Pass.RETRACTION: PassRule(
+        "retraction by the control", RAPIDS, False, "The control works out where it ends (M140). It cuts nothing."
+    ),
+    Pass.DEPARTURE: PassRule(
+        "departure from a contour",
+        frozenset({MotionKind.FEED}),
+        True,
+        "The control goes on from the corrected end of the contour (DEP); no word says where that leads.",
+    ),
+}
+"""The list: nothing else may pass."""
+
+
+def may_pass(passing: Passing, kind: MotionKind) -> bool:
+    """Whether a rule may pass a motion of this kind."""
+    return kind in PASS_RULES[passing.rule].kinds
+
+
+AT_START = "where the axis {} stands when the program starts is not given"
+"""Why a position is not known at first; asked of the setup when it matters."""
+
+UnknownAxes = dict[int, str]
+"""Letter index -> why the position of the axis is not known, with a `{}` for its letter."""
+
+
+class Arc(NamedTuple):
+    """The circle of an arc in command coordinates: centre (3), unit normal (3), signed sweep.
+
+    fixed  a word says where its centre is, not how far that is from the start
+    """
+
+    centre: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    sweep: float
+    fixed: bool = False
+
+
+class Motion(NamedTuple):
+    """One motion of the control.
+
+    axes     axes with a word, as bits
+    target   the command at its end, of every letter; a nominal value along `unknown`
+    code     the motion code, in tenths
+    refusal  why it is refused; empty if it is not
+    passing  why it is passed as it is; None if it is not
+    settles  the axes whose words say where they stand afterwards; None: those of absolute words
+    """
+
+    kind: MotionKind
+    axes: int
+    target: Vector
+    unknown: UnknownAxes
+    code: int
+    refusal: str = ""
+    passing: Passing | None = None
+    arc: Arc | None = None
+    settles: int | None = None
+
+
+def blanked(position: Vector, unknown: UnknownAxes) -> Vector:
+    """A position with NaN where it is not known."""
+    if not unknown:
+        return position
+    return [math.nan if index in unknown else value for index, value in enumerate(position)]
+
+
+def first_reason(unknown: UnknownAxes) -> str:
+    """The reason for the first axis whose position is not known."""
+    index = min(unknown)
+    return unknown[index].format(LETTERS[index])
+
+
+def leaves_unknown(rapid: Motion, before: set[str], lost: UnknownAxes) -> bool:
+    """Whether a rapid says nothing of the axes of the program's frame that are `lost` at its end, and were `before`.
+
+    Where they stand, its correction would depend on. It cuts nothing, and the axes that it names can be corrected as
+    soon as the program has named the others: it passes. `before` are the reasons why something was not known.
+    """
+    return before.issuperset(rapid.unknown.values()) and not any(rapid.axes >> index & 1 for index in lost)

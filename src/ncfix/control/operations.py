@@ -21,8 +21,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 from ncfix.control.coordinates import INDEX, Vector, mask_of
-from ncfix.control.motion import Motion, UnknownAxes
-from ncfix.control.moves import MotionKind
+from ncfix.control.moves import Motion, MotionKind, UnknownAxes
 
 if TYPE_CHECKING:
     from ncfix.control.control import ProgramControl

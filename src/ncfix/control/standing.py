@@ -26,7 +26,7 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.frames import WORLD, FrameStack
 from ncfix.control.modal import Modal, Tools
-from ncfix.control.motion import AT_START, UnknownAxes
+from ncfix.control.moves import AT_START, UnknownAxes
 from ncfix.control.setup import Knowledge
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect

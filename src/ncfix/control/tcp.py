@@ -21,7 +21,7 @@ from ncfix.control.moves import Kinematics, Moves, Rule, TcpState
 
 if TYPE_CHECKING:
     from ncfix.control.control import ProgramControl
-    from ncfix.control.motion import UnknownAxes
+    from ncfix.control.moves import UnknownAxes
 
 
 TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"

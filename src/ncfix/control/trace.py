@@ -1,18 +1,373 @@
-"""Following a program as the control would: from its tree to its motions."""
+"""A program in parts: read and followed one after the other, so that its length does not matter to the memory.
+
+A part ends between two blocks of plain words, where nothing else can be under way. Its lines are those of the file, and
+templates, frames and reasons have the same numbers in all parts, so that parts can be put together.
+
+Following a program part by part, what goes on from one part to the next, and what there is to say at the end: the
+same for all languages.
+
+Following a program as the control would: from its tree to its motions.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
-from ncfix.control.following import finished
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.control import ProgramControl
 from ncfix.control.interpreter import Interpreter
-from ncfix.control.moves import Kinematics, Trace
+from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Setup
-from ncfix.diagnostics import UsageError
-from ncfix.text.language import Run, language_of
+from ncfix.control.turns import remarks, say
+from ncfix.diagnostics import Message, SourceError, UsageError
+from ncfix.text import stamp
+from ncfix.text.dialect import Dialect
+from ncfix.text.dialects import check_content, check_zeros, header_length
+from ncfix.text.language import Language, Run, language_of
 from ncfix.text.layout import AXIS_LETTERS
-from ncfix.text.tree import Program
+from ncfix.text.reader import ProgramReading
+from ncfix.text.tree import Program, Skip, Template
+
+TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles", "calls"})
+"""The fields of `Moves` that are the same for all rows."""
+
+
+class NotInPartsError(Exception):
+    """The program cannot be taken part by part: it has to be read as a whole."""
+
+
+@dataclass(slots=True)
+class PartReader:
+    """Reads parts of one program.
+
+    head        the first bytes of the text, by which it is told what it is; those of the first part, if not given
+    first_line  the line on which the next part begins
+    line_end    the first line end of the first part
+    plain       shape -> whether a part may end before or after a block of it
+    """
+
+    path: str
+    dialect: Dialect
+    head: bytes = b""
+    first_line: int = 1
+    line_end: bytes = b""
+    language: Language = field(init=False)
+    templates: list[Template] = field(default_factory=list)
+    index: dict[bytes | None, int] = field(default_factory=dict)
+    plain: dict[int, bool] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.language = language_of(self.dialect)
+
+    def read(self, source: bytes) -> Program:
+        """The part that begins on `first_line`; raises what `reader.read` raises, `NotInPartsError` for o-words."""
+        begun = self.first_line > 1
+        check_zeros(source, self.path, self.first_line)
+        if not begun:
+            check_content(self.head or source, self.path, self.dialect)
+        blocks = self.language.split(source)
+        if not begun:
+            blocks[0, 0] = header_length(source)
+        end = self._end_later(source, blocks) if begun else self.language.end(source, blocks)
+        reading = ProgramReading(
+            source, self.path, self.dialect, self.language, blocks, end, self.templates, self.index
+        )
+        reading.first_line, reading.line_end = self.first_line, self.line_end
+        before = len(self.templates)
+        program = reading.program()
+        self.line_end = program.line_end
+        if not all(map(self.language.straight, self.templates[before:])):
+            raise NotInPartsError("the program does not run straight from its first line to its last")
+        return program
+
+    def _end_later(self, source: bytes, blocks: NDArray[np.int64]) -> int:
+        """The block that ends the text, where this is not the first part."""
+        if b"%" not in source:
+            return len(blocks)
+        before = b"X\n"
+        return self.language.end(before + source, np.vstack(([[0, 1]], blocks + len(before)))) - 1
+
+    def last_cut(self, program: Program) -> int:
+        """The last block before which a part may end; 0 if there is none."""
+        pairs = ((block, block - 1) for block in range(len(program) - 1, 0, -1))
+        return next((pair[0] for pair in pairs if all(self._is_plain(program, each) for each in pair)), 0)
+
+    def _is_plain(self, program: Program, block: int) -> bool:
+        shape = int(program.template[block])
+        if shape not in self.plain:
+            self.plain[shape] = self._has_plain_shape(program, block)
+        return self.plain[shape]
+
+    def _has_plain_shape(self, program: Program, block: int) -> bool:
+        template = program.templates[int(program.template[block])]
+        if self.language.bulk is None or template.m_codes or any(isinstance(item, Skip) for item in template.items):
+            return False
+        return self.language.bulk(program, block) is not None
+
+
+def stretch(program: Program, start: int, stop: int) -> Program:
+    """The blocks from `start` up to `stop` as a program of their own, its line end included."""
+    ends = (0 if start == 0 else int(program.blocks[start, 0]), len(program.source))
+    if stop < len(program):
+        ends = ends[0], int(program.blocks[stop, 0])
+    numbers = slice(program.first_number[start], program.first_number[stop])
+    return Program(
+        source=program.source[slice(*ends)],
+        path=program.path,
+        dialect=program.dialect,
+        templates=program.templates,
+        template=program.template[start:stop],
+        blocks=_behind(program.blocks[start:stop], ends[0]),
+        first_number=_behind(program.first_number[start : stop + 1], int(program.first_number[start])),
+        number_spans=_behind(program.number_spans[numbers], ends[0]),
+        numbers=program.numbers[numbers],
+        first_line=program.first_line + program.lines_ended_before(ends[0]),
+        line_end=program.line_end,
+    )
+
+
+def _behind(places: NDArray[np.int64], origin: int) -> NDArray[np.int64]:
+    """Places as they count from an origin: the same array where they do already."""
+    return places - origin if origin else places
+
+
+def joined(parts: list[Program]) -> Program:
+    """Parts that follow each other, as one."""
+    if len(parts) == 1:
+        return parts[0]
+    bytes_before = np.cumsum([0, *(len(part.source) for part in parts)])
+    numbers_before = np.cumsum([0, *(len(part.numbers) for part in parts)])
+    shifted = list(zip(parts, bytes_before.tolist(), numbers_before.tolist(), strict=False))
+    return Program(
+        source=b"".join(part.source for part in parts),
+        path=parts[0].path,
+        dialect=parts[0].dialect,
+        templates=parts[-1].templates,
+        template=np.concatenate([part.template for part in parts]),
+        blocks=np.concatenate([part.blocks + at for part, at, _ in shifted]),
+        first_number=np.concatenate([part.first_number[:-1] + n for part, _, n in shifted] + [numbers_before[-1:]]),
+        number_spans=np.concatenate([part.number_spans + at for part, at, _ in shifted]),
+        numbers=np.concatenate([part.numbers for part in parts]),
+        first_line=parts[0].first_line,
+        line_end=parts[0].line_end,
+    )
+
+
+def joined_moves(parts: list[Moves], blocks: list[int]) -> Moves:
+    """The motions of parts that follow each other; `blocks`: how many blocks each of the parts has."""
+    if len(parts) == 1:
+        return parts[0]
+    before = np.cumsum([0, *blocks[:-1]])
+    columns: dict[str, Any] = {
+        each.name: _joined_columns(each.name, parts) for each in fields(Moves) if each.name not in TABLES
+    }
+    shifted = [part.block + at for part, at in zip(parts, before.tolist(), strict=True)]
+    columns["block"] = np.concatenate(shifted).astype(np.int32)
+    return Moves(**columns, **{name: getattr(parts[-1], name) for name in TABLES})
+
+
+LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
+    "held": lambda moves: np.zeros(len(moves), dtype=np.bool_),
+    "approach": lambda moves: np.full(moves.end.shape, np.nan),
+    "placed": lambda moves: np.ones(moves.end.shape, dtype=np.bool_),
+    "spelled": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
+    "resting": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
+    "measured": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
+    "passing": lambda moves: np.zeros(len(moves), dtype=np.int8),
+    "beside": lambda moves: np.zeros(len(moves)),
+    "across": lambda moves: np.full(len(moves), 2, dtype=np.int8),
+    "fixed_centre": lambda moves: np.zeros(len(moves), dtype=np.bool_),
+    "call": lambda moves: np.full(len(moves), -1, dtype=np.int32),
+    "counted": lambda moves: np.repeat(moves.incremental[:, None], len(moves.axes), axis=1),
+}
+"""What columns of `Moves` mean that are left out."""
+
+
+def _joined_columns(name: str, parts: list[Moves]) -> NDArray[Any] | None:
+    """One column of parts that follow each other; None if all lack it."""
+    columns = [getattr(part, name) for part in parts]
+    if all(column is None for column in columns):
+        return None
+    filled = (LACKING[name](part) if column is None else column for part, column in zip(parts, columns, strict=True))
+    return np.concatenate(list(filled))
+
+
+def last_of(program: Program, moves: Moves) -> tuple[Program, Moves]:
+    """The last motion and its block, as copies: the rest need not be kept for them."""
+    block = int(moves.block[-1])
+    found = stretch(program, block, block + 1)
+    columns = ("template", "blocks", "first_number", "number_spans", "numbers")
+    alone = replace(found, **{name: getattr(found, name).copy() for name in columns})
+    motion = taken(moves, np.array([len(moves) - 1]))
+    return alone, replace(motion, block=motion.block - np.int32(block))
+
+
+def taken(moves: Moves, rows: NDArray[np.intp]) -> Moves:
+    """Motions `rows` (k,) alone."""
+    columns = ((each.name, getattr(moves, each.name)) for each in fields(Moves) if each.name not in TABLES)
+    return replace(moves, **{name: column.take(rows, axis=0) for name, column in columns if column is not None})
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """The state in which a part leaves a control, before its last block, where it has changed nothing else for good.
+
+    It goes from one process to another.
+
+    position    (n_axes,) the command, mm and rad
+    feed        the feed in force; `feed_given`: there is one
+    motion      the motion code in force, in tenths
+    variables   those that the program may have set, as the language has them
+    """
+
+    position: list[float]
+    feed: float
+    feed_given: bool
+    motion: int
+    variables: Any
+
+
+class Follower:
+    """Follows a program that comes in parts: the control keeps its state, the interpreter goes on where it was.
+
+    walk     makes the interpreter, given the first part
+    watched  it is to be found out what the next part leaves behind
+    """
+
+    def __init__(
+        self, control: ProgramControl, run: Run, walk: Callable[[Any, Program, Run], Interpreter[Any]]
+    ) -> None:
+        self.control, self.run, self.walk = control, run, walk
+        self.interpreter: Interpreter[Any] | None = None
+        self.watched = self.unchanged = False
+
+    @property
+    def to_the_last(self) -> bool:
+        """What stands behind the end of the program matters: something was looked for that may be there."""
+        return self.interpreter is not None and self.interpreter.to_the_last
+
+    @property
+    def ended(self) -> bool:
+        """The control has come to the end of the program."""
+        return self.interpreter is not None and self.interpreter.ended
+
+    def follow(self, program: Program, last: bool) -> Moves:
+        """The motions of the next part; `last`: nothing comes after it."""
+        control, interpreter = self.control, self.interpreter
+        begun = control.lasting() if self.watched and interpreter is not None else None
+        if interpreter is None:
+            interpreter = self.interpreter = self.walk(control, program, self.run)
+        else:
+            interpreter.next_part(program, self.run.budget(program))
+        control.builder.clear()
+        interpreter.check_part(program)
+        interpreter.last = last
+        interpreter.run()
+        if control.switches:
+            raise NotInPartsError("blocks with / may be skipped, and all positions of block delete are looked at")
+        moves = control.moves()
+        check_reach(program, moves)
+        say(control, program)
+        interpreter.check_motions(program, moves)
+        self.unchanged = begun is not None and begun == control.lasting()
+        return moves
+
+    def checkpoint(self, moves: Moves) -> Checkpoint | None:
+        """What the part that was followed last, with these motions, has left; None if there is more to it than that.
+
+        Its last two blocks have to be straight motions.
+        """
+        control, modal = self.control, self.control.modal
+        if not self.unchanged or control.unknown or control.builder.winding is not None or len(moves) < 2:
+            return None
+        straight = np.isin(moves.kind[-2:], (MotionKind.RAPID, MotionKind.FEED)) & np.isin(moves.modal[-2:], (0, 10))
+        if not straight.all() or moves.block[-2] + 1 != moves.block[-1] or _changes_tools(moves):
+            return None
+        before = moves.start[-1].tolist(), float(moves.feed[-2]), modal.feed_given, int(moves.modal[-2])
+        return Checkpoint(*before, control.set_variables())
+
+    def resume(self, state: Checkpoint) -> None:
+        """Go on as if a part had been followed up to its last block, which comes next."""
+        modal = self.control.modal
+        self.stand(np.array(state.position))
+        modal.feed, modal.feed_given = state.feed, state.feed_given
+        modal.motion = modal.straight = state.motion
+        modal.cycle.initial = None
+        self.control.take_variables(state.variables)
+
+    def stand(self, position: NDArray[np.float64]) -> None:
+        """Take the axes to a command (n_axes,), mm and rad, where the corrected program has left them."""
+        self.control.position = list(self.control.position)
+        for column, value in zip(self.control.builder.columns, position.tolist(), strict=True):
+            self.control.position[column] = value
+
+    @property
+    def lacking(self) -> tuple[Message, ...]:
+        """What the program used so far and the setup does not give, and axes that the machine lacks."""
+        return (*self.control.foreign.values(), *self.control.knowledge.missing.values())
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """What there is to say so far."""
+        return remarks(self.control)
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What was taken as zero so far, in words."""
+        return tuple(self.control.knowledge.assumed)
+
+
+def _changes_tools(moves: Moves) -> bool:
+    """Whether motions are made with more than one tool, or length of it: what is lacking is said of each of them."""
+    tool, length = moves.tool, moves.tool_length
+    same = (length == length[-1]) | (np.isnan(length) & np.isnan(length[-1]))
+    return bool((tool != tool[-1]).any() or not same.all())
+
+
+FAR = 1e9
+"""mm or rad; no machine goes farther from zero, and sums of such numbers do not tell micrometres apart."""
+TOO_FAR = "NCF248"
+
+
+def check_reach(program: Program, moves: Moves) -> None:
+    """Raise SourceError at the first motion that leads farther away than any machine goes."""
+    far, arcs = _are_far(moves.end), np.flatnonzero(moves.kind == MotionKind.ARC)
+    far[arcs] |= _are_far(moves.centre[arcs])
+    rows = np.flatnonzero(far & (moves.rule != Rule.REFUSE))
+    if rows.size:
+        text = "this leads farther away than any machine goes (1e9 mm or radians)"
+        raise SourceError.of(TOO_FAR, text, program.place(int(moves.block[rows[0]])), "check the numbers of the block")
+
+
+def _are_far(places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) which of (n, k) places are too far away."""
+    rows = np.zeros(len(places), dtype=np.bool_)
+    if not places.size or max(places.max(), -places.min()) <= FAR:
+        return rows
+    rows[np.flatnonzero(np.abs(places) > FAR) // places.shape[1]] = True
+    return rows
+
+
+def finished(control: ProgramControl, program: Program, moves: Moves) -> Trace:
+    """The trace of a program; raises UsageError with all that was not given."""
+    check_reach(program, moves)
+    say(control, program)
+    lacking = (*control.foreign.values(), *control.knowledge.missing.values())
+    if lacking:
+        raise UsageError.collected(lacking)
+    marked = stamp.find(program)
+    return Trace(
+        moves=moves,
+        messages=remarks(control),
+        assumed=tuple(control.knowledge.assumed),
+        stamp="" if marked is None else program.text_of(marked),
+        switches=frozenset(control.switches),
+    )
+
 
 NO_LETTER = "NCF207"
 

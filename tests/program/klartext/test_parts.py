@@ -9,7 +9,7 @@ import pytest
 
 from compensate.streaming import assert_alike, compared, streamed, whole
 from ncfix import fast
-from ncfix.control.parts import NotInPartsError
+from ncfix.control.trace import NotInPartsError
 from ncfix.machine import Machine, load
 
 ODDS = (

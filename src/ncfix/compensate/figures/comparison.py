@@ -35,7 +35,7 @@ from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.plan.written import rounding_of_arcs
 from ncfix.compensate.workers import Read
 from ncfix.control.moves import Moves
-from ncfix.control.parts import joined_moves, taken
+from ncfix.control.trace import joined_moves, taken
 from ncfix.diagnostics import DifferenceError, Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program

@@ -23,7 +23,7 @@ import numpy as np
 from ncfix import fast
 from ncfix.compensate.figures.curve import Curve, CurvePoints, length
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places
-from ncfix.control.parts import NotInPartsError
+from ncfix.control.trace import NotInPartsError
 
 ALONG = 0.02
 """A point that is so much shorter or longer along the path counts as this share of that farther away."""

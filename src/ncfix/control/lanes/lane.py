@@ -14,9 +14,9 @@ import numpy as np
 from ncfix.control.arcs import CLOCKWISE, COUNTER, resting_of_many
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.control import ProgramControl
-from ncfix.control.lane_tables import Lane
+from ncfix.control.lanes.block_rows import BlockRows, IntArray, Lookahead, Mask, ProgramText, rows_before
+from ncfix.control.lanes.lane_tables import Lane
 from ncfix.control.moves import FeedMode, MotionKind
-from ncfix.control.stage import BlockRows, IntArray, Lookahead, Mask, ProgramText, rows_before
 
 SHORTEST = 16
 """Stretches of fewer blocks go one by one."""

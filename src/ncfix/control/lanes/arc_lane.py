@@ -14,9 +14,9 @@ from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_clo
 from ncfix.control.builder import Circles
 from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import IDENTITY, X
-from ncfix.control.faults import Fault
-from ncfix.control.lane_tables import LaneTables
-from ncfix.control.stage import BlockRows, FloatArray, IntArray, Mask, ProgramText, words
+from ncfix.control.expressions import Fault
+from ncfix.control.lanes.block_rows import BlockRows, FloatArray, IntArray, Mask, ProgramText, words
+from ncfix.control.lanes.lane_tables import LaneTables
 
 
 def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockRows) -> tuple[Circles | None, int]:

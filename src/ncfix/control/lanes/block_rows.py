@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ncfix import fast
 from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import N_LETTERS
-from ncfix.control.lane_tables import LaneTables
+from ncfix.control.lanes.lane_tables import LaneTables
 from ncfix.control.moves import FeedMode
 from ncfix.text.tree import Program
 
@@ -129,7 +129,7 @@ def followed_compiled(
     control: ProgramControl, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
 ) -> BlockRows:
     """As `followed`."""
-    from ncfix.control import lane_kernel
+    from ncfix.control.lanes import lane_kernel
 
     position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
     n = len(first)
