@@ -21,7 +21,7 @@ from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import Backlash
 from ncfix.text.reader import read
 from ncfix.writer import emit
-from ncfix_siemens.sinumerik import vectors
+from ncfix_siemens.sinumerik import orientation as orienting
 from ncfix_siemens.sinumerik.language import SINUMERIK
 
 CALCULATOR = replace(SETUP, no_point="calculator")
@@ -171,12 +171,12 @@ def test_blocks_with_vectors_are_followed_at_once_as_one_by_one(
         assert fast.engage()
     taken = []
     try:
-        monkeypatch.setattr(vectors, "take", lambda *given: (taken.append(given), take(*given)))
+        monkeypatch.setattr(orienting, "take", lambda *given: (taken.append(given), take(*given)))
         at_once = traced(read(source, "p", "siemens"), machine, SETUP)
     finally:
         fast.disengage()
     assert taken
-    monkeypatch.setattr(vectors, "is_ready", lambda control: False)
+    monkeypatch.setattr(orienting, "is_ready", lambda control: False)
     singly = traced(read(source, "p", "siemens"), machine, SETUP)
     assert at_once.messages == singly.messages
     for each in fields(at_once.moves):

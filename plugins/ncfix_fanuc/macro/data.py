@@ -9,8 +9,8 @@ from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of
 from ncfix.control.moves import Motion, MotionKind
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
-from ncfix_iso.rs274.settings import AFTER_UNFOLLOWED
 from ncfix_iso.rs274.systems import (
+    AFTER_UNFOLLOWED,
     SYSTEM_NAMES,
     activate,
     extended_system,

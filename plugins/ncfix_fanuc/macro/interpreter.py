@@ -12,7 +12,7 @@ from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.language import Run
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
-from ncfix_fanuc.macro import dynamic, polar, scaling, system, vectors
+from ncfix_fanuc.macro import polar, scaling, system, tilt, vectors
 from ncfix_fanuc.macro.control import ANGLE, MacroControl
 from ncfix_fanuc.macro.corners import CORNER
 from ncfix_fanuc.macro.expressions import is_vacant, variable_number
@@ -248,8 +248,8 @@ class MacroInterpreter(RS274Interpreter):
     def move(self, block: Block, codes: Codes, motion: int) -> None:
         """The motion of a block."""
         before = self.control.builder.count
-        if dynamic.turned(self.control, block):
-            self.control.suspended[dynamic.KEY] = dynamic.MOVED
+        if tilt.turns_tables(self.control, block):
+            self.control.suspended[tilt.DYNAMIC] = tilt.TABLES_MOVED
         if self.control.vectors:
             self.by_vector(block, codes, motion)
         else:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ncfix_fanuc.macro import data, dynamic, lengths, mirror, polar, references, scaling, tilt
+from ncfix_fanuc.macro import data, lengths, polar, references, scaling, tilt
 from ncfix_fanuc.macro.cycles import cycle
 from ncfix_fanuc.macro.expressions import compiled
 from ncfix_fanuc.macro.variables import is_lasting, is_system
@@ -77,8 +77,8 @@ FANUC = Rules(
         **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),
         500: scaling.switch,
         510: scaling.switch,
-        501: mirror.mirror,
-        511: mirror.mirror,
+        501: scaling.mirror,
+        511: scaling.mirror,
         531: tilt.align,
         536: tilt.align,
         542: data.setting_error,
@@ -108,12 +108,12 @@ HAAS = replace(
     g_groups=FANUC_G
     | dict.fromkeys(HAAS_MADE, groups.NON_MODAL)
     | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM)
-    | {lengths.HAAS_TIP: groups.LENGTH, dynamic.ON: groups.ROTATION, dynamic.OFF: groups.ROTATION},
+    | {lengths.HAAS_TIP: groups.LENGTH, tilt.DYNAMIC_ON: groups.ROTATION, tilt.DYNAMIC_OFF: groups.ROTATION},
     steps={
         **FANUC.steps,
         **dict.fromkeys(HAAS_MADE, data.made),
         **dict.fromkeys(HAAS_OFFSETS, data.extended),
-        **dict.fromkeys((dynamic.ON, dynamic.OFF), dynamic.dynamic_offset),
+        **dict.fromkeys((tilt.DYNAMIC_ON, tilt.DYNAMIC_OFF), tilt.dynamic_offset),
         lengths.HAAS_TIP: lengths.tool_offset,
         280: references.cancelling,
     },

@@ -1,18 +1,21 @@
 """Scaling: G51 X Y Z P magnifies the words of the program about a point, G50 ends it. A flat program has no need of it.
+And programmable mirror image: G51.1 X10. mirrors X at 10, G50.1 X0 ends that.
 
 Its words are made those that they mean; a correction cannot be written in them, for a magnified digit is a coarser one.
-Sources: Fanuc 30i operator's manual (machining centre), "Scaling"; Haas mill operator's manual, G51; Mitsubishi M700V
+Sources: Fanuc 30i operator's manual (machining centre), "Scaling", "Programmable mirror
+image"; Haas mill operator's manual, G51; Mitsubishi M700V
 programming manual, where it acts on the axes that the block names only.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, Z
+from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, Z, zeros
+from ncfix.control.frames import WORLD, handed, mirrored, turned_about
 from ncfix_iso.rs274.groups import CONTROL, CUTTER, DISTANCE, FEED_MODE, MOTION, PLANE, RETRACT, SPINDLE_MODE
-from ncfix_iso.rs274.settings import unfollowed
+from ncfix_iso.rs274.systems import is_turned, turned_back, unfollowed, words_of
 
 if TYPE_CHECKING:
     from ncfix_fanuc.macro.control import MacroControl
@@ -26,6 +29,8 @@ AXES_SAID = "NCF245"
 ALIKE = "scaling (G51) is taken to act on X, Y and Z alike"
 AT_PEACE = frozenset((MOTION, PLANE, DISTANCE, FEED_MODE, CUTTER, CONTROL, RETRACT, SPINDLE_MODE))
 """Groups of codes that scaling has nothing to do with."""
+MIRROR_OFF = 501
+SPATIAL = (X, Y, Z)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,3 +97,39 @@ def scaled(control: MacroControl, block: Block, codes: Codes) -> Block:
         elif letter == "R" or (letter in CENTRE_LETTERS and not drills):
             block.values[letter] = scaling.factor * value
     return block
+
+
+# -- mirror image ------------------------------------------------------------------------------------------------------
+
+
+def mirror(control: MacroControl, block: Block, code: int) -> None:
+    """G51.1 and G50.1; mirrored rotary axes, and mirrors in turned coordinates, are not followed."""
+    named, elsewhere = words_of(block), turned(control)
+    if code == MIRROR_OFF:
+        unfollowed(control, block, code)
+        for index in named or SPATIAL:
+            control.mirrored.pop(index, None)
+    elif elsewhere or block.runtime or not set(named) <= {*SPATIAL}:
+        unfollowed(control, block, code)
+        return
+    else:
+        control.mirrored |= {index: control.scale[index] * block.values[LETTERS[index]] for index in named}
+    if not elsewhere:
+        put_up(control)
+
+
+def turned(control: MacroControl) -> bool:
+    """Whether coordinates are turned (G68, G68.2)."""
+    return control.tilted or (not control.mirrored and is_turned(control))
+
+
+def put_up(control: MacroControl) -> None:
+    """Take the mirrors into force."""
+    centre = zeros()
+    for index, place in control.mirrored.items():
+        centre[index] = place
+    rotation = mirrored("".join(LETTERS[index] for index in control.mirrored))
+    control.frames = replace(control.frames, mirror=turned_about(rotation, centre) if control.mirrored else WORLD)
+    control.handedness = handed(rotation)
+    turned_back(control)
+    control.refresh()

@@ -2,9 +2,12 @@
 
 X Y Z are then those of the tool tip in a frame that turns with the workpiece, whatever the rotary axes do: the control
 computes the linear axes from the tip as it does under tool-centre-point control.
+The dynamic work offset of Haas (G254, G255) turns the work offset along with the tables as they stand. X Y Z are then
+those of the tip along the machine's axes, from where the origin of the workpiece has gone: the frame of a tilted plane
+that is square to the tool already.
 Sources: Fanuc 30i operator's manual (machining centre), "Tilted working plane indexing"; Mazak, "Inclined-plane
 machining" (roll, pitch and yaw). That the first of three points is the origin, and that the block Q0 shifts it from
-there, is what programs for these controls say of themselves.
+there, is what programs for these controls say of themselves; Haas, "Next Generation Control, mill operator's manual".
 """
 
 from __future__ import annotations
@@ -19,16 +22,14 @@ from ncfix.control.expressions import Fault
 from ncfix.control.frames import WORLD, euler, from_points, from_vectors, shifted, spatial
 from ncfix.control.moves import Motion, MotionKind, Pass, Passing, TcpState
 from ncfix.control.pointing import Triple
-from ncfix.control.posture import normal_of, postures
+from ncfix.control.posture import machine_directions, normal_of, postures
 from ncfix.control.tcp import switch
+from ncfix_iso.rs274.control import Block
 from ncfix_iso.rs274.expressions import whole
-from ncfix_iso.rs274.settings import unfollowed
-from ncfix_iso.rs274.shifts import rotate_system
-from ncfix_iso.rs274.systems import turned_back
+from ncfix_iso.rs274.systems import rotate_system, turned_back, unfollowed
 
 if TYPE_CHECKING:
     from ncfix_fanuc.macro.control import MacroControl
-    from ncfix_iso.rs274.control import Block
 
 TILT, CANCEL = 682, 690
 EULER, ROLL_PITCH_YAW, POINTS, VECTORS = range(4)
@@ -53,6 +54,10 @@ ALIGNMENTS = {
     code: Passing(Pass.ALIGNMENT, f"tool axis alignment ({name})") for code, name in ((531, "G53.1"), (536, "G53.6"))
 }
 ABOUT_TIP = 536
+DYNAMIC_ON, DYNAMIC_OFF = 2540, 2550
+DYNAMIC = "dynamic work offset"
+OFFSET_NOT_SOLVED = "how the tables stand where G254 comes into force, or what is in force besides it, is not followed"
+TABLES_MOVED = "a rotary axis moves while G254 is in force, which counts from where the tables stood"
 
 
 def tilt(control: MacroControl, block: Block, code: int) -> None:
@@ -160,7 +165,7 @@ def end(control: MacroControl) -> None:
     control.refresh()
 
 
-# -- G53.1, G53.6 -----------------------------------------------------------------------------------------------------
+# -- G53.1, G53.6 ------------------------------------------------------------------------------------------------------
 
 
 def align(control: MacroControl, block: Block, code: int) -> None:
@@ -209,3 +214,30 @@ def is_moved_otherwise(control: MacroControl, block: Block) -> bool:
 def is_other_length(control: MacroControl, block: Block) -> bool:
     """Whether H of a block is another length than the one in force."""
     return "H" in block.values and whole(block.values["H"], "H") != control.tools.offset
+
+
+# -- G254 and G255 of Haas ---------------------------------------------------------------------------------------------
+
+
+def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
+    """G254 and G255."""
+    control.suspended.pop(DYNAMIC, None)
+    if code == DYNAMIC_OFF:
+        control.dynamic = False
+        end(control)
+        return
+    machine = None
+    if not (control.mirrored or control.is_rotated):
+        control.settle(control.turning)
+        known = not control.unknown.keys() & {*control.turning}
+        machine = machine_directions(control, control.position) if known else None
+    if machine is None:
+        control.suspended[DYNAMIC] = OFFSET_NOT_SOLVED
+        return
+    control.dynamic = True
+    begin(control, machine.axes, Block(block.index, {}, frozenset(), 0))
+
+
+def turns_tables(control: MacroControl, block: Block) -> bool:
+    """Whether a block has a word of a rotary axis that would turn the tables under the offset."""
+    return control.dynamic and any(block.axes >> index & 1 for index in control.turning)

@@ -39,11 +39,9 @@ from ncfix_iso.rs274.settings import (
     retract,
     select_radius,
     spindle_or_state,
-    unfollowed,
     units,
 )
-from ncfix_iso.rs274.shifts import rotate_system, shift_system
-from ncfix_iso.rs274.systems import select_system
+from ncfix_iso.rs274.systems import rotate_system, select_system, shift_system, unfollowed
 from ncfix_iso.rs274.targets import destination
 
 Step = Callable[[RS274Control, Block, int], None]

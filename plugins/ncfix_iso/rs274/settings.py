@@ -16,23 +16,6 @@ from ncfix_iso.rs274.systems import activate
 
 BAD_SETTING = "NCF221"
 
-UNFOLLOWED = {
-    160: ("polar", "polar coordinates (G16)"),
-    510: ("scaling", "scaling (G51)"),
-    511: ("mirror", "mirroring (G51.1)"),
-    121: ("polar plane", "polar interpolation (G12.1)"),
-    1120: ("polar plane", "polar interpolation (G112)"),
-    682: ("tilt", "a tilted plane (G68.2)"),
-    683: ("tilt", "a tilted plane (G68.3)"),
-    684: ("tilt", "a tilted plane (G68.4)"),
-}
-"""Codes of ISO controls that change coordinates in a way that is not followed: what they switch on, in words."""
-
-ENDS = {150: "polar", 500: "scaling", 501: "mirror", 131: "polar plane", 1130: "polar plane", 690: "tilt"}
-"""The codes that end them."""
-
-AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
-
 
 def plane(control: RS274Control, block: Block, code: int) -> None:
     """G17, G18, G19, and G17.1 to G19.1."""
@@ -99,17 +82,6 @@ def select_radius(control: RS274Control, block: Block, code: int) -> None:
     """D, by which ISO controls know the radius of the cutter from there on; LinuxCNC takes it beside G41 only."""
     if not control.rules.strict:
         control.tools.register = NO_REGISTER if "D" in block.runtime else round(block.values["D"])
-
-
-def unfollowed(control: RS274Control, block: Block, code: int) -> None:
-    """Scaling, mirroring, polar coordinates and tilted planes: refused for as long as they are in force."""
-    if code in UNFOLLOWED:
-        if code == 510 and not block.axes and not block.values.keys() & {"I", "J", "K", "P"}:
-            return
-        key, words = UNFOLLOWED[code]
-        control.suspended[key] = f"{words} is in force, which ncfix does not follow"
-    elif control.suspended.pop(ENDS[code], None):
-        control.lose(control.machine, AFTER_UNFOLLOWED)
 
 
 def unknown_code(control: RS274Control, code: int, *, moving: bool) -> None:

@@ -26,7 +26,7 @@ from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.heading import note_stretch
 from ncfix_siemens.sinumerik.increments import stand
 from ncfix_siemens.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
-from ncfix_siemens.sinumerik.orientation import leads_along
+from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
 from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, SinumerikPlan, is_statement
 from ncfix_siemens.sinumerik.poles import all_or_none
 from ncfix_siemens.sinumerik.state import Sinumerik
@@ -34,7 +34,6 @@ from ncfix_siemens.sinumerik.statements import Turn, act, finish_block, say
 from ncfix_siemens.sinumerik.synchronous import is_harmless
 from ncfix_siemens.sinumerik.undecided import DECIDED_AT_RUNTIME, bypassed, demoted, sweep
 from ncfix_siemens.sinumerik.unit import HEAD, PROCEDURE, SinumerikUnit, units_of
-from ncfix_siemens.sinumerik.vectors import run_vectors
 
 NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
