@@ -401,3 +401,17 @@ def test_it_is_said_when_a_program_does_not_say_its_unit() -> None:
 def test_tools_named_by_h() -> None:
     setup = Setup(tools={3: Tool(50.0)}, initial=dict.fromkeys("XYZ", 0.0), work_offsets=KNOWN.work_offsets)
     assert last(follow("G0G43H3Z10.", setup=setup, dialect="fanuc")) == [0, 0, 60]
+
+
+@pytest.mark.parametrize(
+    ("lines", "end"),
+    [
+        ("G68.2 X10. Y0 Z0 I0 J30. K0\nG68 X0 Y0 R90.\nG1 X10. Y0 Z0 F100", (10, 5 * math.sqrt(3), 5)),
+        ("G68 X5. Y5. R90.\nG68.2 X10. Y0 Z0 I0 J30. K0\nG1 X0 Y10. Z0 F100", (10, 5 * math.sqrt(3), 5)),
+    ],
+)
+def test_a_rotation_turns_in_the_tilted_plane_and_ends_with_the_next_plane(
+    lines: str, end: tuple[float, float, float]
+) -> None:
+    found = last(follow(f"G0 X0 Y0 Z0\n{lines}", "XYZBC", dialect="fanuc"))
+    assert found[:3] == pytest.approx(end, abs=1e-9)
