@@ -10,7 +10,7 @@ from unittest import mock
 
 import pytest
 
-from ncfix.cli.options import SubprogramFiles
+from ncfix.batch.programs import SubprogramFiles
 from ncfix.diagnostics import ExitCode
 
 NEITHER_OFFSET_NOR_START = b"G21 G90 G94 G54\nG1 X10 F100\nM2\n"

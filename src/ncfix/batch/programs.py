@@ -1,14 +1,22 @@
-"""The programs of a shop: files, and what is below folders."""
+"""The programs of a shop: files, what is below folders, and the files of the subprograms that they call."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from ncfix import files
 from ncfix.diagnostics import Place, UsageError
 from ncfix.plugins import registry
+
+if TYPE_CHECKING:
+    from ncfix.control.setup import Setup
+
+SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".mpf")
+"""Under what a subprogram's file may go besides its name, beside the suffix of the program that calls it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,3 +76,53 @@ def _same(here: str, name: str, apart: str | None) -> bool:
 
 def _is(path: str, known: Collection[str]) -> bool:
     return os.path.splitext(path)[1].lower() in known and not os.path.islink(path) and os.path.isfile(path)
+
+
+@dataclass(frozen=True, slots=True)
+class SubprogramFiles:
+    """Finds the files of subprograms in folders, the first first, by their name with or without a suffix.
+
+    Where no file has the name as it is written, one is taken that has it in another case, if it is the only one.
+    """
+
+    folders: tuple[str, ...]
+    suffixes: tuple[str, ...] = SUBPROGRAM_SUFFIXES
+
+    def __call__(self, name: str) -> bytes | None:
+        """The text of a subprogram; None if there is none."""
+        if os.path.basename(name) != name:
+            return None
+        for folder in self.folders:
+            for suffix in self.suffixes:
+                if found := file_of(folder, name + suffix):
+                    return files.read_bytes(found)
+        return None
+
+
+def file_of(folder: str, name: str) -> str:
+    """The path of a file in a folder, its name in any case; empty if there is none, or if there are several."""
+    path = os.path.join(folder, name)
+    if os.path.isfile(path):
+        return path
+    try:
+        alike = names_in(folder, os.stat(folder).st_mtime_ns).get(name.lower(), [])
+    except OSError:
+        return ""
+    path = os.path.join(folder, alike[0]) if len(alike) == 1 else ""
+    return path if os.path.isfile(path) else ""
+
+
+@lru_cache(maxsize=8)
+def names_in(folder: str, changed: int) -> dict[str, list[str]]:
+    """What is in a folder that has changed last at a time (ns): names as they are, by names in lower case."""
+    found: dict[str, list[str]] = {}
+    for each in os.listdir(folder):
+        found.setdefault(each.lower(), []).append(each)
+    return found
+
+
+def subprograms(setup: Setup, *paths: str) -> Callable[[str], bytes | None]:
+    """Finds the files of subprograms: beside the program and the one that it was made of, and where the setup says."""
+    beside = dict.fromkeys("." if path == "-" else os.path.dirname(path) or "." for path in paths)
+    suffixes = dict.fromkeys((*SUBPROGRAM_SUFFIXES, *(os.path.splitext(path)[1].lower() for path in paths)))
+    return SubprogramFiles((*beside, *setup.subprograms), tuple(suffixes))

@@ -14,7 +14,8 @@ from functools import cache, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from ncfix import __version__, fast, files
+from ncfix import fast, files
+from ncfix.batch.programs import subprograms
 from ncfix.batch.work import (
     ExecutorMaker,
     Find,
@@ -27,10 +28,11 @@ from ncfix.batch.work import (
 )
 from ncfix.cli import console
 from ncfix.cli.console import owned
-from ncfix.cli.options import dialect_of, subprograms
+from ncfix.cli.options import dialect_of
 from ncfix.cli.streams import FixedText, Outlet, Source, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
+from ncfix.version import __version__
 
 if TYPE_CHECKING:
     from ncfix.compensate import FixOptions
@@ -103,18 +105,12 @@ class FixJob:
                 yield self._in_parts(source, stream, outlet, find)
 
     def _whole(self, source: Source, text: bytes, find: Find) -> FixedText:
-        from ncfix.compensate.driver import fix_program
+        from ncfix import api
         from ncfix.text.reader import read
 
         path = shown(source.path)
         program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
-        given = program, self.machine, self.setup, self.options, find
-        if self.options.flatten:
-            from ncfix.compensate.driver import fix_flat
-
-            fixed = fix_flat(*given)
-        else:
-            fixed = fix_program(*given)
+        fixed = api.fixed(program, self.machine, self.setup, self.options, find)
         return FixedText(fixed.text, fixed.changed, fixed.report)
 
     @contextmanager

@@ -7,20 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from ncfix import fast
+from ncfix.batch.programs import subprograms
 from ncfix.cli import console
-from ncfix.cli.options import dialect_of, load_machine, read_program, subprograms
+from ncfix.cli.options import dialect_of, load_machine, read_program
 from ncfix.cli.setup_options import SetupOptions
 from ncfix.cli.streams import Source, looked_bytes
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import DifferenceError, Message, NcfixError, UsageError
 
 if TYPE_CHECKING:
-    from ncfix.compensate.block_delete import SwitchSetting
     from ncfix.compensate.checking import Checked
-    from ncfix.compensate.figures.simulation import Along
     from ncfix.compensate.following import Followed, Task
     from ncfix.compensate.parts import Part, Parts
     from ncfix.control.moves import Trace
@@ -87,27 +86,11 @@ class Following:
         assert self.machine is not None
         return follow(program, self.machine, self.setup, subprograms(self.setup, *paths))
 
-    def in_positions(self, program: Program, *paths: str) -> tuple[SwitchSetting, ...]:
-        """A program as this machine follows it in all positions of block delete, or in the one that is stated."""
-        from ncfix.compensate.block_delete import positions_of
-        from ncfix.compensate.following import follow
-
-        machine, find = self.machine, subprograms(self.setup, *paths)
-        assert machine is not None
-        return positions_of(self.setup, lambda own: follow(program, machine, own, find).trace)
-
 
 def axes_of(templates: Sequence[Template]) -> tuple[str, ...]:
     """X Y Z, and what other axes a program with blocks of these shapes has words for."""
     words = {word.address for template in templates for word in template.words}
     return LINEAR + tuple(letter for letter in ROTARY + PARALLEL if letter in words)
-
-
-def figures(along: Along) -> dict[str, Any]:
-    """The error along a path in two figures, um, and the line of the worst; None where nothing was looked at."""
-    if not along.count:
-        return {"max": None, "rms": None, "where": None}
-    return {"max": 1e3 * along.max, "rms": 1e3 * along.rms, "where": along.where}
 
 
 def through(sources: Sequence[Source], in_parts: Callable[[], Found], as_wholes: Callable[[], Found]) -> Found:

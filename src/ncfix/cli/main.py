@@ -13,11 +13,11 @@ from io import TextIOWrapper
 
 import click
 
-from ncfix import __version__
 from ncfix.cli import console
 from ncfix.cli.console import debugging, owned
 from ncfix.diagnostics import ExitCode, Message, NcfixError, UsageError
 from ncfix.plugins import PluginWarning, registry
+from ncfix.version import __version__
 
 VERBS = {
     "fix": "Rewrite programs so that this machine cuts what was meant.",

@@ -93,11 +93,8 @@ def calibrate(
     Without --effects those of the machine file are estimated; of a machine without effects, all that can be. Exit
     code 4: the result does not describe the measurements, and nothing was written.
     """
+    from ncfix import api
     from ncfix.machine import dumps
-    from ncfix.machine.plausible import doubts
-    from ncfix.measure.calibrate import calibrate as calibrated
-    from ncfix.measure.calibrate import guesses, over_the_travels
-    from ncfix.measure.contradictions import refusals
     from ncfix.measure.reader import reads
 
     each_once(measured)
@@ -106,15 +103,21 @@ def calibrate(
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]
     with console.busy("calibrating"):
-        calibration = calibrated(data, machine, effects, loss, prune, knots, time_constants)
-    over = over_the_travels(calibration)
-    remarks = (*calibration.remarks, *guesses(calibration, over))
-    odd = doubts(calibration.machine, target.path)
-    refused = refusals(calibration, odd)
-    if refused and not allow_misfit:
-        console.tell(*(each for each in remarks if each not in refused))
-        raise RefusedError(refused)
-    remarks = (*remarks, *(doubt.message for doubt in odd))
+        found = api.calibrate(
+            data,
+            machine,
+            effects=effects,
+            loss=loss,
+            prune=prune,
+            knots=knots,
+            time_constants=time_constants,
+            path=target.path,
+        )
+    calibration, over = found.calibration, found.prediction
+    if found.refused and not allow_misfit:
+        console.tell(*(each for each in found.remarks if each not in found.refused))
+        raise RefusedError(found.refused)
+    remarks = (*found.remarks, *found.doubts)
     console.tell(*remarks)
     target.write(dumps(calibration.machine).encode())
     if as_json:
@@ -266,8 +269,8 @@ def plan(
     as_json: bool,
 ) -> None:
     """Choose the poses to be measured, and write them as a measurement file to be filled in."""
+    from ncfix import api
     from ncfix.measure.measurement import dumps
-    from ncfix.measure.plan import plan as planned
     from ncfix.measure.plan import skeleton
     from ncfix.measure.reader import reads
 
@@ -280,7 +283,16 @@ def plan(
     names = [name.strip() for name in separate.split(",")] if separate else []
     room = _room(ranges, lengths, balls, reaches, inputs, machine)
     with console.busy("choosing poses"):
-        found = planned(machine, kind, count, room, effects, names, before, seed)
+        found = api.plan(
+            machine,
+            kind=kind,
+            count=count,
+            room=room,
+            effects=effects,
+            separate=names,
+            existing=before,
+            seed=seed,
+        )
     empty = found.plan.form.measured if kind != "probe" else ()
     text = dumps(found.plan, empty)
     if program:
@@ -387,9 +399,9 @@ def diagnose(
 ) -> int:
     """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
+    from ncfix import api
     from ncfix.diagnosis.checks import remarks
     from ncfix.diagnosis.diagnosis import NOTHING
-    from ncfix.diagnosis.diagnosis import diagnose as diagnosed
     from ncfix.diagnosis.presentation import as_dict, text, with_provenance
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
@@ -409,7 +421,7 @@ def diagnose(
     for each in data:
         console.tell_some(each.remarks)
     with console.busy("diagnosing"):
-        diagnosis = diagnosed(data, machine, without)
+        diagnosis = api.diagnose(data, machine, without=without)
     console.tell(*remarks(diagnosis.data, diagnosis.case.unheard_of))
     written = None
     if machine_target is not None and diagnosis.machine is not None:

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -19,15 +16,12 @@ from ncfix.cli.streams import part_bytes
 from ncfix.cli.targets import STREAM, read, shown
 
 if TYPE_CHECKING:
-    from ncfix.control.setup import Setup
     from ncfix.machine import Machine
     from ncfix.text.dialect import Dialect
     from ncfix.text.tree import Program
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
-SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".mpf")
-"""Under what a subprogram's file may go besides its name, beside the suffix of the program that calls it."""
 LONGEST = 5000.0
 """mm: no tool is longer."""
 FINEST_UM = 0.01
@@ -211,53 +205,3 @@ def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None
     if name is not None:
         return get(name)
     return detect(head, path, (machine and machine.control) or "")
-
-
-@dataclass(frozen=True, slots=True)
-class SubprogramFiles:
-    """Finds the files of subprograms in folders, the first first, by their name with or without a suffix.
-
-    Where no file has the name as it is written, one is taken that has it in another case, if it is the only one.
-    """
-
-    folders: tuple[str, ...]
-    suffixes: tuple[str, ...] = SUBPROGRAM_SUFFIXES
-
-    def __call__(self, name: str) -> bytes | None:
-        """The text of a subprogram; None if there is none."""
-        if os.path.basename(name) != name:
-            return None
-        for folder in self.folders:
-            for suffix in self.suffixes:
-                if found := file_of(folder, name + suffix):
-                    return read(found)
-        return None
-
-
-def file_of(folder: str, name: str) -> str:
-    """The path of a file in a folder, its name in any case; empty if there is none, or if there are several."""
-    path = os.path.join(folder, name)
-    if os.path.isfile(path):
-        return path
-    try:
-        alike = names_in(folder, os.stat(folder).st_mtime_ns).get(name.lower(), [])
-    except OSError:
-        return ""
-    path = os.path.join(folder, alike[0]) if len(alike) == 1 else ""
-    return path if os.path.isfile(path) else ""
-
-
-@lru_cache(maxsize=8)
-def names_in(folder: str, changed: int) -> dict[str, list[str]]:
-    """What is in a folder that has changed last at a time (ns): names as they are, by names in lower case."""
-    found: dict[str, list[str]] = {}
-    for each in os.listdir(folder):
-        found.setdefault(each.lower(), []).append(each)
-    return found
-
-
-def subprograms(setup: Setup, *paths: str) -> Callable[[str], bytes | None]:
-    """Finds the files of subprograms: beside the program and the one that it was made of, and where the setup says."""
-    beside = dict.fromkeys("." if path == STREAM else os.path.dirname(path) or "." for path in paths)
-    suffixes = dict.fromkeys((*SUBPROGRAM_SUFFIXES, *(os.path.splitext(path)[1].lower() for path in paths)))
-    return SubprogramFiles((*beside, *setup.subprograms), tuple(suffixes))

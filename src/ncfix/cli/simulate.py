@@ -13,7 +13,7 @@ import click
 from click.core import ParameterSource
 
 from ncfix.cli import console
-from ncfix.cli.following import Following, dialect_in, figures, task_of, tell_of_stamp, through
+from ncfix.cli.following import Following, dialect_in, task_of, tell_of_stamp, through
 from ncfix.cli.options import PATH, FiniteRange, dialect_option, force_option, json_option, load_machine, machine_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.streams import Keep, Source, source_of
@@ -90,7 +90,7 @@ def _simulate_program(following: Following, program: str, target: OutputTarget |
         console.tell_some(messages)
         if target:
             target.write(table)
-    found = figures(along)
+    found = along.figures()
     if as_json:
         console.put_json(path=shown(program), error_um=found, output=target.path if target else None)
     elif not target or target.path != STREAM:
@@ -161,7 +161,7 @@ def _simulate_plan(
     machine_path: str, plan: str, faults: Faults, seed: int, output: str | None, force: bool, as_json: bool
 ) -> None:
     """Fill in a plan."""
-    from ncfix.measure.instruments import simulate as filled
+    from ncfix import api
     from ncfix.measure.measurement import dumps
     from ncfix.measure.reader import reads
 
@@ -170,7 +170,7 @@ def _simulate_plan(
     machine = load_machine(machine_path)
     measurement = reads(read(plan), machine, shown(plan), plan=True)
     console.tell(*measurement.remarks)
-    found = filled(measurement, machine, faults, seed)
+    found = api.simulate(measurement, machine, faults=faults, seed=seed)
     if as_json:
         columns = {name: values for name, values in found.columns.items() if name in found.measured}
         console.put_json(path=shown(plan), rows=len(found), kind=found.kind, measured=columns, output=output)

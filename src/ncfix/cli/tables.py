@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix import files
+from ncfix.batch.programs import subprograms
 from ncfix.cli import console
-from ncfix.cli.following import Following, figures
+from ncfix.cli.following import Following
 from ncfix.cli.options import (
     CONTROL,
     FOLDER,
@@ -27,7 +28,6 @@ from ncfix.cli.options import (
     json_option,
     machine_option,
     sound,
-    subprograms,
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import STREAM, shown
@@ -71,7 +71,7 @@ def along(
     program, followed = _followed(following, path)
     names, machine, moves = followed.machine.axis_names, followed.machine, followed.trace.moves
     intent, lines = Intent(machine, moves, State()), program.lines(moves.block)
-    before = figures(Along.of(tip_errors(intent, lines)))
+    before = Along.of(tip_errors(intent, lines)).figures()
     if control.rewrites:
         after = rewritten(following, settings, path).report.as_dict()["error_after_um"] or before
     else:
@@ -79,7 +79,7 @@ def along(
             text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
             raise RefusedError.of("NCF438", text, Place(shown(path)), INSTEAD)
         made = tip_with(lambda q, way, length: tables.for_tool(length).at(names, q, way))
-        after = figures(Along.of(tip_errors(intent, lines, made=made)))
+        after = Along.of(tip_errors(intent, lines, made=made)).figures()
     fixed_length = not (control.any_tool or control.rewrites) and machine.depends_on_tool_length
     used = moves.tool_length[np.isfinite(moves.tool_length)].tolist() if fixed_length else []
     others = sorted({round(each, 3) for each in used if abs(each - tool_length) > SAME})
@@ -92,13 +92,17 @@ def along(
 
 def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
     """The program as `ncfix fix` rewrites it under these settings of the control."""
-    from ncfix.compensate import FixOptions
-    from ncfix.compensate.driver import fix_program
+    from ncfix import api
 
     assert following.machine is not None
-    options = FixOptions(strategy=settings["strategy"], tolerance_um=float(settings["tolerance_um"]))
-    find = subprograms(following.setup, path)
-    return fix_program(following.read(path), following.machine, following.setup, options, find)
+    return api.fix(
+        following.read(path),
+        following.machine,
+        setup=following.setup,
+        strategy=settings["strategy"],
+        tolerance_um=float(settings["tolerance_um"]),
+        resolve=subprograms(following.setup, path),
+    )
 
 
 def rewritten_file(following: Following, settings: Mapping[str, str], path: str) -> dict[str, bytes]:
@@ -174,8 +178,9 @@ def export(
     The figures are those of the files: they are read back and run as the control would, over 20000 random poses.
     """
 
+    from ncfix import api
     from ncfix.plugins import called
-    from ncfix.tables.control import Request, Written, get_control
+    from ncfix.tables.control import Written, get_control
     from ncfix.tables.correction import ranges_of
     from ncfix.tables.export import export as exported
 
@@ -185,9 +190,10 @@ def export(
     machine = following.machine
     assert machine is not None
     sound(machine, machine_path, force)
-    space = ranges_of(machine, given_ranges(machine, ranges))
-    options = chosen.settings(dict(_pair(each, "--set NAME=VALUE") for each in settings), complete=not probe)
-    request = Request(machine, space, tool_length, 1e-3 * target_um, options)
+    covered = given_ranges(machine, ranges)
+    ranges_of(machine, covered)
+    pairs = dict(_pair(each, "--set NAME=VALUE") for each in settings)
+    request = api.table_request(chosen, machine, tool_length, target_um, covered, pairs, complete=not probe)
     if probe:
         found = called("controls", chosen.name, chosen.probe, request, gives=Written)
         write_folder(output, found, force)
@@ -197,9 +203,9 @@ def export(
     with console.busy("making tables"):
         made = exported(chosen, request)
         if program is not None:
-            more["program"] = along(following, chosen, made.tables, options, program, tool_length)
+            more["program"] = along(following, chosen, made.tables, request.settings, program, tool_length)
         if program is not None and chosen.rewrites:
-            made = replace(made, files={**made.files, **rewritten_file(following, options, program)})
+            made = replace(made, files={**made.files, **rewritten_file(following, request.settings, program)})
     write_folder(output, made, force)
     console.tell_some(made.messages)
     tell(made, as_json, control=chosen.name, reaches=made.reaches, **more)
@@ -316,9 +322,9 @@ def emulate(
     Exit code 1 if there is something to remark on the files.
     """
 
+    from ncfix import api
     from ncfix.tables.control import get_control
     from ncfix.tables.export import SIDE_FILE, read_manifest
-    from ncfix.tables.export import emulate as emulated
 
     chosen = get_control(control)
     following = Following.of(machine_path, dialect, given)
@@ -327,7 +333,8 @@ def emulate(
     more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
     with console.busy("running the tables"):
         try:
-            found = emulated(chosen, content, following.machine, folder.rstrip(os.sep), other_machine)
+            name = folder.rstrip(os.sep)
+            found = api.emulate(chosen, content, following.machine, other_machine=other_machine, name=name)
         except ConfigError as error:
             raise ConfigError.collected(_below(folder, error.messages, content)) from error
         if program is not None:

@@ -5,14 +5,15 @@ Long programs are compared while they are read, if they can be.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from ncfix.batch.programs import subprograms
 from ncfix.cli import console
-from ncfix.cli.following import Following, dialect_in, figures, task_of, tell_of_stamp, through
+from ncfix.cli.following import Following, dialect_in, task_of, tell_of_stamp, through
 from ncfix.cli.options import PATH, dialect_option, json_option, machine_option, read_program, tolerance_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.streams import Source, source_of
@@ -20,102 +21,14 @@ from ncfix.cli.targets import STREAM, shown
 from ncfix.diagnostics import ExitCode, Message, SourceError
 
 if TYPE_CHECKING:
-    from ncfix.compensate.account import Why
     from ncfix.compensate.figures.comparison import SideBySide
+    from ncfix.compensate.figures.verification import Compared
     from ncfix.text.tree import Program
 
 Said = tuple[Sequence[Message], ...]
 """What there is to say of following the original, and the other."""
 FEW = 5
 """Lines that are named by their numbers."""
-
-
-@dataclass(frozen=True, slots=True)
-class Compared:
-    """Two programs on one machine: figures of the original, of the other along its own path, and along the original's.
-
-    beyond       lines of the other with errors larger than tolerance and rounding
-    not_reached  lines of the original from which the other is farther away
-    unseen       lines of the original that may cut, and are not looked at
-    no_figure    how many motions at feed are not looked at, by reason
-    blind        some of these may cut
-    left         linear axis -> lines of the original that cut, and nobody but the machine knows where that axis stands:
-                 nothing can be corrected along it there
-    rounding_um  what the control's digits may add to the path
-    """
-
-    before: dict[str, Any]
-    after: dict[str, Any]
-    left_out: dict[str, Any]
-    beyond: list[int]
-    not_reached: list[int]
-    unseen: list[int]
-    left: dict[str, list[int]]
-    rounding_um: float
-    no_figure: dict[str, int]
-    blind: bool
-
-    @property
-    def beyond_somewhere(self) -> bool:
-        """Something is farther from the intended path than the tolerance and what rounding adds."""
-        return bool(self.beyond or self.not_reached)
-
-    @property
-    def within(self) -> bool:
-        """Nothing is farther from the intended path than that, and nothing that may cut is left out."""
-        return not self.beyond_somewhere and not self.blind
-
-    @classmethod
-    def of(cls, comparison: SideBySide) -> Compared:
-        """What was found along both programs."""
-        before, there, back = (match.along for match in comparison.matches)
-        return cls(
-            before=figures(before),
-            after=figures(there),
-            left_out=figures(back),
-            beyond=there.lines_beyond,
-            not_reached=back.lines_beyond,
-            unseen=comparison.lines_unseen,
-            left=comparison.lines_left,
-            rounding_um=comparison.rounding * 1e3,
-            no_figure=reason_counts(comparison.no_figure),
-            blind=any(why.cuts for why in comparison.no_figure),
-        )
-
-    @classmethod
-    def together(cls, several: Sequence[Compared]) -> Compared:
-        """The worst of several ways in which the programs may run."""
-        axes = dict.fromkeys(axis for each in several for axis in each.left)
-        reasons = sorted({reason for each in several for reason in each.no_figure})
-        return cls(
-            before=_worst([each.before for each in several]),
-            after=_worst([each.after for each in several]),
-            left_out=_worst([each.left_out for each in several]),
-            beyond=_lines(each.beyond for each in several),
-            not_reached=_lines(each.not_reached for each in several),
-            unseen=_lines(each.unseen for each in several),
-            left={axis: _lines(each.left.get(axis, []) for each in several) for axis in axes},
-            rounding_um=max(each.rounding_um for each in several),
-            no_figure={reason: max(each.no_figure.get(reason, 0) for each in several) for reason in reasons},
-            blind=any(each.blind for each in several),
-        )
-
-
-def _worst(several: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The figures of the one with the largest error, and the largest rms, of those in which something was looked at."""
-    seen = [each for each in several if each["max"] is not None]
-    if not seen:
-        return several[0]
-    return {**max(seen, key=lambda each: float(each["max"])), "rms": max(each["rms"] for each in seen)}
-
-
-def _lines(several: Iterable[Sequence[int]]) -> list[int]:
-    return sorted({line for each in several for line in each})
-
-
-def reason_counts(found: Mapping[Why, int]) -> dict[str, int]:
-    """Counts by reason, in plain words."""
-    return {why.reason: count for why, count in sorted(found.items())}
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,22 +59,15 @@ class ProgramPair:
         return [found], tuple(each.said for each in cuts)
 
     def _as_wholes(self) -> tuple[Sequence[SideBySide], Said]:
-        from ncfix.compensate.block_delete import in_pairs, messages_of
-        from ncfix.compensate.figures.comparison import whole
-        from ncfix.compensate.following import placed
+        from ncfix.compensate.figures.verification import FollowedProgram, side_by_side
 
-        original = self._read(self.original)
-        meant = self.following.in_positions(original, self.original.path)
-        other = self._read(self.fixed, like=original)
-        done = self.following.in_positions(other, self.fixed.path, self.original.path)
-        assert self.following.machine is not None
-        machine = placed(self.following.machine, self.following.setup)
-        found: list[SideBySide] = []
-        for first, second in in_pairs(meant, done):
-            found.append(self._side_by_side())
-            cuts = whole(machine, original, first.trace.moves, meant=True)
-            found[-1].run(cuts, whole(machine, other, second.trace.moves))
-        return found, (messages_of(meant), messages_of(done))
+        machine, setup = self.following.machine, self.following.setup
+        assert machine is not None
+        first, second = self.original.path, self.fixed.path
+        meant = FollowedProgram.of(self._read(self.original), machine, setup, subprograms(setup, first))
+        other = self._read(self.fixed, like=meant.program)
+        done = FollowedProgram.of(other, machine, setup, subprograms(setup, second, first))
+        return side_by_side(meant, done, machine, setup, self.tolerance_um)
 
     def _side_by_side(self) -> SideBySide:
         from ncfix.compensate.figures.comparison import SideBySide
@@ -189,6 +95,8 @@ def compared(following: Following, original: str, fixed: str, tolerance_um: floa
     with source_of(original) as first, source_of(fixed) as second:
         found, (of_first, of_second) = ProgramPair(following, first, second, tolerance_um).compared()
         tell_of_stamp(first)
+    from ncfix.compensate.figures.verification import Compared
+
     told = {(each.code, each.text) for each in of_first}
     console.tell_some([*of_first, *(each for each in of_second if (each.code, each.text) not in told)])
     return Compared.together([Compared.of(each) for each in found])

@@ -20,7 +20,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix import __version__
 from ncfix.compensate import FixOptions
 from ncfix.compensate.plan.arrays import Array, Mask
 from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
@@ -34,6 +33,7 @@ from ncfix.text import stamp
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run, language_of
 from ncfix.text.tree import Program
+from ncfix.version import __version__
 
 Resolve = Callable[[str], bytes | None]
 

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ncfix import __version__
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.error_model import signals_of
@@ -25,6 +24,7 @@ from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Mask
 from ncfix.measure.refine import pruned, with_time_constants
 from ncfix.measure.selection import Selection, select
+from ncfix.version import __version__
 
 ALIKE = 0.02
 """Factors this near to 1 or -1 count as such."""

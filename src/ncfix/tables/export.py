@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ncfix import __version__
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
 from ncfix.plugins import called, handed
@@ -22,6 +21,7 @@ from ncfix.tables.control import Control, Files, Least, Request, Written
 from ncfix.tables.correction import POSES, Residual, random_poses, ranges_of, residual
 from ncfix.tables.grid import Array
 from ncfix.tables.sheet import as_html, as_markdown
+from ncfix.version import __version__
 
 SIDE_FILE = "ncfix-tables.json"
 SCHEMA = 1

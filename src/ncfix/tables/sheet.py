@@ -7,10 +7,10 @@ from html import escape
 
 import numpy as np
 
-from ncfix import __version__
 from ncfix.tables.compensation import Tables
 from ncfix.tables.control import Control, Request, Written
 from ncfix.tables.correction import Residual, corners, residual
+from ncfix.version import __version__
 
 CLASSES = {
     "L-POS": "how far each linear axis goes, along itself.",

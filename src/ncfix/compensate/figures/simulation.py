@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -103,6 +103,12 @@ class Along:
         if not self.count:
             return 0.0
         return float(np.sqrt(self.squares / self.way if self.way else self.plain_squares / self.count))
+
+    def figures(self) -> dict[str, Any]:
+        """The error along the path in two figures, um, and the line of the worst; None where nothing was looked at."""
+        if not self.count:
+            return {"max": None, "rms": None, "where": None}
+        return {"max": 1e3 * self.max, "rms": 1e3 * self.rms, "where": self.where}
 
     @property
     def lines_beyond(self) -> list[int]:

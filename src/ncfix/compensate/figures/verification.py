@@ -1,0 +1,131 @@
+"""What a machine does with two programs, measured against what the first of them means: figures and a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ncfix.compensate.account import Why
+from ncfix.compensate.block_delete import SwitchSetting, in_pairs, messages_of, positions_of
+from ncfix.compensate.figures.comparison import SideBySide, whole
+from ncfix.compensate.following import Resolve, follow, placed
+from ncfix.compensate.plan.written import rounding
+from ncfix.control.setup import Setup
+from ncfix.diagnostics import Message
+from ncfix.machine import Machine
+from ncfix.text.tree import Program
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """Two programs on one machine: figures of the original, of the other along its own path, and along the original's.
+
+    beyond       lines of the other with errors larger than tolerance and rounding
+    not_reached  lines of the original from which the other is farther away
+    unseen       lines of the original that may cut, and are not looked at
+    no_figure    how many motions at feed are not looked at, by reason
+    blind        some of these may cut
+    left         linear axis -> lines of the original that cut, and nobody but the machine knows where that axis stands:
+                 nothing can be corrected along it there
+    rounding_um  what the control's digits may add to the path
+    """
+
+    before: dict[str, Any]
+    after: dict[str, Any]
+    left_out: dict[str, Any]
+    beyond: list[int]
+    not_reached: list[int]
+    unseen: list[int]
+    left: dict[str, list[int]]
+    rounding_um: float
+    no_figure: dict[str, int]
+    blind: bool
+
+    @property
+    def beyond_somewhere(self) -> bool:
+        """Something is farther from the intended path than the tolerance and what rounding adds."""
+        return bool(self.beyond or self.not_reached)
+
+    @property
+    def within(self) -> bool:
+        """Nothing is farther from the intended path than that, and nothing that may cut is left out."""
+        return not self.beyond_somewhere and not self.blind
+
+    @classmethod
+    def of(cls, comparison: SideBySide) -> Compared:
+        """What was found along both programs."""
+        before, there, back = (match.along for match in comparison.matches)
+        return cls(
+            before=before.figures(),
+            after=there.figures(),
+            left_out=back.figures(),
+            beyond=there.lines_beyond,
+            not_reached=back.lines_beyond,
+            unseen=comparison.lines_unseen,
+            left=comparison.lines_left,
+            rounding_um=comparison.rounding * 1e3,
+            no_figure=reason_counts(comparison.no_figure),
+            blind=any(why.cuts for why in comparison.no_figure),
+        )
+
+    @classmethod
+    def together(cls, several: Sequence[Compared]) -> Compared:
+        """The worst of several ways in which the programs may run."""
+        axes = dict.fromkeys(axis for each in several for axis in each.left)
+        reasons = sorted({reason for each in several for reason in each.no_figure})
+        return cls(
+            before=_worst([each.before for each in several]),
+            after=_worst([each.after for each in several]),
+            left_out=_worst([each.left_out for each in several]),
+            beyond=_lines(each.beyond for each in several),
+            not_reached=_lines(each.not_reached for each in several),
+            unseen=_lines(each.unseen for each in several),
+            left={axis: _lines(each.left.get(axis, []) for each in several) for axis in axes},
+            rounding_um=max(each.rounding_um for each in several),
+            no_figure={reason: max(each.no_figure.get(reason, 0) for each in several) for reason in reasons},
+            blind=any(each.blind for each in several),
+        )
+
+
+def _worst(several: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The figures of the one with the largest error, and the largest rms, of those in which something was looked at."""
+    seen = [each for each in several if each["max"] is not None]
+    if not seen:
+        return several[0]
+    return {**max(seen, key=lambda each: float(each["max"])), "rms": max(each["rms"] for each in seen)}
+
+
+def _lines(several: Iterable[Sequence[int]]) -> list[int]:
+    return sorted({line for each in several for line in each})
+
+
+def reason_counts(found: Mapping[Why, int]) -> dict[str, int]:
+    """Counts by reason, in plain words."""
+    return {why.reason: count for why, count in sorted(found.items())}
+
+
+@dataclass(frozen=True, slots=True)
+class FollowedProgram:
+    """A program as a machine follows it in all positions of block delete, or in the one that is stated."""
+
+    program: Program
+    positions: tuple[SwitchSetting, ...]
+
+    @classmethod
+    def of(cls, program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None) -> FollowedProgram:
+        """Follow a program; raises what `follow` raises."""
+        return cls(program, positions_of(setup, lambda own: follow(program, machine, own, resolve).trace))
+
+
+def side_by_side(
+    original: FollowedProgram, other: FollowedProgram, machine: Machine, setup: Setup, tolerance_um: float
+) -> tuple[list[SideBySide], tuple[Sequence[Message], Sequence[Message]]]:
+    """Two programs gone along side by side, once for each position of block delete; what is said of following them."""
+    known = placed(machine, setup)
+    found: list[SideBySide] = []
+    for first, second in in_pairs(original.positions, other.positions):
+        found.append(SideBySide(tolerance_um / 1e3, rounding(machine)))
+        cuts = whole(known, original.program, first.trace.moves, meant=True)
+        found[-1].run(cuts, whole(known, other.program, second.trace.moves))
+    return found, (messages_of(original.positions), messages_of(other.positions))
