@@ -134,7 +134,7 @@ def begin(control: MacroControl, rotation: Rotation, origin: Block) -> None:
     end(control)
     feature = shifted({index: control.modal.unit * origin.get(LETTERS[index]) for index in (X, Y, Z)})
     control.frames = replace(control.frames, plane=replace(feature, rotation=rotation), rotation=WORLD)
-    control.tilted, control.said = True, None
+    control.tilted, control.frame_unknown = True, None
     switch(control, control.tools.vector, True)
     control.refresh()
 
@@ -158,7 +158,7 @@ def end(control: MacroControl) -> None:
     """Out of the tilted plane."""
     if not control.tilted:
         return
-    control.tilted, control.said = False, None
+    control.tilted, control.frame_unknown = False, None
     control.frames = replace(control.frames, plane=WORLD, rotation=WORLD)
     switch(control, control.tools.vector, control.setup.tcp or control.tip_control)
     turned_back(control)

@@ -144,7 +144,7 @@ def settle(control: KlartextControl, words: MotionWords) -> None:
 def command_of(control: KlartextControl, where: Where, axes: int) -> tuple[Vector, UnknownAxes]:
     """A position as a command; axes without a word stay exactly where they are."""
     found = control.axes_of(where.unknown)
-    control.saying = found, where.unknown
+    control.end_unknown = found, where.unknown
     return control.command(where.inner, axes), found
 
 

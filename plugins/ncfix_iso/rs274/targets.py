@@ -57,7 +57,7 @@ def words_destination(control: RS274Control, block: Block) -> tuple[Vector, Unkn
             index = INDEX[letter]
             origin = target[index] if incremental else control.offset[index]
             target[index] = origin + control.scale[index] * value
-    if control.said is not None:
+    if control.frame_unknown is not None:
         return target, rotated_unknown(control, block, incremental)
     return target, unknown_after(control, block, incremental, control.unknown)
 
@@ -93,7 +93,7 @@ def rotated_unknown(control: RS274Control, block: Block, incremental: bool) -> U
     """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
     own = unknown_after(control, block, incremental, control.lost_in_frame())
     unknown = control.axes_of(own)
-    control.saying = unknown, own
+    control.end_unknown = unknown, own
     return unknown
 
 

@@ -225,18 +225,18 @@ class ProgramControl(ControlState):
             target, here = motion.target, self.position
             self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
         lost = self._lost_at_end(motion)
-        told = self.saying is not None and self.saying[0] is motion.unknown
+        told = self.end_unknown is not None and self.end_unknown[0] is motion.unknown
         if motion.kind != MotionKind.DWELL:
-            self.said = lost if told else None
-        self.saying = None
+            self.frame_unknown = lost if told else None
+        self.end_unknown = None
         self.places.settle(settles)
         self.places.lose(mask_of(lost))
         self.places.begun = True
 
     def _lost_at_end(self, motion: Motion) -> UnknownAxes:
         """What is not known at the end of a motion, along the axes of the program's frame."""
-        if self.saying is not None and self.saying[0] is motion.unknown:
-            return self.saying[1]
+        if self.end_unknown is not None and self.end_unknown[0] is motion.unknown:
+            return self.end_unknown[1]
         return self.lost_in_frame() if motion.kind == MotionKind.DWELL else self.along_frame(motion.unknown)
 
     def ends_in_hole(self, motion: Motion) -> bool:

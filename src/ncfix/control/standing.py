@@ -64,9 +64,9 @@ class ControlState(ABC):
     stretch    mm per program unit of length in the frames in force
     position   the command of every letter, mm and rad; a nominal value where `unknown` has the letter's index
     unknown    letter index -> why the position is not known
-    said       what is not known along the axes of a turned frame, where its words have said more than the machine's
-               axes alone tell; None: they tell all. `saying`: what of the machine's axes is not known where the words
-               of this block lead, and with it the same along those of the frame
+    frame_unknown  the same along the axes of a turned frame, where its words tell more than the axes of the machine do;
+                   None: these tell all
+    end_unknown    what is not known where the words of this block lead: of the axes of the machine, and of the frame
     places     which axes the program itself has brought to where they stand
     knowledge  what was asked of the setup, and what it does not give
     offset_checked  it has been asked for the work offset in force
@@ -100,8 +100,8 @@ class ControlState(ABC):
         self.tilted = False
         self.switches = set[int]()
         self.tcp = run.setup.tcp
-        self.said: UnknownAxes | None = None
-        self.saying: tuple[UnknownAxes, UnknownAxes] | None = None
+        self.frame_unknown: UnknownAxes | None = None
+        self.end_unknown: tuple[UnknownAxes, UnknownAxes] | None = None
         self.locate: Callable[[], Place] = lambda: Place("")
         self.offset_checked = False
         self._frame = -1
@@ -150,7 +150,7 @@ class ControlState(ABC):
         tool = zeros() if self.tcp else self.tools.vector
         self.offset: Vector = [a + b for a, b in zip(whole.shift, tool, strict=True)]
         if self.rotation != whole.rotation:
-            self.said = None
+            self.frame_unknown = None
         self.rotation = whole.rotation
         self.is_rotated = self.rotation != IDENTITY
         self.inverse = transposed(self.rotation)
@@ -206,15 +206,15 @@ class ControlState(ABC):
 
     def lose(self, indices: Sequence[int], reason: str) -> None:
         """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
-        self.said = None
+        self.frame_unknown = None
         for index in indices:
             if index in self.machine:
                 self.unknown[index] = reason
 
     def lost_in_frame(self) -> UnknownAxes:
         """What is not known along the axes of the program's frame."""
-        if self.said is not None and self.unknown:
-            return self.said
+        if self.frame_unknown is not None and self.unknown:
+            return self.frame_unknown
         return self.along_frame(self.unknown)
 
     def along_frame(self, unknown: UnknownAxes) -> UnknownAxes:

@@ -65,7 +65,7 @@ def switch(control: ProgramControl, tool: Vector, on: bool) -> None:
         control, control.position, control.unknown, before, after
     ):
         control.lose((X, Y, Z), TURNED)
-        control.said = lost
+        control.frame_unknown = lost
     control.tcp = on
 
 
