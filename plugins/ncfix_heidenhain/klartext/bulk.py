@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from ncfix.control.moves import Moves
 from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.tree import (
-    START,
-    Anchor,
     Assignment,
     Command,
     Item,
@@ -22,7 +20,7 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix.writer.pieces import Pieces
-from ncfix_heidenhain.klartext.layout import CORNERS, FULL, KlartextLayout, is_between, layout_of
+from ncfix_heidenhain.klartext.layout import CORNERS, FULL, is_between, layout_of
 
 Mask = NDArray[np.bool_]
 
@@ -51,22 +49,12 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
         layout.blank,
         lower=False,
         further=not layout.after,
-        lead=lead_of(program, block, layout),
+        lead=layout.prefix.stop,
         opening="L",
         closing=layout.closing and layout.blank + layout.closing,
         turns_named=True,
         arc=ArcLayout({}, alone=True) if layout.name in ARCS else None,
     )
-
-
-def lead_of(program: Program, block: int, layout: KlartextLayout) -> Anchor:
-    """Up to where lines of further pieces repeat the beginning of the block: its number, unless they get none."""
-    numbers = [item for item in program.items_of(block) if isinstance(item, Word) and item.address == "N"]
-    if program.dialect.block_numbers != "none" or not numbers:
-        return layout.code_at
-    start = int(program.blocks[block, 0])
-    text = program.source[start : program.position(block, numbers[0].span.start) + 1]
-    return Anchor(START, len(text) - len(text.lstrip(b" \t")))
 
 
 # -- motions that need the renderer -----------------------------------------------------------------------------------

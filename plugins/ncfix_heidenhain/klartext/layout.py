@@ -9,6 +9,7 @@ from functools import lru_cache
 
 from ncfix.text.layout import AXIS_LETTERS, INCREMENT, Layout
 from ncfix.text.tree import (
+    START,
     Anchor,
     Command,
     Comment,
@@ -47,6 +48,7 @@ RELATIVE_POLE = re.compile(rb"(?im)\n[ \t]*/?[ \t]*\d*[ \t]*CC(?![A-Z])(?:[^\r\n
 class KlartextLayout(Layout):
     """The writable parts of a motion block; the words of its axes may be increments (IX), its R is that of CR.
 
+    prefix    its block number, unless blocks that are put in get none, and block skip
     name      its path function, as in `KlartextPlan.name`
     function  where that is written, None in a block of words alone
     polar     PR, PA, IPR, IPA words
@@ -55,6 +57,7 @@ class KlartextLayout(Layout):
     motion    the block says itself which kind of motion it is
     """
 
+    prefix: Span
     name: str
     function: Span | None
     polar: tuple[Word, ...]
@@ -70,7 +73,8 @@ def layout_of(program: Program, block: int) -> KlartextLayout | None:
     if found is None:
         return None
     corner = is_corner(program, block, -1) or is_corner(program, block, 1)
-    return _in_place(shape, separator(program, block, found[1]), corner)
+    numbered = program.dialect.block_numbers != "none"
+    return _in_place(shape, separator(program, block, found[1]), corner, numbered)
 
 
 class Shape:
@@ -89,10 +93,14 @@ class Shape:
 
 
 @lru_cache(maxsize=4096)
-def _in_place(shape: Shape, blank: str, corner: bool) -> KlartextLayout | None:
+def _in_place(shape: Shape, blank: str, corner: bool, numbered: bool) -> KlartextLayout | None:
     """The layout of blocks of a shape that have the rest in common, too."""
     found = _of_shape(shape)
-    return None if found is None else replace(found[0], blank=blank, corner=corner)
+    if found is None:
+        return None
+    number = next(filter(is_number, shape.template.items), None)
+    lead = found[0].code_at if numbered or number is None else number.span.start
+    return replace(found[0], blank=blank, corner=corner, prefix=Span(Anchor(START, 0), lead))
 
 
 @lru_cache(maxsize=4096)
@@ -120,7 +128,7 @@ def _of_shape(shape: Shape) -> tuple[KlartextLayout, Word | None] | None:
         words_at=Anchor(-1, 0) if end is None else end.span.stop,
         code_at=start_of(items),
         blank=" ",
-        prefix=None,
+        prefix=Span(Anchor(START, 0), Anchor(START, 0)),
         closing="FMAX" if any(command.name == "fmax" for command in commands) else "",
     )
     return layout, last
@@ -144,7 +152,7 @@ def acts_late(word: Word) -> bool:
 def start_of(items: Sequence[Item]) -> Anchor:
     """Where the block begins behind its number and block skip."""
     begins = (item.span.start for item in items if not (isinstance(item, Skip) or is_number(item)))
-    return next(begins, Anchor(-1, 0))
+    return next(begins, Anchor(START, 0))
 
 
 def is_corner(program: Program, block: int, way: int) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,16 +109,6 @@ class KlartextWriter(BlockWriter):
 
     def _cased(self, address: str) -> str:
         return address
-
-    @cached_property
-    def prefix(self) -> str:
-        """What stands before the function: the block number, which inserted blocks repeat, and its blanks."""
-        start = int(self.program.blocks[self.block, 0])
-        at = self.program.position(self.block, self.layout.code_at)
-        text = self.program.source[start:at].decode("latin-1")
-        if self.program.dialect.block_numbers == "none":
-            text = re.sub(r"\d+[ \t]*", "", text)
-        return "" if "\n" in text else text
 
     def _must_name(self, column: int) -> bool:
         return column in self.named or super()._must_name(column)

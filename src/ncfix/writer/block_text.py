@@ -113,7 +113,8 @@ class BlockText:
     @cached_property
     def prefix(self) -> str:
         """What lines that are put in begin with."""
-        return self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
+        text = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
+        return "" if "\n" in text else text
 
     def _line(self, words: Sequence[str]) -> None:
         """Put a line behind the block."""
