@@ -2,10 +2,13 @@
 
 Source: Fanuc 30i operator's manual, "Custom macro", "Branch and repetition", "Macro call", "Argument specification";
 "Subprogram".
+
+Programs of the machine's builder or of a probe's maker, O8000 to O9999, are in the control, not at hand.
 """
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable
 from functools import cached_property
@@ -13,16 +16,41 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.control.coordinates import mask_of
 from ncfix.control.expressions import Fault, Unknown
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow, Return
+from ncfix.control.modal import NO_MOTION
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
 from ncfix.text.tree import OWordLine as FlowItem
-from ncfix_fanuc.macro import builder
 from ncfix_fanuc.macro.expressions import number
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.parameters import Store
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit, has_words
+
+LOCKED = range(8000, 10000)
+NOT_AT_HAND = "NCF246"
+AFTER = "where the axis {{}} stands after the program O{label}, which is not at hand, is not known"
+TAKEN = "the program O{label} is not at hand, and is taken to leave offsets, tool lengths and modal codes as they are"
+
+
+def is_builders(label: str) -> bool:
+    """Whether a number is one of those that are locked in the control."""
+    return label.isdigit() and int(label) in LOCKED
+
+
+def ran(control: RS274Control, label: str) -> None:
+    """Such a program has run."""
+    control.warn(
+        NOT_AT_HAND,
+        TAKEN.format(label=label),
+        "check what it sets, or say where its file is: --subprograms DIR",
+    )
+    control.lose(control.machine, AFTER.format(label=label))
+    control.places.lose(mask_of(control.machine))
+    control.modal.motion, control.modal.feed, control.modal.cycle.initial = NO_MOTION, math.nan, None
+    control.unwritten = control.unwritten or f"the program O{label} is not at hand"
+
 
 BAD_JUMP = "NCF242"
 
@@ -236,9 +264,9 @@ class MacroFlow(ProgramFlow[RS274Unit]):
         try:
             entry = self.entry(label)
         except Fault as fault:
-            if fault.code != NO_SUBPROGRAM or not builder.is_builders(label):
+            if fault.code != NO_SUBPROGRAM or not is_builders(label):
                 raise
-            builder.ran(self.control, label)
+            ran(self.control, label)
             return None
         self.budget.foresee(times - 1)
         if arguments is None:

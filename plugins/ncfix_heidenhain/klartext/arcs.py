@@ -2,18 +2,21 @@
 
 Source: TNC 640, "Programming: contours". The sense of rotation counts in the program's frame; in a mirrored frame it
 turns round, as on the control.
+
+A step is one motion block while it is executed, and what all path functions do with it.
 """
+
+from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
 from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
-from ncfix.control.coordinates import IDENTITY, Plane, Vector, dot, rotated
+from ncfix.control.coordinates import IDENTITY, Plane, Vector, X, Y, dot, rotated
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
-from ncfix.control.moves import Arc, Motion, MotionKind
+from ncfix.control.moves import Arc, Motion, MotionKind, UnknownAxes
 from ncfix_heidenhain.klartext.control import KlartextControl
-from ncfix_heidenhain.klartext.step import Step, somewhere, with_increments
 from ncfix_heidenhain.klartext.targets import (
     BAD_POLE,
     PLANE_OF,
@@ -28,6 +31,53 @@ from ncfix_heidenhain.klartext.targets import (
     pole_frame,
     starts_unknown,
 )
+
+IN_PLANE = 1 << X | 1 << Y
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One motion block while it is executed.
+
+    name    its path function
+    words   its words
+    flags   `fmax`, `dr+`, ...
+    codes   its M codes
+    """
+
+    name: str
+    words: MotionWords
+    flags: frozenset[str]
+    codes: frozenset[int]
+
+    @property
+    def kind(self) -> MotionKind:
+        """At FMAX a rapid."""
+        return MotionKind.RAPID if "fmax" in self.flags else MotionKind.FEED
+
+
+def with_increments(control: KlartextControl, on: bool) -> None:
+    """Whether the words of the next motion count from where it begins."""
+    control.modal.incremental = on
+
+
+def somewhere(control: KlartextControl, axes: int, target: Vector, unknown: UnknownAxes, reason: str) -> None:
+    """A refused curve that ends nobody knows where: the motion before it must still end where it did."""
+    normal = control.rotation[0][2], control.rotation[1][2], control.rotation[2][2]
+    control.modal.arc_absolute = True
+    control.make(
+        Motion(
+            MotionKind.ARC, axes | IN_PLANE, target, unknown, 10, refusal=reason, arc=Arc((0.0, 0.0, 0.0), normal, 0.0)
+        )
+    )
+    control.modal.arc_absolute = False
+    control.path.tangent = None
+
+
+def refuse(control: KlartextControl, reason: str) -> None:
+    """A motion that is not followed."""
+    control.refuse_here(reason)
+
 
 BAD_ARC = "NCF220"
 

@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterator, Mapping
 from ncfix.control.coordinates import PLANES, X, Y, dot, rotated
 from ncfix.control.expressions import Unknown, Value, nominal, signed
 from ncfix.text.spelling import value_of
+from ncfix_heidenhain.klartext.arcs import IN_PLANE, somewhere
 from ncfix_heidenhain.klartext.control import FREELY, KlartextControl
 from ncfix_heidenhain.klartext.free import ContourElement, Element, solved
-from ncfix_heidenhain.klartext.step import IN_PLANE, somewhere
 from ncfix_heidenhain.klartext.targets import command_of, here, pole_frame
 from ncfix_heidenhain.klartext.units import KlartextUnit
 

@@ -13,9 +13,9 @@ from ncfix.control.coordinates import X, Y, Z, mask_of
 from ncfix.control.expressions import Fault, numbers
 from ncfix.control.moves import Motion, MotionKind
 from ncfix_heidenhain.klartext import transformations
+from ncfix_heidenhain.klartext.arcs import Step, refuse
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, KlartextControl
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, HolePosition, pattern_of_cycle
-from ncfix_heidenhain.klartext.step import Step, refuse
 from ncfix_heidenhain.klartext.targets import MotionWords, Where, command_of, led, polar, polar_axes
 from ncfix_heidenhain.klartext.tilting import cycle_19
 

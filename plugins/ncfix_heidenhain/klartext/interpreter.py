@@ -21,7 +21,8 @@ from ncfix.text.language import Run
 from ncfix.text.reach import UNREAD
 from ncfix.text.tree import Command, Opaque, Program, Template
 from ncfix_heidenhain.klartext import cycles, lines, tilting, transformations
-from ncfix_heidenhain.klartext.codes import after_motion, before_motion
+from ncfix_heidenhain.klartext.arcs import Step, refuse
+from ncfix_heidenhain.klartext.blocks import unread_line
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.flow import PROGRAM, KlartextFlow
 from ncfix_heidenhain.klartext.lane import run_lane
@@ -29,12 +30,9 @@ from ncfix_heidenhain.klartext.layout import CORNERS, FULL, axis_numbers, poles_
 from ncfix_heidenhain.klartext.paths import PATHS, astray
 from ncfix_heidenhain.klartext.plans import KlartextPlan
 from ncfix_heidenhain.klartext.poles import relies_at_once
-from ncfix_heidenhain.klartext.statements import statement
-from ncfix_heidenhain.klartext.step import Step, refuse
+from ncfix_heidenhain.klartext.statements import after_motion, before_motion, call_tool, define_tool, statement
 from ncfix_heidenhain.klartext.targets import MotionWords, axis_letters, set_pole
-from ncfix_heidenhain.klartext.tools import call_tool, define_tool
 from ncfix_heidenhain.klartext.units import KlartextUnit
-from ncfix_heidenhain.klartext.unread import unread_line
 
 if TYPE_CHECKING:
     from ncfix_heidenhain.klartext.flatten import KlartextFlattener

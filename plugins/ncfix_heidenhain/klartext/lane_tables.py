@@ -13,8 +13,8 @@ from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.lanes import lane_tables as shared
 from ncfix.control.lanes.lane_tables import Lane
 from ncfix.text.tree import Constant, Literal, Template
+from ncfix_heidenhain.klartext.arcs import IN_PLANE
 from ncfix_heidenhain.klartext.plans import LETTERS, KlartextPlan
-from ncfix_heidenhain.klartext.step import IN_PLANE
 
 STRAIGHT = frozenset({"", "l", "ln"})
 ARCS = {"cr": "R", "c": "", "cp": "IPA"}

@@ -11,8 +11,8 @@ from ncfix.control.frames import unit
 from ncfix.control.moves import Motion, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.posture import WayRules, postures
 from ncfix.control.tcp import switch
+from ncfix_heidenhain.klartext.arcs import Step, refuse, with_increments
 from ncfix_heidenhain.klartext.control import DEPARTED, KlartextControl
-from ncfix_heidenhain.klartext.step import Step, refuse, with_increments
 from ncfix_heidenhain.klartext.targets import (
     MotionWords,
     command_of,

@@ -6,11 +6,10 @@ control would stop at it, or knows a form of the block that is not known here.
 
 from __future__ import annotations
 
-from ncfix_heidenhain.klartext.arcs import circular, circular_by_radius, circular_polar, tangential
+from ncfix_heidenhain.klartext.arcs import Step, circular, circular_by_radius, circular_polar, tangential
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.lines import straight, straight_polar
 from ncfix_heidenhain.klartext.plans import CARTESIAN, MOVING, POLAR, VECTOR
-from ncfix_heidenhain.klartext.step import Step
 
 PATHS = {
     "": straight,

@@ -1,18 +1,199 @@
-"""Statements that are known by their first words: they move nothing, or are refused."""
+"""Statements that are known by their first words: they move nothing, or are refused.
+
+M codes that matter to where the tool goes; TOOL CALL and TOOL DEF.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 
+from ncfix.control.coordinates import Z, mask_of, zeros
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import Pass, Passing
-from ncfix_heidenhain.klartext.codes import tip_control
+from ncfix.control.setup import Tool
+from ncfix.control.tcp import switch
+from ncfix_heidenhain.klartext.arcs import Step
 from ncfix_heidenhain.klartext.contours import follow_free
-from ncfix_heidenhain.klartext.control import AFTER_PROBING, PRESET, KlartextControl
+from ncfix_heidenhain.klartext.control import AFTER_PROBING, PRESET, RETRACTED, TOOL, KlartextControl
 from ncfix_heidenhain.klartext.flow import KlartextFlow
 from ncfix_heidenhain.klartext.patterns import pattern_of
+from ncfix_heidenhain.klartext.targets import MotionWords
 from ncfix_heidenhain.klartext.transformations import is_plain, trans
+
+SUSPENDING = {
+    104: "M104: the datum that was set last comes back into force",
+    114: "M114: the control works the geometry of the machine into positions",
+    144: "M144: the control works the geometry of the machine into positions",
+}
+ENDING = {115: 114, 145: 144}
+CHOSEN = "M138: the control takes only some of the rotary axes into account"
+UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
+RETRACT = Passing(Pass.RETRACTION, "retract along the tool axis (M140)")
+COUNTED = "from where the axis {} counts after M126 depends on a parameter of the machine: it went past a turn"
+FULL = 2 * math.pi
+COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}
+
+
+def before_motion(control: KlartextControl, step: Step) -> None:
+    """What acts from the start of the block."""
+    for flag, side in COMPENSATION.items():
+        if flag in step.flags:
+            if not side:
+                control.end_compensation()
+            control.modal.compensated = side
+    for code in step.codes:
+        if code in SUSPENDING:
+            control.suspended[f"M{code}"] = SUSPENDING[code]
+        elif code in ENDING:
+            control.suspended.pop(f"M{ENDING[code]}", None)
+    control.suspended.pop("M130", None)
+    if 130 in step.codes and control.plane_tilted:
+        control.suspended["M130"] = UNTILTED
+    if step.codes & {126, 127}:
+        end_of_short_ways(control, 127 in step.codes)
+    if 136 in step.codes or 137 in step.codes:
+        control.modal.feed_mode = 95 if 136 in step.codes else 94
+    if 128 in step.codes:
+        tip_control(control, on=True)
+    if 94 in step.codes:
+        reduce_turns(control, step.flags)
+    if 138 in step.codes:
+        choose_axes(control, step.flags)
+
+
+def end_of_short_ways(control: KlartextControl, on: bool) -> None:
+    """M127 after M126: an axis that went past a turn may count from there, or from the angle below a turn.
+
+    M126 means nothing to an axis that cannot go round, as the one that tilts the tool: it may stand below zero.
+    """
+    pointing = control.pointing if on and control.shortest else None
+    tilts = None if pointing is None else control.machine[pointing.columns[1]]
+    for index in control.turning if on and control.shortest else ():
+        below = control.position[index] < 0 and index != tilts
+        if index not in control.unknown and (below or control.position[index] >= FULL):
+            control.lose([index], COUNTED)
+    control.shortest = not on
+
+
+def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
+    """M138: the rotary axes that tilted planes and control of the tip take into account, those of the machine again."""
+    control.suspended.pop("M138", None)
+    turning = {"XYZABCUVW"[index].lower() for index in control.turning}
+    if flags & set("abc") not in (set(), turning):
+        control.suspended["M138"] = CHOSEN
+
+
+def reduce_turns(control: KlartextControl, flags: frozenset[str]) -> None:
+    """M94: rotary axes, those that are named if any is, are said by an angle below a turn from here on."""
+    named = flags & set("abc")
+    for index in control.turning:
+        if not named or "XYZABCUVW"[index].lower() in named:
+            control.position[index] %= 2 * math.pi
+
+
+def tip_control(control: KlartextControl, *, on: bool) -> None:
+    """M128 and M129, FUNCTION TCPM."""
+    control.m128 = on
+    control.switch_tip()
+
+
+def after_motion(control: KlartextControl, code: int, own: MotionWords, flags: frozenset[str]) -> None:
+    """What acts at the end of the block."""
+    if code == 129:
+        tip_control(control, on=False)
+        control.path.by_vector = control.path.spatial = False
+    elif code == 140:
+        control.pass_here(RETRACT, RETRACTED, "XYZ" if control.tcp else "Z")
+
+
+NAMED = -1
+"""The number that stands for a tool that is called by name."""
+
+OTHER_AXIS = "the tool axis is {}: only tools along Z are followed"
+AT_RUN_TIME = "the length of the tool is known only at run time"
+
+
+def define_tool(control: KlartextControl, tool: str | float | None, words: MotionWords, flags: frozenset[str]) -> None:
+    """TOOL DEF: the length of a tool, where the program brings it."""
+    if isinstance(tool, float) and "L" in words.values:
+        radius = words.values.get("R")
+        length = words.values["L"] * control.modal.unit
+        control.defined_tools[int(tool)] = Tool(length, None if radius is None else radius * control.modal.unit)
+
+
+def call_tool(control: KlartextControl, tool: str | float | None, words: MotionWords, flags: frozenset[str]) -> None:
+    """TOOL CALL: without a number only speed, feed or oversizes are new."""
+    if "F" in words.values:
+        control.auto_feed = words.values["F"] * control.modal.unit
+    if tool is None and "DR" in words.values:
+        control.tools.cutter = math.nan
+    if tool is None and "DL" not in words.values:
+        return
+    control.suspended.pop(TOOL, None)
+    if isinstance(tool, float) and not tool.is_integer():
+        tool = f"{tool:g}"
+    axis = next((letter for letter in "xyuvw" if letter in flags), None)
+    if axis is not None:
+        control.suspended[TOOL] = OTHER_AXIS.format(axis.upper())
+    if "DL" in words.runtime:
+        control.suspended[TOOL] = AT_RUN_TIME
+    if isinstance(tool, str):
+        control.tools.spindle = NAMED
+    if isinstance(tool, float):
+        control.tools.spindle = control.tools.selected = int(tool)
+    if tool is not None:
+        control.places.lose(mask_of(control.machine))
+    control.tool_called = True
+    control.tools.offset = control.tools.spindle
+    tell_radius(control, words.values.get("DR", 0.0))
+    named = control.setup.named_tools.get(tool.upper()) if isinstance(tool, str) else None
+    if named is not None and named.radius is not None:
+        control.tools.cutter = named.radius + words.values.get("DR", 0.0) * control.modal.unit
+    length = length_by_name(control, tool) if isinstance(tool, str) else length_of(control, int(control.tools.spindle))
+    set_length(control, length + words.values.get("DL", 0.0) * control.modal.unit)
+
+
+def tell_radius(control: KlartextControl, oversize: float) -> None:
+    """Q108 is the radius of the active tool, in the unit of the program; and contours are offset by it."""
+    number = int(control.tools.spindle)
+    defined = control.defined_tools.get(number, Tool())
+    radius = control.knowledge.known_tool_radius(number)
+    radius = defined.radius if radius is None else radius
+    control.tools.cutter = math.nan if radius is None else radius + oversize * control.modal.unit
+    control.scope.parameters.assign("Q108", (radius or 0.0) / control.modal.unit + oversize, runtime=radius is None)
+
+
+def set_length(control: KlartextControl, length: float) -> None:
+    """The machine stands still when the length of the tool changes; the tip does not."""
+    tool = zeros()
+    tool[Z] = length
+    if control.tcp:
+        switch(control, tool, True)
+    control.tools.vector = tool
+    control.refresh()
+
+
+def length_by_name(control: KlartextControl, name: str) -> float:
+    """The length of a tool that is called by its name, mm; zero if it is lacking."""
+    named = control.setup.named_tools.get(name.upper())
+    if named is not None and named.length is not None:
+        return named.length
+    control.knowledge.lack("NCF202", f"length of tool {name}", "is used", f'--tool "{name}"=LENGTH')
+    return 0.0
+
+
+def length_of(control: KlartextControl, number: int) -> float:
+    """The length of a tool, mm: as the setup has it, else as the program defines it; tool 0 has none."""
+    known = control.knowledge.known_tool_length(number)
+    if known is not None:
+        return known
+    defined = control.defined_tools.get(number)
+    if defined is not None and defined.length is not None:
+        return defined.length
+    return 0.0 if number == 0 else control.knowledge.tool_length(number)
+
 
 PROBING = Passing(Pass.PROBING, "probing")
 MEASURED = "TCH PROBE {} makes what it measures the datum, a rotation or the kinematics: that is known only at run time"

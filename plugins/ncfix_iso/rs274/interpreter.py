@@ -13,6 +13,7 @@ from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.text.language import Run
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
+from ncfix_iso.rs274.blocks import check_words
 from ncfix_iso.rs274.choice import motion_of
 from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE
@@ -23,7 +24,6 @@ from ncfix_iso.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix_iso.rs274.order import DWELL, MACHINE, MOTIONS
 from ncfix_iso.rs274.plans import Codes, RS274Plan, RS274Unit, grouped_codes, has_words
 from ncfix_iso.rs274.settings import unknown_code
-from ncfix_iso.rs274.wordcheck import check_words
 
 if TYPE_CHECKING:
     from ncfix.control.operations import CycleTable

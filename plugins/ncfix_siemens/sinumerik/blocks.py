@@ -1,18 +1,300 @@
-"""One block of SINUMERIK by the grammar; what the grammar does not take and has a name in it is kept as it is."""
+"""One block of SINUMERIK by the grammar; what the grammar does not take and has a name in it is kept as it is.
+
+A grammar's tree becomes the template of its shape.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
-from lark import UnexpectedInput
+from lark import Token, UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
-from ncfix.text.build import Parsed, TooDeepError, check_exponents, check_numbers, start_of
+from ncfix.text.build import (
+    NUMBERS,
+    Branch,
+    Node,
+    Parsed,
+    TooDeepError,
+    TreeBuilder,
+    check_exponents,
+    check_numbers,
+    edges,
+    kind,
+    start_of,
+    tokens_of,
+)
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError
-from ncfix.text.grammar import parse
-from ncfix.text.tree import END, START, Anchor, Opaque, Span, Template
-from ncfix_siemens.sinumerik.build import build
+from ncfix.text.grammar import Squeezed, parse
+from ncfix.text.tree import (
+    END,
+    START,
+    Anchor,
+    Assignment,
+    Command,
+    Comment,
+    Constant,
+    Expression,
+    FunctionCall,
+    Item,
+    NamedParameter,
+    NumberedParameter,
+    Opaque,
+    OWordLine,
+    Skip,
+    Span,
+    StringLiteral,
+    Template,
+    Unary,
+    Word,
+)
+from ncfix_siemens.sinumerik.vocabulary import SETTERS
+
+BRACKET = "("
+"""The operator of a `Unary` that is nothing but a pair of brackets."""
+
+BASES = {"H": 16, "B": 2, "D": 10}
+MAX_DEPTH = 150
+"""How deep expressions may be nested."""
+
+
+def build(tree: Branch, text: str) -> Parsed:
+    """Make the template of a block from its tree; raises `TooDeepError`."""
+    tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
+    spans = tuple(edges(token) for token in tokens)
+    slots = {edges(token): slot for slot, token in enumerate(tokens)}
+    whole = Squeezed(text, list(range(len(text) + 1)))
+    builder = SinumerikBuilder(text, whole, slots, tuple(stop for _, stop in spans))
+    items = tuple(builder.block(tree))
+    last = tree.children[-1] if tree.children else None
+    comment = edges(last)[0] if isinstance(last, Token) and kind(last) == "COMMENT" else -1
+    return Parsed(Template(items, len(tokens)), spans, tuple(value_of(token) for token in tokens), comment)
+
+
+def value_of(number: Token) -> float:
+    """The value of a number, `1.5EX-3` included."""
+    return float(str(number).upper().replace("EX", "E"))
+
+
+@dataclass(frozen=True, slots=True)
+class SinumerikBuilder(TreeBuilder):
+    """Makes items of trees."""
+
+    def block(self, tree: Branch) -> Iterator[Item]:
+        """The items of a block in the order written."""
+        for node in tree.children:
+            if isinstance(node, Token):
+                yield self.token(node)
+            else:
+                yield from self.statement(node)
+
+    def token(self, token: Token) -> Item:
+        """An item that is a single terminal."""
+        span = self.span(token)
+        match kind(token):
+            case "COMMENT":
+                return Comment(self.span_to_end(token))
+            case "SKIP":
+                return Skip(int(token[1:] or 0), span)
+            case "HEAD" | "PROCEDURE":
+                return Opaque("program head", span)
+            case name:
+                return Opaque(name.lower(), span)
+
+    def statement(self, tree: Branch) -> Iterator[Item]:
+        """The items that one rule makes."""
+        makers: dict[str, Callable[[Branch], Item]] = {
+            "line_number": self.word,
+            "word": self.word,
+            "code": self.code,
+            "assignment": self.setting,
+            "command": self.command,
+            "indirect": self.indirect,
+            "element": self.bare_element,
+            "label": self.label_here,
+            "condition": self.condition,
+            "plain": self.plain,
+            "counted": self.counted,
+            "jump": self.jump,
+            "repetition": self.repetition,
+            "declaration": self.declaration,
+        }
+        name = kind(tree)
+        if name == "case":
+            yield from self.case(tree)
+        else:
+            yield makers[name](tree)
+
+    # -- words --------------------------------------------------------------------------------------------------------
+
+    def setting(self, tree: Branch) -> Item:
+        """A word or a variable that gets a value."""
+        *target, value = tree.children
+        name = str(target[0])
+        if len(target) == 1 and is_word(name):
+            return Word(name.upper(), self.expression(value), self.span(tree), self.span(value))
+        return Assignment(self.target(target), self.expression(value), self.span(tree))
+
+    def target(self, nodes: list[Node]) -> NumberedParameter | NamedParameter | FunctionCall:
+        """What gets a value: `R1`, `R[..]`, a variable, an element of an array."""
+        name = str(nodes[0])
+        if len(nodes) == 2:
+            return self.array_element(name, nodes[1])
+        if kind(nodes[0]) == "PARAMETER":
+            return NumberedParameter(Constant(float(name[1:])))
+        return NamedParameter(name.lower())
+
+    def array_element(self, name: str, index: Node, depth: int = 0) -> NumberedParameter | FunctionCall:
+        """`R[..]`, or an element of another array."""
+        places = self.arguments(index, depth)
+        if name.upper() == "R" and len(places) == 1 and places[0] is not None:
+            return NumberedParameter(places[0])
+        return FunctionCall(name.lower(), places, indexed=True)
+
+    def command(self, tree: Branch) -> Item:
+        """A name, perhaps with arguments."""
+        name, *rest = tree.children
+        arguments = self.arguments(rest[0]) if rest else ()
+        return Command(str(name).lower(), arguments, bool(rest), self.span(tree))
+
+    def indirect(self, tree: Branch) -> Item:
+        """`CALL "NAME"`."""
+        name, text = tree.children
+        return Command(str(name).lower(), (StringLiteral(str(text)[1:-1]),), True, self.span(tree))
+
+    def bare_element(self, tree: Branch) -> Item:
+        """`NAME[..]` by itself: a macro of an array, not known to do anything."""
+        name, index = tree.children
+        return Command(str(name).lower(), self.arguments(index), True, self.span(tree))
+
+    def declaration(self, tree: Branch) -> Item:
+        """`DEF type name, name = value`: a command with the type, and each name with its value or None."""
+        parts: list[Expression | None] = []
+        for node in tree.children:
+            if isinstance(node, Token):
+                if kind(node) == "TYPE":
+                    parts.append(StringLiteral(str(node).split("[")[0].strip().lower()))
+                continue
+            name, *rest = node.children
+            dimensions = [part for part in rest if kind(part) == "dimensions"]
+            values = [part for part in rest if kind(part) != "dimensions"]
+            parts += [self.target([name, *dimensions]), self.expression(values[0]) if values else None]
+        return Command("def", tuple(parts), True, self.span(tree))
+
+    # -- control structures -------------------------------------------------------------------------------------------
+
+    def label_here(self, tree: Branch) -> Item:
+        """`NAME:`."""
+        return OWordLine(str(tree.children[0]).rstrip(": \t").upper(), "label", (), self.span(tree))
+
+    def condition(self, tree: Branch) -> Item:
+        """`IF`, `WHILE`, `UNTIL`."""
+        keyword, value = tree.children
+        return OWordLine("", str(keyword).lower(), (self.expression(value),), self.span(tree))
+
+    def plain(self, tree: Branch) -> Item:
+        """A keyword alone."""
+        return OWordLine("", str(tree.children[0]).lower(), (), self.span(tree))
+
+    def counted(self, tree: Branch) -> Item:
+        """`FOR name = first TO last`."""
+        _, *target, first, _, last = tree.children
+        values = (self.target(target), self.expression(first), self.expression(last))
+        return OWordLine("", "for", values, self.span(tree))
+
+    def jump(self, tree: Branch) -> Item:
+        """`GOTOF`, `GOTOB`, ... and where to."""
+        keyword, *where = tree.children
+        return OWordLine(destination(where[0]) if where else "", str(keyword).lower(), (), self.span(tree))
+
+    def repetition(self, tree: Branch) -> Item:
+        """`REPEAT` that begins a loop, or repeats what stands from a label on, to another if there is one."""
+        keyword, *labels = tree.children
+        names = [str(label).upper() for label in labels]
+        return OWordLine(
+            names[0] if names else "", str(keyword).lower(), tuple(map(StringLiteral, names[1:])), self.span(tree)
+        )
+
+    def case(self, tree: Branch) -> Iterator[Item]:
+        """`CASE value OF constant GOTOF label ... DEFAULT GOTOF label`: one item for each part."""
+        keyword, value, of, *choices = tree.children
+        head = self.between(edges(keyword)[0], edges(of)[1])
+        yield OWordLine("", "case", (self.expression(value),), head)
+        for choice in choices:
+            *before, keyword, where = choice.children  # type: ignore[union-attr]
+            values = tuple(self.expression(node) for node in before if not isinstance(node, Token))
+            name = "of" if kind(choice) == "choice" else "default"
+            yield OWordLine(destination(where), f"{name} {str(keyword).lower()}", values, self.span(choice))
+
+    # -- expressions --------------------------------------------------------------------------------------------------
+
+    def arguments(self, node: Node, depth: int = 0) -> tuple[Expression | None, ...]:
+        """What stands between brackets; None where an argument is left out."""
+        assert not isinstance(node, Token)
+        values = tuple(None if kind(part) == "omitted" else self.expression(part, depth) for part in node.children)
+        return () if values == (None,) else values
+
+    def compound(self, tree: Branch, depth: int) -> Expression:
+        """The expression that a tree stands for."""
+        if depth > MAX_DEPTH:
+            raise TooDeepError(edges(tree)[0])
+        parts = tree.children
+        first = parts[0]
+        match kind(tree):
+            case "literal":
+                return self.expression(first, depth)
+            case "bracket":
+                return Unary(BRACKET, self.expression(first, depth))
+            case "text":
+                return StringLiteral(str(first)[1:-1])
+            case "axis":
+                return StringLiteral(str(first).upper())
+            case "bits":
+                return Constant(bits(str(first)))
+            case "parameter":
+                return NumberedParameter(Constant(float(str(first)[1:])))
+            case "name":
+                return NamedParameter(str(first).lower())
+            case "element":
+                return self.array_element(str(first), parts[1], depth)
+            case "call":
+                return FunctionCall(str(first).lower(), self.arguments(parts[1], depth))
+            case "list":
+                return FunctionCall(BRACKET, self.arguments(tree, depth))
+            case "unary":
+                return Unary(str(first).lower(), self.expression(parts[1], depth))
+            case "binary":
+                left, operator, right = parts
+                return self.binary(left, operator, right, depth)
+        raise AssertionError(f"the grammar has an expression {tree.data!r} that nobody builds")
+
+
+def is_word(name: str) -> bool:
+    """Whether a name with a value is an address: a letter, a letter with a number, or one of the longer ones."""
+    if name[:1].upper() == "R" and name[1:].isdigit():
+        return False
+    return len(name) == 1 or name[1:].isdigit() or name.lower() in SETTERS
+
+
+def destination(node: Node) -> str | Expression:
+    """Where a jump leads: a label or `N100`; a text names one."""
+    text = str(node)
+    if kind(node) == "TEXT":
+        return text[1:-1].upper()
+    return "".join(text.split()).upper()
+
+
+def bits(text: str) -> float:
+    """The value of `'HFF'`, `'B1010'`, `'D12'`; NaN if it has none."""
+    body = text.strip("'")
+    try:
+        return float(int(body[1:], BASES[body[0].upper()]))
+    except ValueError:
+        return float("nan")
+
 
 STATEMENT = "statement"
 """The kind of an `Opaque` that could not be understood: it may be anything, a call of a cycle for instance."""

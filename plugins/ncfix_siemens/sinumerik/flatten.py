@@ -27,12 +27,12 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
-from ncfix_siemens.sinumerik.patterns import PATTERNS
+from ncfix_siemens.sinumerik.cycles import PATTERNS
+from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.plans import ANY_PARAMETER, Calling, Letting, names_in
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
-from ncfix_siemens.sinumerik.variables import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.vocabulary import FORM, FORMS, HARMLESS
 
 BARE = Spelling(point=False)

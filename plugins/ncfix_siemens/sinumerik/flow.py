@@ -9,11 +9,10 @@ from functools import partial
 from ncfix.control.expressions import Evaluate, Fault, Unknown, Value, number
 from ncfix.control.flow import NO_LABEL, Jump, Let, OpenCall, Operation, ProgramFlow, Repeat
 from ncfix.text.tree import Expression, NamedParameter, NumberedParameter
-from ncfix_siemens.sinumerik.expressions import Key, compiled
+from ncfix_siemens.sinumerik.expressions import Key, Local, compiled
 from ncfix_siemens.sinumerik.plans import Branching, Letting
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
-from ncfix_siemens.sinumerik.variables import Local
 
 
 class AtRuntimeError(Exception):

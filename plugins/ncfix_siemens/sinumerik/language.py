@@ -21,10 +21,8 @@ from ncfix_siemens.sinumerik.blocks import parse_block
 from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 from ncfix_siemens.sinumerik.interpreter import SinumerikInterpreter
 from ncfix_siemens.sinumerik.layout import SinumerikLayout, layout_of
-from ncfix_siemens.sinumerik.numbering import renumbered
 from ncfix_siemens.sinumerik.plans import fixed_centre
-from ncfix_siemens.sinumerik.poles import polar_words
-from ncfix_siemens.sinumerik.scanning import scan
+from ncfix_siemens.sinumerik.scanning import polar_words, renumbered, scan
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import VECTOR
 from ncfix_siemens.sinumerik.writing import SPELLING, SinumerikWriter

@@ -29,7 +29,7 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix_siemens.sinumerik.circles import VIA
-from ncfix_siemens.sinumerik.poles import has_partial
+from ncfix_siemens.sinumerik.scanning import has_partial
 from ncfix_siemens.sinumerik.vocabulary import ANGLES, DRILLING, FORM, FORMS, HARMLESS, MOTIONS, POLAR, VECTOR
 
 END_OF_SUBPROGRAM = frozenset({17.0})

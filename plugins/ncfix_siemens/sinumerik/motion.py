@@ -1,10 +1,15 @@
-"""What one block moves: straight lines, arcs, machine coordinates, reference points, and what is not followed."""
+"""What one block moves: straight lines, arcs, machine coordinates, reference points, and what is not followed.
+
+Synchronized actions: what the control may do at any time while the blocks that follow are executed.
+"""
 
 from __future__ import annotations
 
+import re
+
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
 from ncfix.control.moves import MotionKind, Pass, Passing
-from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, through_point
+from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, tangential, through_point
 from ncfix_siemens.sinumerik.cycles import TO_A_HOLE, drill, hole_after
 from ncfix_siemens.sinumerik.destination import (
     BlockWordValues,
@@ -17,8 +22,25 @@ from ncfix_siemens.sinumerik.destination import (
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.orientation import oriented
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
-from ncfix_siemens.sinumerik.tangents import tangential
 from ncfix_siemens.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS
+
+_ACTION = r"""
+    \$A_\w+(?:\[[^\]]*\])?=\S+
+    | \$AC_(?:OVR|VC|MARKER|PARAM|TIMER|FIFO\d*)(?:\[[^\]]*\])?=\S+ | \$AA_(?:OVR|VC)\[\w+\]=\S+
+    | [MHS]\d*=?[\d.]+ | (?:SETAL|LOCK|UNLOCK|RESET|CANCEL)\([^()]*\) | RDISABLE
+"""
+HARMLESS = re.compile(rf"(?:(?:{_ACTION})\s*)+", re.IGNORECASE | re.VERBOSE)
+"""Actions that move no axis, change no coordinates and no variable that the program computes with."""
+
+DO = re.compile(r"\bDO\b", re.IGNORECASE)
+AROUND_EQUALS = re.compile(r"\s*=\s*")
+
+
+def is_harmless(text: str) -> bool:
+    """Whether a synchronized action may act at any time, and nothing that is followed changes."""
+    _, *actions = DO.split(AROUND_EQUALS.sub("=", text.split(";")[0]), maxsplit=1)
+    return bool(actions) and HARMLESS.fullmatch(actions[0].strip()) is not None
+
 
 MACHINE = "machine coordinates ({})"
 MEASURING = Passing(Pass.PROBING, "measuring (MEAS)")

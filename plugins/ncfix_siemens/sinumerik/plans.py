@@ -28,8 +28,7 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
-from ncfix_siemens.sinumerik.blocks import STATEMENT
-from ncfix_siemens.sinumerik.build import BRACKET
+from ncfix_siemens.sinumerik.blocks import BRACKET, STATEMENT
 from ncfix_siemens.sinumerik.expressions import compiled
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS
 

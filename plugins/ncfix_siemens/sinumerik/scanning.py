@@ -2,17 +2,26 @@
 
 A digit inside a name belongs to the name, and so does the number of an extended address (`C1=`): they are part of the
 shape. The reader compares with the grammar for every shape, and goes by the grammar where the two differ.
+
+Besides: block numbers, all anew; and programs in which a block has only one of AP and RP.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.control.moves import Moves, Rule
+from ncfix.diagnostics import RefusedError
 from ncfix.text.numbers import fill, find_numbers, is_numeric, runs_of, table
 from ncfix.text.shapes import NUMBER_MARK, Scan, block_of, in_slices, matches, odd_blocks, shape_keys
+from ncfix.text.tree import Program, Template
+from ncfix_siemens.sinumerik.vocabulary import POLAR
 
 FIXED = table(b"GgMmRr")
 """A number after these is no value but says which code or parameter it is."""
@@ -88,3 +97,117 @@ def extension(source: bytes, place: int) -> tuple[int, int]:
         start -= 1
     alone = start > 0 and source[start - 1] in LETTERS[:-2] and (start == 1 or source[start - 2] not in LETTERS)
     return (start, stop) if alone else (stop, stop)
+
+
+NOT_NUMBERED = "NCF256"
+STEP = 10
+
+BLOCK = re.compile(
+    r"(?P<before>[ \t]*(?:/\d?[ \t]*)?)(?:N[ \t]*(?P<number>\d+)(?P<blank>[ \t]*))?(?P<rest>.*)",
+    re.IGNORECASE | re.DOTALL,
+)
+WORDS = re.compile(r"[A-Z][ \t]*[-+=.\d]", re.IGNORECASE)
+"""How a block begins that is nothing but words, as those are that are put in."""
+
+LABEL = re.compile(r"[A-Z_]\w*[ \t]*:(?!=)", re.IGNORECASE)
+HEAD = re.compile(r"[ \t]*%")
+SILENT = re.compile(r'"[^"]*"|;.*', re.DOTALL)
+JUMP = re.compile(r"\b(?:GOTO[FBC]?|REPEATB?)[ \t]+(?P<where>N[ \t]*\d+(?:[ \t]+N[ \t]*\d+)?)(?!\w)", re.IGNORECASE)
+NUMBER = re.compile(r"N[ \t]*(\d+)", re.IGNORECASE)
+BY_TEXT = re.compile(r'"[ \t]*N[ \t]*\d*[ \t]*"', re.IGNORECASE)
+"""A block number, or the beginning of one, as a text: the target of a jump may be made of it."""
+
+
+def renumbered(source: bytes) -> bytes:
+    """A program with its blocks numbered 10, 20, ... wherever they have numbers, and blocks of words where others have.
+
+    Raises RefusedError NCF256 where a jump goes to a number that stands twice, or that is put together at run time.
+    """
+    lines = source.decode("latin-1").splitlines(keepends=True)
+    return "".join(line for unit in units(lines) for line in numbered(unit)).encode("latin-1")
+
+
+def units(lines: list[str]) -> Iterator[list[str]]:
+    """The programs of an archive."""
+    heads = [place for place, line in enumerate(lines) if HEAD.match(line)]
+    edges = sorted({0, *heads, len(lines)})
+    for begin, end in pairwise(edges):
+        yield lines[begin:end]
+
+
+def numbered(lines: list[str]) -> list[str]:
+    """The lines of one program."""
+    blocks = [BLOCK.fullmatch(line) for line in lines]
+    old = [int(block["number"]) for block in blocks if block is not None and block["number"]]
+    if not old:
+        return lines
+    blank = next(block["blank"] for block in blocks if block is not None and block["number"])
+    result, new, count = [], {}, 0
+    for line, block in zip(lines, blocks, strict=True):
+        if block is None or not (block["number"] or is_words(block["rest"])):
+            result.append(line)
+            continue
+        count += STEP
+        if block["number"]:
+            new[int(block["number"])] = count
+        gap = block["blank"] if block["number"] else blank
+        result.append(f"{block['before']}N{count}{gap}{block['rest']}")
+    return [redirected(line, new, old) for line in result]
+
+
+def is_words(text: str) -> bool:
+    """Whether a block without a number is nothing but words."""
+    return bool(WORDS.match(text)) and not LABEL.match(text)
+
+
+def redirected(line: str, new: dict[int, int], old: list[int]) -> str:
+    """A line whose jumps go to the new numbers."""
+    if BY_TEXT.search(line.split(";")[0]):
+        raise RefusedError.of(NOT_NUMBERED, f"a jump may go to a number that is a text: {line.strip()[:40]}")
+    code = SILENT.sub(lambda found: " " * len(found[0]), line)
+    pieces, done = [], 0
+    for place, number in targets(code):
+        if old.count(number) > 1:
+            raise RefusedError.of(NOT_NUMBERED, f"a jump goes to N{number}, which stands there more than once")
+        pieces += [line[done : place[0]], str(new.get(number, number))]
+        done = place[1]
+    return "".join([*pieces, line[done:]])
+
+
+def targets(code: str) -> list[tuple[tuple[int, int], int]]:
+    """Where block numbers stand that a line leads to, and what they are."""
+    return [
+        (number.span(1), int(number[1]))
+        for jump in JUMP.finditer(code)
+        for number in NUMBER.finditer(code, jump.start("where"), jump.end())
+    ]
+
+
+POLES = frozenset({1100, 1110, 1120})
+ALL_OR_NONE = "polar coordinates of which only one is written, where another block with such words has to stay"
+
+
+def polar_words(template: Template) -> frozenset[str]:
+    """The polar words of a motion: AP, RP."""
+    if not POLES.isdisjoint(template.g_codes):
+        return frozenset()
+    return frozenset(word.address for word in template.words) & POLAR
+
+
+def has_partial(program: Program) -> bool:
+    """Whether a block relies on a polar word that was written before."""
+    return any(len(polar_words(template)) == 1 for template in program.templates)
+
+
+def all_or_none(moves: Moves, program: Program) -> Moves:
+    """The motions, with all that have polar words refused where one of them cannot be corrected."""
+    if not has_partial(program):
+        return moves
+    shapes = [index for index, template in enumerate(program.templates) if polar_words(template)]
+    polar = np.isin(program.template[moves.block], shapes)
+    if not (polar & (moves.rule != Rule.CORRECT)).any():
+        return moves
+    rows = polar & (moves.rule == Rule.CORRECT)
+    reasons = (*moves.reasons, ALL_OR_NONE)
+    reason = np.where(rows, len(moves.reasons), moves.reason).astype(np.int16)
+    return replace(moves, rule=np.where(rows, Rule.REFUSE, moves.rule).astype(np.int8), reason=reason, reasons=reasons)

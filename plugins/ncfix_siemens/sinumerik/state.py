@@ -37,8 +37,8 @@ from ncfix.control.turns import Winding, watch
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_siemens.sinumerik import heading
+from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.increments import Footing, footings, stand
-from ncfix_siemens.sinumerik.variables import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.vocabulary import MOTIONS, PATH_WORDS, TURNING
 
 if TYPE_CHECKING:

@@ -1,20 +1,25 @@
-"""What the codes and names of a block do, and in which order: settings first, then frames, tools, and the motion."""
+"""What the codes and names of a block do, and in which order: settings first, then frames, tools, and the motion.
+
+Calls of subprograms: by name, by number, by a text; and names that are none of ours.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import INDEX
 from ncfix.control.expressions import Evaluate, Fault, number
 from ncfix.control.frames import WORLD
 from ncfix.text.tree import Expression, FunctionCall, NamedParameter
 from ncfix_siemens.sinumerik import framing, motion
-from ncfix_siemens.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
 from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import BlockWordValues, set_pole
-from ncfix_siemens.sinumerik.plans import LISTS, Calling, SinumerikPlan, evaluates
+from ncfix_siemens.sinumerik.framing import into_spindle, set_length
+from ncfix_siemens.sinumerik.plans import LISTS, Calling, SinumerikPlan, evaluates, plain_text
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.swivel import swivel
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
@@ -30,6 +35,83 @@ from ncfix_siemens.sinumerik.vocabulary import (
     UNFOLLOWED,
     UNFOLLOWED_MOTIONS,
 )
+
+if TYPE_CHECKING:
+    pass
+
+
+Find = Callable[[str], SinumerikUnit | None]
+
+UNKNOWN_CYCLE = "NCF252"
+TRANSFORMING = ("traori", "transmit", "tracyl", "traang", "tracon", "trafoo")
+"""How names of transformations by kinematic chains begin, `TRANSMIT_K`."""
+
+CALLED_BY_TEXT = frozenset({"call", "extcall"})
+FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF))?$", re.IGNORECASE)
+"""A program named in a text, perhaps with a path."""
+
+
+def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
+    """A subprogram, or a cycle of the machine's builder."""
+    if turn.modal:
+        text = f"the modal subprogram {step.name.upper()} is in force, which ncfix does not follow"
+        control.suspended["cycle"] = text
+        return
+    unit = find(step.name)
+    if unit is not None:
+        turn.subprogram, turn.called, turn.arguments, turn.written = unit, step, step.arguments, step.written
+        turn.times = round(turn.words.get("P", 1.0))
+        return
+    if step.name.startswith(TRANSFORMING):
+        control.suspended[step.name] = (
+            f"the transformation {step.name.upper()} is in force, which ncfix does not follow"
+        )
+        return
+    ran_elsewhere(control, step.name.upper(), changes_tool=control.fresh_tool)
+
+
+def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
+    """A name or number that is no subprogram at hand is taken as a cycle of the builder; it may change the tool."""
+    text = f"{name} is not known: it is taken as a cycle that leaves coordinates as they are"
+    control.warn(
+        UNKNOWN_CYCLE,
+        text,
+        "if it is a subprogram, say where its file is: --subprograms DIR",
+    )
+    control.lose_all(AFTER_CYCLE)
+    control.changed_by_cycle |= changes_tool
+    if "tool" in control.suspended:
+        into_spindle(control)
+        set_length(control)
+
+
+def call_by_text(turn: Turn, step: Calling, find: Find) -> bool:
+    """`CALL "NAME"`, `EXTCALL("NAME.SPF")`: whether the program is at hand."""
+    found = FILE.search(plain_text(step.written[0]) or "") if step.written else None
+    unit = find(found["name"]) if found else None
+    if unit is None:
+        return False
+    turn.subprogram, turn.called, turn.times = unit, step, round(turn.words.get("P", 1.0))
+    return True
+
+
+def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
+    """`L123`: a subprogram by its number."""
+    value = turn.words.values.get("L")
+    if "L" not in turn.words.values:
+        return
+    if turn.modal:
+        control.suspended["cycle"] = "a modal subprogram (MCALL L) is in force, which ncfix does not follow"
+        return
+    if value is None:
+        control.refusal = control.refusal or "which subprogram is called (L) is known only at run time"
+        return
+    unit = find(f"L{value:g}")
+    if unit is None:
+        turn.elsewhere = f"L{value:g}"
+        return
+    turn.subprogram, turn.times = unit, round(turn.words.get("P", 1.0))
+
 
 CONFLICT = "NCF208"
 FRAMES_STAY = "$mn_frame_geoax_change_mode"

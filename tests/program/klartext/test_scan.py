@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ncfix import fast
-from ncfix_heidenhain.klartext.shapes import scan, split
+from ncfix_heidenhain.klartext.blocks import scan, split
 from program.test_many_blocks import klartext
 
 CYCLE = [

@@ -14,7 +14,7 @@ from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import load
 from ncfix.text.reader import read
-from ncfix_siemens.sinumerik.numbering import renumbered
+from ncfix_siemens.sinumerik.scanning import renumbered
 
 
 @pytest.mark.parametrize(
