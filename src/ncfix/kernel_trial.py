@@ -13,14 +13,14 @@ from ncfix.kernel_build import compiled
 LIBRARY = Library(__name__)
 
 
-class Pair(NamedTuple):
+class TrialPair(NamedTuple):
     """A tuple with names."""
 
     low: NDArray[np.float64]
     high: NDArray[np.uint8]
 
 
-Given = tuple[int, Pair]
+Given = tuple[int, TrialPair]
 
 
 @LIBRARY.helper
@@ -29,7 +29,7 @@ def scaled(value: float, factor: float) -> float:
     return value * factor
 
 
-@LIBRARY.kernel("f8[:,:]", ("i8", (Pair, "f8[:]", "u1[:]")), "f8", "b1[:]", "i4[:]", "i8[:]", "f8[:,:,:]")
+@LIBRARY.kernel("f8[:,:]", ("i8", (TrialPair, "f8[:]", "u1[:]")), "f8", "b1[:]", "i4[:]", "i8[:]", "f8[:,:,:]")
 def weighed(
     values: NDArray[np.float64],
     given: Given,
@@ -57,7 +57,7 @@ def passes() -> bool:
     """
     LIBRARY.link(compiled(LIBRARY))
     values = np.arange(6.0).reshape(3, 2) / 7
-    pair = Pair(np.array([0.25, -3.0]), np.array([3, 200], dtype=np.uint8))
+    pair = TrialPair(np.array([0.25, -3.0]), np.array([3, 200], dtype=np.uint8))
     chosen, small = np.array([True, False, True]), np.array([-5, 0, 9], dtype=np.int32)
     plain, fast = np.zeros((2, 3, 2)), np.zeros((2, 3, 2))
     common = (values, (2, pair), -1.5, chosen, small, np.array([1 << 40, -2]))

@@ -19,7 +19,7 @@ from ncfix.tables.compensation import Compensation
 from ncfix.tables.correction import exact_correction, linear_axes, rotary_correction
 from ncfix.tables.grid import Array, full_grid, on_full_grid
 from ncfix.tables.lower_bounds import Remainder, least_worst
-from ncfix.tables.scheme_tables import AxisPositions, Corrections, Sample, StagedTables, by_way, followed
+from ncfix.tables.scheme_tables import AxisPositions, Corrections, StagedTables, TableSample, by_way, followed
 from ncfix.tables.separable import (
     Part,
     Separation,
@@ -336,7 +336,7 @@ def _followed(
     known = {output: selection.layouts(output) for output in selection.outputs}
     fine = [line.fine for line in lines]
     evaluate = by_way(lambda q, direction: scale * correct(q, direction))
-    found = followed(Sample.of(left.nodes), known, fine, evaluate, left.along)
+    found = followed(TableSample.of(left.nodes), known, fine, evaluate, left.along)
     return {output: [absorbed(one, selection.tolerance) for one in each] for output, each in found.items()}
 
 

@@ -98,14 +98,14 @@ class AxisPositions:
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class TableSample:
     """Where functions of one axis are looked for: combinations of nodes of all axes, (m, n_axes), their numbers."""
 
     nodes: Sequence[Array]
     places: NDArray[np.intp]
 
     @classmethod
-    def of(cls, nodes: Sequence[Array]) -> Sample:
+    def of(cls, nodes: Sequence[Array]) -> TableSample:
         """Spread evenly over pairs and triples of axes (a Sobol net)."""
         unit = qmc.Sobol(len(nodes), scramble=False).random_base2(SAMPLES)
         counts = np.array([len(line) for line in nodes])
@@ -148,7 +148,7 @@ class Sample:
 
 
 def followed(
-    sample: Sample, layouts: TableLayouts, fine: Sequence[Array], evaluate: Evaluate, left: Left | None = None
+    sample: TableSample, layouts: TableLayouts, fine: Sequence[Array], evaluate: Evaluate, left: Left | None = None
 ) -> dict[int, list[TableLayout]]:
     """The same layouts with their functions at the positions `fine` of each axis."""
     curves: dict[tuple[int, int | None], Curves] = {}
