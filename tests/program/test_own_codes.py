@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from ncfix.control.trace import trace
 from ncfix.diagnostics import PluginError, SourceError
 from ncfix.machine import Machine, load
 from ncfix.plugin import family
+from ncfix.testing import check_language, gcode_statements
+from ncfix.testing.language import Pair
 from ncfix.text.dialect import Dialect
 from ncfix.text.reader import read
 
@@ -133,6 +136,18 @@ def test_codes_that_no_dialect_can_have(code: str) -> None:
 def test_codes_in_a_language_that_takes_none() -> None:
     with pytest.raises(PluginError, match="takes none"):
         read(b"G0 X0\n", dialect=family("siemens").derive("x", title="X", codes={"G150": []}))
+
+
+@pytest.mark.parametrize("level", ["H", "L", "X", "EE"])
+def test_addresses_that_are_no_level(level: str) -> None:
+    with pytest.raises(ValueError, match="cannot be the address of the level"):
+        CycleTable(level=level)
+
+
+def test_the_contract_in_a_tilted_plane() -> None:
+    tilted = Pair(on=("G168 X1. Y2. Z3. A10. B20. C0.",), off=("G69",))
+    found = check_language(OWN, replace(gcode_statements(OWN), frames=(tilted,)), count=5)
+    assert found["right"] > 20
 
 
 def test_dialects_of_a_derived_one() -> None:

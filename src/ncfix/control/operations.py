@@ -26,7 +26,8 @@ from ncfix.control.moves import Motion, MotionKind, UnknownAxes
 if TYPE_CHECKING:
     from ncfix.control.control import ProgramControl
 
-LEVELS = "DEHIJKLPQR"
+LEVELS = "EIJQR"
+"""Addresses that may give the level of a cycle: no code of the families has another use for them in its block."""
 LOST = "where the axis {{}} stands after {} is not known"
 NOT_FOLLOWED = "{} is in force, which ncfix does not follow"
 AFTER = "where the axis {{}} stands after {} is not followed"
