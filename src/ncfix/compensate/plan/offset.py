@@ -251,8 +251,8 @@ def _meeting(one: ContactPath, other: ContactPath, turn: Array) -> tuple[Array, 
     most = np.abs(one.radius) / SHARPEST
     back, on = np.clip(-corner, -most, most), np.clip(corner, -most, most)
     over = (one.left(one.end) + other.left(other.start)) * one.radius[:, None]
-    flat = one.end + over / (1 + np.cos(turn))[:, None]
     smooth = np.abs(turn) < SMOOTH
+    flat = one.end + over / np.where(smooth, 1 + np.cos(turn), 1.0)[:, None]
     for _ in range(STEPS):
         here, there = one.beside(one.end, back), other.beside(other.start, on)
         miss = _flat(there - here, one.up)
