@@ -1,4 +1,4 @@
-"""Fanuc and its like: what differs from the RS274 family, whose tracer and renderer this one uses.
+"""Fanuc and its like: what differs from the RS274 family, whose interpreter and writer this one uses.
 
 A number may mean something else without its decimal point (`points`), flow control is Macro B (`flow`, `arithmetic`,
 `variables`), and some codes set other things (`data`, `tilt`, `polar`).

@@ -27,11 +27,11 @@ Mask = NDArray[np.bool_]
 STRAIGHT = frozenset({"", "l", "ln"})
 ARCS = frozenset({"c", "cr"})
 FEW = 1e-6
-"""Degrees from zero or a full turn at which a corrected angle is looked at by the renderer."""
+"""Degrees from zero or a full turn at which a corrected angle is looked at by `BlockWriter`."""
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
-    """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
+    """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
     items = program.items_of(block)
     if any(isinstance(item, Skip | Opaque | OWordLine | Assignment) for item in items):
         return None
@@ -57,11 +57,11 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     )
 
 
-# -- motions that need the renderer -----------------------------------------------------------------------------------
+# -- motions that need `BlockWriter` -----------------------------------------------------------------------------------
 
 
 def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> Mask:
-    """(n,) motions that the renderer has to look at.
+    """(n,) motions that `BlockWriter` has to look at.
 
     Those beside a corner that the control makes; and where rotary axes are corrected, those in which one has no word,
     or comes to zero or a full turn.

@@ -38,7 +38,7 @@ def words_of(program: Program, block: int) -> tuple[Word, ...]:
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
-    """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
+    """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
     layout = writable(program, block) if any(w.address in AXIS_LETTERS for w in words_of(program, block)) else None
     found = None if layout is None else bulk_layout(program, block, layout)
     if layout is None or found is None:

@@ -46,7 +46,7 @@ def unroll(interpreter: SinumerikInterpreter, steps: Mapping[str, float], limit:
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
-    """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
+    """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
     layout = layout_of(program, block)
     formed = layout is not None and not layout.forms.keys().isdisjoint(layout.axes)
     if layout is None or not layout.axes or layout.polar or layout.angles or formed:
@@ -73,7 +73,7 @@ def without(words: Mapping[str, Word], addresses: Container[str]) -> dict[str, W
 
 
 def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(n,) motions that the renderer has to look at: a direction of the tool that changes, or that further pieces have.
+    """(n,) motions for `BlockWriter`: a changed direction of the tool, or one that further pieces have.
 
     One that is the same, and in one piece, leads the rotary axes to where the program has them.
     """

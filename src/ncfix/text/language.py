@@ -37,7 +37,7 @@ Resolve = Callable[[str], bytes | None]
 
 
 class BlockLayout(Protocol):
-    """Where things stand in a motion block; what else there is, only the family's own renderer knows."""
+    """Where things stand in a motion block; what else there is, only the family's own writer knows."""
 
     @property
     def motion(self) -> Word | None:
@@ -58,7 +58,7 @@ class ArcLayout:
     centre  I J K -> which of the block's numbers each has
     fixed   which of them count from the origin, whatever else is in force
     radius  which of them R has, and where that word stands, with the blank before it; None without
-    alone   none of this is known: the renderer writes the arc, once the motions around it are written
+    alone   none of this is known: `BlockWriter` writes the arc, once the motions around it are written
     """
 
     centre: Mapping[str, int]

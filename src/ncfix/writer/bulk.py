@@ -1,6 +1,6 @@
 """Stretches of corrected motions, straight ones and arcs, written all at once.
 
-What the emitter and the renderer do motion by motion, done as columns, byte for byte; a test holds the two together.
+What the emitter and `BlockWriter` do motion by motion, done as columns, byte for byte; a test holds the two together.
 A motion qualifies if its block is words with plain numbers, is executed once, and becomes one block with the same
 motion code. Whatever is not clear to the last digit (a value in the middle between two outputs, a position that is
 not on the digits) ends a stretch, and the emitter takes it by itself.
@@ -169,7 +169,7 @@ class Bulk:
         return clear, words.centre
 
     def alone(self, row: int, stop: int) -> list[int]:
-        """The arcs from motion `row` up to `stop` that the renderer writes."""
+        """The arcs from motion `row` up to `stop` that `BlockWriter` writes."""
         alone = self.layouts.alone
         if not alone.any():
             return []

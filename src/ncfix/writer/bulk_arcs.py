@@ -26,17 +26,17 @@ Mask = NDArray[np.bool_]
 PLANES = np.array(((1, 2), (2, 0), (0, 1)))
 """The axes of a plane, X Y Z being 0 1 2, in the order in which their words are added; by the one across it."""
 CIRCLE_MM = 1e-3
-"""Ends that are nearer to each other may be those of a full circle: that is for the renderer to say."""
+"""Ends that are nearer to each other may be those of a full circle: that is for `BlockWriter` to say."""
 SEMICIRCLE = 1e-6
 """Program units: a radius that is so near to half the chord says too little of where the centre is."""
 TIE = 1e-4
-"""Half output steps: so near to what is allowed between two centres, which side it is on is for the renderer to say."""
+"""Half output steps: so near to the distance allowed between centres, which side it is on is for `BlockWriter` to say."""
 
 
 def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, layouts: Layouts) -> Mask:
     """(n,) arcs that become one arc, and whose words are such that it may be written in bulk.
 
-    Those that the renderer writes by themselves may become more than that.
+    Those that `BlockWriter` writes by themselves may become more than that.
 
     first  (n,) the first piece of each motion
     """

@@ -46,7 +46,7 @@ class Layouts:
     fixed      (s, 3) which of these count from the origin
     centre_heads  (s, 3, 2) what stands before the number of one that is missing, as `heads`
     radius     (s,) which of them is R, or `NONE`
-    alone      (s,) the renderer writes them
+    alone      (s,) `BlockWriter` writes them
     taken      (s, 2, 2) slot and offset of where that word begins, with the blank before it, and of its end
     spelling   how numbers are written
     lined      lines of further pieces begin with more than axis words

@@ -192,7 +192,7 @@ class _Emitter:
         return stop - row
 
     def _write_alone(self, row: int, stop: int) -> None:
-        """Write the arcs of a stretch that the renderer has to write."""
+        """Write the arcs of a stretch that `BlockWriter` has to write."""
         rows = write_alone(self.bulk.alone(row, stop), stop, self.start, self.moves.programmed, self._written)
         self.in_stretch[rows] = False
         self.replaced = self.replaced if stop - 1 in rows[-1:] else None

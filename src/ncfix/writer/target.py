@@ -1,4 +1,4 @@
-"""What one corrected motion shall become in a block, and what became of it: what goes into a renderer and comes out."""
+"""What one corrected motion shall become in a block, and what became of it: what `BlockWriter` takes and gives back."""
 
 from __future__ import annotations
 

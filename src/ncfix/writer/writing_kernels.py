@@ -47,7 +47,7 @@ def put_line(
 ) -> int:
     """Write a further piece of a motion on a line of its own, and take the axes there; -1 where that is not clear.
 
-    A piece that moves nothing is not: it is for the renderer to say. `heads` (axes, 2) are those of the shape, `lead`
+    A piece that moves nothing is not: it is for `BlockWriter` to say. `heads` (axes, 2) are those of the shape, `lead`
     the bytes of `text` that the line repeats.
     """
     (wanted, now, told), (decimals, half, signed), (end_of_line, _, openings, closings) = axes, digits, lines
