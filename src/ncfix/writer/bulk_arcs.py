@@ -30,7 +30,7 @@ CIRCLE_MM = 1e-3
 SEMICIRCLE = 1e-6
 """Program units: a radius that is so near to half the chord says too little of where the centre is."""
 TIE = 1e-4
-"""Half output steps: so near to the distance allowed between centres, which side it is on is for `BlockWriter` to say."""
+"""Half output steps: so near to the distance allowed between centres, the side that it is on is for `BlockWriter`."""
 
 
 def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, layouts: Layouts) -> Mask:
