@@ -24,10 +24,9 @@ from ncfix.text.reader import read
 
 MACHINE = machine()
 WORDS_AT_ONCE = 4
-STRAY = 0.1
-"""Of the statements of a language with a table of what its codes take, how many have one word that theirs does not."""
 THERE = 0.6
-"""How likely a word that a code takes is there, one that it needs nearly always."""
+SURE = 0.95
+"""How likely a word is there that a code takes, and one that it needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +37,9 @@ class Family:
     words   what may stand behind; of one address only one
     before  the programs before it, several modes; after: what follows
     leads   (head, words, mode) whether the manuals say that the block moves axes, or that the control stops at it
-    takes   head -> the addresses that it takes, those that it needs in capitals; a control that stops at all others
-            would hardly ever be asked for more without it
+    takes   head -> the addresses or words that it takes, those that it needs in capitals; a control that stops at all
+            others would hardly ever be asked for more without it
+    stray   how many of these statements have one word that their code does not take
     """
 
     dialect: str
@@ -49,6 +49,7 @@ class Family:
     after: str
     leads: Callable[[str, Sequence[str], int], bool]
     takes: Mapping[str, str] = field(default_factory=dict)
+    stray: float = 0.5
 
     def cases(self) -> Iterator[Case]:
         """Every head with every subset of the words, behind every mode."""
@@ -70,17 +71,18 @@ class Family:
     def taken(self, dice: random.Random) -> Case:
         """A head with some of the words that it takes, and now and then one that it does not."""
         head, mode = dice.choice(self.heads), dice.randrange(len(self.before))
-        takes = self.takes.get(head) or self.takes[f"mode {mode}"]
+        takes = (self.takes.get(head) or self.takes[f"mode {mode}"]).split()
+        likely = {each.lower(): THERE if each.islower() else SURE for each in takes}
         by_address: dict[str, list[str]] = {}
         for word in self.words:
             by_address.setdefault(address(word), []).append(word)
-        chosen = [
-            dice.choice(forms)
-            for letter, forms in by_address.items()
-            if dice.random() < (0.95 if letter in takes else THERE if letter.lower() in takes else 0.0)
-        ]
-        if dice.random() < STRAY:
-            others = [word for word in self.words if address(word).lower() not in takes.lower()]
+        chosen, others = [], []
+        for name, forms in by_address.items():
+            taken = [word for word in forms if {name.lower(), word.lower()} & likely.keys()]
+            others += [word for word in forms if word not in taken]
+            if taken and dice.random() < max(likely.get(name.lower(), 0.0), likely.get(taken[0].lower(), 0.0)):
+                chosen.append(dice.choice(taken))
+        if dice.random() < self.stray:
             chosen.append(dice.choice(others))
         return Case(self, head, tuple(chosen), mode)
 
@@ -181,6 +183,23 @@ KLARTEXT = Family(
     ),
     after="L X+1 Y+2 Z+30 F100\nL X+3\nM30\nEND PGM T MM\n",
     leads=klartext_leads,
+    takes={
+        "L": "x y z f fmax r0 m99 m91 m3",
+        "LP": "PR pa z f",
+        "LN": "X Y z f",
+        "C": "X+30 Y+40 dr- dr+ f",
+        "CP": "PA dr- dr+ f z",
+        "CR": "X Y r+25 r-25 DR- dr+ f",
+        **dict.fromkeys(("CT", "APPR LCT", "DEP LCT", "CYCL CALL POS"), "X Y z f r+25 m3"),
+        **dict.fromkeys(("CTP", "APPR PLT", "APPR PLCT"), "PR PA f LEN10 r+25"),
+        **dict.fromkeys(("APPR LT", "APPR LN", "APPR CT"), "X Y LEN10 r+25 cca90 f"),
+        **dict.fromkeys(("DEP LT", "DEP LN", "DEP CT"), "LEN10 cca90 r+25 f"),
+        "RND": "R+25 f",
+        "CC": "x y",
+        "CYCL CALL": "m3 fmax",
+        "mode 0": "x y z fmax m99 m3",
+        "mode 1": "x y z f m3",
+    },
 )
 
 # -- ISO, Fanuc, LinuxCNC ---------------------------------------------------------------------------------------------
@@ -191,31 +210,31 @@ SETTLING = ("G17", "G90", "G40", "G43", "M3", "G61", "G54", "G94")
 """Modes, with which a block leads where its axis words say."""
 CYCLES = ("G73", "G81", "G82", "G83", "G85", "G86", "G89")
 LINUXCNC_TAKES = {
-    **dict.fromkeys(("G0", "G1", "G91 G1", "G91 G0"), "xyzf"),
-    **dict.fromkeys(("G2", "G3"), "xyzijrfp"),
-    **dict.fromkeys(("G18 G2", "G18 G3"), "xyzikrf"),
-    **dict.fromkeys(("G28", "G30"), "xyz"),
-    **dict.fromkeys(("G53 G0", "G53 G1"), "XYzf"),
-    **dict.fromkeys(("G81", "G85", "G86"), "xyZRlf"),
-    **dict.fromkeys(("G82", "G89"), "xyZRlPf"),
-    **dict.fromkeys(("G73", "G83"), "xyZRQlf"),
-    **dict.fromkeys(("G93 G1",), "xyzF"),
-    "G33": "ZK",
-    "G38.2": "xyZf",
-    "G31": "xyZf",
+    **dict.fromkeys(("G0", "G1", "G91 G1", "G91 G0"), "x y z f"),
+    **dict.fromkeys(("G2", "G3"), "x y z i j r f p"),
+    **dict.fromkeys(("G18 G2", "G18 G3"), "x y z i k r f"),
+    **dict.fromkeys(("G28", "G30"), "x y z"),
+    **dict.fromkeys(("G53 G0", "G53 G1"), "X Y z f"),
+    **dict.fromkeys(("G81", "G85", "G86"), "x y Z R l f"),
+    **dict.fromkeys(("G82", "G89"), "x y Z R l P f"),
+    **dict.fromkeys(("G73", "G83"), "x y Z R Q l f"),
+    **dict.fromkeys(("G93 G1",), "x y z F"),
+    "G33": "Z K",
+    "G38.2": "x y Z f",
+    "G31": "x y Z f",
     "G4": "P",
-    "G92": "Xyz",
-    "G52": "xyz",
-    "G10 L2 P1": "xyz",
-    "G10 L20 P1": "xyz",
+    "G92": "X y z",
+    "G52": "x y z",
+    "G10 L2 P1": "x y z",
+    "G10 L20 P1": "x y z",
     "G43.1": "Z",
-    "G41 D1": "Xy",
-    "G43": "hxyzf",
+    "G41 D1": "X y",
+    "G43": "h x y z f",
     "M3 S500": "f",
     "G64": "p",
-    "mode 0": "xyzf",
-    "mode 1": "xyzijrfp",
-    "mode 2": "xyzrlf",
+    "mode 0": "x y z f",
+    "mode 1": "x y z i j r f p",
+    "mode 2": "x y z r l f",
     **dict.fromkeys(("G17", "G90", "G40", "M3", "G61", "G54", "G94"), ""),
 }
 """Of each code the addresses that LinuxCNC takes with it; what is not here takes those of the mode."""
@@ -251,6 +270,7 @@ def iso(dialect: str) -> Family:
         after="G80\nG40 G90 G94 G17 G1 X1. Y2. Z30. F100.\nX3.\nM30\n",
         leads=iso_leads,
         takes=LINUXCNC_TAKES if dialect != "fanuc" else {},
+        stray=0.1,
     )
 
 
@@ -286,6 +306,23 @@ SIEMENS = Family(
     ),
     after="G1 G90 X1 Y2 Z30 F100\nX3\nM30\n",
     leads=siemens_leads,
+    takes={
+        **dict.fromkeys(("G0", "G1", "mode 0"), "x y z f rnd ap rp"),
+        **dict.fromkeys(("G2", "G3", "mode 1"), "x30 y40 i20 i=ac(30) j0 z cr f"),
+        **dict.fromkeys(("CIP", "mode 2"), "X30 y40 i1 j1 k1=3 z f"),
+        "CT": "X Y z f",
+        "SUPA G0": "x y z",
+        "G33": "Z K f",
+        "G4": "f",
+        **dict.fromkeys(("ASPLINE", "BSPLINE", "CSPLINE", "INVCW", "G331"), "X Y z f"),
+        "POLY": "po[x] y f",
+        **dict.fromkeys(("TRANS", "ATRANS", "G74"), "x y z"),
+        "ROT": "x z",
+        "MIRROR": "x y",
+        "G110": "x y",
+        "G111": "X Y",
+        "CYCLE81(10,0,2,-5)": "f",
+    },
 )
 
 FAMILIES = (KLARTEXT, SIEMENS, iso("fanuc"), iso("linuxcnc"), iso("iso"))

@@ -44,6 +44,7 @@ CALLING = frozenset({"", "l", "ln", "lp", "cycl call", "cycl call pos"})
 NOT_TAKEN = "{} takes no word {}: the control would stop, or makes a path of it that is not followed"
 TWICE = "{} with a word {} in the plane of its pole: where the control would go is not sure"
 CALLED_BY_ARC = "a cycle that is called in a block with {}: two motions in one block are not followed"
+CALLED_AT_MACHINE = "a cycle that is called in a block with M91 or M92: from which coordinates it drills is not sure"
 NO_FIRST_POINT = "{} without the point at which the contour begins"
 NO_HEIGHT = "CYCL CALL POS without Z: the manuals ask for all three axes, and at which height it is called is not sure"
 COUNTED_HEIGHT = "CYCL CALL POS with a height in increments (IZ): from where the control counts it is not sure"
@@ -58,6 +59,8 @@ def astray(control: KlartextControl, step: Step, *, called: bool) -> str:
     said = name.upper() or "a block of words alone"
     if called and name not in CALLING:
         return CALLED_BY_ARC.format(said)
+    if (called or name.startswith("cycl call")) and step.codes & {91, 92}:
+        return CALLED_AT_MACHINE
     other = next((word for word in words if word in MOVING and word not in TAKES.get(name, MOVING)), "")
     if step.flags & {"dr+", "dr-"} and name in TAKES and name not in TURNING:
         other = "DR"
