@@ -99,6 +99,7 @@ FRAMES = [
     case("polar with words left out and a probe", "G111 X5 Y5\nG1 AP=30 RP=10 F100\nMEAS=1 AP=60", L4=N, L5=P),
     case("arcs about the pole", "G111 X1 Y2\nG1 X11 F100\nG3 AP=90 RP=10\nG2 AP=0", L2=R, L4=R, L5=R, L6=R),
     case("an arc about the pole with a radius", "G111 X1 Y12\nG3 AP=90 RP=10 CR=9 F100\nG1 X5 Y5", L2=N, L4=N, L5=R),
+    case("polar and an axis of the plane", "G111 X5 Y5\nG1 AP=30 RP=10 X9 F100\nG0 X9 Y9 Z60", L4=N, L5=R),
     case("polar in diameters", "DIAMON\nG111 X5 Y5\nG1 AP=30 RP=10 F100\nX9 Y9", L5=N, L6=R),
     case("TRAORI", "TRAORI\nG1 X5 Y6 Z7 F100\nTRAFOOF\nG0 X1 Y1 Z50", L4=R, L6=R),
     case("turning, X not said", "G96 S100 M4\nG1 X6 F0.1\nDIAMOF\nX7\nG961\nX8", L4=N, L6=R, L8=R),

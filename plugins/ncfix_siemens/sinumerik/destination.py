@@ -19,6 +19,7 @@ RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM9
 POLAR = "NCF223"
 POLAR_DIAMETER = "polar coordinates (AP, RP) while X is a diameter"
 NO_POLE = "polar coordinates (AP, RP) while no pole is known"
+TWICE = "polar coordinates (AP, RP) beside {} in the plane: which of them counts is not sure"
 NO_RADIUS = "a polar radius (RP) of zero: the control takes the distance from the pole instead"
 ASIDE = "an angle (AP) that is left out, or an increment of AP or RP, where the axes have left the last polar position"
 TURN = 2 * math.pi
@@ -184,6 +185,10 @@ def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector
     A radius of zero means the distance of the start. A radius alone goes with the angle of the start, or with the last
     one; increments count from either. So the axes must stand where the last polar words have led them.
     """
+    plane = control.modal.plane
+    doubled = [letter for letter in "XYZ" if letter in words.values and INDEX[letter] in (plane.first, plane.second)]
+    if doubled:
+        return TWICE.format(doubled[0])
     if radius is not None and abs(radius) < NEAR_POLE:
         return NO_RADIUS
     forms = {address: counts_on(control, words.forms.get(address, "")) for address in POLAR_WORDS & words.values.keys()}
