@@ -191,3 +191,24 @@ def test_a_flat_program_would_have_the_numbers_of_one_position(machine: Machine)
         one = fix_flat(program, machine, replace(SETUP, block_skip=skipped), FixOptions())
         assert not one.report.refused
         assert end in one.text.decode() or f"X{int(end[1:]) - 1}.9" in one.text.decode()
+
+
+@pytest.mark.parametrize(
+    ("structure", "found"),
+    [
+        ("IF R1>4\nG1 X11\n/ELSE\nG1 X12\nENDIF", False),
+        ("/IF R1>4\nG1 X11\nELSE\nG1 X12\nENDIF", False),
+        ("FOR R2=1 TO 2\nG1 X=R2\n/ENDFOR", False),
+        ("/IF R1>4\n/G1 X11\n/ENDIF", True),
+    ],
+)
+def test_a_structure_of_which_a_part_is_skipped_is_not_followed(structure: str, found: bool, machine: Machine) -> None:
+    """Where ELSE is skipped the control looks for it, or does not: millimetres between the two."""
+    text = f"G17 G71 G90 G94 G54\nR1=2\nG1 X10 Y0 Z5 F500\n{structure}\nG1 X20 Y25 Z0\nM30\n"
+    if found:
+        assert fixed(text, machine, "siemens").changed
+    else:
+        with pytest.raises(SourceError) as raised:
+            fixed(text, machine, "siemens")
+        assert raised.value.code == "NCF230"
+    assert fixed(text, machine, "siemens", replace(SETUP, block_skip=False)).changed

@@ -12,7 +12,9 @@ from ncfix.text.tree import Expression, NamedParameter, NumberedParameter
 from ncfix_siemens.sinumerik.expressions import Key, Local, compiled
 from ncfix_siemens.sinumerik.plans import Branching, Letting
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.unit import SinumerikUnit
+from ncfix_siemens.sinumerik.unit import BROKEN, SinumerikUnit
+
+SKIPPED_PART = "a part of this structure is skipped by block delete (/): whether the control finds it there is not sure"
 
 
 class AtRuntimeError(Exception):
@@ -59,6 +61,8 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         if keyword in ("repeat", "repeatb") and step.label:
             return (self._section(step, here),)
 
+        self._check_whole(here)
+
         def past() -> int:
             return unit.others.get(here, unit.end_of(here, keyword)) + 1
 
@@ -81,6 +85,14 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
             case "endfor":
                 return (Jump(lambda: unit.begin_of(here, keyword) + 1, lambda: self._next(here)),)
         return ()
+
+    def _check_whole(self, here: int) -> None:
+        """Raise `Fault` where a part of the structure of a block is skipped: the control may not find it."""
+        unit = self.unit
+        for block in unit.parts_of(here) if unit.some_deletable else ():
+            skip = unit.plan(block).skip
+            if skip is not None and self.control.is_deleted(skip):
+                raise Fault(BROKEN, SKIPPED_PART)
 
     def holds(self, step: Branching) -> bool:
         """Whether a condition holds."""

@@ -48,6 +48,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
     ends        block of a structure's begin -> block of its end, and ELSE -> ENDIF
     others      block of an IF -> block of its ELSE, where it has one
     begins      block of a structure's end -> block of its begin
+    some_deletable  a part of a structure has / before it
     labels      label -> the blocks where it stands
     parameters  of its PROC
     saves       the PROC says SAVE: modal codes and frames of the caller come back
@@ -71,6 +72,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         self.ends: dict[int, int] = {}
         self.others: dict[int, int] = {}
         self.begins: dict[int, int] = {}
+        self.some_deletable = False
         self.labels: dict[str, list[int]] = {}
         self.parameters: tuple[ProcParameter, ...] = ()
         self.saves = False
@@ -119,6 +121,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
     def _note(self, step: Branching, steps: list[Branching], block: int, stack: list[tuple[str, int]]) -> None:
         keyword = step.keyword
         jumps = keyword == "if" and any(other.keyword.startswith("goto") for other in steps)
+        self.some_deletable |= self.plan(block).skip is not None
         if keyword == "label":
             self.labels.setdefault(step.label, []).append(block)
         elif keyword in OPENING and not jumps and not (keyword == "repeat" and step.label):
@@ -130,6 +133,12 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
             self.ends[begin], self.begins[block] = block, begin
             if begin in self.others:
                 self.ends[self.others[begin]] = block
+
+    def parts_of(self, block: int) -> tuple[int, ...]:
+        """The blocks of the structure that has a part in a block: where it begins, its ELSE, and its end."""
+        begin = next((each for each, other in self.others.items() if other == block), self.begins.get(block, block))
+        parts = begin, self.others.get(begin), self.ends.get(begin)
+        return tuple(each for each in parts if each is not None)
 
     def end_of(self, block: int, keyword: str) -> int:
         """Where the structure that begins in a block ends; raises `Fault` if it does not."""
