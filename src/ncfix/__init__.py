@@ -10,11 +10,12 @@ docs/api.md goes through the functions; `ncfix.api` has them. Nothing is importe
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 from ncfix.version import __version__ as __version__
 
+TYPE_CHECKING = False  # `typing` takes longer to import than all of this
 if TYPE_CHECKING:
+    from typing import Any
+
     from ncfix.api import calibrate as calibrate
     from ncfix.api import diagnose as diagnose
     from ncfix.api import emulate as emulate
