@@ -126,7 +126,7 @@ def test_a_fault_is_found_wherever_it_is(machine: Machine, texts: tuple[str, str
     """Square to the path, of less than the play, on a motion and at its ends."""
     before, after = (moves_of(text, machine) for text in texts)
     column = machine.axis_names.index("Z")
-    for row in range(3, len(after) - 1, 9):
+    for row in range(3, len(after) - 1, 27):
         end, start = after.end.copy(), after.start.copy()
         end[row, column] += size
         start[row + 1, column] += size
@@ -155,7 +155,7 @@ def test_arcs_and_rapids_and_several_axes_that_turn_at_once(machine: Machine, se
     """Arcs on which axes turn round, just behind their begin, too, and rapids in which corrections turn axes round."""
     rng, at = np.random.default_rng(seed), np.array([20.0, 20.0, 0.0])
     lines = ["G21 G90 G94 G17 F900", "G0 X20 Y20 Z5", "G1 Z0"]
-    for turn in range(12):
+    for turn in range(5):
         radius, angle, sweep = rng.uniform(2, LARGEST), rng.uniform(0, 2 * np.pi), rng.choice([0.05, 0.4, 3.0])
         centre = at[:2] - radius * np.array([np.cos(angle), np.sin(angle)])
         end = centre + radius * np.array([np.cos(angle + sweep), np.sin(angle + sweep)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -32,10 +33,12 @@ class Variant:
     controls: Controls
 
 
+SPARSER = int(os.environ.get("NCFIX_CORPUS", "3"))
+"""Every third of the files that each strategy is for; `NCFIX_CORPUS=1`: all of them."""
 VARIANTS = {
-    "rotary-then-linear, all offsets zero": Variant("rotary-then-linear", 1, Controls()),
-    "position, with work offsets and tools": Variant("position", 4, SETUP),
-    "full": Variant("full", 9, Controls()),
+    "rotary-then-linear, all offsets zero": Variant("rotary-then-linear", SPARSER, Controls()),
+    "position, with work offsets and tools": Variant("position", 4 * SPARSER, SETUP),
+    "full": Variant("full", 6 * SPARSER, Controls()),
 }
 REFUSED_SHARE = 0.02
 

@@ -12,7 +12,7 @@ from differential.errors import Machine
 from differential.generated import Study
 from differential.generator import Generator
 
-CASES = int(os.environ.get("NCFIX_GENERATED", "24"))
+CASES = int(os.environ.get("NCFIX_GENERATED", "12"))
 REFUSED_SHARE = 0.02
 
 

@@ -23,7 +23,7 @@ from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
 from ncfix.text.reader import read
 
-PROGRAMS = int(os.environ.get("NCFIX_SIEMENS", "8"))
+PROGRAMS = int(os.environ.get("NCFIX_SIEMENS", "4"))
 OFFSETS = {54: (0.0, 0.0, 60.0), 55: (5.0, -7.0, 70.0), 505: (-3.0, 4.0, 65.0)}
 LENGTHS = {1: 80.0, 2: 95.0}
 START = {"X": 0.0, "Y": 0.0, "Z": 250.0, "A": 0.0, "C": 0.0}

@@ -13,7 +13,7 @@ from differential.canon import Canon
 from differential.errors import Machine
 from differential.judge import Terms, judge
 
-CASES = int(os.environ.get("NCFIX_FUZZ", "240"))
+CASES = int(os.environ.get("NCFIX_FUZZ", "120"))
 JUDGED = 60
 HEAD = b"G21 G90 G17 G94 G54\nG0 X10 Y5 Z20\nF300\n"
 PIECES = (
