@@ -45,6 +45,29 @@ def test_switching_tcp_off_with_the_table_turned_is_followed() -> None:
     np.testing.assert_allclose(moves.end[-1, [x, y, z]], [0.0, -10.0, 200.0], atol=1e-9)
 
 
+@pytest.mark.parametrize("angle", [0.0, 90.0, 30.0])
+@pytest.mark.parametrize("dialect", ["iso", "fanuc"])
+@pytest.mark.parametrize(
+    "block", ["G53 G0 X30.", "G53 G0 Y-15.", "G53 G0 Z200.", "G53 G0 X5. Z150.", "G28 Z5.", "G28 X10."]
+)
+def test_axes_that_machine_coordinates_do_not_name_stand_still_under_tcp(
+    block: str, dialect: str, angle: float
+) -> None:
+    """A motion in machine coordinates moves the axes that it names, however the numbers of the tip change with it."""
+    text = f"G21 G90 G0 G43.4 H1 X10. Y0. Z5. C{angle}\n{block}\nM2\n"
+    machine = loads(ROTARY_TABLE)
+    moves = follow(read(text.encode(), "a.nc", dialect), machine, SETUP).trace.moves
+    kinematics, on, off = kinematics_of(machine), TcpState(True, 100.0), TcpState(False, 0.0)
+    assert kinematics is not None
+    start, end = (np.array(kinematics(each.tolist(), on, off)) for each in (moves.end[0], moves.end[-1]))
+    named = [letter in block for letter in moves.axes]
+    # affine maps of 256 mm probes in double precision
+    np.testing.assert_allclose(end[~np.array(named)], start[~np.array(named)], atol=1e-9)
+    words = {word[0]: float(word[1:]) for word in block.split() if word[0] in "XYZ"}
+    wanted = [0.0 if "G28" in block else words[letter] for letter in moves.axes if letter in words]
+    np.testing.assert_allclose(end[named], wanted, atol=1e-9)
+
+
 def test_kinematics_say_a_command_there_and_back() -> None:
     convert = kinematics_of(loads(ROTARY_TABLE))
     assert convert is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ncfix.control.coordinates import INDEX, N_LETTERS, Vector, mask_of, rotated
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import FeedMode, Motion, MotionKind, Pass, Passing, UnknownAxes
-from ncfix.control.tcp import from_machine
+from ncfix.control.tcp import led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.feeds import check_feed
 from ncfix_iso.rs274.systems import REFERENCES, is_given, store, stored
@@ -115,16 +115,15 @@ def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
 def reference_target(control: RS274Control, name: str, axes: int) -> tuple[Vector, UnknownAxes]:
     """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
     first = REFERENCES[name]
-    target, unknown = along(control, stored(control, first), axes), dict(control.unknown)
+    place, unsure = along(control, stored(control, first), axes), dict(control.unknown)
     for index in control.machine:
         if axes >> index & 1:
-            unknown.pop(index, None)
+            unsure.pop(index, None)
             given = is_given(control, first, index) and not control.parameters.is_unknown(first + index)
             if not given and not assumed(control, name):
-                unknown[index] = AFTER_REFERENCE
-    if control.tcp:
-        from_machine(control, target, unknown)
-    return target, unknown
+                unsure[index] = AFTER_REFERENCE
+    led = {i: place[i] for i in range(N_LETTERS) if axes >> i & 1 or place[i] != control.position[i]}
+    return led_in_machine(control, led, unsure)
 
 
 def along(control: RS274Control, point: Vector, axes: int) -> Vector:

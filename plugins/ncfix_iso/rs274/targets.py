@@ -11,7 +11,7 @@ import math
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, X, Y
 from ncfix.control.expressions import Fault, nominal
 from ncfix.control.moves import UnknownAxes
-from ncfix.control.tcp import from_machine
+from ncfix.control.tcp import led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import check_system
 
@@ -129,14 +129,6 @@ def by_radius_and_angle(control: RS274Control, block: Block, x: float, y: float)
 
 def machine_destination(control: RS274Control, block: Block) -> tuple[Vector, UnknownAxes]:
     """The command at which a motion in machine coordinates (G53) ends."""
-    target, unknown = control.position[:], dict(control.unknown)
-    for letter, value in block.values.items():
-        if letter in INDEX:
-            index = INDEX[letter]
-            target[index] = control.scale[index] * value
-            unknown.pop(index, None)
-            if letter in block.runtime:
-                unknown[index] = RUNTIME
-    if control.tcp:
-        from_machine(control, target, unknown)
-    return target, unknown
+    named = [letter for letter in block.values if letter in INDEX]
+    axes = {INDEX[letter]: control.scale[INDEX[letter]] * block.values[letter] for letter in named}
+    return led_in_machine(control, axes, {INDEX[letter]: RUNTIME for letter in named if letter in block.runtime})

@@ -11,6 +11,7 @@ axes that a correction has put beside their places.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
     from ncfix.control.moves import UnknownAxes
 
 
+FloatArray = NDArray[np.float64]
+
+MACHINE = TcpState(False, 0.0)
+
 TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
 
 
@@ -32,10 +37,29 @@ def rotary_at_zero(control: ProgramControl, position: Vector, unknown: UnknownAx
     return all(index not in unknown and abs(position[index]) < 1e-12 for index in control.turning)
 
 
-def from_machine(control: ProgramControl, target: Vector, unknown: UnknownAxes) -> None:
-    """Make a position of the axes one of tool-centre-point control, in place."""
-    if not converted(control, target, unknown, TcpState(False, 0.0), TcpState(True, control.tools.vector[Z])):
+def led_in_machine(
+    control: ProgramControl, axes: Mapping[int, float], unsure: UnknownAxes
+) -> tuple[Vector, UnknownAxes]:
+    """The command at which a motion ends that leads axes to places of the machine, while the others stand still.
+
+    axes    letter index -> where that axis of the machine goes, mm or rad
+    unsure  why that is not known, of those of which it is not
+
+    Under TCP the tip moves along other axes, too: the numbers of an axis that stands still change with the rest.
+    """
+    target, unknown = control.position[:], dict(control.unknown)
+    tip = TcpState(True, control.tools.vector[Z])
+    still = [index for index in (X, Y, Z) if index in control.machine and index not in axes]
+    if control.tcp and still and not converted(control, target, unknown, tip, MACHINE):
+        unknown |= dict.fromkeys(still, TURNED)
+    for index, value in axes.items():
+        target[index] = value
+        unknown.pop(index, None)
+        if index in unsure:
+            unknown[index] = unsure[index]
+    if control.tcp and not converted(control, target, unknown, MACHINE, tip):
         unknown |= {index: TURNED for index in (X, Y, Z) if index in control.machine}
+    return target, unknown
 
 
 def converted(
@@ -69,12 +93,8 @@ def switch(control: ProgramControl, tool: Vector, on: bool) -> None:
     control.tcp = on
 
 
-FloatArray = NDArray[np.float64]
-
 ALIKE = 1e-7
 """mm and rad; positions that are the same but for rounding."""
-
-MACHINE = TcpState(False, 0.0)
 
 
 def renamed(moves: Moves, row: int, position: FloatArray, kinematics: Kinematics | None) -> FloatArray | None:
