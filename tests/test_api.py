@@ -80,3 +80,10 @@ def test_subprograms_beside_a_program_and_of_a_text(shop: Path) -> None:
     found = ncfix.simulate(ncfix.read_program(Path("main.nc")), Path("machine.toml"), setup=SETUP)
     assert os.listdir(shop)
     assert found.max_um is not None
+
+
+def test_a_path_or_a_text_and_not_both() -> None:
+    for given in ({}, {"source": "part.nc", "text": "M30\n"}):
+        for function in (ncfix.read_program, ncfix.load_machine):
+            with pytest.raises(TypeError, match="a path or a text is needed, and not both"):
+                function(**given)

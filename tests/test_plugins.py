@@ -149,3 +149,19 @@ def test_the_built_in_controllers_are_ordinary_plugins() -> None:
     assert not found.problems
     assert {"iso", "linuxcnc"} <= set(plugins.registry("dialects"))
     assert {plugin.distribution for plugin in found.loaded if plugin.name in ("gcode", "linuxcnc")} == {"ncfix"}
+
+
+def test_a_dialect_that_cannot_be_is_told_with_its_plugin(install: Install, monkeypatch: pytest.MonkeyPatch) -> None:
+    derived = "from ncfix.plugin import SetTool, family, like\n" + (
+        'family("fanuc").derive("bad", title="Bad", codes={"G150": [SetTool("T"), like("G69")]})\n'
+    )
+    with pytest.warns(PluginWarning, match=r"NCF501: plugin 'bad' left out.*G150: like.* stands alone"):
+        collect([install("bad", derived)])
+    found = collect([install("suffixed", GOOD.replace('"iso.lark", ()', '"iso.lark", ("nak",)', 1))])
+    monkeypatch.setattr(plugins, "load_plugins", lambda: found)
+    plugins.leave.cache_clear()
+    with pytest.warns(
+        PluginWarning, match="NCF508: 'suffixed' of plugin 'suffixed' left out.*'nak' cannot be a suffix"
+    ):
+        things = plugins.registry("dialects")
+    assert list(things) == ["suffixed-too"]

@@ -41,16 +41,18 @@ if TYPE_CHECKING:
     Measured = Measurement | str | os.PathLike[str]
 
 PathName = str | os.PathLike[str]
+ONE_SOURCE = "a path or a text is needed, and not both"
 
 
 def load_machine(source: PathName | None = None, *, text: str | None = None) -> Machine:
     """The machine that a file, or a text in TOML, describes; raises `ConfigError` NCF3xx with all that is wrong."""
     from ncfix.machine import load, loads
 
-    if text is not None:
+    if source is not None and text is None:
+        return load(os.fspath(source))
+    if text is not None and source is None:
         return loads(text)
-    assert source is not None, "a path or a text is needed"
-    return load(os.fspath(source))
+    raise TypeError(ONE_SOURCE)
 
 
 def read_program(
@@ -69,12 +71,13 @@ def read_program(
     from ncfix.text.dialects import detect
     from ncfix.text.reader import read
 
-    path = "<program>" if source is None else os.fspath(source)
-    if text is None:
-        assert source is not None, "a path or a text is needed"
+    if source is not None and text is None:
+        path = os.fspath(source)
         content = read_bytes(path)
+    elif text is not None and source is None:
+        path, content = "<program>", text.encode("latin-1") if isinstance(text, str) else text
     else:
-        content = text.encode("latin-1") if isinstance(text, str) else text
+        raise TypeError(ONE_SOURCE)
     chosen = detect(content, path, (machine and machine.control) or "") if dialect is None else dialect
     return read(content, path, chosen)
 

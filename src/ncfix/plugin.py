@@ -28,6 +28,7 @@ from ncfix.text.dialect import TURNING as TURNING
 from ncfix.text.dialect import Dialect as Dialect
 
 if TYPE_CHECKING:
+    from ncfix.control.operations import ALL_AXES as ALL_AXES
     from ncfix.control.operations import CycleTable as CycleTable
     from ncfix.control.operations import Like as Like
     from ncfix.control.operations import Lose as Lose
@@ -90,7 +91,8 @@ if TYPE_CHECKING:
 HERE = ("FOREIGN", "TURNING", "Dialect", "Register", "family", "hookimpl")
 ELSEWHERE = {
     "ncfix.control.operations": (
-        *("CycleTable", "Like", "Lose", "Operation", "Rapid", "Refuse", "Resume", "SetTool", "Suspend", "like"),
+        *("ALL_AXES", "CycleTable", "Like", "Lose", "Operation", "Rapid", "Refuse", "Resume", "SetTool", "Suspend"),
+        "like",
     ),
     "ncfix.diagnostics": (
         *("Code", "ConfigError", "Message", "NcfixError", "Place", "RefusedError", "SourceError", "UsageError"),

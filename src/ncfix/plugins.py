@@ -118,7 +118,9 @@ def lacking(kind: str, thing: Any) -> str:
     if kind not in NEEDS:
         return "" if callable(thing) else "it cannot be called"
     absent = [name for name in NEEDS[kind] if not hasattr(thing, name)]
-    return f"it has no {', '.join(absent)}" if absent else ""
+    if absent:
+        return f"it has no {', '.join(absent)}"
+    return str(thing.complaint()) if kind == "dialects" and hasattr(thing, "complaint") else ""
 
 
 @cache

@@ -14,6 +14,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
 from ncfix.machine import load
+from ncfix.text.dialects import signature_rank
 from ncfix.text.reader import read
 
 PROGRAM = b"""O100
@@ -58,6 +59,15 @@ def test_a_program(folder: Path, root: Path, monkeypatch: pytest.MonkeyPatch) ->
         r"G177 X29\.\d+ Y29\.\d+ Z-10\.\d+ E1\.\d+ Q3\. F100\.\nX39\.\d+ Y34\.\d+ Z-10\.\d+ E\d\.\d+\n", text
     )
     assert "G168 X10. Y0. Z0. A0. B30. C0." in text
+
+
+@pytest.mark.parametrize("line", [b"G100 T5 X1.", b"N10 G100T5", b"G168 X0. A0. B1. C0.", b"G177 X1. Z-5. E2. Q3."])
+def test_a_text_shows_it(folder: Path, monkeypatch: pytest.MonkeyPatch, line: bytes) -> None:
+    monkeypatch.syspath_prepend(folder)
+    from ncfix_nakano import NAKANO
+
+    assert signature_rank(NAKANO, b"G21 G90\n" + line + b"\n") == 0
+    assert signature_rank(NAKANO, b"G100 X5.\nG1 (G100 T5)\nG1680 G177.1\n") is None
 
 
 def test_it_is_shown_in_the_document_and_short(folder: Path, root: Path) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from ncfix.cli.listings import own_codes
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.control.operations import CycleTable, Lose, Rapid, Refuse, Resume, SetTool, Suspend, like
+from ncfix.control.operations import ALL_AXES, CycleTable, Lose, Rapid, Refuse, Resume, SetTool, Suspend, like
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import PluginError, SourceError
@@ -136,6 +138,86 @@ def test_codes_that_no_dialect_can_have(code: str) -> None:
 def test_codes_in_a_language_that_takes_none() -> None:
     with pytest.raises(PluginError, match="takes none"):
         read(b"G0 X0\n", dialect=family("siemens").derive("x", title="X", codes={"G150": []}))
+
+
+WRONG = {
+    "like beside another": ({"codes": {"G150": [SetTool("T"), like("G69")]}}, "G150: like.* stands alone"),
+    "no operation": ({"codes": {"G150": ["G69"]}}, "'G69' is no operation"),
+    "a suffix without its point": ({"suffixes": ("nak",)}, "'nak' cannot be a suffix"),
+    "a suffix that is no tuple": ({"suffixes": ".nak"}, "'.' cannot be a suffix"),
+    "capital letters": ({"suffixes": (".NAK",)}, "'.NAK' cannot be a suffix"),
+    "a sign of comments": ({"comment": "' {}"}, "no comment can be written"),
+    "a comment without its text": ({"comment": "()"}, "no comment can be written"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_no_dialect_can_have(name: str) -> None:
+    changes, said = WRONG[name]
+    with pytest.raises(ValueError, match=f"x: .*{said}"):
+        OWN.derive("x", title="X", **changes)
+
+
+@pytest.mark.parametrize("comment", ["({})", "; {}", ";{}", "(NCFIX {})"])
+def test_signs_of_comments(comment: str) -> None:
+    assert OWN.derive("x", title="X", comment=comment).comment == comment
+
+
+@pytest.mark.parametrize("address", ["X", "B", "W", "G", "N", "TT", "t", ""])
+def test_addresses_that_are_no_tool(address: str) -> None:
+    with pytest.raises(ValueError, match="cannot be the address of a tool"):
+        SetTool(address)
+
+
+@pytest.mark.parametrize("axes", ["", "XQ", "x", "X Y"])
+def test_letters_that_are_no_axes(axes: str) -> None:
+    with pytest.raises(ValueError, match="are no axes"):
+        Lose(axes, "it")
+
+
+@pytest.mark.parametrize(
+    "field", [{"repeats": "X"}, {"repeats": ("K", "L")}, {"repeats": "E", "level": "E"}, {"needs": ("Q",)},
+              {"needs": "q"}, {"returns": "top"}],
+)  # fmt: skip
+def test_fields_that_no_cycle_has(field: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="cycle"):
+        CycleTable(**field)
+
+
+HOME = OWN.derive("home", title="Home", codes={"G110": [SetTool("T"), Lose(ALL_AXES, "the tool change (G110)")]})
+
+
+def test_all_axes_are_lost_until_each_is_named(dmu50: Machine) -> None:
+    lines = "F100.\nG110 T3\nG1 X6.\nG0 X1. Y1. Z5.\nB0. C0.\nG1 X7.\nM30\n"
+    moves = moves_of(f"G90 G54 G0 X0. Y0. Z10. B0. C0.\n{lines}", dmu50, HOME)
+    assert [Rule(rule) for rule in moves.rule] == [Rule.CORRECT, Rule.REFUSE, Rule.PASS, Rule.CORRECT, Rule.CORRECT]
+    assert "the tool change (G110)" in moves.reasons[moves.reason[1]]
+
+
+@pytest.mark.parametrize(("line", "known"), [("Z9.", True), ("G53 Z9.", True), ("G91 Z9.\nG90", False)])
+def test_how_a_lost_axis_becomes_known(dmu50: Machine, line: str, known: bool) -> None:
+    moves = moves_of(f"G90 G54 G0 X0. Y0. Z10. B0. C0.\nF100.\nG130\n{line}\nG1 X5.\nM30\n", dmu50)
+    assert (moves.rule[-1] == Rule.CORRECT) == known
+
+
+def test_a_tool_that_is_set_leaves_the_axes_where_they_are(dmu50: Machine) -> None:
+    moves = moves_of("G90 G54 G0 X0. Y0. Z10. B0. C0.\nF100.\nM160 T3\nG1 X6.\nM30\n", dmu50)
+    assert (moves.rule == Rule.CORRECT).all()
+    assert np.isclose(moves.start[1][dmu50.axis_names.index("Z")], 10.0)
+
+
+def test_motions_before_a_refusal_are_corrected(dmu50: Machine) -> None:
+    moves = moves_of("G90 G54 G0 X0. Y0. Z10. B0. C0.\nG1 X5. F100.\nG131\nX6.\nM30\n", dmu50)
+    assert [Rule(rule) for rule in moves.rule] == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]
+
+
+def test_what_own_codes_do_in_words() -> None:
+    assert own_codes(HOME)[-3:] == [
+        "G110: the tool T comes into the spindle; where the axes stand after the tool change (G110) is not known",
+        "G177: drilling cycle, level E, needs Q, returns to the level",
+        "G178: drilling cycle, level R, returns to the initial level, in its block only",
+    ]
+    assert {"G168: as G68.2, A as I, B as J, C as K, P0", "G187: moves nothing"} < {*own_codes(OWN)}
 
 
 @pytest.mark.parametrize("level", ["H", "L", "X", "EE"])

@@ -13,7 +13,7 @@ NAKANO = family("fanuc").derive(
     title="Nakano N7",
     grammar=str(Path(__file__).with_name("nakano.lark")),
     suffixes=(".nak",),
-    signature=(rb"(?im)^[^(;\n]*(?<![A-Z])G[ \t]*(?:100[ \t]*T|168|177)(?![\d.])",),
+    signature=(rb"(?im)^[^(;\n]*(?<![A-Z])G[ \t]*(?:100[ \t]*T|(?:168|177)(?![\d.]))",),
     line_limit=128,
     codes={
         "G100": [SetTool("T"), Rapid()],

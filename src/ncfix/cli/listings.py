@@ -55,10 +55,18 @@ def dialects(name: str | None, as_json: bool) -> None:
         lines = [f"{found[name].name}: {found[name].title}"]
         for field, heading in PARTS:
             lines += ["", heading, *(f"  {sentence}" for sentence in getattr(found[name], field))]
+        if own := own_codes(found[name]):
+            lines += ["", "codes of its own", *(f"  {sentence}" for sentence in own)]
         console.put("".join(f"{line}\n" for line in lines))
     else:
         rows = [(name, it.title, " ".join(it.suffixes)) for name, it in found.items()]
         console.table(("name", "title", "suffixes"), rows)
+
+
+def own_codes(dialect: Dialect) -> list[str]:
+    """What each code and cycle does that the dialect adds to those of its family."""
+    codes = ((code, "; ".join(map(str, operations)) or "moves nothing") for code, operations in dialect.codes)
+    return [f"{code}: {does}" for code, does in (*codes, *((code, str(table)) for code, table in dialect.cycles))]
 
 
 def all_codes() -> dict[str, Code]:

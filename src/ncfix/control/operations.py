@@ -5,6 +5,7 @@ and the account of path words hold for them as for any other code. A code is a f
 
     codes={
         "G100": [SetTool("T"), Rapid()],                       # change the tool, then go to the words in rapid
+        "G110": [SetTool("T"), Lose(ALL_AXES, "the tool change (G110)")],  # ... and stay where tools are changed
         "G168": [like("G68.2", I="A", J="B", K="C", P=0)],     # a tilted plane by other addresses
         "G120": [Suspend("scaling of the fixture (G120)")],    # a mode that is not followed ...
         "G121": [Resume("scaling of the fixture (G120)")],     # ... and its end
@@ -15,12 +16,13 @@ and the account of path words hold for them as for any other code. A code is a f
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
-from ncfix.control.coordinates import INDEX, Vector, mask_of
+from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of
 from ncfix.control.moves import Motion, MotionKind, UnknownAxes
 
 if TYPE_CHECKING:
@@ -28,6 +30,12 @@ if TYPE_CHECKING:
 
 LEVELS = "EIJQR"
 """Addresses that may give the level of a cycle: no code of the families has another use for them in its block."""
+REPEATS = "EKLP"
+"""Addresses that may say how often a cycle drills: their numbers are no lengths."""
+NO_WORDS = "GMNO"
+"""Addresses of codes and of names of blocks and programs."""
+ALL_AXES = LETTERS
+"""For `Lose`: all axes that the machine has."""
 LOST = "where the axis {{}} stands after {} is not known"
 NOT_FOLLOWED = "{} is in force, which ncfix does not follow"
 AFTER = "where the axis {{}} stands after {} is not followed"
@@ -59,6 +67,8 @@ class Operation(ABC):
 
     takes: ClassVar[bool] = False
     """It takes the axis words of its block, so that these make no other motion."""
+    alone: ClassVar[bool] = False
+    """It is all that its code does: no other operation stands beside it."""
 
     @abstractmethod
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
@@ -72,11 +82,17 @@ class Like(Operation):
     words  the family's address -> the own address whose word it gets, or a fixed number
     """
 
+    alone: ClassVar[bool] = True
+
     code: str
     words: tuple[tuple[str, str | float], ...] = ()
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """The family's code stands in its place wherever blocks are read: there is nothing left to do."""
+
+    def __str__(self) -> str:
+        given = (f"{own} as {known}" if isinstance(own, str) else f"{known}{own:g}" for known, own in self.words)
+        return f"as {self.code}" + "".join(f", {each}" for each in given)
 
 
 def like(code: str, **words: str | float) -> Like:
@@ -86,9 +102,20 @@ def like(code: str, **words: str | float) -> Like:
 
 @dataclass(frozen=True, slots=True)
 class SetTool(Operation):
-    """The tool that a word names is put into the spindle; the machine may go anywhere to change it."""
+    """The tool that a word names comes into the spindle, as with M6.
+
+    It does not mean that the axes go anywhere: their positions stay known, and motions after it are corrected from
+    there. It only means that no word is added for an axis until the program names that axis again. Where the code
+    leaves the axes at the place where tools are changed, `Lose` stands beside it.
+
+    address  of the word, no axis letter; without that word it is the tool that was selected last
+    """
 
     address: str = "T"
+
+    def __post_init__(self) -> None:
+        if not is_letters(self.address, LETTERS + NO_WORDS) or len(self.address) != 1:
+            raise ValueError(f"{self.address!r} cannot be the address of a tool: one letter, of no axis")
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
@@ -97,23 +124,36 @@ class SetTool(Operation):
         control.tools.spindle = control.tools.selected
         control.places.lose(mask_of(control.machine))
 
+    def __str__(self) -> str:
+        return f"the tool {self.address} comes into the spindle"
+
 
 @dataclass(frozen=True, slots=True)
 class Lose(Operation):
-    """Axes go where the program does not say: nothing is known of them until the program names them again.
+    """Axes go where the program does not say: motions at feed are refused until each is brought to a known place.
 
-    axes   letters
+    That is one that the program names in absolute or in machine coordinates, or a reference point.
+
+    axes   letters, linear and rotary; those that the machine lacks do not count. `ALL_AXES` for all
     after  after what, for messages: "the tool change (G100)"
     """
 
     axes: str
     after: str
 
+    def __post_init__(self) -> None:
+        if not is_letters(self.axes) or not {*self.axes} <= INDEX.keys():
+            raise ValueError(f"{self.axes!r} are no axes: letters of {LETTERS}, or ALL_AXES")
+
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         indices = [INDEX[letter] for letter in self.axes if INDEX[letter] in control.machine]
         control.lose(indices, LOST.format(self.after))
         control.places.lose(mask_of(indices))
+
+    def __str__(self) -> str:
+        axes = "the axes" if self.axes == ALL_AXES else f"the axes {' '.join(self.axes)}"
+        return f"where {axes} stand after {self.after} is not known"
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +170,9 @@ class Rapid(Operation):
             control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
             control.whole = whole
 
+    def __str__(self) -> str:
+        return "the axes go to the words of the block in rapid"
+
 
 @dataclass(frozen=True, slots=True)
 class Suspend(Operation):
@@ -140,6 +183,9 @@ class Suspend(Operation):
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         control.suspended[self.mode] = NOT_FOLLOWED.format(self.mode)
+
+    def __str__(self) -> str:
+        return f"motions are refused from here: {self.mode}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,16 +199,22 @@ class Resume(Operation):
         if control.suspended.pop(self.mode, None):
             control.lose(control.machine, AFTER.format(self.mode))
 
+    def __str__(self) -> str:
+        return f"the end of {self.mode}"
+
 
 @dataclass(frozen=True, slots=True)
 class Refuse(Operation):
-    """Every motion from here on is refused; `why` is told for each."""
+    """Every motion from here on is refused, those before it are not; `why` is told for each."""
 
     why: str
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         control.refusal = control.refusal or self.why
+
+    def __str__(self) -> str:
+        return f"motions are refused from here on: {self.why}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +225,7 @@ class CycleTable:
 
     level    the address of the level from which it feeds
     needs    addresses without which the control does not begin it
-    repeats  addresses that say how often it drills; empty: those of the family
+    repeats  addresses that say how often it drills, of E K L P; empty: those of the family
     returns  where it ends: "mode" (as G98 and G99 say), "level", or "initial" (where the series of holes began)
     modal    it stays in force until G80 or another motion code
     """
@@ -185,9 +237,28 @@ class CycleTable:
     modal: bool = True
 
     def __post_init__(self) -> None:
-        if len(self.level) != 1 or self.level not in LEVELS:
+        if not isinstance(self.level, str) or len(self.level) != 1 or self.level not in LEVELS:
             raise ValueError(f"{self.level!r} cannot be the address of the level of a cycle: one of {LEVELS}")
+        if self.needs != "" and not is_letters(self.needs, NO_WORDS):
+            raise ValueError(f'{self.needs!r} are not the addresses that a cycle needs: letters in a string, "QP"')
+        if self.repeats != "" and (not is_letters(self.repeats, self.level) or not {*self.repeats} <= {*REPEATS}):
+            text = f"{self.repeats!r} cannot be the addresses of the repeats of a cycle"
+            raise ValueError(f"{text}: letters of {REPEATS} in a string, not the level's")
+        if self.returns not in ("mode", "level", "initial"):
+            raise ValueError(f'a cycle returns to {self.returns!r}: "mode", "level" or "initial"')
+
+    def __str__(self) -> str:
+        needs = f", needs {' '.join(self.needs)}" if self.needs else ""
+        ends = {"mode": "as G98 and G99 say", "level": "to the level", "initial": "to the initial level"}[self.returns]
+        count = f", repeats by {' or '.join(self.repeats)}" if self.repeats else ""
+        once = "" if self.modal else ", in its block only"
+        return f"drilling cycle, level {self.level}{needs}{count}, returns {ends}{once}"
 
     def ends_at_level(self, mode: bool) -> bool:
         """Whether it ends at the level; `mode`: G99 is in force."""
         return mode if self.returns == "mode" else self.returns == "level"
+
+
+def is_letters(text: object, but: str = "") -> bool:
+    """Whether it is a string of capital letters, one at least, none of these."""
+    return isinstance(text, str) and re.fullmatch("[A-Z]+", text) is not None and not {*text} & {*but}

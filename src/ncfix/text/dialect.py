@@ -43,6 +43,9 @@ CODE = re.compile(r"[GM]\d{1,4}(\.\d)?")
 FIXED = frozenset({"G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G53", "G80", "G90", "G91"})
 """Codes whose meaning the reader and the writer rely on: no dialect may give them another."""
 
+COMMENT = re.compile(r"\([^(){}]*\{\}[^(){}]*\)|;[^{}\r\n]*\{\}[^{}\r\n]*")
+"""How the comments of the families may be written: their readers know `(...)` and `;`, whatever a grammar says."""
+
 HINTS = {LATHE: "lathe programs are followed where they say what X is: LinuxCNC (G7, G8), Siemens (DIAMON, DIAMOF)"}
 """What helps with a language that is refused by name, where it is another thing than to name the dialect."""
 
@@ -121,19 +124,15 @@ class Dialect:
         changes  of any other field. Without them its suffixes and signatures are none, so that programs are only read
                  as this if the machine file or --dialect says so
 
-        Raises ValueError for a code that is none, or whose meaning the reader and the writer rely on.
+        Raises ValueError for what cannot be: see `complaint`, and a sign of comments that the language does not read.
         """
         own = {code: tuple(operations) for code, operations in (codes or {}).items()}
         drills = dict(cycles or {})
-        for code in (*own, *drills):
-            cannot = code in drills or any(operation.takes for operation in own[code])
-            if not CODE.fullmatch(code) or code in FIXED or (code.startswith("M") and cannot):
-                raise ValueError(f"{name}: {code!r} cannot be a code of a dialect's own")
         if both := own.keys() & drills.keys():
             raise ValueError(f"{name}: {min(both)} cannot be a code and a cycle")
         before = {code: operations for code, operations in self.codes if code not in drills}
         tables = {code: table for code, table in self.cycles if code not in own}
-        return replace(
+        made = replace(
             self,
             name=name,
             title=title,
@@ -141,3 +140,24 @@ class Dialect:
             cycles=tuple((tables | drills).items()),
             **{"suffixes": (), "signature": (), "variant_of": self.variant_of or self.name, **changes},
         )
+        if complaint := made.complaint():
+            raise ValueError(f"{name}: {complaint}")
+        if made.language == self.language and not COMMENT.fullmatch(made.comment):
+            raise ValueError(f'{name}: no comment can be written as {made.comment!r}: "({{}})" or "; {{}}"')
+        return made
+
+    def complaint(self) -> str:
+        """What is wrong with its suffixes, codes and cycles; empty if nothing is."""
+        for suffix in self.suffixes:
+            if not suffix.startswith(".") or suffix != suffix.lower() or len(suffix) < 2:
+                return f"{suffix!r} cannot be a suffix: lower case, with the point"
+        drills = [code for code, _ in self.cycles]
+        for code, operations in (*self.codes, *((code, ()) for code in drills)):
+            if wrong := [each for each in operations if not hasattr(each, "carry_out")]:
+                return f"{code}: {wrong[0]!r} is no operation"
+            cannot = code in drills or any(operation.takes for operation in operations)
+            if not CODE.fullmatch(code) or code in FIXED or (code.startswith("M") and cannot):
+                return f"{code!r} cannot be a code of a dialect's own"
+            if len(operations) > 1 and any(operation.alone for operation in operations):
+                return f"{code}: like(...) stands alone in its list"
+        return ""
