@@ -27,7 +27,7 @@ LINUXCNC = Dialect(
     understands=(
         "G0 G1 G2 G3 with centre or radius, helices, full circles, G17 G18 G19",
         "G90 G91, G20 G21, modal words and codes",
-        "G54 ... G59.3, G52, G92, G10 L2 L20, G68 G69, tool lengths (G43, G43.1, G43.2, G49)",
+        "G54 ... G59.3, G52, G92, G10 L2 L20 (also with R), tool lengths (G43, G43.1, G43.2, G49)",
         "canned cycles G73 G74 G81 ... G89, G98 G99",
         "O-words, parameters and expressions; blocks executed from several states with --flatten",
         "G41 G42: the programmed contour is corrected, the control offsets it",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 from dataclasses import replace
@@ -9,11 +10,28 @@ from pathlib import Path
 
 import pytest
 
+from ncfix.compensate.following import follow
+from ncfix.control.setup import Setup
+from ncfix.diagnostics import NcfixError
+from ncfix.machine import load
 from ncfix.text.dialects import check_content, detect, get, names
 from ncfix.text.grammar import find_grammar, parser
 from ncfix.text.reader import read
 from ncfix.text.tree import Word
 from program.lanes import assert_read_right
+
+FIVE_AXES = Path(__file__).parents[2] / "examples/machines/wCAYFXZSt.toml"
+
+
+@pytest.mark.parametrize("name", names())
+def test_codes_that_a_dialect_says_it_understands_are_codes_of_it(name: str) -> None:
+    dialect, machine = get(name), load(str(FIVE_AXES))
+    for code in {code for line in dialect.understands for code in re.findall(r"\bG\d+(?:\.\d+)?\b", line)}:
+        program = read(f"G21 G90\nG0 X1 Y1 Z50\n{code}\nM2\n".encode(), "part.nc", dialect)
+        try:
+            follow(program, machine, Setup(assume_zero=True))
+        except NcfixError as error:
+            assert error.messages[0].code != "NCF227", f"{name}: {error.messages[0].text}"
 
 
 def test_the_built_in_dialects_are_there() -> None:
