@@ -1,17 +1,15 @@
 """Parts of plain straight motions, which is what long programs are made of: planned and written in few passes.
 
-The same plan that `path` and `solve` make, with all left out that such a part cannot need: there are no cycles in it,
-no axes without words, nothing that is refused, tool-centre-point control (TCP) is on in all of it or nowhere, and every
-motion begins where the one before ended. Whatever turns out to need more than that, or comes near to a limit, is for
-the long way. Both ways write the same bytes; a test holds them together.
+The plan is that of `path` and `solve` without what such a part cannot need: it has no cycles, no axes without words and
+nothing that is refused, tool-centre-point control (TCP) is on in all of it or nowhere, and each motion begins where the
+one before ended. What needs more, or comes near to a limit, goes the long way. Both write the same bytes, tests say.
 
-With TCP X Y Z of a command are the tip's, the linear axes follow it and do not go straight from one end to the other; a
-bound of how far they stray tells whether they may leave their travel on the way.
+With TCP X Y Z of a command are the tip's. The linear axes follow it, and not straight: a bound of how far they stray
+tells whether they may leave their travel on the way.
 
-The few arcs, dwells and turns of rotary axes among plain motions are mostly planned with these: an arc that stays one,
-a dwell between motions that end where they shall, a turn. What is more than that is planned by the long way, as a short
-program of its own: each with the motion before it, so that it begins where it shall, and the one behind it, which may
-have to begin somewhere else than it would behind a plain motion.
+Most of the few arcs, dwells and turns of rotary axes among plain motions are planned with these: an arc that stays
+one, a dwell between motions that end where they shall, a turn. The others are planned the long way, each as a short
+program with the motion before it and the one behind it.
 """
 
 from __future__ import annotations
@@ -82,8 +80,8 @@ class MotionEnds:
         """From the commands of a program; None where axes under TCP may not reach every point, or stray by no bound."""
         if led and not (moves_as_one(machine) and skew(machine) is not None):
             return None
-        poses = cls(machine, tool_length, led, commands, commands)
-        return replace(poses, meant=poses.joints(commands)) if led else poses
+        ends = cls(machine, tool_length, led, commands, commands)
+        return replace(ends, meant=ends.joints(commands)) if led else ends
 
     def joints(self, commands: Array) -> Array:
         """The axis positions that follow from commands (k, n_axes)."""
@@ -176,8 +174,7 @@ def by_the_long_way(
     near = distinct(np.concatenate([odd - 1, odd, odd + 1]))
     few = taken(moves, near)
     agreed = agree(few, machine, dialect, options)
-    still = few.kind == MotionKind.DWELL
-    if agreed.reasons or agreed.plan.findings or (agreed.kept != still).any():
+    if agreed.reasons or agreed.plan.findings or (agreed.kept != (few.kind == MotionKind.DWELL)).any():
         return None
     pieces = agreed.plan.pieces
     own = ~(plain[near] & plain[near - 1])

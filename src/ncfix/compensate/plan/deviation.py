@@ -1,8 +1,8 @@
 """How far a real machine leaves the intended path: looked at for the plan, and as figures before and after.
 
-Actual and intended tip are compared at the same fraction of a motion (see `intent`). For the plan motions are looked at
-as closely as is needed to tell whether they stay within the tolerance. For figures, motions of canned cycles and rapids
-are looked at where they end, all others along the way: as densely as the error model may bend, and at its kinks.
+Actual and intended tip are compared at the same fraction of a motion (see `intent`): for the plan as closely as is
+needed to tell whether motions stay within the tolerance; for figures where cycles and rapids end, and along all other
+motions as densely as the error model may bend, and at its kinks.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ def deviations(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolera
 
     uneasy  (n,) motions that may not begin where they should: they are looked at there too
 
-    Motions that cannot be off by over half of the tolerance, by a bound, need no look. Short ones of the others get one
-    sample in the middle at first. Those that are off by so much are looked at again, as closely as the error model may
-    bend. Of those that are too long for it the deviation is infinite.
+    Motions that by a bound are off by less than half of the tolerance need no look. Short ones of the others get one
+    sample in the middle. Those off by more there are looked at as closely as the error model may bend; infinite where
+    they are too long for that.
     """
     worst = bounds(intent, real, rows, uneasy)
     unknown = np.flatnonzero(~(worst <= SURE * tolerance))
@@ -149,8 +149,7 @@ def straight_bounds(
     """As `bounds`, of straight motions (k, n_axes) between corrected ends, with `shifts` of their linear axes there."""
     most_far = np.maximum(farthest(start), farthest(end))
     least, angle = bow.of(np.abs(end - start), most_far, float(np.abs(tool_lengths).max()), ~linear)
-    before, after = shifts
-    sizes = [lengths(each) for each in (before, after, after - before)]
+    sizes = [lengths(each) for each in (*shifts, shifts[1] - shifts[0])]
     turned = (np.maximum(sizes[0], sizes[1]) * angle + 2 * sizes[2]) * angle
     most: Array = least + CORNER * turned / 8 + CLOSE
     return most
@@ -186,8 +185,7 @@ def beside(intent: Intent, real: Segments, rows: Index) -> Array | None:
         return None
     assert intent.wordless is not None
     counts, fraction = interior(intent, real, on, FIRST, 1)
-    move = on[owners(counts)]
-    result = np.zeros(intent.wordless.shape)
+    move, result = on[owners(counts)], np.zeros(intent.wordless.shape)
     for part in slices(len(move), PLANNED_BATCH):
         which, at = move[part], fraction[part]
         off = np.abs(intent.guessed(real, which, at) - real.at(which, at))
@@ -202,9 +200,8 @@ def uneasy_starts(intent: Intent, kept: Mask) -> Mask:
     """
     moves = intent.moves
     uneasy = np.ones(len(moves), dtype=bool)
-    joined = every(moves.start[1:] == moves.end[:-1])
-    same = moves.tool_length[1:] == moves.tool_length[:-1]
-    uneasy[1:] = kept[:-1] | ~joined | ~same
+    joined = every(moves.start[1:] == moves.end[:-1]) & (moves.tool_length[1:] == moves.tool_length[:-1])
+    uneasy[1:] = kept[:-1] | ~joined
     if intent.arrival is not None:
         rows = np.arange(1, len(moves))
         now = intent.direction(rows, np.full(len(rows), INSTANT))
@@ -295,8 +292,7 @@ def path_error(
     tally, which = FigureTally(), np.flatnonzero(chosen & (moves.kind != MotionKind.DWELL)[pieces.move])
     for part in samples(written, which, density, tilts, known):
         tally.add(part)
-    found = _beside(written, chosen)
-    if found is not None:
+    if (found := _beside(written, chosen)) is not None:
         tally.add(found)
     return tally.result()
 
