@@ -396,7 +396,7 @@ def check_name(way: str, path: str) -> None:
             raise UsageError.of("NCF023", problem, Place(path), NAME_HINT)
 
 
-def alike(path: str) -> str:
+def folded_name(path: str) -> str:
     """The same for all names that some file system takes for one: case and composed letters make no difference."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", path).casefold())
 

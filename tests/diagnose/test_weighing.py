@@ -43,7 +43,7 @@ def five() -> World:
     return World.of("wCBXFZYSt", 1, 80)
 
 
-def heard(world: World, shown: Array, seed: int = 0) -> Evidence:
+def evidence_of(world: World, shown: Array, seed: int = 0) -> Evidence:
     """The named groups before data with this in them."""
     seen = residual_data([world.measured(shown, np.random.default_rng(seed), stated=True)], world.machine)
     background = estimated_background(seen, everything_covariance(seen, world.visible.groups), seen.relative)
@@ -52,7 +52,7 @@ def heard(world: World, shown: Array, seed: int = 0) -> Evidence:
 
 @pytest.fixture(scope="module")
 def evidence(world: World) -> Evidence:
-    return heard(world, np.zeros(len(world.data.y)))
+    return evidence_of(world, np.zeros(len(world.data.y)))
 
 
 def test_noise_alone_rarely_weighs_more_than_nothing(evidence: Evidence) -> None:
@@ -104,7 +104,7 @@ def test_members_that_are_free_are_no_names(evidence: Evidence) -> None:
 
 
 def test_an_effect_is_selected_with_its_runners_up(world: World) -> None:
-    scale = Comparison(heard(world, world.effect("lateral play EZX", SIZE_UM, np.random.default_rng(3))))
+    scale = Comparison(evidence_of(world, world.effect("lateral play EZX", SIZE_UM, np.random.default_rng(3))))
     found = with_alternatives(scale, select(scale, scale.names))
     assert found.named == ["lateral play EZX"]
     assert max(found.runners_up["lateral play EZX"].values()) < found.odds["lateral play EZX"]

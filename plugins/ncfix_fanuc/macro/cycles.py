@@ -21,7 +21,7 @@ def cycle(control: RS274Control, block: Block, code: int) -> None:
     modal, across = control.modal, control.modal.plane.across
     if not modal.incremental and not control.offset_checked:
         check_system(control)
-    control.settle(tuple(control.unknown))
+    control.use_start_positions(tuple(control.unknown))
     program = control.program_position()
     initial = program[across] if modal.cycle.initial is None else modal.cycle.initial
     take_levels(control, block, initial, control.rules.level_of(code))

@@ -60,7 +60,7 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
         if code in TIP_CONTROL:
             note_turned(control)
     lengths.tool_offset(control, block, SAME.get(code, code))
-    if control.tools.vector[Z] != before and "Z" not in block.values and not settled(control):
+    if control.tools.vector[Z] != before and "Z" not in block.values and not z_is_named_first(control):
         control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
 
 
@@ -74,7 +74,7 @@ def direct(control: MacroControl, block: Block, code: int) -> None:
             control.suspended[INCLINED] = INCLINED
 
 
-def settled(control: MacroControl) -> bool:
+def z_is_named_first(control: MacroControl) -> bool:
     """Whether Z is named, or the program ends, before anything else moves: then nothing rests on where Z stands."""
     for shape in control.coming():
         words = {word.address for word in shape.words}

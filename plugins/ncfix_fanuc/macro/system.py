@@ -52,7 +52,7 @@ def positions(control: MacroControl) -> dict[int, Getter]:
 
 def machine_position(control: MacroControl, index: int) -> float:
     """Where an axis stands in machine coordinates, program units."""
-    control.settle((index,))
+    control.use_start_positions((index,))
     return control.position[index] / control.unit_of(index)
 
 

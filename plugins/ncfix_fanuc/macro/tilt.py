@@ -173,7 +173,7 @@ def align(control: MacroControl, block: Block, code: int) -> None:
 
     In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece.
     """
-    control.settle(control.turning)
+    control.use_start_positions(control.turning)
     found = postures(control, normal_of(control.rotation))
     target, lost = control.position[:], set[int]()
     if found is not None and found.ways:
@@ -228,7 +228,7 @@ def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
         return
     machine = None
     if not (control.mirrored or control.is_rotated):
-        control.settle(control.turning)
+        control.use_start_positions(control.turning)
         known = not control.unknown.keys() & {*control.turning}
         machine = machine_directions(control, control.position) if known else None
     if machine is None:

@@ -48,7 +48,7 @@ def directed(control: MacroControl, block: Block, motion: int) -> str:
         return AT_RUNTIME
     if control.pointing is None:
         return NO_KINEMATICS
-    control.settle(axes)
+    control.use_start_positions(axes)
     if control.unknown.keys() & set(axes):
         return FROM_UNKNOWN
     found = postures(control, wanted(control, block), WayRules(in_travel=True))

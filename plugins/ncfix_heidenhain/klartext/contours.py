@@ -74,7 +74,7 @@ def worked_out(
     """The contour that begins with a block."""
     blocks = list(blocks_of_contour(unit, first))
     keys = [(unit.external, block) for block in blocks]
-    control.settle((X, Y))
+    control.use_start_positions((X, Y))
     lost = X in control.unknown or Y in control.unknown or changes_pole(control)
     if lost or control.cycle.modal or any(unit.plan(block).skip for block in blocks):
         return dict.fromkeys(keys)

@@ -203,13 +203,13 @@ class KlartextControl(base.ProgramControl):
             self.whole = True
         super().make(motion)
         if self.is_rotated:
-            self.places.settle(self._settles(motion))
+            self.places.place(self._placed_by(motion))
         self.whole = whole
 
-    def _settles(self, motion: Motion) -> int:
+    def _placed_by(self, motion: Motion) -> int:
         """As of every control; a cycle with depths from the datum says where the tool axis stands, too."""
-        if motion.settles is not None:
-            return motion.settles
+        if motion.placed is not None:
+            return motion.placed
         own = motion.axes | (1 << Z if motion.code == BY_DEPTH else 0)
         machine = motion.passing is not None and motion.passing.rule is Pass.MACHINE_COORDINATES
         return 0 if self.modal.incremental or machine else own

@@ -113,7 +113,7 @@ def call(control: KlartextControl, step: Step) -> None:
     if cycle.number not in DRILLING | MILLING | OLD_DRILLING:
         own_path(control, step)
         return
-    control.settle(tuple(control.unknown))
+    control.use_start_positions(tuple(control.unknown))
     is_polar = step.name == "lp"
     where = polar(control, step.words)[0] if is_polar else led(control, step.words)
     axes = polar_axes(control, step.words) if is_polar else step.words.axes
@@ -140,7 +140,7 @@ def pattern(control: KlartextControl, places: tuple[HolePosition, ...] | None, n
         reason = PATTERN.format(name) if places is None else OWN_PATH.format(control.cycle.number)
         control.refuse_here(reason)
         return
-    control.settle(tuple(control.unknown))
+    control.use_start_positions(tuple(control.unknown))
     control.budget.spend(len(places))
     for place in places:
         where = led(control, MotionWords({"X": place.x, "Y": place.y}, frozenset()))

@@ -151,9 +151,9 @@ def take(control: KlartextControl, stage: KlartextBlockRows, unit: KlartextUnit,
         if sided.any():
             control.builder.many_rest(np.where(sided, resting_of_many(control, mask, starts, ends), 0))
         plane = plane_of(control)
-        adrift = control.places.adrift | np.where(sided & (mask & plane == 0), plane, 0)
+        unplaced = control.places.unplaced | np.where(sided & (mask & plane == 0), plane, 0)
         control.builder.circles(circles._replace(row=np.searchsorted(moving, circles.row)))
-        control.builder.extend(MotionColumns(blocks, mask, styles, stage.feed[moving], starts, ends, adrift))
+        control.builder.extend(MotionColumns(blocks, mask, styles, stage.feed[moving], starts, ends, unplaced))
         control.position = ends[-1].tolist()
         keep_tangent(control, stage.path, circles)
     keep_pole(control, unit, block, shapes)

@@ -85,7 +85,7 @@ def straight_polar(control: KlartextControl, step: Step) -> None:
 def name_polar(control: KlartextControl, step: Step) -> None:
     """PR and PA say where the axes of the plane are as well as their own words."""
     if {"PR", "PA"} <= step.words.values.keys():
-        control.places.settle(mask_of((control.path.plane.first, control.path.plane.second)))
+        control.places.place(mask_of((control.path.plane.first, control.path.plane.second)))
 
 
 def run(

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from ncfix.control.control import ADRIFT
+from ncfix.control.control import UNPLACED
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import AT_START, UnknownAxes
@@ -91,7 +91,7 @@ def destination(control: KlartextControl, words: MotionWords) -> tuple[Vector, U
 def led(control: KlartextControl, words: MotionWords) -> Where:
     """The position to which the words of axes lead."""
     if words.incremental:
-        settle(control, words)
+        use_start_of(control, words)
     where = here(control)
     for address, value in words.values.items():
         letter = address.removeprefix("I")
@@ -116,15 +116,15 @@ def derived(control: KlartextControl, words: MotionWords, axes: int) -> str:
     Directions of the tool say where its axes go. Polar words, and arcs of which an end has one word, count from a place
     that the program may not have said.
     """
-    if not control.places.adrift:
+    if not control.places.unplaced:
         return ""
     own = words.axes
     if {"PR", "PA"} <= words.values.keys():
         own |= polar_axes(control, words)
     if words.values.keys() & {"TX", "TY", "TZ"}:
         own |= mask_of(control.turning)
-    index = next((i for i in control.machine if (axes & ~own & control.places.adrift) >> i & 1), None)
-    return "" if index is None else ADRIFT.format(LETTERS[index])
+    index = next((i for i in control.machine if (axes & ~own & control.places.unplaced) >> i & 1), None)
+    return "" if index is None else UNPLACED.format(LETTERS[index])
 
 
 def by_spatial_angles(control: KlartextControl, words: MotionWords, where: Where) -> None:
@@ -133,12 +133,12 @@ def by_spatial_angles(control: KlartextControl, words: MotionWords, where: Where
         where.unknown |= dict.fromkeys(control.turning, SPATIAL)
 
 
-def settle(control: KlartextControl, words: MotionWords) -> None:
+def use_start_of(control: KlartextControl, words: MotionWords) -> None:
     """Increments count from where axes stand: start positions that matter are asked for."""
     wanted = [INDEX[address[1:]] for address in words.values if address[0] == "I" and address[1:] in INDEX]
     if control.is_rotated:
         wanted = list(control.machine)
-    control.settle(wanted)
+    control.use_start_positions(wanted)
 
 
 def command_of(control: KlartextControl, where: Where, axes: int) -> tuple[Vector, UnknownAxes]:
@@ -197,7 +197,7 @@ def polar(control: KlartextControl, words: MotionWords) -> tuple[Where, float | 
     if path.pole is None:
         raise Fault(BAD_POLE, "polar coordinates, and no pole (CC) is known")
     plane, (first, second) = path.plane, path.pole
-    control.settle((plane.first, plane.second))
+    control.use_start_positions((plane.first, plane.second))
     start = here(control)
     where = led(control, words)
     away = start.inner[plane.first] - first, start.inner[plane.second] - second
@@ -246,5 +246,5 @@ def polar_axes(control: KlartextControl, words: MotionWords) -> int:
 
 def starts_unknown(control: KlartextControl) -> bool:
     """Where the motion begins is not known in X Y Z."""
-    control.settle([index for index, why in control.unknown.items() if why is AT_START])
+    control.use_start_positions([index for index, why in control.unknown.items() if why is AT_START])
     return any(index in control.unknown for index in (X, Y, Z) if index in control.machine)

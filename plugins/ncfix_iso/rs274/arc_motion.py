@@ -25,7 +25,7 @@ def arc(control: RS274Control, block: Block, code: int) -> None:
     control.modal.motion = code
     plane = control.modal.plane
     check_words(control, block, plane)
-    control.settle(tuple(control.unknown))
+    control.use_start_positions(tuple(control.unknown))
     target, unknown = destination(control, block)
     step = control.in_frame([b - a for a, b in zip(control.position, target, strict=True)])
     end = step[plane.first], step[plane.second]

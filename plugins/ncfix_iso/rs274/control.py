@@ -154,6 +154,6 @@ class RS274Control(shared.ProgramControl):
 
     def coordinate(self, index: int) -> Value:
         """Where an axis stands in program units, X not as a diameter; marked where it is known only at run time."""
-        self.settle((index,))
+        self.use_start_positions((index,))
         value = self.program_position()[index] / self.unit_of(index)
         return Unknown(LETTERS[index], value) if index in self.unknown or index in self.composed.unknown else value

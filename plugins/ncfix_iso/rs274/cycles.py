@@ -28,7 +28,7 @@ def cycle(control: RS274Control, block: Block, code: int) -> None:
     check_cycle(control, block, code)
     if not modal.incremental and not control.offset_checked:
         check_system(control)
-    control.settle(tuple(control.unknown))
+    control.use_start_positions(tuple(control.unknown))
     take_words(control, block, code, plane)
     program = control.program_position()
     initial = program[plane.across] if modal.cycle.initial is None else modal.cycle.initial
@@ -133,14 +133,14 @@ def drill(
         program[across] = r
         control.builder.approach(command(control, block, program))
     program[across] = depth
-    bottom, adrift = command(control, block, program), control.places.adrift
-    settles = 0 if control.modal.incremental else block.axes | 1 << across
+    bottom, unplaced = command(control, block, program), control.places.unplaced
+    placed = 0 if control.modal.incremental else block.axes | 1 << across
     if control.rules.strict:
         control.builder.rests(mask_of(control.turning))
-    control.make(Motion(MotionKind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, settles=settles))
+    control.make(Motion(MotionKind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, placed=placed))
     at_level = control.rules.ends_at_level(code, control.modal.retract_to_r)
     if not at_level:
-        control.places.lose(adrift & 1 << across)
+        control.places.lose(unplaced & 1 << across)
     program[across] = clear
     control.position = command(control, block, program)
     if height is not None and not at_level:

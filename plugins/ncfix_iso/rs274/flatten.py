@@ -122,8 +122,8 @@ class RS274Flattener(Flattener):
 
     def must_stand(self, axes: int) -> None:
         """Raise `Fault` where absolute words would have to say where an axis stands, and the program has not."""
-        adrift = self.control.places.adrift & axes
-        index = next((index for index in self.control.machine if adrift >> index & 1), None)
+        unplaced = self.control.places.unplaced & axes
+        index = next((index for index in self.control.machine if unplaced >> index & 1), None)
         if index is not None:
             what = f"the program has not said where the axis {LETTERS[index]} stands"
             raise Fault(RUNTIME, f"{what}, so it cannot be written out flat")
@@ -235,8 +235,8 @@ class RS274Flattener(Flattener):
         plane = self.control.modal.plane
         if self.control.modal.incremental:
             self.must_stand(block.axes | 1 << plane.across)
-        adrift = self.control.places.adrift & ~block.axes
-        known = [i for i in (plane.first, plane.second) if not adrift >> i & 1]
+        unplaced = self.control.places.unplaced & ~block.axes
+        known = [i for i in (plane.first, plane.second) if not unplaced >> i & 1]
         over = "".join(LETTERS[i] for i in known if LETTERS[i] in self.steps)
         across = LETTERS[plane.across]
         named = "".join(x for x in LETTERS if block.axes >> INDEX[x] & 1 and x in self.steps and x not in over)

@@ -145,7 +145,7 @@ def set_tool(control: RS274Control, block: Block, kind: int) -> None:
         return
     length = control.modal.unit * block.values["Z"]
     if kind != 1:
-        control.settle((Z,))
+        control.use_start_positions((Z,))
         system = control.modal.system if kind == 10 else len(SYSTEM_NAMES)
         shift = control.frames.additive.shift[Z] + control.frames.local.shift[Z] if kind == 10 else 0.0
         length = control.position[Z] - stored(control, first_parameter(system))[Z] - shift - length

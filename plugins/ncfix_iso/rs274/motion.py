@@ -145,7 +145,7 @@ def assumed(control: RS274Control, name: str) -> bool:
 
 def save_reference(control: RS274Control, block: Block, code: int) -> None:
     """G28.1 and G30.1: the position becomes the reference point."""
-    control.settle(tuple(control.unknown))
+    control.use_start_positions(tuple(control.unknown))
     first = REFERENCES[f"G{code // 10}"]
     for index, value in enumerate(control.position):
         store(control, first, index, value, index in control.unknown)

@@ -261,7 +261,7 @@ def origin_for_position(control: RS274Control, block: Block, system: int, origin
     """The origin with which the control stands at the words of the block in that system, and where it is doubtful."""
     turn = turn_of(control, system)
     involved = {*words_of(block), *((X, Y) if turn is not IDENTITY and block.axes & 3 else ())}
-    control.settle(tuple(involved))
+    control.use_start_positions(tuple(involved))
     outer = [p - o - t for p, o, t in zip(control.position, origin, control.tools.vector, strict=True)]
     shifts = zip(control.frames.additive.shift, control.frames.local.shift, strict=True)
     now = [a - s - local for a, (s, local) in zip(rotated(transposed(turn), outer), shifts, strict=True)]
@@ -300,7 +300,7 @@ def shift_system(control: RS274Control, block: Block, code: int) -> None:
     control.parameters.assign(SHIFT_ACTIVE, float(code in (520, 920, 923)))
     compose(control)
     if code == 920:
-        control.places.settle(mask_of(words_of(block)))
+        control.places.place(mask_of(words_of(block)))
     elif code == 520:
         control.places.shift(mask_of(words_of(block)))
     else:
@@ -325,7 +325,7 @@ def set_shift(control: RS274Control, block: Block, *, from_position: bool) -> No
     """The shift that the words ask for."""
     shift = [*control.frames.additive.shift]
     if from_position:
-        control.settle(tuple(control.unknown) if control.is_rotated else words_of(block))
+        control.use_start_positions(tuple(control.unknown) if control.is_rotated else words_of(block))
     position = control.program_position()
     doubtful = {*control.unknown, *control.composed.unknown} if from_position else set()
     for index in words_of(block):
@@ -374,7 +374,7 @@ def turn_about_point(control: RS274Control, block: Block, before: Rotation) -> N
             step = centre[index] if control.modal.incremental else 0.0
             centre[index] = control.scale[index] * block.values[letter] + step
         else:
-            control.settle((index,))
+            control.use_start_positions((index,))
     if block.runtime or control.unknown.keys() & {plane.first, plane.second}:
         control.refusal = control.refusal or "the centre or angle of a rotation (G68) is known only at run time"
     turned = turned_about(product(before, about(plane, block.get("R"))), centre)

@@ -31,7 +31,7 @@ STRAIGHT = 1e-9
 
 def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     """CT with its end; TURN adds full turns."""
-    control.settle_all()
+    control.use_all_start_positions()
     end, heading, plane = destination(control, words), control.heading, control.modal.plane
     why = tangent_refusal(words)
     step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
@@ -101,7 +101,7 @@ def misled(control: Sinumerik, words: BlockWordValues, name: str, taken: frozens
 
 def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """An arc, helix or full circle by its centre, radius or opening angle."""
-    control.settle_all()
+    control.use_all_start_positions()
     end = destination(control, words)
     doubtful = bool(end.unknown or control.unknown or words.runtime("I", "J", "K", "CR", "AR", "TURN"))
     clockwise, plane = code == CLOCKWISE, control.modal.plane
@@ -227,7 +227,7 @@ def circle_of(control: Sinumerik, plane: Plane, centre: Point, sweep: float) -> 
 
 def through_point(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """CIP: the circle through the start, the point I1 J1 K1 and the end, in any plane."""
-    control.settle_all()
+    control.use_all_start_positions()
     end = destination(control, words)
     why = VIA_AT_RUNTIME if words.runtime(*VIA, "TURN") else doubtful_diameter(control, words, "I1")
     if why:

@@ -215,7 +215,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
         return
     take_up(control)
     mind_carried(control)
-    control.settle_all()
+    control.use_all_start_positions()
     here = End(control.position[:], dict(control.unknown), dict(control.lost))
     drill(control, BlockWordValues(block, {}, {}, 0), here, drilling, refusal=WITH_WORDS if words.axes else "")
 
@@ -253,11 +253,11 @@ def drill(
     depth, clear = drilling.depth, drilling.clear
     bottom = over if depth is None else at_height(control, over, depth)
     counted = sum(1 << index for index in control.counted_words(words))
-    settles = (stated & ~counted) | (1 << across if depth is not None else 0)
+    placed = (stated & ~counted) | (1 << across if depth is not None else 0)
     control.builder.called(drilling.call(control, words.block, modal=modal))
     code = control.modal.motion
     control.go(
-        ProgrammedMotion(MotionKind.CYCLE, words, bottom, code if code >= 0 else 10, refusal=refusal, settles=settles)
+        ProgrammedMotion(MotionKind.CYCLE, words, bottom, code if code >= 0 else 10, refusal=refusal, placed=placed)
     )
     control.heading = None
     if clear is None or depth is None:

@@ -82,7 +82,7 @@ class ProgrammedMotion(NamedTuple):
 
     code        the motion code, in tenths
     refusal, passing, arc  as in `Motion`
-    settles     as there; None: the axes of its words, but for increments, and none where the motion is passed
+    placed     as there; None: the axes of its words, but for increments, and none where the motion is passed
     by_machine  the words are machine coordinates
     """
 
@@ -93,7 +93,7 @@ class ProgrammedMotion(NamedTuple):
     refusal: str = ""
     passing: Passing | None = None
     arc: Arc | None = None
-    settles: int | None = None
+    placed: int | None = None
     by_machine: bool = False
 
 
@@ -258,9 +258,9 @@ def set_pole(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
     """Where the axes of the plane stand in the frame; None where that is not known."""
     here, plane = control.program_position(), control.modal.plane
-    control.settle_all()
+    control.use_all_start_positions()
     axes = plane.first, plane.second
-    if control.lost.keys() & {*axes} or control.places.adrift & mask_of(axes):
+    if control.lost.keys() & {*axes} or control.places.unplaced & mask_of(axes):
         return None
     return None if any(unsteady(control, index) for index in axes) else (here[plane.first], here[plane.second])
 

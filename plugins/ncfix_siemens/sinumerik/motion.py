@@ -82,7 +82,7 @@ def moved(control: Sinumerik, words: BlockWordValues, special: frozenset[str]) -
     oriented(control, words)
     drilling = control.modes.modal_cycle
     if drilling is not None and not special and code not in OTHER_WAYS:
-        control.settle_all()
+        control.use_all_start_positions()
         drill(control, words, destination(control, words), drilling, refusal=refusal_of(control, words), modal=True)
     else:
         words.refusal = words.refusal or (TO_A_HOLE if drilling is not None else "")
@@ -151,7 +151,7 @@ def refusal_of(control: Sinumerik, words: BlockWordValues) -> str:
 
 def refused(control: Sinumerik, words: BlockWordValues, code: int, why: str) -> None:
     """A motion that is followed only as far as its end."""
-    control.settle_all()
+    control.use_all_start_positions()
     control.go(ProgrammedMotion(MotionKind.FEED, words, destination(control, words), code, refusal=why))
 
 

@@ -93,7 +93,7 @@ def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
     wanted = by_angles(control, words) if any(address in words.values for address in ANGLES) else by_vector(words)
     if wanted is None:
         return WHICH_ANGLES
-    control.settle_all()
+    control.use_all_start_positions()
     if control.unknown.keys() & {*control.turning}:
         return FROM_UNKNOWN.format(LETTERS[control.machine[control.pointing.columns[0]]])
     found = postures(control, direction_of(control, wanted))

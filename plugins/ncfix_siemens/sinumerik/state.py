@@ -287,12 +287,12 @@ class Sinumerik(ProgramControl):
         super().refuse_here(reason)
         self.lose_all(AFTER_THAT.format(reason))
 
-    def settle_all(self) -> None:
+    def use_all_start_positions(self) -> None:
         """All start positions matter: they are given, or lacking and taken as zero."""
-        self.settle(tuple(self.unknown))
-        self.forget_settled()
+        self.use_start_positions(tuple(self.unknown))
+        self.forget_unknown()
 
-    def forget_settled(self) -> None:
+    def forget_unknown(self) -> None:
         """Coordinates whose start position has been asked for are known."""
         self.lost = {index: why for index, why in self.lost.items() if why is not AT_START or index in self.unknown}
 
@@ -301,9 +301,9 @@ class Sinumerik(ProgramControl):
     def go(self, leg: ProgrammedMotion) -> None:
         """Make a motion of a block, and keep where it leads in coordinates of the program."""
         words, end = leg.words, leg.end
-        axes, settles = self._axes_of(words), leg.settles
-        if settles is None:
-            settles = 0 if leg.passing else axes & ~mask_of(self.counted_words(words))
+        axes, placed = self._axes_of(words), leg.placed
+        if placed is None:
+            placed = 0 if leg.passing else axes & ~mask_of(self.counted_words(words))
         self.lost, self.fresh_tool = end.lost, False
         refusal, self.whole = leg.refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
         sure = (letter for letter, form in words.forms.items() if form in TURNING and letter in INDEX)
@@ -312,10 +312,10 @@ class Sinumerik(ProgramControl):
         if follows:
             self.ask_for_length()
         heading.note(self, leg, follows=follows)
-        self.make(Motion(leg.kind, axes, end.target, end.unknown, leg.code, refusal, leg.passing, leg.arc, settles))
+        self.make(Motion(leg.kind, axes, end.target, end.unknown, leg.code, refusal, leg.passing, leg.arc, placed))
         self.whole = False
         stand(self, axes, by_machine=leg.by_machine)
-        self.forget_settled()
+        self.forget_unknown()
 
     def _axes_of(self, words: BlockWordValues) -> int:
         """The axes that a block names, as bits: polar coordinates name both axes of the plane."""

@@ -154,7 +154,7 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
 
 def level(control: Sinumerik, plane: SwivelPlane) -> None:
     """A plane that is not turned, while the rotary axes stand still: as they stand, the tool has to be square to it."""
-    control.settle(control.turning)
+    control.use_start_positions(control.turning)
     whole = control.frames.plane.then(plane.frame) if plane.adds else plane.frame
     if whole.rotation != WORLD.rotation or not rotary_at_zero(control, control.position, control.unknown):
         control.suspended["tilt"] = UNFOLLOWED.format(STILL)

@@ -74,7 +74,7 @@ class FixJob:
         options = (__version__, self.machine.hash, self.setup, self.dialect, self.options, digest_of(target.source))
         return text_digest(repr(options).encode())
 
-    def heard(self, target: OutputTarget) -> tuple[FixOutcome, list[str]]:
+    def outcome_and_messages(self, target: OutputTarget) -> tuple[FixOutcome, list[str]]:
         """Fix one program elsewhere: what came of it, and what there is to say."""
         with console.keeping() as said:
             return self.outcome(target), said
@@ -259,7 +259,7 @@ class Batch:
             for target in rest:
                 yield self.job.outcome(target, jobs)
             return
-        for outcome, said in results_in_order(self.job.heard, rest, make, jobs, _lost):
+        for outcome, said in results_in_order(self.job.outcome_and_messages, rest, make, jobs, _lost):
             for line in said:
                 console.say(line)
             yield outcome

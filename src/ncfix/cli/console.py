@@ -272,7 +272,7 @@ def abandon_stdout() -> None:
     _abandon(sys.stdout)
 
 
-def settle() -> None:
+def abandon_unwritable() -> None:
     """Point streams at nothing that still hold what could not be written: Python's exit would fail on that (120)."""
     for stream in (sys.stdout, sys.stderr):
         try:

@@ -113,7 +113,7 @@ def main() -> None:
     if not sys.warnoptions and "--debug" not in sys.argv:
         warnings.simplefilter("ignore", RuntimeWarning)
     code = run(sys.argv[1:])
-    console.settle()
+    console.abandon_unwritable()
     gc.freeze()  # what is left ends with the process, and need not be gone through for cycles
     sys.exit(code)
 

@@ -202,7 +202,7 @@ def _check_clash(found: Sequence[OutputTarget]) -> None:
     """Refuse outputs that are one file, here or on a computer that does not tell large letters from small ones."""
     same: dict[object, list[OutputTarget]] = {}
     for target in found:
-        same.setdefault((target.in_place and _file(target.path)) or files.alike(target.path), []).append(target)
+        same.setdefault((target.in_place and _file(target.path)) or files.folded_name(target.path), []).append(target)
     for group in same.values():
         if len(group) > 1:
             sources = ", ".join(target.source for target in group)

@@ -20,7 +20,14 @@ from ncfix.compensate.account import Reason
 from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import PathError
 from ncfix.compensate.plan.findings import Finding
-from ncfix.compensate.solve import Agreed, PrecedingMotion, SelfCheckError, Settled, differences, settle
+from ncfix.compensate.solve import (
+    AcceptedPlan,
+    PrecedingMotion,
+    SelfCheckError,
+    WrittenPlan,
+    differences,
+    plan_and_write,
+)
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.standing import BLOCK_DELETE, named_switches
@@ -165,23 +172,23 @@ def most_moves(positions: Sequence[SwitchSetting]) -> int:
     return max(len(each.trace.moves) for each in positions)
 
 
-def worst_findings(every: Sequence[Settled]) -> list[tuple[Finding, ...]]:
+def worst_findings(every: Sequence[WrittenPlan]) -> list[tuple[Finding, ...]]:
     """The findings in each position, each block's only where its figure is the largest of all of them."""
     if len(every) == 1:
         return [every[0].plan.findings]
     worst, where = dict[tuple[str, int], float](), dict[tuple[str, int], tuple[int, int]]()
-    for position, settled in enumerate(every):
-        for finding in settled.plan.findings:
+    for position, solution in enumerate(every):
+        for finding in solution.plan.findings:
             for row, value in zip(finding.moves.tolist(), finding.values.tolist(), strict=True):
-                key = finding.code, int(settled.moves.block[row])
+                key = finding.code, int(solution.moves.block[row])
                 if key not in worst or value > worst[key]:
                     worst[key], where[key] = value, (position, row)
     return [
         tuple(
-            finding.among([where[finding.code, int(settled.moves.block[row])] == (k, row) for row in finding.moves])
-            for finding in settled.plan.findings
+            finding.among([where[finding.code, int(solution.moves.block[row])] == (k, row) for row in finding.moves])
+            for finding in solution.plan.findings
         )
-        for k, settled in enumerate(every)
+        for k, solution in enumerate(every)
     ]
 
 
@@ -213,41 +220,43 @@ def not_in_all(why: Exception, program: Program) -> RefusedError:
 
 @dataclass(frozen=True, slots=True)
 class Together:
-    """What is settled for each position, and the text of all.
+    """The plan for each position, and the text of all.
 
     added_blocks  lines added
     """
 
-    settled: tuple[Settled, ...]
+    plans: tuple[WrittenPlan, ...]
     splices: Splices
     added_blocks: int
 
 
-def settle_together(
+def plan_and_write_all(
     program: Program,
     moves: Sequence[Moves],
     machine: Machine,
     options: FixOptions,
     readings: Readings,
     before: PrecedingMotion | None = None,
-    first: Agreed | None = None,
+    first: AcceptedPlan | None = None,
 ) -> Together:
-    """Settle a program in all positions, so that they agree on the text; `moves` and `readings` of each of them.
+    """Plan and write a program so that all positions agree on the text; `moves` and `readings` of each of them.
 
-    before, first  of a program in one position, see `settle`
+    before, first  of a program in one position, see `plan_and_write`
     """
     if len(moves) == 1:
-        settled = settle(program, moves[0], machine, options, readings[0], before, first)
-        return Together((settled,), settled.emission.splices, settled.emission.added_blocks)
+        solution = plan_and_write(program, moves[0], machine, options, readings[0], before, first)
+        return Together((solution,), solution.emission.splices, solution.emission.added_blocks)
     refused, whole, spelled = dict[int, Reason](), _starting_elsewhere(moves), dict[int, Mask]()
     while True:
-        found: list[Settled] = []
+        found: list[WrittenPlan] = []
         for k, own in enumerate(moves):
             twin = next((j for j in range(k) if equal(own, moves[j]) and equal(readings[k], readings[j])), None)
             if twin is not None:
                 found.append(found[twin])
                 continue
-            found.append(settle(program, _held(own, whole, spelled), machine, options, readings[k], refused=refused))
+            found.append(
+                plan_and_write(program, _held(own, whole, spelled), machine, options, readings[k], refused=refused)
+            )
         more = {block: why for each in found for block, why in each.reasons.items()}
         if more.keys() > refused.keys():
             refused = more
@@ -280,7 +289,7 @@ def _held(moves: Moves, whole: set[int], spelled: Mapping[int, Mask]) -> Moves:
     return replace(moves, spelled=named & ~moves.programmed)
 
 
-def _named(found: Sequence[Settled], block: int) -> Mask:
+def _named(found: Sequence[WrittenPlan], block: int) -> Mask:
     """(n_axes,) the axes that a block leads anywhere, in any position."""
     axes = np.zeros(len(found[0].moves.axes), dtype=np.bool_)
     for each in found:
@@ -310,7 +319,7 @@ def _differing(moves: Sequence[Moves], edits: Sequence[Mapping[int, Edits]]) -> 
     return differing
 
 
-def _merged(found: Sequence[Settled], edits: Sequence[Mapping[int, Edits]]) -> Together:
+def _merged(found: Sequence[WrittenPlan], edits: Sequence[Mapping[int, Edits]]) -> Together:
     """The text of all positions: they agree on blocks that several of them execute."""
     wanted = {block: own for done in edits for block, own in done.items()}
     every = [edit for block in sorted(wanted) for edit in wanted[block]]
@@ -376,19 +385,19 @@ class WholeProof:
             raise not_in_all(why, self.program) from why
 
     def _taught(self, together: Together, text: bytes) -> Readings | None:
-        pairs = list(zip(together.settled, (self._again(text, each) for each in self.follows), strict=True))
-        wrong = [differences(settled, again) for settled, again in pairs]
+        pairs = list(zip(together.plans, (self._again(text, each) for each in self.follows), strict=True))
+        wrong = [differences(solution, again) for solution, again in pairs]
         at = next((k for k, each in enumerate(wrong) if each.any()), None)
         if at is None:
             return None
         self.attempts -= 1
         if not self.attempts:
-            (settled, again), piece = pairs[at], int(np.argmax(wrong[at]))
-            pieces, move = settled.plan.pieces, int(settled.plan.pieces.move[piece])
-            meant = settled.moves.end[move] if pieces.kept[piece] else settled.emission.end[piece]
-            line = self.program.line(int(settled.moves.block[move]))
+            (solution, again), piece = pairs[at], int(np.argmax(wrong[at]))
+            pieces, move = solution.plan.pieces, int(solution.plan.pieces.move[piece])
+            meant = solution.moves.end[move] if pieces.kept[piece] else solution.emission.end[piece]
+            line = self.program.line(int(solution.moves.block[move]))
             raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {meant}")
-        return [SecondReading.of(again, settled.plan.pieces) for settled, again in pairs]
+        return [SecondReading.of(again, solution.plan.pieces) for solution, again in pairs]
 
     def _again(self, text: bytes, follow: Callable[[Program], Trace]) -> Moves:
         try:

@@ -120,8 +120,8 @@ class Survey:
             if block >= 0:
                 self.refused.append(Message("NCF432", moves.reasons[moves.reason[row]], program.place(block)))
         if self.machine is not None:
-            adrift = (moves.kind == MotionKind.ARC) & ~np.isfinite(moves.centre).all(axis=1)
-            kept = (moves.rule == Rule.PASS) | ~np.isfinite(moves.end).all(axis=1) | adrift
+            lost_centre = (moves.kind == MotionKind.ARC) & ~np.isfinite(moves.centre).all(axis=1)
+            kept = (moves.rule == Rule.PASS) | ~np.isfinite(moves.end).all(axis=1) | lost_centre
             for finding in findings(self.machine, moves, untouched(moves, kept).pieces):
                 self.travel.add(finding, program, moves, position=position)
 

@@ -29,8 +29,8 @@ from ncfix.compensate.block_delete import (
     WholeProof,
     assumed_of,
     messages_of,
+    plan_and_write_all,
     positions_of,
-    settle_together,
     stamped,
 )
 from ncfix.compensate.following import (
@@ -53,8 +53,8 @@ from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import PathError, path_error
 from ncfix.compensate.plan.offset import is_offset
 from ncfix.compensate.report import FixReport, Tally, in_lines
-from ncfix.compensate.solve import Agreed, PrecedingMotion, Settled, agree, increments
-from ncfix.compensate.workers import Ground, Read, Share, crew
+from ncfix.compensate.solve import AcceptedPlan, PrecedingMotion, WrittenPlan, accepted_plan, increments
+from ncfix.compensate.workers import Ground, Read, Share, worker_pool
 from ncfix.control.flatten import flatten
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
@@ -141,35 +141,35 @@ class Corrector:
         self,
         unit: ProgramPart,
         moves: Sequence[Moves],
-        agreed: Agreed | None = None,
+        accepted: AcceptedPlan | None = None,
         before: PrecedingMotion | None = None,
         leave: Callable[[PrecedingMotion, int], object] = _nobody,
     ) -> ProvedPart:
         """Settle, write, prove and count a part.
 
         moves   its motions, in each position of block delete
-        agreed  the plan to begin with, if that has been made already
+        accepted  the plan to begin with, if that has been made already
         before  what the part before has left
         leave   is told what this one leaves, and how long its text is, before it is proved
         """
         task, part = self.task, unit.together
         readings: Readings | None = [None] * len(moves)
         while readings is not None:
-            together = settle_together(part.program, moves, self.machine, task.options, readings, before, agreed)
-            settled = together.settled[0]
-            if before is not None and (settled.unmoored or settled.kept[0] != before.kept):
+            together = plan_and_write_all(part.program, moves, self.machine, task.options, readings, before, accepted)
+            solution = together.plans[0]
+            if before is not None and (solution.unmoored or solution.kept[0] != before.kept):
                 raise NotInPartsError("a refusal reaches back into an earlier part")
             text = self._text(part.program, together.splices, before is None)
             if not part.last:
-                leave(PrecedingMotion.of(settled.rounds, np.zeros(len(settled.moves.axes), dtype=np.int8)), len(text))
+                leave(PrecedingMotion.of(solution.rounds, np.zeros(len(solution.moves.axes), dtype=np.int8)), len(text))
             readings = self.proof.taught(unit, together, text)
         own, tally = None, Tally(self.machine.least_increment[0])
         if unit.head is not None:
-            own = np.ones(len(settled.moves), dtype=bool)
+            own = np.ones(len(solution.moves), dtype=bool)
             own[:1] = False
         tally.add(part.program, together, own, self.machine)
         if task.options.verify:
-            errors = [(each.moves, self._tip_errors(each, own, unit)) for each in together.settled]
+            errors = [(each.moves, self._tip_errors(each, own, unit)) for each in together.plans]
             self.note(tally, part.program, *errors)
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
@@ -186,18 +186,18 @@ class Corrector:
         self.stamped = edit.text
         return spliced(program.source, Splices.joined([splices, Splices.of([edit])]))
 
-    def _tip_errors(self, settled: Settled, own: Mask | None, unit: ProgramPart) -> PathError:
+    def _tip_errors(self, solution: WrittenPlan, own: Mask | None, unit: ProgramPart) -> PathError:
         """Tip errors before and after, with the numbers as the control will understand them; of motions `own` (n,)."""
-        emission, shown = settled.emission, settled.shown(self.task.options.split_rapids)
+        emission, shown = solution.emission, solution.shown(self.task.options.split_rapids)
         return path_error(
             self.machine,
-            settled.moves,
-            replace(settled.plan.pieces, end=emission.end, centre=emission.centre),
+            solution.moves,
+            replace(solution.plan.pieces, end=emission.end, centre=emission.centre),
             emission.start,
             state=State() if unit.head is None else State(direction=unit.direction),
             rows=shown if own is None else own & shown,
             tilts=False,
-            known=settled.plan.known,
+            known=solution.plan.known,
         )
 
     def note(self, tally: Tally, program: Program, *errors: tuple[Moves, PathError]) -> None:
@@ -323,7 +323,7 @@ class PartCorrector(Corrector):
         if unit.head is not None and is_offset(unit.head.moves).any():
             raise NotInPartsError("the control offsets a contour from one part into the next")
         course = None if self.planner is None else self.planner.plan(unit)
-        agreed = None if course is not None else self._agreed(unit)
+        accepted = None if course is not None else self._accepted_plan(unit)
         before = share.before(number)
         if before is not None and foreign:
             self.parts_proof.follower.stand(before.position)
@@ -331,12 +331,12 @@ class PartCorrector(Corrector):
             plain = written(self.language, course, before.position, increments(self.machine))
             if plain is not None:
                 return self._plainly(course, plain, number, share)
-        agreed, moves = agreed or self._agreed(unit), unit.together.moves
+        accepted, moves = accepted or self._accepted_plan(unit), unit.together.moves
         if before is not None:
             before, (first, *_) = replace(before, direction=unit.direction), before.rounds
             if first.kept.any() or (moves.wordless[0] & (first.shift != 0)).any():
-                agreed = None  # the motion before was left as it was, or an axis goes on standing off its place
-        return self.correct(unit, [moves], agreed, before, partial(share.leave, number))
+                accepted = None  # the motion before was left as it was, or an axis goes on standing off its place
+        return self.correct(unit, [moves], accepted, before, partial(share.leave, number))
 
     def _plainly(self, course: PlainPlan, plain: Emission, number: int, share: Share) -> ProvedPart:
         """Finish a part of plain motions."""
@@ -346,20 +346,20 @@ class PartCorrector(Corrector):
             shift = course.real.start[-1] - moves.start[-1]
             left = PrecedingMotion.steady(shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy())
             share.leave(number, left, len(text))
-        settled = course.settled(plain)
-        self.parts_proof.check(part, settled, text, plain.splices)
+        solution = course.written_plan(plain)
+        self.parts_proof.check(part, solution, text, plain.splices)
         tally = Tally(self.machine.least_increment[0])
-        tally.add_plain(part.program, settled, largest_shift(course, plain), course.intent)
+        tally.add_plain(part.program, solution, largest_shift(course, plain), course.intent)
         if self.task.options.verify:
             self.note(tally, part.program, (moves, figures(course, plain, self.task.options.split_rapids)))
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
-    def _agreed(self, unit: ProgramPart) -> Agreed:
+    def _accepted_plan(self, unit: ProgramPart) -> AcceptedPlan:
         """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
         part = unit.together
         nowhere = np.zeros(len(part.moves.axes))
         guess = None if unit.head is None else PrecedingMotion.steady(nowhere, unit.direction, nowhere)
-        return agree(part.moves, self.machine, self.task.dialect, self.task.options, guess)
+        return accepted_plan(part.moves, self.machine, self.task.dialect, self.task.options, guess)
 
     def report(self, tally: Tally, suspicion: tuple[Message, ...]) -> FixReport:
         """The report of all parts."""
@@ -417,7 +417,7 @@ class Stream:
         task = self.task
         task.check()
         task.follower()
-        with crew(self.jobs, partial(PartCorrector, task), self.ground) as others:
+        with worker_pool(self.jobs, partial(PartCorrector, task), self.ground) as others:
             own = self.corrector = PartCorrector(task, others.spread(self.read))
             for number, done in own.work(others.share):
                 others.put(number, done)

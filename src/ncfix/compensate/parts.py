@@ -19,8 +19,8 @@ from ncfix.compensate.plan.arrays import Index, Mask
 from ncfix.compensate.plan.deviation import PathError
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs, matters
-from ncfix.compensate.solve import SelfCheckError, Settled, differences
-from ncfix.compensate.workers import Passage, Read, Share
+from ncfix.compensate.solve import SelfCheckError, WrittenPlan, differences
+from ncfix.compensate.workers import PartCheckpoint, Read, Share
 from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.trace import Follower, NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
@@ -38,13 +38,13 @@ MOST_PENDING = 64
 class Part:
     """Text that can be worked on: a program that ends where it may, its motions, and whether it is the last.
 
-    passage  what stands before it has been passed over, see there
+    checkpoint  what stands before it has been passed over, see there
     """
 
     program: Program
     moves: Moves
     last: bool
-    passage: Passage | None = None
+    checkpoint: PartCheckpoint | None = None
 
     @property
     def lines(self) -> Index:
@@ -83,17 +83,17 @@ class Parts:
     def parts(self) -> Iterator[Part]:
         """The text in parts that end where they may."""
         pending: list[tuple[Program, Moves]] = []
-        for program, last, passage in self._texts():
+        for program, last, checkpoint in self._texts():
             refuse_stamped(program, self.options)
             self.reader.first_line += program.lines_ended
             self.blocks += len(program)
             self.follower.watched = self.share.shares(self.found)
             pending.append((program, self.follower.follow(program, last)))
-            self.led = bool(pending[-1][1].tcp.any()) if passage is None else passage.led
+            self.led = bool(pending[-1][1].tcp.any()) if checkpoint is None else checkpoint.led
             last |= self.follower.ended
-            if passage is not None:
+            if checkpoint is not None:
                 self.found += 1
-                yield Part(*pending.pop(), last, passage)
+                yield Part(*pending.pop(), last, checkpoint)
                 continue
             if not last and not _ends_clean(*pending[-1]):
                 self._tell(None)
@@ -102,7 +102,7 @@ class Parts:
                 continue
             programs = [each for each, _ in pending]
             moves = joined_moves([each for _, each in pending], [len(each) for each in programs])
-            self._tell(None if last or len(pending) > 1 else self._passage(*pending[0]))
+            self._tell(None if last or len(pending) > 1 else self._checkpoint(*pending[0]))
             if last:
                 self._check_rest()
             self.found += 1
@@ -123,28 +123,28 @@ class Parts:
             count += not text and not ended
         return count
 
-    def _tell(self, passage: Passage | None) -> None:
+    def _tell(self, checkpoint: PartCheckpoint | None) -> None:
         """Tell others of an own part, once: before more text is read, which the first process may wait to hand out."""
         if self.share.shares(self.found) and self.told < self.found:
             self.told = self.found
-            self.share.announce(self.found, passage)
+            self.share.announce(self.found, checkpoint)
 
-    def _passage(self, program: Program, moves: Moves) -> Passage | None:
+    def _checkpoint(self, program: Program, moves: Moves) -> PartCheckpoint | None:
         """What others have to know of a part; None if they have to follow it."""
-        remains = None if self.sided else self.follower.checkpoint(moves)
-        if remains is None:
+        control = None if self.sided else self.follower.checkpoint(moves)
+        if control is None:
             return None
         begin = int(program.blocks[-1, 0])
         lines = program.lines_ended_before(begin)
-        return Passage(len(program.source), begin, lines, len(program) - 1, self.led, remains)
+        return PartCheckpoint(len(program.source), begin, lines, len(program) - 1, self.led, control)
 
-    def _passed(self, passage: Passage, text: bytes) -> Program:
+    def _passed(self, checkpoint: PartCheckpoint, text: bytes) -> Program:
         """Pass over a part, which this text begins with, but for its last block."""
-        self.rest = text[passage.size :]
-        self.reader.first_line += passage.lines
-        self.blocks += passage.blocks
-        self.follower.resume(passage.remains)
-        return self.reader.read(text[passage.begin : passage.size])
+        self.rest = text[checkpoint.size :]
+        self.reader.first_line += checkpoint.lines
+        self.blocks += checkpoint.blocks
+        self.follower.resume(checkpoint.control)
+        return self.reader.read(text[checkpoint.begin : checkpoint.size])
 
     def _check_rest(self) -> None:
         """Raise `NotInPartsError` if text comes after the end of the program that might belong to it."""
@@ -158,7 +158,7 @@ class Parts:
         """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
         return self.size // 8 if self.led else self.size
 
-    def _texts(self) -> Iterator[tuple[Program, bool, Passage | None]]:
+    def _texts(self) -> Iterator[tuple[Program, bool, PartCheckpoint | None]]:
         """The text in parts that end between two blocks of plain words; True with the last one.
 
         All processes read the same, so that their parts are the same.
@@ -175,10 +175,10 @@ class Parts:
             if text.isspace():
                 self.rest = text
                 continue
-            passage = self.share.passage(self.found)
-            if passage is not None and passage.size <= len(text):
+            checkpoint = self.share.checkpoint(self.found)
+            if checkpoint is not None and checkpoint.size <= len(text):
                 wanted = self._wanted
-                yield self._passed(passage, text), False, passage
+                yield self._passed(checkpoint, text), False, checkpoint
                 continue
             begun = text[: text.rfind(b"\n", 0, max(text.rfind(b"\n"), 0)) + 1]
             program = None if not begun or begun.isspace() else self.reader.read(begun)
@@ -345,23 +345,25 @@ class PartProof:
         part = unit.part
         if unit.head is not None and not foreign:
             self.follower.stand(unit.head.moves.end[-1])
-        if part.passage is not None:
-            self.again.first_line += part.passage.lines
-            self.follower.resume(part.passage.remains)
+        if part.checkpoint is not None:
+            self.again.first_line += part.checkpoint.lines
+            self.follower.resume(part.checkpoint.control)
         self.again.first_line += part.program.lines_ended
         self.follower.follow(part.program, part.last)
 
     def taught(self, unit: ProgramPart, together: Together, text: bytes) -> Readings | None:
         """See `driver.Proof.taught`."""
-        (settled,), head = together.settled, unit.head
+        (solution,), head = together.plans, unit.head
         if head is None:
-            self.check(unit.part, settled, text, None)
+            self.check(unit.part, solution, text, None)
         else:
-            own = settled.plan.pieces.move > 0
-            self.check(unit.part, settled, text, together.splices.moved(-len(head.program.source)), own)
+            own = solution.plan.pieces.move > 0
+            self.check(unit.part, solution, text, together.splices.moved(-len(head.program.source)), own)
         return None
 
-    def check(self, part: Part, settled: Settled, text: bytes, edits: Splices | None, own: Mask | None = None) -> None:
+    def check(
+        self, part: Part, solution: WrittenPlan, text: bytes, edits: Splices | None, own: Mask | None = None
+    ) -> None:
         """Raise what `taught` does; `edits` make the text of that of the part, if known; `own` (m,): pieces in it."""
         if edits is not None and fast.engaged() and not left_alone(part.program.source, edits, text):
             raise SelfCheckError("more of the text has changed than was written anew")
@@ -372,7 +374,7 @@ class PartProof:
             raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
         self.again.first_line += program.lines_ended
         try:
-            right = not differences(settled, again, own).any()
+            right = not differences(solution, again, own).any()
         except SelfCheckError:
             right = False
         if not right:

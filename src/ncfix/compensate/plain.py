@@ -47,7 +47,7 @@ from ncfix.compensate.plan.segments import Segments, accelerations, arcs_within,
 from ncfix.compensate.plan.splitting import Split
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding
-from ncfix.compensate.solve import Settled, agree
+from ncfix.compensate.solve import WrittenPlan, accepted_plan
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
 from ncfix.control.trace import taken
 from ncfix.machine import Machine, State
@@ -173,10 +173,10 @@ def by_the_long_way(
         return None
     near = distinct(np.concatenate([odd - 1, odd, odd + 1]))
     few = taken(moves, near)
-    agreed = agree(few, machine, dialect, options)
-    if agreed.reasons or agreed.plan.findings or (agreed.kept != (few.kind == MotionKind.DWELL)).any():
+    accepted = accepted_plan(few, machine, dialect, options)
+    if accepted.reasons or accepted.plan.findings or (accepted.kept != (few.kind == MotionKind.DWELL)).any():
         return None
-    pieces = agreed.plan.pieces
+    pieces = accepted.plan.pieces
     own = ~(plain[near] & plain[near - 1])
     chosen = own[pieces.move]
     columns = {name: getattr(pieces, name)[chosen] for name in ("fraction", "end", "arc", "centre", "kept")}
@@ -226,12 +226,12 @@ class PlainPlan:
         kind = self.part.moves.kind[:-1]
         return np.append(self.behind_rapid, (kind == MotionKind.DWELL) | (kind == MotionKind.RAPID))
 
-    def settled(self, emission: Emission) -> Settled:
+    def written_plan(self, emission: Emission) -> WrittenPlan:
         """The plan and its text as the long way has them."""
         moves = self.part.moves
         untold = np.zeros(len(moves)), np.ones(len(moves), dtype=bool)
         plan = Plan(self.pieces, self.real.start, *untold, self.findings)
-        return Settled(moves, plan, emission, moves.kind == MotionKind.DWELL, {}, unmoored=False)
+        return WrittenPlan(moves, plan, emission, moves.kind == MotionKind.DWELL, {}, unmoored=False)
 
     def last(self, of_pieces: Array) -> Array:
         """Of what all pieces (m, k) have that of the last piece of each motion, (n, k)."""

@@ -26,7 +26,7 @@ from ncfix.compensate.plan.findings import Notes
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import rounding_along
-from ncfix.compensate.solve import Settled, increments
+from ncfix.compensate.solve import WrittenPlan, increments
 from ncfix.control.flatten import Flat
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
@@ -186,17 +186,17 @@ class Tally:
 
     def add(self, program: Program, together: Together, own: Mask | None, machine: Machine) -> None:
         """Take in a part, in all positions of block delete; of its motions those that are `own` (n,), if given."""
-        every, steps = together.settled, increments(machine)
+        every, steps = together.plans, increments(machine)
         lacking = [each.lacking(steps, own) for each in every]
         left = [left_where_they_stand(program, each.moves, lack) for each, lack in zip(every, lacking, strict=True)]
         self.left = joined(self.left, either(left))
         account = Account.together([Account.of(each.moves, each.kept, each.reasons) for each in every])
         unseen = Counter[str]()
-        for k, (settled, lack, found) in enumerate(zip(every, lacking, worst_findings(every), strict=True)):
-            moves, plan, intent = settled.moves, settled.plan, Intent(machine, settled.moves, State())
+        for k, (solution, lack, found) in enumerate(zip(every, lacking, worst_findings(every), strict=True)):
+            moves, plan, intent = solution.moves, solution.plan, Intent(machine, solution.moves, State())
             self.rounding = max(self.rounding, rounding_along(intent, plan.pieces, plan.corners, own))
-            self.largest = max(self.largest, largest_correction(moves, settled, own))
-            unseen |= without_figure(moves, settled.kept, lack.axes if lack else None, own)
+            self.largest = max(self.largest, largest_correction(moves, solution, own))
+            unseen |= without_figure(moves, solution.kept, lack.axes if lack else None, own)
             for finding in found:
                 self.found.add(finding, program, moves, own, k)
         self.unseen += unseen
@@ -210,26 +210,26 @@ class Tally:
         self.refused += refusals(program, replace(account, refused=refused))
         self._look_at_numbers(program, every[0], True if own is None else own)
 
-    def add_plain(self, program: Program, settled: Settled, largest: float, intent: Intent) -> None:
+    def add_plain(self, program: Program, solution: WrittenPlan, largest: float, intent: Intent) -> None:
         """Take in a part of dwells and motions that were corrected, each in a block of its own.
 
         largest  shift of a linear command, mm
         """
-        self.rounding = max(self.rounding, rounding_along(intent, settled.plan.pieces, settled.plan.corners))
-        self.moves += len(settled.moves)
-        self.compensated += int(np.count_nonzero(~settled.kept))
-        self.inserted += settled.emission.added_blocks
+        self.rounding = max(self.rounding, rounding_along(intent, solution.plan.pieces, solution.plan.corners))
+        self.moves += len(solution.moves)
+        self.compensated += int(np.count_nonzero(~solution.kept))
+        self.inserted += solution.emission.added_blocks
         self.largest = max(self.largest, largest)
-        self.changed |= len(settled.emission.splices) > 0
-        self._look_at_numbers(program, settled)
-        for finding in settled.plan.findings:
-            self.found.add(finding, program, settled.moves)
+        self.changed |= len(solution.emission.splices) > 0
+        self._look_at_numbers(program, solution)
+        for finding in solution.plan.findings:
+            self.found.add(finding, program, solution.moves)
 
-    def _look_at_numbers(self, program: Program, settled: Settled, own: Mask | bool = True) -> None:
+    def _look_at_numbers(self, program: Program, solution: WrittenPlan, own: Mask | bool = True) -> None:
         """Note the numbers in the first lines of a program; `own` (n,) motions of the part."""
         if program.first_line <= LOOKED:
-            among = ~settled.kept & own & (program.lines(settled.moves.block) <= LOOKED)
-            self.numbers = numbers_of(settled.moves, settled.shift, among, self.step)
+            among = ~solution.kept & own & (program.lines(solution.moves.block) <= LOOKED)
+            self.numbers = numbers_of(solution.moves, solution.shift, among, self.step)
 
     def take(self, other: Tally) -> None:
         """Take in what has been done to the part that comes next."""
@@ -306,10 +306,10 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
     ]
 
 
-def largest_correction(moves: Moves, settled: Settled, own: Mask | None = None) -> float:
+def largest_correction(moves: Moves, solution: WrittenPlan, own: Mask | None = None) -> float:
     """The largest shift of a linear command, mm; of motions `own` (n,) if given."""
-    done = ~settled.kept if own is None else own & ~settled.kept
-    return float(np.nanmax(lengths(settled.shift[:, ~moves.rotary])[done], initial=0.0)) if done.any() else 0.0
+    done = ~solution.kept if own is None else own & ~solution.kept
+    return float(np.nanmax(lengths(solution.shift[:, ~moves.rotary])[done], initial=0.0)) if done.any() else 0.0
 
 
 def in_lines(report: FixReport, flat: Flat, program: Program) -> FixReport:

@@ -1,4 +1,4 @@
-"""Plan and text brought into agreement: what cannot be written is kept, and then the rest is planned anew.
+"""Plan and text made consistent: what cannot be written stays as it was, and then the rest is planned anew.
 
 A block that is executed from several states may need another correction each time; a refused arc must begin where it
 began. Both show only when the text is written, and both change what the other motions have to do. So plan and emitter
@@ -117,7 +117,7 @@ class SelfCheckError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Settled:
+class WrittenPlan:
     """A plan that can be written, and its text.
 
     moves     the motions as programmed
@@ -170,7 +170,7 @@ class Settled:
 
 
 @dataclass(frozen=True, slots=True)
-class Agreed:
+class AcceptedPlan:
     """A plan that nothing speaks against but, perhaps, its text.
 
     kept      (n,) motions left as they were
@@ -191,53 +191,55 @@ class Agreed:
         return Round(np.array(kept), np.array(shift), position.copy())
 
 
-def settle(
+def plan_and_write(
     program: Program,
     moves: Moves,
     machine: Machine,
     options: FixOptions,
     reading: SecondReading | None = None,
     before: PrecedingMotion | None = None,
-    first: Agreed | None = None,
+    first: AcceptedPlan | None = None,
     refused: Mapping[int, Reason] = NONE,
-) -> Settled:
+) -> WrittenPlan:
     """Plan and write until both agree.
 
     reading  what the control made of an earlier attempt
     before   what an earlier part of the program left, where this is a part: its last motion is the first one here
-    first    the plan to begin with, from `agree`, if that has been made already
+    first    the plan to begin with, from `accepted_plan`, if that has been made already
     refused  blocks that are refused whatever the plan is, and why
     """
-    agreed = first or agree(moves, machine, program.dialect, options, before, refused=refused)
+    accepted = first or accepted_plan(moves, machine, program.dialect, options, before, refused=refused)
     kinematics, rounds = kinematics_of(machine), list[Round]()
     while True:
         done = None if before is None else before.in_round(len(rounds)).position
-        emission = emit(program, moves, agreed.plan.pieces, increments(machine), reading, done, kinematics)
-        moving = without_idle(moves, agreed.plan.pieces, emission, 0 if done is None else 1)
-        if moving is not agreed.plan.pieces:
-            agreed = replace(agreed, plan=replace(agreed.plan, pieces=moving))
+        emission = emit(program, moves, accepted.plan.pieces, increments(machine), reading, done, kinematics)
+        moving = without_idle(moves, accepted.plan.pieces, emission, 0 if done is None else 1)
+        if moving is not accepted.plan.pieces:
+            accepted = replace(accepted, plan=replace(accepted.plan, pieces=moving))
             continue
         if len(moves):
-            rounds.append(agreed.round(emission.end[-1]))
+            rounds.append(accepted.round(emission.end[-1]))
         if not emission.conflicts and (before is None or len(rounds) >= len(before.rounds)):
-            return Settled(moves, agreed.plan, emission, agreed.kept, agreed.reasons, agreed.unmoored, tuple(rounds))
-        if emission.conflicts and emission.conflicts.keys() <= agreed.reasons.keys():
+            return WrittenPlan(
+                moves, accepted.plan, emission, accepted.kept, accepted.reasons, accepted.unmoored, tuple(rounds)
+            )
+        if emission.conflicts and emission.conflicts.keys() <= accepted.reasons.keys():
             raise AssertionError(f"blocks {sorted(emission.conflicts)} are kept and yet in conflict")
         for block, why in emission.conflicts.items():
-            _explain(agreed.reasons, [block], CODE_OF_TEXT, why)
-        agreed = agree(moves, machine, program.dialect, options, before, agreed, len(rounds))
+            _explain(accepted.reasons, [block], CODE_OF_TEXT, why)
+        accepted = accepted_plan(moves, machine, program.dialect, options, before, accepted, len(rounds))
 
 
-def agree(
+def accepted_plan(
     moves: Moves,
     machine: Machine,
     dialect: Dialect,
     options: FixOptions,
     before: PrecedingMotion | None = None,
-    earlier: Agreed | None = None,
+    earlier: AcceptedPlan | None = None,
     number: int = 0,
     refused: Mapping[int, Reason] = NONE,
-) -> Agreed:
+) -> AcceptedPlan:
     """Plan until nothing speaks against it; `earlier` says what is kept already, and why, in round `number`.
 
     refused  blocks that are refused in any case, where there is no `earlier` plan
@@ -280,7 +282,7 @@ def agree(
         astray = led_astray(machine, moves, planned.pieces, planned.start, state)
         waiting = head is not None and len(trail) < len(head.kept)
         if not (stays.any() or (~bound[astray]).any() or waiting):
-            return Agreed(planned, kept, reasons, unmoored, tuple(trail))
+            return AcceptedPlan(planned, kept, reasons, unmoored, tuple(trail))
         for finding in (*against, *planned.findings):
             for k, row in enumerate(finding.moves.tolist()):
                 if stays[row]:
@@ -338,19 +340,19 @@ TURN = 1.0
 """rad; a corrected arc turns by what it did but for little, or else by a full turn more or less."""
 
 
-def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask:
+def differences(solution: WrittenPlan, again: Moves, own: Mask | None = None) -> Mask:
     """Pieces that the control would understand otherwise than they were meant.
 
     own  (m,) pieces that stand in the text that was read; all if not given
 
     Raises `SelfCheckError` if their number differs.
     """
-    emission, pieces = settled.emission, settled.plan.pieces
+    emission, pieces = solution.emission, solution.plan.pieces
     rows = np.arange(len(pieces)) if own is None else np.flatnonzero(own)
     if len(again) != len(rows):
         raise SelfCheckError(f"the corrected program has {len(again)} motions, {len(rows)} were written")
     meant = emission.end if own is None else picked(emission.end, rows)
-    differs: Mask = differ(again.end, meant) | _strayed(settled, again, rows)
+    differs: Mask = differ(again.end, meant) | _strayed(solution, again, rows)
     if not pieces.arc.any():
         return differs
     arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
@@ -361,14 +363,14 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
     off = across(off, again.normal[arcs])  # the height of a centre means nothing
     differs[arcs[differ(off, np.zeros_like(off))]] = True
     before = np.where(np.diff(pieces.move, prepend=-1) == 0, np.append(0.0, pieces.fraction[:-1]), 0.0)
-    sweeps = settled.moves.sweep[pieces.move] * (pieces.fraction - before)  # its share of what its motion does
+    sweeps = solution.moves.sweep[pieces.move] * (pieces.fraction - before)  # its share of what its motion does
     differs[arcs] |= np.abs(again.sweep[arcs] - sweeps[rows[arcs]]) > TURN
     return differs
 
 
-def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
+def _strayed(solution: WrittenPlan, again: Moves, rows: Index) -> Mask:
     """Motions that are kept, and that the new text leads elsewhere: what they rely on was not kept."""
-    pieces, ends = settled.plan.pieces, settled.moves.end
+    pieces, ends = solution.plan.pieces, solution.moves.end
     if not pieces.kept.any():
         return np.zeros(len(rows), dtype=bool)
     kept = pieces.kept[rows]

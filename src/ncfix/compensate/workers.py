@@ -1,10 +1,11 @@
 """Several processes that correct one program: each corrects parts of its own, and knows what the others leave behind.
 
-Parts are taken in turn. What a part leaves in the control (`Passage`) is told to all as soon as it has been followed;
-only where that is more than can be told, the others read and follow it, too. What it leaves to the motions behind it
-(`PrecedingMotion`) is handed on as soon as its text is there, so that the next one can be written, too, while it is
-still being proved. Texts do not go from one process to another: each reads the program from its file, and puts what it
-has corrected where it belongs (`Ground`); the first process counts, and hands out what comes through a pipe.
+Parts are taken in turn. What a part leaves in the control (`PartCheckpoint`) is told to all as soon as it has been
+followed; only where that is more than can be told, the others read and follow it, too. What it leaves to the motions
+behind it (`PrecedingMotion`) is handed on as soon as its text is there, so that the next one can be written, too,
+while it is still being proved. Texts do not go from one process to another: each reads the program from its file, and
+puts what it has corrected where it belongs (`Ground`); the first process counts, and hands out what comes through a
+pipe.
 
 Each process has a line to each of the others. Nobody waits for a process that is gone: its lines end (`Post`), also in
 the middle of a message, and who listens there gets `GoneError`; and when the first process leaves the work, whatever
@@ -42,23 +43,23 @@ class GoneError(Exception):
 
 @dataclass(slots=True)
 class Post:
-    """What a process sends to the others, and what it has heard from them.
+    """What a process sends to the others, and what it has received from them.
 
     mine    its own number
     lines   to the others, by their numbers
-    heard   by the kind of a message and the number it has, mostly that of a part
+    received  by the kind of a message and the number it has, mostly that of a part
     unsent  messages on their way: nobody who tells something waits until another one listens
     """
 
     mine: int = 0
     lines: Mapping[int, Connection] = field(default_factory=dict)
-    heard: dict[tuple[str, int], Any] = field(default_factory=dict)
+    received: dict[tuple[str, int], Any] = field(default_factory=dict)
     unsent: SimpleQueue[tuple[int, bytes] | None] = field(default_factory=SimpleQueue)
 
     def tell(self, kind: str, number: int, what: Any, to: int | None = None) -> None:
         """Tell something to one process, or to all others; what cannot be packed raises here, and is not lost later."""
         if to == self.mine:
-            self.heard[kind, number] = what
+            self.received[kind, number] = what
         elif self.lines:
             data = pickle.dumps((kind, number, what))
             for each in self.lines if to is None else (to,):
@@ -77,14 +78,14 @@ class Post:
                 kind, number, what = pickle.loads(line.recv_bytes())
             except (EOFError, OSError):
                 raise GoneError("a process that worked on the program has ended") from None
-            self.heard[kind, number] = what
+            self.received[kind, number] = what
         return bool(talking)
 
     def waited_for(self, kind: str, number: int) -> Any:
         """A message, as soon as it is there, once. Raises `GoneError`."""
-        while (kind, number) not in self.heard:
+        while (kind, number) not in self.received:
             self.listen()
-        return self.heard.pop((kind, number))
+        return self.received.pop((kind, number))
 
     @contextmanager
     def opened(self, failed: Callable[[], object]) -> Iterator[Post]:
@@ -125,14 +126,14 @@ def own_lines(lines: Lines, mine: int) -> dict[int, Connection]:
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
+class PartCheckpoint:
     """A part that left little behind: only its last block has still to be read and followed.
 
     size     bytes of the part
     begin    where its last block begins
     lines    that end before that, and `blocks` that stand there
     led      the tip was under control (TCP) somewhere in it
-    remains  what the control was like there
+    control  what the control was like there
     """
 
     size: int
@@ -140,7 +141,7 @@ class Passage:
     lines: int
     blocks: int
     led: bool
-    remains: Checkpoint
+    control: Checkpoint
 
 
 Result = TypeVar("Result")
@@ -191,19 +192,19 @@ class Share:
         """Whether a part is its own, and others want to know of it."""
         return self.jobs > 1 and self.has(number)
 
-    def announce(self, number: int, passage: Passage | None) -> None:
+    def announce(self, number: int, checkpoint: PartCheckpoint | None) -> None:
         """Tell the others what an own part leaves in the control; None: they have to follow it themselves."""
-        self.post.tell("passage", number, passage)
+        self.post.tell("checkpoint", number, checkpoint)
 
-    def passage(self, number: int) -> Passage | None:
+    def checkpoint(self, number: int) -> PartCheckpoint | None:
         """What a part of another process leaves in the control; None: it has to be followed. Waits for it."""
-        heard, owner = self.post.heard, number % self.jobs
-        heard.pop(("passage", number - 1), None)
+        received, owner = self.post.received, number % self.jobs
+        received.pop(("checkpoint", number - 1), None)
         if self.has(number):
             return None
-        while ("passage", number) not in heard and ("silent", owner) not in heard:
+        while ("checkpoint", number) not in received and ("silent", owner) not in received:
             self.post.listen()
-        found: Passage | None = heard.get(("passage", number))
+        found: PartCheckpoint | None = received.get(("checkpoint", number))
         return found
 
     def before(self, number: int) -> PrecedingMotion | None:
@@ -286,7 +287,7 @@ class Worker(Protocol[Made]):
 
 
 @dataclass(slots=True)
-class Crew(Generic[Result]):
+class WorkerPool(Generic[Result]):
     """This process and those beside it, and what they have done.
 
     given  how many parts have been given back
@@ -313,13 +314,13 @@ class Crew(Generic[Result]):
 
     def put(self, number: int, result: Result) -> None:
         """Note what this process has done."""
-        self.share.post.heard["done", number] = result
+        self.share.post.received["done", number] = result
 
     def ready(self) -> Iterator[Result]:
         """What has been done, in order, as far as it is there."""
         while self.share.post.listen(0):
             pass
-        while ("done", self.given) in self.share.post.heard:
+        while ("done", self.given) in self.share.post.received:
             yield self._next()
 
     def rest(self, count: int) -> Iterator[Result]:
@@ -336,14 +337,14 @@ class Crew(Generic[Result]):
 
 
 @contextmanager
-def crew(jobs: int, worker: Callable[[Read], Worker[Made]], ground: Ground | None) -> Iterator[Crew[Made]]:
+def worker_pool(jobs: int, worker: Callable[[Read], Worker[Made]], ground: Ground | None) -> Iterator[WorkerPool[Made]]:
     """Those who work on a program: `jobs` processes, of which this is one.
 
     worker  makes what corrects a text in another process
     ground  the files; without them, and where processes cannot be forked, this one works alone
     """
     if jobs <= 1 or ground is None or not FORKS:
-        yield Crew(Share())
+        yield WorkerPool(Share())
         return
     from multiprocessing import get_context
 
@@ -363,7 +364,7 @@ def crew(jobs: int, worker: Callable[[Read], Worker[Made]], ground: Ground | Non
             process.start()
         with Post(0, own_lines(lines, 0)).opened(end) as post:
             try:
-                yield Crew(Share(jobs, post), ground)
+                yield WorkerPool(Share(jobs, post), ground)
             finally:
                 end()
     finally:

@@ -138,9 +138,9 @@ class MotionBuilder:
     # -- motions ------------------------------------------------------------------------------------------------------
 
     def add(
-        self, block: int, programmed: int, style: int, feed: float, start: Vector, end: Vector, adrift: int
+        self, block: int, programmed: int, style: int, feed: float, start: Vector, end: Vector, unplaced: int
     ) -> None:
-        """One motion; `adrift`: axes that the program has not brought to where they stand."""
+        """One motion; `unplaced`: axes that the program has not brought to where they stand."""
         buffer = self._buffer
         buffer.block.append(block)
         buffer.programmed.append(programmed)
@@ -148,7 +148,7 @@ class MotionBuilder:
         buffer.feed.append(feed)
         buffer.start.extend(start)
         buffer.end.extend(end)
-        buffer.adrift.append(adrift)
+        buffer.unplaced.append(unplaced)
         self.count += 1
         if len(buffer.block) >= BUFFERED:
             self._flush()
@@ -224,9 +224,9 @@ class MotionBuilder:
         """All motions so far."""
         self._flush()
         parts = self._stretches or [Buffer().stretch()]
-        block, mask, adrift, style, feed = (
+        block, mask, unplaced, style, feed = (
             _joined([getattr(part, name) for part in parts])
-            for name in ("block", "programmed", "adrift", "style", "feed")
+            for name in ("block", "programmed", "unplaced", "style", "feed")
         )
         start, end = _joined_ends(parts, self.columns)
         named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
@@ -254,7 +254,7 @@ class MotionBuilder:
             reasons=tuple(self._reasons),
             pointing=None,
             approach=self._approach_column(len(block)),
-            placed=(~named).take(adrift, axis=0, mode="clip") if adrift.any() else None,
+            placed=(~named).take(unplaced, axis=0, mode="clip") if unplaced.any() else None,
             fixed_centre=self._fixed_column(len(block)),
             counted=counted,
             measured=self._mask_column(self._measured, np.zeros(len(block), dtype=np.bool_)),
@@ -391,7 +391,7 @@ def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
 
 @dataclass(slots=True)
 class MotionColumns:
-    """Consecutive motions as columns; `programmed` and `adrift` are bit masks by letter, `start` and `end` (n, 9).
+    """Consecutive motions as columns; `programmed` and `unplaced` are bit masks by letter, `start` and `end` (n, 9).
 
     path  (n + 1, 9) what both are views of, where each motion begins where the one before it ends
     """
@@ -402,7 +402,7 @@ class MotionColumns:
     feed: FloatArray
     start: FloatArray
     end: FloatArray
-    adrift: IntArray
+    unplaced: IntArray
     path: FloatArray | None = None
 
     def ends(self, columns: list[int]) -> tuple[FloatArray, FloatArray]:
@@ -424,7 +424,7 @@ class Buffer:
     feed: list[float] = field(default_factory=list)
     start: list[float] = field(default_factory=list)
     end: list[float] = field(default_factory=list)
-    adrift: list[int] = field(default_factory=list)
+    unplaced: list[int] = field(default_factory=list)
 
     def stretch(self) -> MotionColumns:
         """The motions as columns."""
@@ -435,5 +435,5 @@ class Buffer:
             np.array(self.feed, dtype=np.float64),
             np.array(self.start, dtype=np.float64).reshape(-1, N_LETTERS),
             np.array(self.end, dtype=np.float64).reshape(-1, N_LETTERS),
-            np.array(self.adrift, dtype=np.int64),
+            np.array(self.unplaced, dtype=np.int64),
         )

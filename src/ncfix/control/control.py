@@ -40,7 +40,7 @@ TAKEN = (
     "it is among passed_codes, but its block has words of axes or H, which it may take: give them a block of their own"
 )
 
-ADRIFT = "the program has not said where the axis {} stands, and this motion would need a word for it"
+UNPLACED = "the program has not said where the axis {} stands, and this motion would need a word for it"
 """Why a motion is left as it is, or refused, that moves an axis without naming it."""
 
 RIGHT = 42
@@ -180,11 +180,11 @@ class ProgramControl(ControlState):
             self._ask_for_start(motion)
         if self.composed.unknown:
             self.places.lose(mask_of(self.composed.unknown))
-        settles = self._settles(motion)
-        adrift = self._adrift(settles) | self.still_beside(motion.axes)
-        self._note_increments(motion, settles)
-        fate = self._fate(motion, adrift)
-        self._keep_places(motion, settles)
+        placed = self._placed_by(motion)
+        unplaced = self._unplaced(placed) | self.still_beside(motion.axes)
+        self._note_increments(motion, placed)
+        fate = self._fate(motion, unplaced)
+        self._keep_places(motion, placed)
         style = self._style_of(fate)
         self.beside &= ~fate.axes
         if fate.arc is not None:
@@ -194,7 +194,7 @@ class ProgramControl(ControlState):
         if fate.kind != MotionKind.DWELL:
             self.block_words = ()
         start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
-        self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, adrift)
+        self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, unplaced)
         if self.ends is not None:
             self.ends.append(fate.target[:])
         self.position, self.unknown = fate.target, fate.unknown
@@ -204,22 +204,22 @@ class ProgramControl(ControlState):
         kind, unknown = motion.kind, motion.unknown
         if AT_START in unknown.values() or (kind != MotionKind.RAPID and AT_START in self.unknown.values()):
             everywhere = tuple(self.unknown) if kind != MotionKind.RAPID else tuple(unknown)
-            self.settle(everywhere)
+            self.use_start_positions(everywhere)
             for index in [index for index, why in unknown.items() if why is AT_START]:
                 del unknown[index]
 
-    def _settles(self, motion: Motion) -> int:
+    def _placed_by(self, motion: Motion) -> int:
         """The axes whose words say where they stand behind the motion."""
-        if motion.settles is not None:
-            return motion.settles
+        if motion.placed is not None:
+            return motion.placed
         return 0 if motion.passing or self.modal.incremental else motion.axes
 
-    def _note_increments(self, motion: Motion, settles: int) -> None:
+    def _note_increments(self, motion: Motion, placed: int) -> None:
         """Some words of the motion count from where it starts, or do not, against the distance mode in force."""
-        if not motion.passing and settles & motion.axes != (0 if self.modal.incremental else motion.axes):
-            self.builder.counted(motion.axes & ~settles)
+        if not motion.passing and placed & motion.axes != (0 if self.modal.incremental else motion.axes):
+            self.builder.counted(motion.axes & ~placed)
 
-    def _keep_places(self, motion: Motion, settles: int) -> None:
+    def _keep_places(self, motion: Motion, placed: int) -> None:
         """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
         if motion.passing and motion.kind != MotionKind.DWELL:
             target, here = motion.target, self.position
@@ -229,7 +229,7 @@ class ProgramControl(ControlState):
         if motion.kind != MotionKind.DWELL:
             self.frame_unknown = lost if told else None
         self.end_unknown = None
-        self.places.settle(settles)
+        self.places.place(placed)
         self.places.lose(mask_of(lost))
         self.places.begun = True
 
@@ -243,11 +243,11 @@ class ProgramControl(ControlState):
         """Whether there is a hole where the motion ends: then it matters where that is, as in a cut."""
         return motion.kind == MotionKind.CYCLE
 
-    def _fate(self, motion: Motion, adrift: int) -> Motion:
+    def _fate(self, motion: Motion, unplaced: int) -> Motion:
         """The motion as it will be judged: rapids pass that need words for axes of which nobody has said enough."""
         if motion.passing is None and self._leaves_unknown(motion) and not self.ends_in_hole(motion):
             return motion._replace(passing=Passing(Pass.UNSAID, first_reason(motion.unknown)))
-        return self._dragged(motion, adrift)
+        return self._dragged(motion, unplaced)
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
@@ -256,13 +256,13 @@ class ProgramControl(ControlState):
         before = {*self.unknown.values(), *self.lost_in_frame().values()}
         return leaves_unknown(rapid, before, self._lost_at_end(rapid))
 
-    def _adrift(self, settled: int) -> int:
-        """Axes that must get no word in a motion that brings `settled` to their places; turned axes go together."""
-        adrift = self.places.adrift & ~settled
-        if adrift and self.is_rotated:
+    def _unplaced(self, placed: int) -> int:
+        """Axes that must get no word in a motion that brings `placed` to their places; turned axes go together."""
+        unplaced = self.places.unplaced & ~placed
+        if unplaced and self.is_rotated:
             turned = self._turned()
-            adrift |= turned if adrift & turned else 0
-        return adrift
+            unplaced |= turned if unplaced & turned else 0
+        return unplaced
 
     def still_beside(self, axes: int) -> int:
         """Axes of the plane that get no word in a motion across it, see `arcs`."""
@@ -280,9 +280,9 @@ class ProgramControl(ControlState):
         """Axes that are moved by words of others, since the frame is turned."""
         return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < SQUARE)
 
-    def _dragged(self, motion: Motion, adrift: int) -> Motion:
+    def _dragged(self, motion: Motion, unplaced: int) -> Motion:
         """The motion; if it moves an axis that has no word and must get none, a rapid passes, others are refused."""
-        wordless = adrift & self.places.adrift & ~motion.axes
+        wordless = unplaced & self.places.unplaced & ~motion.axes
         if not wordless or motion.passing or motion.refusal or motion.unknown:
             return motion
         moved = mask_of(i for i in self.machine if motion.target[i] != self.position[i])
@@ -291,7 +291,7 @@ class ProgramControl(ControlState):
         index = next((i for i in self.machine if (wordless & moved) >> i & 1), None)
         if index is None:
             return motion
-        why = ADRIFT.format(LETTERS[index])
+        why = UNPLACED.format(LETTERS[index])
         if motion.kind == MotionKind.RAPID and not self.ends_in_hole(motion):
             return motion._replace(passing=Passing(Pass.UNSAID, why))
         return motion._replace(refusal=why)

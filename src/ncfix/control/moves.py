@@ -411,7 +411,7 @@ class Motion(NamedTuple):
     code     the motion code, in tenths
     refusal  why it is refused; empty if it is not
     passing  why it is passed as it is; None if it is not
-    settles  the axes whose words say where they stand afterwards; None: those of absolute words
+    placed  the axes whose words say where they stand afterwards; None: those of absolute words
     """
 
     kind: MotionKind
@@ -422,7 +422,7 @@ class Motion(NamedTuple):
     refusal: str = ""
     passing: Passing | None = None
     arc: Arc | None = None
-    settles: int | None = None
+    placed: int | None = None
 
 
 def blanked(position: Vector, unknown: UnknownAxes) -> Vector:

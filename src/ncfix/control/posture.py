@@ -110,7 +110,7 @@ def postures(
     outer, inner = pointing.columns
     letters = control.machine[outer], control.machine[inner]
     if here is None:
-        control.settle(letters)
+        control.use_start_positions(letters)
         if control.unknown.keys() & {*letters}:
             return None
         here = control.position[letters[0]], control.position[letters[1]]

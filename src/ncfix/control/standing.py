@@ -197,7 +197,7 @@ class ControlState(ABC):
 
     # -- what is known ------------------------------------------------------------------------------------------------
 
-    def settle(self, indices: Sequence[int]) -> None:
+    def use_start_positions(self, indices: Sequence[int]) -> None:
         """The start positions of these axes matter: they are given, or lacking and taken as zero."""
         for index in indices:
             if self.unknown.get(index) is AT_START:

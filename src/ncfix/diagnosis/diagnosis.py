@@ -103,7 +103,7 @@ class Gap:
 
 @dataclass(frozen=True, repr=False)
 class Case:
-    """What is asked: the data, the candidates, and the court where they are heard.
+    """What is asked: the data, the candidates, and what compares them.
 
     considered  all candidates; `unheard_of` names that were refused and do not exist
     gathered    those that the data can show, and those that they cannot

@@ -207,7 +207,7 @@ class Evidence:
         """Where a group's columns are."""
         return slice(int(self.bounds[index]), int(self.bounds[index + 1]))
 
-    def heard(self, members: Sequence[Member], beside: Array | None = None) -> CandidateOdds:
+    def candidate_odds(self, members: Sequence[Member], beside: Array | None = None) -> CandidateOdds:
         """The odds of all groups beside these members, at their likeliest share of the background.
 
         beside  further columns in the coordinates that are there at unit size
@@ -437,11 +437,11 @@ class Comparison:
             chosen + (np.log(len(alternatives)) + UNNAMED if name in alternatives else np.log(len(self.names)))
         )
 
-    def heard(self, members: Members) -> CandidateOdds:
+    def candidate_odds(self, members: Members) -> CandidateOdds:
         """The odds of everything beside these members."""
         key = frozenset(members.values())
         if key not in self.asked:
-            self.asked[key] = self.evidence.heard(self.all(members), self.allowance(members))
+            self.asked[key] = self.evidence.candidate_odds(self.all(members), self.allowance(members))
         return self.asked[key]
 
     def allowance(self, members: Members) -> Array | None:

@@ -111,7 +111,7 @@ def proposed(scale: Comparison, selected: Selected, sigma: float) -> Proposal | 
 def _side(scale: Comparison, others: Members, name: str) -> Hypothesis:
     """A name as it would be beside the others."""
     evidence = scale.evidence
-    members = scale.heard(others).likeliest(evidence.forms[name], FORMS)
+    members = scale.candidate_odds(others).likeliest(evidence.forms[name], FORMS)
     everyone = [*others.values(), members[0]]
     forms = tuple((evidence.groups[member.group], member.size) for member in members)
     return Hypothesis(forms[0][0], evidence.numbers(everyone, evidence.share(everyone))[-1], forms)

@@ -189,12 +189,12 @@ def _changes(scale: Comparison, offered: Sequence[str], members: Members, fixed:
 
 def likeliest(scale: Comparison, offered: Sequence[str], members: Members) -> dict[str, Member]:
     """The effects that have the best odds beside some members, in their likeliest form and size."""
-    heard, evidence = scale.heard(members), scale.evidence
-    free = {name: heard.of(evidence.forms[name]) for name in offered if name not in members}
+    odds, evidence = scale.candidate_odds(members), scale.evidence
+    free = {name: odds.of(evidence.forms[name]) for name in offered if name not in members}
     order = sorted(free, key=lambda name: -free[name])
     named = [name for name in order if name in evidence.names][:TRIED]
     nameless = [name for name in order if name in evidence.alternatives][: TRIED // 2]
-    return {name: heard.likeliest(evidence.forms[name])[0] for name in (*named, *nameless)}
+    return {name: odds.likeliest(evidence.forms[name])[0] for name in (*named, *nameless)}
 
 
 def with_alternatives(scale: Comparison, members: Members) -> Selected:
@@ -207,7 +207,8 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
         others = _less(members, name)
         sort = [each for each in _sort(evidence, name) if each not in others]
         tried = {
-            each: scale.heard(others).likeliest(evidence.forms[each], FORMS) for each in likeliest(scale, sort, others)
+            each: scale.candidate_odds(others).likeliest(evidence.forms[each], FORMS)
+            for each in likeliest(scale, sort, others)
         }
         tried[name] = [members[name]]
         heaviest = {each: max(scale.weight({**others, each: own}) for own in forms) for each, forms in tried.items()}
@@ -230,7 +231,7 @@ def _formed(scale: Comparison, members: Members) -> dict[str, Member]:
     """
     found = dict(members)
     for name in members:
-        forms = scale.heard(_less(found, name)).likeliest(scale.evidence.forms[name], FORMS)
+        forms = scale.candidate_odds(_less(found, name)).likeliest(scale.evidence.forms[name], FORMS)
         found = max([found, *({**found, name: form} for form in forms)], key=scale.weight)
     return found
 

@@ -125,7 +125,7 @@ class Language:
     control   what the control keeps while it follows a program of a dialect
     interpreter  (control, program, run) -> the walk through a program; `in_parts`: this is the first of its parts
     layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
-    alike     those of all blocks of a shape are the same
+    same_per_shape  those of all blocks of a shape are the same
     writer    (program, block, layout, target, spelling) -> what writes the motion of a block: `BlockWriter`, or a
               class of its kind with what no other control has
     spelling  program -> how what is put into it is spelled
@@ -151,7 +151,7 @@ class Language:
     layout: Callable[[Program, int], BlockLayout | None]
     writer: Callable[[Program, int, Any, Target, Spelling], Writer]
     spelling: Callable[[Program], Spelling]
-    alike: bool = False
+    same_per_shape: bool = False
     lenient: bool = False
     arc_pieces: bool = False
     bulk: Callable[[Program, int], BulkLayout | None] | None = None

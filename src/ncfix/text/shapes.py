@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.text.alike import Alike, alike
 from ncfix.text.numbers import (
     BLANK,
     BLANKS,
@@ -36,6 +35,7 @@ from ncfix.text.numbers import (
     is_numeric,
     table,
 )
+from ncfix.text.uniform_lines import UniformLines, find_uniform_lines
 
 NUMBER_MARK = 1
 COMMENT_MARK = 2
@@ -140,13 +140,13 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
         found = scan_compiled(text, blocks, pointless)
         if found is not None:
             return found
-    same = alike(source, blocks, pointless=pointless)
+    same = find_uniform_lines(source, blocks, pointless=pointless)
     if same is None:
         return in_slices(source, blocks, partial(scan_any, pointless=pointless))
     return with_others(source, blocks, pointless, same)
 
 
-def with_others(source: bytes, blocks: NDArray[np.int64], pointless: bool, same: Alike) -> Scan:
+def with_others(source: bytes, blocks: NDArray[np.int64], pointless: bool, same: UniformLines) -> Scan:
     """The scan of a text of which some lines are alike; the others are put together and scanned as any text is."""
     n, m, mark = len(blocks), len(same.columns), bytes([NUMBER_MARK])
     shapes: list[bytes | None] = [same.example.key(mark, bytes([POINTLESS_MARK]) if pointless else mark)]

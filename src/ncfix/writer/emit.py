@@ -379,7 +379,7 @@ class _Emitter:
         return self.position
 
     def _layout(self, block: int) -> BlockLayout | None:
-        key = int(self.program.template[block]) if self.language.alike else block
+        key = int(self.program.template[block]) if self.language.same_per_shape else block
         if key not in self.layouts:
             self.layouts[key] = self.language.layout(self.program, block)
         return self.layouts[key]

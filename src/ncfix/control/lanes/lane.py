@@ -85,13 +85,13 @@ def is_open(control: ProgramControl, unit: LaneText, block: int) -> bool:
 
 
 def before_placing(control: ProgramControl, mask: IntArray, block: int) -> int:
-    """The block that first brings an adrift axis to its place, or the end of blocks with these axis words (n,).
+    """The block that first brings an unplaced axis to its place, or the end of blocks with these axis words (n,).
 
-    That block goes by itself, so that all of a stretch have the same axes adrift.
+    That block goes by itself, so that all of a stretch have the same axes unplaced.
     """
-    if not control.places.adrift or control.modal.incremental:
+    if not control.places.unplaced or control.modal.incremental:
         return block + len(mask)
-    placing = (mask & control.places.adrift) != 0
+    placing = (mask & control.places.unplaced) != 0
     return block + (int(np.argmax(placing)) if placing.any() else len(mask))
 
 
@@ -128,11 +128,11 @@ def take(control: ProgramControl, stage: BlockRows, block: int, main: bool, circ
     blocks, stage = np.arange(block, block + len(moves)), stage.only(moves)
     blocks = blocks.compress(moves) if main else np.full(len(stage.mask), control.row_block)
     control.places.begun = True
-    plane, adrift = control.still_beside(0), np.full(len(blocks), control.places.adrift)
+    plane, unplaced = control.still_beside(0), np.full(len(blocks), control.places.unplaced)
     if plane:
-        adrift |= np.where(stage.mask & plane != 0, 0, plane)
+        unplaced |= np.where(stage.mask & plane != 0, 0, plane)
     path = stage.path
-    stretch = MotionColumns(blocks, stage.mask, styles(control, stage), stage.feed, path[:-1], path[1:], adrift, path)
+    stretch = MotionColumns(blocks, stage.mask, styles(control, stage), stage.feed, path[:-1], path[1:], unplaced, path)
     if plane:
         resting = resting_of_many(control, stretch.programmed, stretch.start, stretch.end)
         resting[rows] = 0

@@ -116,7 +116,7 @@ class Column:
 
 
 @dataclass(frozen=True, slots=True)
-class Alike:
+class UniformLines:
     """Lines that are like an example: `rows` (k,) of all lines; the numbers of each of its places, and their values."""
 
     example: Example
@@ -136,7 +136,7 @@ class Alike:
         return spans.reshape(-1, 2), values.ravel()
 
 
-def alike(source: bytes, blocks: IntArray, *, pointless: bool) -> Alike | None:
+def find_uniform_lines(source: bytes, blocks: IntArray, *, pointless: bool) -> UniformLines | None:
     """The lines among `blocks` (n, 2) that are like the one in their middle; None if they are too few to matter.
 
     pointless  numbers without a point make lines different
@@ -160,7 +160,7 @@ def alike(source: bytes, blocks: IntArray, *, pointless: bool) -> Alike | None:
         own = np.flatnonzero(fine)
         rows, columns = rows.take(own), [column.take(own) for column in columns]
         values = [column.take(own) for column in values]
-    return Alike(example, rows, columns, values) if len(rows) * SHARE >= len(blocks) else None
+    return UniformLines(example, rows, columns, values) if len(rows) * SHARE >= len(blocks) else None
 
 
 def _columns(

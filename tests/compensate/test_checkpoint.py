@@ -14,7 +14,7 @@ from compensate.test_stream import OPTIONS, SETUP, program, streamed
 from ncfix.compensate.driver import PartCorrector
 from ncfix.compensate.following import Task
 from ncfix.compensate.parts import Part, Units
-from ncfix.compensate.workers import Passage, ReadAhead, Share
+from ncfix.compensate.workers import PartCheckpoint, ReadAhead, Share
 from ncfix.control.moves import Moves
 from ncfix.control.trace import TABLES
 from ncfix.diagnostics import NcfixError
@@ -33,29 +33,29 @@ def machine(root: Path) -> Machine:
 class Telling(Share):
     """Has all parts, and keeps what it would tell of them."""
 
-    heard: dict[int, Passage | None] = field(default_factory=dict)
+    received: dict[int, PartCheckpoint | None] = field(default_factory=dict)
 
     def has(self, number: int) -> bool:
         return True
 
-    def announce(self, number: int, passage: Passage | None) -> None:
-        self.heard[number] = passage
+    def announce(self, number: int, checkpoint: PartCheckpoint | None) -> None:
+        self.received[number] = checkpoint
 
-    def passage(self, number: int) -> Passage | None:
+    def checkpoint(self, number: int) -> PartCheckpoint | None:
         return None
 
 
 @dataclass
 class Hearing(Share):
-    """Has no part, and has heard of all."""
+    """Has no part, and has received of all."""
 
-    heard: dict[int, Passage | None] = field(default_factory=dict)
+    received: dict[int, PartCheckpoint | None] = field(default_factory=dict)
 
     def has(self, number: int) -> bool:
         return False
 
-    def passage(self, number: int) -> Passage | None:
-        return self.heard[number]
+    def checkpoint(self, number: int) -> PartCheckpoint | None:
+        return self.received[number]
 
 
 def gone_through(source: bytes, machine: Machine, dialect: str, share: Share) -> tuple[Units, list[Part]]:
@@ -87,12 +87,12 @@ def test_a_control_goes_on_as_if_it_had_followed_what_was_passed_over(
     )
     telling = Telling(2)
     reference, expected = gone_through(source, machine, dialect, telling)
-    units, found = gone_through(source, machine, dialect, Hearing(2, heard=telling.heard))
-    assert sum(each is not None for each in telling.heard.values()) >= 1
+    units, found = gone_through(source, machine, dialect, Hearing(2, received=telling.received))
+    assert sum(each is not None for each in telling.received.values()) >= 1
     assert len(found) == len(expected)
     for mine, theirs in zip(found, expected, strict=True):
         place = theirs.program
-        if mine.passage is None:
+        if mine.checkpoint is None:
             assert mine.program.source == place.source
             assert_same_motions(mine.moves, theirs.moves)
         assert mine.program.line(len(mine.program) - 1) == place.line(len(place) - 1)
@@ -116,9 +116,9 @@ def test_processes_pass_over_parts_of_each_other(jobs: int, machine: Machine, mo
     """Counted in the first process."""
     passed, resume = [], Units._passed
 
-    def counted(self: Units, passage: Passage, text: bytes) -> object:
-        passed.append(passage.blocks)
-        return resume(self, passage, text)
+    def counted(self: Units, checkpoint: PartCheckpoint, text: bytes) -> object:
+        passed.append(checkpoint.blocks)
+        return resume(self, checkpoint, text)
 
     monkeypatch.setattr(Units, "_passed", counted)
     for seed in range(3):

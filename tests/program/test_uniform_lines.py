@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ncfix.text import shapes
-from ncfix.text.alike import FEWEST, LINE, SHARE, Example, alike
 from ncfix.text.shapes import Scan, scan_any, split_blocks, with_others
+from ncfix.text.uniform_lines import FEWEST, LINE, SHARE, Example, find_uniform_lines
 
 USUAL = ("N{n} G1 X{x} Y{y} Z{z} F{f}", "G01X{x}Y{y}Z{z}", "n{n} g1 x{x}\ty{y}", "T{n} M6", "X{x} E{n} D{y}")
 NUMBERS = ("1.2345", "-0.0000", "+7.5", "123.4567", "-1234.5678", "0.0001", "98765.4321", "12.", "-3", ".5", "007.10")
@@ -72,7 +72,7 @@ def test_lines_by_an_example_are_scanned_as_any_text(line: str, others: float, p
     for numbers in (NUMBERS, NUMBERS[:2], NUMBERS[:6], ("5.0625",), ("-17", "4")):
         source = text_of(random, line, numbers, others)
         blocks = split_blocks(source)
-        same = alike(source, blocks, pointless=pointless)
+        same = find_uniform_lines(source, blocks, pointless=pointless)
         if same is not None:
             assert_same(with_others(source, blocks, pointless, same), scan_any(source, blocks, pointless))
         assert same is not None or (pointless and len(numbers) > SHARE)
