@@ -296,6 +296,10 @@ def texts(dialect: str, seeds: range) -> Iterator[tuple[str, str]]:
         yield name, language.marked("\n".join(language.write(frame, event, many, random.Random(name))) + "\n")
 
 
+JUMP = 0.1
+"""mm: farther than any correction here."""
+
+
 def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> None:
     """Correct a program, follow it before and after, and note what became of its motions."""
     language = LANGUAGES[dialect]
@@ -311,8 +315,11 @@ def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> No
     found.faults += [f"{name}: line {line}: a motion that is no rapid passes" for line in claims.unlawful]
     meant, done = language.steps(text, False), language.steps(fixed.text.decode(), True)
     assert [(step.mark, step.sort) for step in meant] == [(step.mark, step.sort) for step in done], name
-    fresh = True
+    fresh, stood = True, None
     for wanted, made in zip(meant, done, strict=True):
+        if stood is None or np.abs(wanted.tip[0] - stood).max() > JUMP:
+            fresh = True  # another tool, whose tip no motion has led to where it stands
+        stood = wanted.tip[-1]
         fate = claims.fate(wanted)
         found.motions[fate] += 1
         if fate != "corrected":

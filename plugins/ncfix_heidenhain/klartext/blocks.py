@@ -57,7 +57,7 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix_heidenhain.klartext.control import KlartextControl
-from ncfix_heidenhain.klartext.plans import MOVING, owners
+from ncfix_heidenhain.klartext.plans import MOVING, SIZES, owners
 
 COMMENT = re.compile(rb";[^\r\n]*")
 JOINED = re.compile(rb"~[ \t]*(?=\r*\n)")
@@ -268,11 +268,11 @@ def built(tree: Branch, text: str) -> Parsed:
 
 
 def is_twice(items: list[Item]) -> bool:
-    """Whether a block says twice where an axis goes: the control marks it as an error."""
+    """Whether a block says twice where an axis goes, or how its arc lies: the control marks it as an error."""
     owned = owners(items)
     words = [w.address.removeprefix("I") for k, w in enumerate(items) if isinstance(w, Word) and k not in owned]
-    leading = [address for address in words if address in MOVING]
-    return len(leading) > len(set(leading))
+    once = [address for address in words if address in MOVING or address in SIZES]
+    return len(once) > len(set(once))
 
 
 def place_of(anchor: Anchor, spans: tuple[tuple[int, int], ...]) -> int:

@@ -169,6 +169,7 @@ def drill(control: KlartextControl, where: Where, axes: int, heights: tuple[floa
         if not refusal:
             control.warn(MOVED_AS_A_WHOLE, AS_A_WHOLE.format(control.cycle.number))
     control.position, control.unknown = command_of(control, over, axes | 1 << Z)
+    control.frame_unknown = over.unknown
     control.path.tangent = None
 
 

@@ -84,6 +84,9 @@ VECTOR = frozenset({"TX", "TY", "TZ"})
 MOVING = CARTESIAN | POLAR | VECTOR
 """The addresses that lead somewhere."""
 
+SIZES = frozenset({"R", "LEN", "CCA"})
+"""The radius of an arc, the length of a line of an approach, and the angle about the centre."""
+
 ALWAYS_MOVING = frozenset({"c", "cp", "cr", "ct", "ctp", "ln"})
 """Path functions that move even where they name no end: `C DR-` is a full circle."""
 

@@ -28,6 +28,13 @@ def test_an_axis_that_is_said_twice_is_an_error_of_the_block(block: str) -> None
     assert "no Klartext" in fates(f"CC X+0 Y+0\nL X+5 Y+5 Z+5 FMAX\n{block}")[-1][1]
 
 
+@pytest.mark.parametrize(
+    "block", ["CR X+10 Y+40 DR+ R+45 R-45", "CTP PR+20 IPA-60 R+25 R-25", "APPR CT X+10 Y+40 CCA90 R+5 CCA45 RL"]
+)
+def test_a_size_of_an_arc_that_is_said_twice_is_an_error_of_the_block(block: str) -> None:
+    assert "no Klartext" in fates(f"L X+8 Y+20 Z+3 FMAX\nCC X+30 Y+20\nL X+10 F200\n{block}")[-1][1]
+
+
 def test_m94_and_m138_name_axes_without_numbers() -> None:
     assert ends("L C+370 FMAX\nL C+380 M94 C FMAX", "XYZC")[-1] == [0, 0, 0, 380]
     assert fates("L X+1 Y+1 Z+1 M138 C FMAX\nL X+2\nM138\nL X+3", "XYZBC")[1:] == [
@@ -152,6 +159,15 @@ def test_a_pocket_is_corrected_at_its_place_and_bottom_which_is_said() -> None:
     assert moves.end[1].tolist() == [50, 40, -15]
     assert moves.end[3].tolist() == [5, 6, 55]
     assert [message.code for message in trace.messages] == ["NCF280"]
+
+
+@pytest.mark.parametrize(
+    "frame", ["CYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+30", "CYCL DEF 7.0 DATUM\nCYCL DEF 7.1 X+5"]
+)
+def test_where_the_tool_stands_after_a_pocket_is_not_known_in_any_frame(frame: str) -> None:
+    found = fates(f"L X+1 Y+1 Z+90 FMAX\n{frame}\n{POCKET}\nL X+50 Y+40 FMAX M99\nL X+60 FMAX M99")
+    assert [rule for rule, _ in found[1:]] == [Rule.CORRECT, Rule.REFUSE]
+    assert "after a cycle with a path of its own is not followed" in found[2][1]
 
 
 def test_a_pocket_is_written_as_a_hole_is() -> None:
