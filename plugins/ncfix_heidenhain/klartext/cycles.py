@@ -168,8 +168,7 @@ def drill(control: KlartextControl, where: Where, axes: int, heights: tuple[floa
         over.unknown |= {X: AFTER_CYCLE, Y: AFTER_CYCLE}
         if not refusal:
             control.warn(MOVED_AS_A_WHOLE, AS_A_WHOLE.format(control.cycle.number))
-    control.position, control.unknown = command_of(control, over, axes | 1 << Z)
-    control.frame_unknown = over.unknown
+    control.stand(*command_of(control, over, axes | 1 << Z), over.unknown)
     control.path.tangent = None
 
 
@@ -202,5 +201,5 @@ def own_path(control: KlartextControl, step: Step) -> None:
     position, unknown = control.position[:], dict(control.unknown)
     refuse(control, OWN_PATH.format(control.cycle.number))
     if control.cycle.number in IN_SPACE and not step.words.axes >> (Z + 1):
-        control.position, control.unknown = position, unknown
+        control.stand(position, unknown)
     control.lose(range(3), AFTER_CYCLE)

@@ -142,9 +142,11 @@ def drill(
     if not at_level:
         control.places.lose(unplaced & 1 << across)
     program[across] = clear
-    control.position = command(control, block, program)
+    above = command(control, block, program)
     if height is not None and not at_level:
-        control.unknown = control.axes_of({**unknown, across: height})
+        control.stand(above, control.axes_of({**unknown, across: height}))
+    else:
+        control.position = above
 
 
 def hole_unknown(control: RS274Control, block: Block) -> UnknownAxes:

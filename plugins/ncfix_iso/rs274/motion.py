@@ -213,7 +213,7 @@ def refused(control: RS274Control, block: Block, code: int) -> None:
     before, known = control.position, control.unknown
     control.make(Motion(MotionKind.FEED, block.axes, target, unknown, code, refusal=REFUSALS[code]))
     if code == 331:
-        control.position, control.unknown, control.frame_unknown = before, known, None
+        control.stand(before, known)
 
 
 def end_spline(control: RS274Control, block: Block, code: int) -> None:

@@ -229,7 +229,7 @@ def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
         words, over, refusal = lead_to(control, block, point, name)
         drill(control, words, over, drilling, refusal=refusal, modal=True)
     control.lost = dict(control.lost) | dict.fromkeys((plane.first, plane.second), AFTER_PATTERN)
-    control.unknown = control.axes_of(control.lost)
+    control.stand(control.position, control.axes_of(control.lost))
 
 
 def hole_after(control: Sinumerik, words: BlockWordValues) -> None:

@@ -204,6 +204,13 @@ class ControlState(ABC):
                 self.knowledge.start_position(LETTERS[index])
                 del self.unknown[index]
 
+    def stand(self, position: Vector, unknown: UnknownAxes, in_frame: UnknownAxes | None = None) -> None:
+        """The control stands there by itself: behind a hole, or where it comes back to.
+
+        in_frame  what is not known along the axes of the program's frame, where that says more than `unknown` does
+        """
+        self.position, self.unknown, self.frame_unknown = position, unknown, in_frame
+
     def lose(self, indices: Sequence[int], reason: str) -> None:
         """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
         self.frame_unknown = None
