@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ncfix.control.coordinates import mask_of
 from ncfix.control.expressions import Fault, Unknown
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow, Return
-from ncfix.control.modal import NO_MOTION
+from ncfix.control.state import NO_MOTION
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
 from ncfix.text.tree import OWordLine as FlowItem

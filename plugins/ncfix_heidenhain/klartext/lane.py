@@ -21,10 +21,9 @@ from ncfix.control.moves import Arc, FeedMode, MotionKind
 from ncfix_heidenhain.klartext.arc_lane import keep_pole, turned
 from ncfix_heidenhain.klartext.arcs import direction_at_end
 from ncfix_heidenhain.klartext.control import KlartextControl
-from ncfix_heidenhain.klartext.lane_tables import FEED, RAPID
 from ncfix_heidenhain.klartext.layout import CORNERS
 from ncfix_heidenhain.klartext.lines import FLAT
-from ncfix_heidenhain.klartext.units import KlartextUnit
+from ncfix_heidenhain.klartext.units import FEED, RAPID, KlartextUnit
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

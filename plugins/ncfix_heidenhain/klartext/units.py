@@ -1,17 +1,140 @@
-"""A Klartext program ready to be followed: the plans of its blocks, its labels, where it begins."""
+"""A Klartext program ready to be followed: the plans of its blocks, its labels, where it begins.
+
+For the fast lane also: which shapes of blocks are nothing but a motion with plain numbers, or a pole.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.control.arcs import CLOCKWISE, COUNTER
+from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.interpreter import TextUnit
-from ncfix.text.tree import Program
-from ncfix_heidenhain.klartext.lane_tables import KlartextLaneTables
-from ncfix_heidenhain.klartext.plans import KlartextPlan, plan_of
+from ncfix.control.lanes import lane_tables as shared
+from ncfix.control.lanes.lane_tables import Lane
+from ncfix.text.tree import Constant, Literal, Program, Template
+from ncfix_heidenhain.klartext.arcs import IN_PLANE
+from ncfix_heidenhain.klartext.plans import LETTERS, KlartextPlan, plan_of
+
+STRAIGHT = frozenset({"", "l", "ln"})
+ARCS = {"cr": "R", "c": "", "cp": "IPA"}
+"""Arcs in the plane of X and Y, and the address besides axes that each has."""
+
+IDLE = frozenset({"F", "S", "NX", "NY", "NZ"})
+"""Addresses that lead nowhere."""
+
+SIDES = {"r0": 0, "rl": 41, "rr": 42}
+"""What radius compensation is from a block on."""
+
+SENSES = {"dr-": CLOCKWISE, "dr+": COUNTER}
+FLAGS = frozenset({"fmax", *SIDES})
+HARMLESS = frozenset({3, 4, 5, 7, 8, 9, 13, 14})
+"""M codes of spindle and coolant: they change nothing that motions depend on."""
+
+NOTHING = Lane((), -1, -1)
+RAPID, FEED = 0, 10
+
+
+@dataclass(frozen=True, slots=True)
+class KlartextLaneTables:
+    """The shapes of a program as columns.
+
+    open   (s,) blocks of the shape may go through the fast lane
+    empty  (s,) they do nothing
+    side   (s,) what radius compensation is from them on, -1 if it stays
+    words  axes, feed and motion as in every lane; motion is that of motions; arcs move X and Y
+    arc    (s,) the name of the arc that they make, empty for none
+    value  (s,) which number of a block is R of CR, or IPA of CP; -1
+    pole   (s, 2) which ones are X and Y of a pole (CC); -1
+    """
+
+    open: NDArray[np.bool_]
+    empty: NDArray[np.bool_]
+    side: NDArray[np.int64]
+    words: shared.LaneTables
+    arc: NDArray[np.str_]
+    value: NDArray[np.int64]
+    pole: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, templates: Sequence[Template], plans: Sequence[KlartextPlan], axes: int) -> KlartextLaneTables:
+        """The tables of some shapes; `axes`: bit mask of the letters that the machine has."""
+        slots = [slots_of(template, plan) for template, plan in zip(templates, plans, strict=True)]
+        lanes = [lane_of(plan, own, axes) for plan, own in zip(plans, slots, strict=True)]
+        sides = [max((SIDES[flag] for flag in plan.flags & SIDES.keys()), default=-1) for plan in plans]
+        tables = cls(
+            np.array([lane is not None for lane in lanes], dtype=np.bool_),
+            np.array([plan.empty for plan in plans], dtype=np.bool_),
+            np.array(sides, dtype=np.int64),
+            shared.LaneTables.of(lanes),
+            np.array([plan.name if plan.name in ARCS else "" for plan in plans], dtype="U2"),
+            np.full(len(plans), -1),
+            np.full((len(plans), 2), -1),
+        )
+        for shape in np.flatnonzero(tables.open).tolist():
+            plan, own = plans[shape], slots[shape] or {}
+            if plan.name in ARCS:
+                tables.words.mask[shape] |= IN_PLANE
+                tables.value[shape] = own.get(ARCS[plan.name], -1)
+            elif plan.name == "cc":
+                tables.pole[shape] = own["X"], own["Y"]
+        return tables
+
+
+def slots_of(template: Template, plan: KlartextPlan) -> Mapping[str, int] | None:
+    """Address -> slot of the words of a motion; None if some are more than plain numbers."""
+    values = {word.address: word.value for word in template.words if not isinstance(word.value, Constant)}
+    slots = {address: value.slot for address, value in values.items() if isinstance(value, Literal) and address != "N"}
+    return slots if slots.keys() == plan.words.keys() else None
+
+
+def lane_of(plan: KlartextPlan, slots: Mapping[str, int] | None, axes: int) -> Lane | None:
+    """The fast lane's view of a shape; None if its blocks are more than a motion with plain numbers, or a pole."""
+    if plan.empty:
+        return NOTHING
+    if slots is None or not is_plain(plan):
+        return None
+    named = mask_of(INDEX[address] for address in slots if address in INDEX)
+    if plan.name == "cc":
+        return NOTHING if slots.keys() == {"X", "Y"} and not plan.flags and not plan.codes else None
+    if plan.name in ARCS:
+        return arc_of(plan, slots) if not (named | IN_PLANE) & ~axes else None
+    if plan.name not in STRAIGHT or (plan.name == "ln" and not slots.keys() & LETTERS):
+        return None
+    if not slots.keys() <= LETTERS | IDLE or named & ~axes:
+        return None
+    words = tuple((INDEX[letter], slot) for letter, slot in slots.items() if letter in INDEX)
+    if not plan.flags <= FLAGS or len(plan.flags & SIDES.keys()) > 1:
+        return None
+    return Lane(words, slots.get("F", -1), RAPID if "fmax" in plan.flags else FEED)
+
+
+def arc_of(plan: KlartextPlan, slots: Mapping[str, int]) -> Lane | None:
+    """The same of an arc; None if it is not in the plane of X and Y, or lacks what it needs."""
+    own, named = ARCS[plan.name], slots.keys() & LETTERS
+    senses = plan.flags & SENSES.keys()
+    if len(senses) != 1 or not plan.flags <= senses | {"r0"} or not slots.keys() <= {"X", "Y", "Z", "F", "S", own}:
+        return None
+    if (own and own not in slots) or not (named <= {"Z"} if plan.name == "cp" else named & {"X", "Y"}):
+        return None
+    if plan.name == "cr" and "Z" in named and len(named) < 3:
+        return None
+    words = tuple((INDEX[letter], slots[letter]) for letter in sorted(named))
+    return Lane(words, slots.get("F", -1), SENSES[next(iter(senses))])
+
+
+def is_plain(plan: KlartextPlan) -> bool:
+    """Whether a block does nothing but what its words with numbers say, and what is harmless."""
+    if plan.skip or plan.flow or plan.assignments or plan.tool is not None or plan.statement:
+        return False
+    return not any(code not in HARMLESS or own for code, own in plan.codes)
+
 
 NO_BEGIN = "NCF275"
 BEGIN = re.compile(r"BEGIN\s+PGM(?P<rest>.*)", re.IGNORECASE | re.DOTALL)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ncfix.control import control as shared
 from ncfix.control.coordinates import INCH, LETTERS, zeros
 from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
-from ncfix.control.modal import Saved
+from ncfix.control.state import Saved
 from ncfix.control.turns import watch
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run

@@ -1,4 +1,4 @@
-"""The walk through a program: block after block, as flow control leads."""
+"""The walk through a program: block after block, as flow control leads, and which motion each block executes."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from ncfix.control.coordinates import LETTERS, N_LETTERS, mask_of
 from ncfix.control.expressions import Fault, Unknown
 from ncfix.control.flow import NEVER_ENDS, WAITS, ProgramFlow
 from ncfix.control.interpreter import NO_END, Interpreter
+from ncfix.control.state import NO_MOTION
 from ncfix.text.language import Run
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
 from ncfix_iso.rs274.blocks import check_words
-from ncfix_iso.rs274.choice import motion_of
-from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
+from ncfix_iso.rs274.control import ARCS, POLAR, RUNTIME_BRANCH, Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE
 from ncfix_iso.rs274.expressions import number_of, whole
 from ncfix_iso.rs274.flow import OWords
-from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS, LENGTH, NON_MODAL
-from ncfix_iso.rs274.motion import BAD_MOTION, in_machine_coordinates
+from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS, LENGTH, NON_MODAL, TURNING_CYCLES
+from ncfix_iso.rs274.motion import BAD_MOTION, NO_CODE, in_machine_coordinates
 from ncfix_iso.rs274.order import DWELL, MACHINE, MOTIONS
 from ncfix_iso.rs274.plans import Codes, RS274Plan, RS274Unit, grouped_codes, has_words
 from ncfix_iso.rs274.settings import unknown_code
@@ -28,6 +28,56 @@ from ncfix_iso.rs274.settings import unknown_code
 if TYPE_CHECKING:
     from ncfix.control.operations import CycleTable
     from ncfix_iso.rs274.flatten import RS274Flattener
+
+
+WITHOUT_AXES = frozenset((0, 10, *ARCS, 52, NO_MOTION, *TURNING_CYCLES))
+"""Motion codes that need no axis word."""
+
+
+def motion_of(control: RS274Control, plan: RS274Plan, codes: Codes) -> int | None:
+    """The motion code that a block executes; raises `Fault` where its axis words have no code."""
+    has_axes = plan.axes != 0
+    if codes.motion is not None:
+        return explicit_motion(control, codes, codes.motion, has_axes)
+    if codes.takes or (has_axes and codes.g.get(LENGTH) in DYNAMIC_OFFSETS):
+        return None
+    modal = control.modal.motion
+    if has_axes and modal in (NO_MOTION, -1):
+        return without_code(control)
+    if has_axes:
+        return modal
+    level = control.rules.level_of(modal)
+    if not control.rules.strict and level in plan.letters and control.modal.cycle.initial is not None:
+        return modal if modal in control.rules.cycles else None
+    return modal if plan.letters & {"I", "J", "K"} and modal in ARCS else None
+
+
+def explicit_motion(control: RS274Control, codes: Codes, motion: int, has_axes: bool) -> int | None:
+    """The motion code that a block names, if it is executed."""
+    if codes.takes and motion != NO_MOTION:
+        only_modal(control, motion, "two G codes of the block both use its axis words")
+        return None
+    if motion == NO_MOTION and has_axes and not codes.takes and control.rules.strict:
+        raise Fault(BAD_MOTION, "axis words cannot be used with G80")
+    if not has_axes and motion not in WITHOUT_AXES:
+        only_modal(control, motion, f"G{motion / 10:g} needs an axis word")
+        return None
+    return motion
+
+
+def only_modal(control: RS274Control, motion: int, fault: str) -> None:
+    """A motion code that comes into force and moves nothing yet; LinuxCNC refuses it."""
+    if control.rules.strict:
+        raise Fault(BAD_MOTION, fault)
+    control.modal.motion = motion
+
+
+def without_code(control: RS274Control) -> int:
+    """Axis words while no motion code is in force."""
+    if control.rules.strict:
+        raise Fault(BAD_MOTION, "axis words, and no motion code is in force", "G0 or G1 is missing")
+    return NO_CODE
+
 
 CALL, RETURN = 980, 990
 DRILLING = 810

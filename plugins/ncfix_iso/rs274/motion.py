@@ -1,15 +1,56 @@
-"""Straight motions, reference points, probing, and motions that are followed only as far as their end."""
+"""Feeds and straight motions, reference points, probing, and motions that are followed only as far as their end.
+
+Source: LinuxCNC documentation, "G93, G94, G95", "F".
+"""
 
 from __future__ import annotations
+
+import math
 
 from ncfix.control.coordinates import INDEX, N_LETTERS, Vector, mask_of, rotated
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import FeedMode, Motion, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.tcp import led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.feeds import check_feed
 from ncfix_iso.rs274.systems import REFERENCES, is_given, store, stored
 from ncfix_iso.rs274.targets import destination, machine_destination
+
+NO_FEED = "NCF225"
+
+
+def feed_mode(control: RS274Control, block: Block, code: int) -> None:
+    """G93, G94, G95. In LinuxCNC a feed per minute or revolution has to be given anew after its code."""
+    mode = code // 10
+    if mode != control.modal.feed_mode or (control.rules.strict and mode != FeedMode.INVERSE_TIME):
+        control.modal.feed = math.nan
+        control.modal.feed_given = False
+    control.modal.feed_mode = mode
+
+
+def feed(control: RS274Control, block: Block, code: int) -> None:
+    """F."""
+    unit = 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
+    control.modal.feed = math.nan if "F" in block.runtime else unit * block.values["F"]
+    control.modal.feed_given = control.modal.feed != 0.0
+
+
+def speed(control: RS274Control, block: Block, code: int) -> None:
+    """S."""
+    control.modal.speed = block.values["S"]
+
+
+def check_feed(control: RS274Control, block: Block) -> None:
+    """Raise `Fault` where LinuxCNC refuses a motion for want of a feed."""
+    if not control.needs_feed:
+        return
+    if control.modal.feed_mode == FeedMode.INVERSE_TIME:
+        if "F" not in block.values:
+            raise Fault(NO_FEED, "in inverse time mode (G93) every motion at feed needs its own F")
+    elif not control.modal.feed_given:
+        raise Fault(NO_FEED, "a motion at feed, and no feed (F) is set")
+    elif control.modal.feed_mode == FeedMode.PER_REVOLUTION and control.modal.speed == 0.0:
+        raise Fault(NO_FEED, "a feed per revolution (G95), and no spindle speed (S) is set")
+
 
 BAD_MOTION = "NCF221"
 MACHINE_COORDINATES = Passing(Pass.MACHINE_COORDINATES, "machine coordinates (G53)")

@@ -13,7 +13,6 @@ from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.arc_motion import arc
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.cycles import cycle
-from ncfix_iso.rs274.feeds import feed, feed_mode, speed
 from ncfix_iso.rs274.groups import Rules
 from ncfix_iso.rs274.lengths import change_tool, select_tool, set_data, tool_offset
 from ncfix_iso.rs274.motion import (
@@ -22,11 +21,14 @@ from ncfix_iso.rs274.motion import (
     cancel,
     dwell,
     end_spline,
+    feed,
+    feed_mode,
     go_to_reference,
     one_way,
     probe,
     refused,
     save_reference,
+    speed,
     straight,
     turning_cycle,
 )

@@ -15,7 +15,7 @@ from ncfix.control.coordinates import INDEX
 from ncfix.control.expressions import Evaluate, Fault
 from ncfix.control.interpreter import TextUnit
 from ncfix.control.lanes.lane_tables import Lane
-from ncfix.control.modal import NO_MOTION
+from ncfix.control.state import NO_MOTION
 from ncfix.text.reach import UNREAD, Deletable, deletable
 from ncfix.text.tree import (
     Assignment,

@@ -10,7 +10,7 @@ import math
 
 from ncfix.control.coordinates import INCH, PLANES
 from ncfix.control.expressions import Fault
-from ncfix.control.modal import Modal, Saved
+from ncfix.control.state import Modal, Saved
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import activate
 

@@ -24,14 +24,21 @@ from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.heading import note_stretch
 from ncfix_siemens.sinumerik.increments import stand
-from ncfix_siemens.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
 from ncfix_siemens.sinumerik.motion import is_harmless
 from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
 from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, SinumerikPlan, is_statement
 from ncfix_siemens.sinumerik.scanning import all_or_none
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn, act, call_word, finish_block, ran_elsewhere, say
-from ncfix_siemens.sinumerik.undecided import DECIDED_AT_RUNTIME, bypassed, demoted, sweep
+from ncfix_siemens.sinumerik.undecided import (
+    BY_THEMSELVES,
+    DECIDED_AT_RUNTIME,
+    bypassed,
+    demoted,
+    let_axis_go,
+    note_letting,
+    sweep,
+)
 from ncfix_siemens.sinumerik.unit import HEAD, PROCEDURE, SinumerikUnit, units_of
 
 NOT_UNDERSTOOD = "NCF250"

@@ -30,7 +30,7 @@ from ncfix.compensate.solve import (
 )
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
-from ncfix.control.standing import BLOCK_DELETE, named_switches
+from ncfix.control.state import BLOCK_DELETE, named_switches
 from ncfix.diagnostics import Message, NcfixError, Place, RefusedError, SourceError, UsageError
 from ncfix.machine import Machine
 from ncfix.text.reader import read

@@ -29,7 +29,7 @@ from ncfix.control.moves import (
 )
 from ncfix.control.pointing import Pointing
 from ncfix.control.posture import MachineDirections, pointing_of
-from ncfix.control.standing import ControlState
+from ncfix.control.state import ControlState
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run

@@ -1,17 +1,16 @@
-"""Motions as columns: what the control does, one row per motion, in the order in which it does it.
+"""Motions: what a block asks for, what the control does, and by which rule a motion may stay uncorrected.
 
-Positions are *commands*: what the control is told in its own coordinate system of axes, with work offsets, G92 and
-tool offsets added. Without tool-centre-point control a command is the machine's axis positions. With it (`tcp`), X Y
-Z of the command are the coordinates of the tool tip in the workpiece, turned with it; the machine floor knows how to
-make axis positions of that, this floor does not.
+`Moves` holds them as columns, one row per motion, in the order in which the control makes them. Positions are
+*commands*: what the control is told in its own coordinate system of axes, with work offsets, G92 and tool offsets
+added. Without tool-centre-point control a command is the machine's axis positions. With it (`tcp`), X Y Z of the
+command are the coordinates of the tool tip in the workpiece, turned with it; only the machine model can make axis
+positions of that.
 
-The rules by which a motion passes as it is: all there are, what each may pass, and why that is right.
+`Motion` is one motion as its block means it, with what is not known of its end.
 
-A motion that is neither corrected nor refused has one of these rules, whatever the language of its program, and the
-reports count it by that rule. What no rule here may pass is corrected or refused: a feed, say, is never passed because
-nobody has said where an axis stands.
-
-A motion as a block means it, and what is not known of where it leads.
+`Pass` lists all rules by which a motion may stay as it is, whatever the language of its program, with the motions that
+each may pass and the reason. The reports count such motions by rule. A motion that no rule may pass is corrected or
+refused. A feed, for example, never passes because its axis has no known position.
 """
 
 from __future__ import annotations

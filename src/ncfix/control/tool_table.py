@@ -1,12 +1,9 @@
-"""Tool tables: LinuxCNC's `.tbl`, Heidenhain's TOOL.T (`tool_t`), and CSV with a header.
+"""Tool tables: LinuxCNC's `.tbl`, Heidenhain's TOOL.T, and CSV with a header.
 
-LinuxCNC documentation, "Tool table format": one tool a line, `T1 P1 Z120.5 D10 ; comment`; Z is the length offset and D
-the diameter, in the machine's unit, which is mm here.
-
-Heidenhain's tool table TOOL.T: columns at fixed places under a line of names.
-
-Source: TNC 640 user's manual, "Entering tool data in the table". L and R with their oversizes DL and DR count; a tool
-with an index (5.1) has no place in a table by number and is left out, and so is a row without a length.
+- LinuxCNC: one tool a line, `T1 P1 Z120.5 D10 ; comment`. Z is the length offset and D the diameter, both in mm here,
+  since the machine's unit is mm. Source: LinuxCNC documentation, "Tool table format".
+- TOOL.T: columns at fixed places under a line of names. L and R count with their oversizes DL and DR. A tool with an
+  index (5.1) and a row without a length are left out. Source: TNC 640 user's manual, "Entering tool data in the table".
 """
 
 from __future__ import annotations

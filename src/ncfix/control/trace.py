@@ -1,12 +1,9 @@
-"""A program in parts: read and followed one after the other, so that its length does not matter to the memory.
+"""Programs followed as the control would execute them, from their blocks to their motions: whole (`trace`) or in parts.
 
-A part ends between two blocks of plain words, where nothing else can be under way. Its lines are those of the file, and
-templates, frames and reasons have the same numbers in all parts, so that parts can be put together.
-
-Following a program part by part, what goes on from one part to the next, and what there is to say at the end: the
-same for all languages.
-
-Following a program as the control would: from its tree to its motions.
+A long program is read (`PartReader`) and followed (`Follower`) part after part, so that its length does not matter to
+the memory. A part ends between two blocks of plain words, where no cycle, call or loop can be under way. Its lines are
+those of the file, and templates, frames and reasons have the same numbers in all parts, so that parts can be joined.
+A `Checkpoint` is the state of the control between two parts.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""From bytes to a `Program`: two lanes, one grammar.
+"""Reads a program: from bytes to a `Program`.
 
-The grammar decides what a block means. A block's shape is parsed once, and its template is then used for every block
-of that shape, with the numbers that the scan found. Where the scan and the grammar do not see the same numbers, the
-block's own text is its shape, and its numbers are the grammar's.
+A scan finds the numbers of all blocks. What is left of a block without them is its shape. The grammar parses each shape
+once; the resulting template serves every block of that shape, with the numbers of the scan. Where scan and grammar do
+not find the same numbers, the block is parsed by itself: its own text is its shape, and its numbers are the grammar's.
 """
 
 from __future__ import annotations
