@@ -14,12 +14,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import reduce
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix.control.coordinates import DEGREE, LETTERS, mask_of, product
 from ncfix.control.expressions import Fault, number
@@ -27,62 +25,13 @@ from ncfix.control.frames import turned
 from ncfix.control.lanes.block_rows import BlockRows, IntArray, stage_of
 from ncfix.control.lanes.lane import SHORTEST, before_placing, is_open, take
 from ncfix.control.moves import FeedMode
-from ncfix.control.pointing import FloatArray, Pointing, Triple, Ways, dot, nearest, to_each
+from ncfix.control.pointing import Pointing, Triple, Ways, dot, nearest
 from ncfix.control.posture import FAR, postures
-from ncfix.text.tree import Program
 from ncfix_siemens.sinumerik.destination import BlockWordValues
+from ncfix_siemens.sinumerik.directions import NO_LENGTH
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.vocabulary import ANGLES, NORMALS, OTHERS, VECTOR
-
-NO_LENGTH = 1e-9
-"""A shorter vector says nothing."""
-
-
-class VectorText(Protocol):
-    """A program text whose blocks give vectors."""
-
-    @property
-    def program(self) -> Program:
-        """The program."""
-
-    @property
-    def vectors(self) -> NDArray[np.int64]:
-        """(s, 3) the slots of A3 B3 C3 in the blocks of each shape, -1 for none."""
-
-
-@dataclass(slots=True)
-class Directions:
-    """The ways to point the tool in blocks from `begin` on."""
-
-    begin: int = 0
-    ways: list[Ways] = field(default_factory=list)
-
-    def known(self, pointing: Pointing, text: VectorText, block: int, stop: int, least: int) -> list[Ways]:
-        """The ways from a block on: of so many blocks at least, unless one of them gives no direction, up to `stop`."""
-        if not self.begin <= block <= self.begin + len(self.ways) - least:
-            self.begin, self.ways = block, ways_of(pointing, vectors_of(text, block, stop))
-        return self.ways[block - self.begin : stop - self.begin]
-
-
-def vectors_of(text: VectorText, start: int, stop: int) -> FloatArray:
-    """(n, 3) the components of the vectors of blocks; zero where one is not written."""
-    program = text.program
-    slots = text.vectors[program.template[start:stop]]
-    values = program.numbers[program.first_number[start:stop, None] + np.maximum(slots, 0)]
-    found: FloatArray = np.where(slots >= 0, values, 0.0)
-    return found
-
-
-def ways_of(pointing: Pointing, vectors: FloatArray) -> list[Ways]:
-    """The two ways to each direction of vectors (n, 3), up to the first that has no length or is not reached."""
-    x, y, z = vectors.T
-    length = to_each(math.hypot, x, y, z)
-    size = np.maximum(length, NO_LENGTH)
-    reached, ways = pointing.ways_of_many((x / size, y / size, z / size))
-    wrong = np.flatnonzero(~reached | (length < NO_LENGTH))
-    return ways[: wrong[0]] if wrong.size else ways
-
 
 BAD_VECTOR = "NCF254"
 WAY = "NCF253"

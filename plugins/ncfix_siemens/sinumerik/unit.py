@@ -16,7 +16,7 @@ from ncfix.control.expressions import Fault
 from ncfix.control.interpreter import TextUnit
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.text.tree import StringLiteral as Label
-from ncfix_siemens.sinumerik.orientation import Directions
+from ncfix_siemens.sinumerik.directions import Directions
 from ncfix_siemens.sinumerik.plans import Branching, SinumerikPlan, plan_of
 
 HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*(?:;.*)?$", re.IGNORECASE)
