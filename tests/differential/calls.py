@@ -78,7 +78,8 @@ def _same_arguments(one: Call, two: Call, original: Canon, fixed: Canon) -> bool
 def _feeds(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[int, str]]:
     """Each piece runs at the feed of its motion; with inverse time all the pieces together take its time.
 
-    So they do where only rotary axes turn: F is degrees a minute then, but mm a minute as soon as X Y Z move too.
+    So they do where only rotary axes turn: F is degrees a minute then, but mm a minute as soon as X Y Z move too. In
+    which mode such a turn is written does not matter: a slow one of G93 may need G94, where its F has digits enough.
     """
     wanted, before = _feed_of(original)
     given, after = _feed_of(fixed)
@@ -89,7 +90,7 @@ def _feeds(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[
         if segments.fate[k] in (Fate.WRONG, Fate.CONTOUR) or original.kind[k] == RAPID:
             continue
         pieces = range(first, last + 1)
-        if any(after[j] != before[k] for j in pieces):
+        if not turns[k] and any(after[j] != before[k] for j in pieces):
             yield int(original.line[k]), "the feed mode changed"
         elif not before[k] and not turns[k]:
             other = next((given[j] for j in pieces if abs(given[j] - wanted[k]) > 1e-4), None)

@@ -106,6 +106,22 @@ def test_a_wrong_fixer_is_caught(verdict_of: Callable[..., Verdict], name: str) 
     assert any(word in complaint for complaint in verdict.complaints), str(verdict)
 
 
+@pytest.mark.parametrize(("feed", "said"), [("45", ""), ("90", "s for a turn")])
+def test_a_turn_may_change_its_feed_mode_and_not_its_time(
+    rs274: Callable[..., Canon], machine: Callable[[str], Machine], feed: str, said: str
+) -> None:
+    model = machine("five_bc")
+    turn = "ABC"[model.rotary[0] - 3]
+    start = f"G21 G90 G17\nG0 X0 Y0 Z10 {turn}0\nG93\n"
+    slow = rs274(f"{start}G1 {turn}90 F0.5\nG94\nM2\n".encode())
+    done = rs274(f"{start}G94 G1 {turn}90 F{feed}\nG93\nG94\nM2\n".encode())
+    found = [
+        each for each in judge(slow, done, model, Terms(passed=lambda _: True)).complaints if "COMMENT" not in each
+    ]
+    assert ["feed mode" in each or "s for " in each for each in found] == [True] * bool(said)
+    assert all(said in each for each in found)
+
+
 def test_motions_that_are_passed_by_rule_must_stay(verdict_of: Callable[..., Verdict]) -> None:
     assert verdict_of(PLAIN, Flaws(leaves=7), Terms(tolerance=2e-3, passed=lambda line: line == 8)).right
     touched = verdict_of(PLAIN, Flaws(), Terms(tolerance=2e-3, passed=lambda line: line == 8))
