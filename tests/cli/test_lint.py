@@ -111,3 +111,20 @@ def test_the_same_file_twice_is_one(tmp_path: Path, ncfix: Any) -> None:
     path = tmp_path / "x.comp"
     path.write_text("0 0 0\n10 0 0\n")
     assert len(json.loads(ncfix("lint", path, path, "--json").out)["files"]) == 1
+
+
+@pytest.mark.parametrize("settings", [(), ("grids=one", "negate=XZ"), ("steps=even", "fit=area")])
+@pytest.mark.parametrize("name", ["three_axis", "angle_head"])
+def test_nothing_is_said_of_what_export_has_written_for_isg(
+    tmp_path: Path, ncfix: Any, root: Path, name: str, settings: tuple[str, ...]
+) -> None:
+    """No hint about its own file, neither of `lint` nor of `emulate`, whatever is set."""
+    out, machine = tmp_path / "tables", root / "examples" / "machines" / f"{name}.toml"
+    given = [word for setting in settings for word in ("--set", setting)]
+    assert ncfix("export", "isg", "-m", machine, "-o", out, *given).code == ExitCode.DONE
+    result = ncfix("lint", out, "--json")
+    entries = json.loads(result.out)["files"]
+    assert (result.code, {entry["form"] for entry in entries}) == (ExitCode.DONE, {"isg"})
+    assert [entry["findings"] for entry in entries] == [[]] * len(entries)
+    run = ncfix("emulate", "isg", out, "-m", machine)
+    assert (run.code, "volcomp" in run.err) == (ExitCode.DONE, False), run.err
