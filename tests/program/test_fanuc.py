@@ -11,7 +11,9 @@ import pytest
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
+from ncfix.compensate.following import follow as follow_on
 from ncfix.compensate.following import kinematics_of
+from ncfix.control.moves import Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError, UsageError
@@ -373,6 +375,26 @@ def test_g53_1_turns_the_tool_square_to_the_plane(root: Path, name: str, angles:
     axis = pose[:3, :3] @ zero[:3, :3].T @ np.array([0.0, 0.0, 1.0])
     assert axis == pytest.approx(plane[:, 2], abs=1e-8)
     assert math.isclose(float(np.linalg.det(plane)), 1.0)
+
+
+@pytest.mark.parametrize(("length", "rule"), [("", Rule.REFUSE), ("G43H1", Rule.CORRECT)])
+def test_cuts_in_a_tilted_plane_need_a_tool_length_in_force(root: Path, length: str, rule: Rule) -> None:
+    """Without one the control leads the gauge point along the plane; rapids are not refused, G43 may come."""
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    lines = [
+        "G21G54G0X0.Y0.Z90.A0.C0.",
+        "T1M6",
+        "G68.2X1.Y2.Z3.I0.J30.K0.",
+        "G53.1",
+        "G0X0.Y0.",
+        f"{length}G1Z9.F500.",
+        "M30",
+    ]
+    setup = Setup(assume_zero=True, no_point="IS-B", tools={1: Tool(80.0)})
+    program = read("\n".join(lines).encode(), "part", "fanuc")
+    moves = follow_on(program, machine, setup).trace.moves
+    assert moves.rule[-1] == rule
+    assert moves.rule[-2] != Rule.REFUSE
 
 
 # -- the corpus -------------------------------------------------------------------------------------------------------
