@@ -1,6 +1,7 @@
 """A program followed on a machine: its kinematics under tool-centre-point control, and the conditions it runs under."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from ncfix.compensate.following import follow, kinematics_of
 from ncfix.control.moves import Rule, TcpState
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import UsageError
-from ncfix.machine import loads
+from ncfix.machine import load, loads
 from ncfix.text.reader import read
 
 ROTARY_TABLE = """
@@ -66,6 +67,26 @@ def test_axes_that_machine_coordinates_do_not_name_stand_still_under_tcp(
     words = {word[0]: float(word[1:]) for word in block.split() if word[0] in "XYZ"}
     wanted = [0.0 if "G28" in block else words[letter] for letter in moves.axes if letter in words]
     np.testing.assert_allclose(end[named], wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("block", ["SUPA G0 Z240", "G53 G0 X20", "G153 G1 Y-15 Z200 F500"])
+def test_axes_that_machine_coordinates_do_not_name_stand_still_in_a_swivelled_plane(root: Path, block: str) -> None:
+    swivel = 'CYCLE800(1,"T",0,57,0,0,0,10,15,5,0,0,0,-1)'
+    text = f"G90 G710\nT1 D1\nG0 X0 Y0 Z200 A0 C0\n{swivel}\nG0 X10 Y20 Z30\n{block}\nM30\n"
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    moves = follow(read(text.encode(), "a.mpf", "siemens"), machine, SETUP).trace.moves
+    kinematics, on, off = kinematics_of(machine), TcpState(True, 100.0), TcpState(False, 0.0)
+    assert kinematics is not None
+    assert moves.rule[-1] == Rule.PASS
+    start, end = (np.array(kinematics(each.tolist(), on, off)) for each in moves.end[-2:])
+    words = {word[0]: float(word[1:]) for word in block.split()[2:] if word[0] in "XYZ"}
+    tool = {"Z": 100.0}
+    wanted = [
+        words.get(axis, place) + tool.get(axis, 0.0) * (axis in words)
+        for axis, place in zip(moves.axes, start, strict=True)
+    ]
+    # affine maps of 256 mm probes in double precision
+    np.testing.assert_allclose(end, wanted, atol=1e-9)
 
 
 def test_kinematics_say_a_command_there_and_back() -> None:

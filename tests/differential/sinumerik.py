@@ -238,6 +238,7 @@ class Control(Standing):
     def transform(self, on: bool) -> None:
         """TRAORI and TRAFOOF: the axes stand still."""
         self.stand(lambda: None, tcp=on)
+        self.modes["transformed"] = on
 
     def stand(self, change: Callable[[], None], tcp: bool) -> None:
         """Change something while the axes stand still."""

@@ -60,7 +60,7 @@ class Standing:
 
     def __post_init__(self) -> None:
         self.modes = {"g": 0, "plane": 17, "inc": False, "unit": 1.0, "tcp": False, "pole": np.zeros(2), "diameter": 1}
-        self.modes |= {"polar": [0.0, 0.0], "drill": None, "ori": "", "angles": ""}
+        self.modes |= {"polar": [0.0, 0.0], "drill": None, "transformed": False, "ori": "", "angles": ""}
 
     # -- where it stands -----------------------------------------------------------------------------------------------
 
@@ -131,6 +131,15 @@ class Standing:
     def move(self, words: dict[str, Any], fixed: bool) -> None:
         """A motion, whose end and way come from the words."""
         turned = self.turn_words(words)
+        if fixed and self.modes["tcp"] and not self.modes["transformed"]:
+            q, length = self.axes(self.base[None], turned[:1])[0], np.array([0.0, 0.0, self.length])
+            for index, letter in enumerate("XYZ"):
+                if letter in words:
+                    q[index] = length[index] + self.one(words[letter], q[index] - length[index], self.modes["unit"])
+            q[3:] = turned[-1, 3:]
+            self.base = self.base_of(q)
+            self.sweep(np.repeat(self.base[None], LINE_SAMPLES, axis=0), turned, "fixed")
+            return
         if fixed:
             for index, letter in enumerate("XYZ"):
                 if letter in words:

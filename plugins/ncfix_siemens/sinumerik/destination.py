@@ -10,6 +10,7 @@ from typing import NamedTuple
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import Arc, MotionKind, Passing, UnknownAxes
+from ncfix.control.tcp import led_in_machine
 from ncfix_siemens.sinumerik.increments import unsteady
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
@@ -28,6 +29,7 @@ NEAR_POLE = 1e-6
 """mm"""
 STILL = 1e-9
 """rad; an axis that is nearer to where it shall be stands there already."""
+IN_PLANE = "where the axis {} stands after increments in machine coordinates in a swivelled plane is not followed"
 
 
 @dataclass(slots=True)
@@ -266,14 +268,35 @@ def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
 
 
 def machine_destination(control: Sinumerik, words: BlockWordValues) -> End:
-    """The command at which a motion in machine coordinates (SUPA, G53, G153) ends: frames off, the tool's length on."""
-    target, unknown = control.position[:], dict(control.unknown)
-    for letter in LETTERS:
-        if letter in words.values:
-            place_at_machine(control, words, letter, target, unknown)
+    """The command at which a motion in machine coordinates (SUPA, G53, G153) ends: frames off, the tool's length on.
+
+    A swivelled plane is a frame: without it the words are those of the machine's axes. TRAORI keeps them the tip's.
+    """
     if POLAR_WORDS & words.values.keys():
         raise Fault(POLAR, "polar coordinates do not go with machine coordinates")
+    if control.tcp and not (control.modes.transformed or control.setup.tcp):
+        target, unknown = led_in_machine(control, *axes_of_machine(control, words))
+    else:
+        target, unknown = control.position[:], dict(control.unknown)
+        for letter in LETTERS:
+            if letter in words.values:
+                place_at_machine(control, words, letter, target, unknown)
     return End(target, unknown, lost_in_frame(control, unknown))
+
+
+def axes_of_machine(control: Sinumerik, words: BlockWordValues) -> tuple[dict[int, float], UnknownAxes]:
+    """Where words lead axes of the machine, mm and rad, the tool's length on; and why that is not known."""
+    axes, unsure = dict[int, float](), dict[int, str]()
+    for letter in LETTERS:
+        if letter in words.values:
+            index, value = INDEX[letter], words.values[letter]
+            axes[index] = control.tools.vector[index]
+            axes[index] += control.of_setup(letter) * control_unit(control, index) * (value or 0.0)
+            if value is None:
+                unsure[index] = RUNTIME
+            elif counts_on(control, words.forms.get(letter, "")):
+                unsure[index] = IN_PLANE
+    return axes, unsure
 
 
 def place_at_machine(
