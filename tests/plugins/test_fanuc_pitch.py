@@ -17,7 +17,8 @@ from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
 from ncfix.tables.table_files import Remarks
-from ncfix.testing import AXES, check_control, single_error
+from ncfix.testing import check_control, single_error
+from ncfix.testing.tables import AXES
 from ncfix_fanuc.parameters import PunchedParameter, read_records
 from ncfix_fanuc.pitch import diffused
 from ncfix_fanuc.pitch_files import Pitch, pitch_text, read_increments
