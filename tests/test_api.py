@@ -87,3 +87,29 @@ def test_a_path_or_a_text_and_not_both() -> None:
         for function in (ncfix.read_program, ncfix.load_machine):
             with pytest.raises(TypeError, match="a path or a text is needed, and not both"):
                 function(**given)
+
+
+def test_a_machine_that_cannot_be_makes_nothing_unless_forced(shop: Path) -> None:
+    effect = '\n[[effect]]\nname = "EYX"\nbasis = "constant"\ncoefficients = [80.0]\n'
+    text = (shop / "machine.toml").read_text() + effect
+    (shop / "odd.toml").write_text(text)
+    program = ncfix.read_program(text="G21 G90 G94\nG0 X1 Y1 Z1\nG1 X5 F100\nM2\n", dialect="linuxcnc")
+    for make in (
+        lambda force: ncfix.fix(program, "odd.toml", setup=SETUP, force=force),
+        lambda force: ncfix.export("linuxcnc", "odd.toml", output="out", force=force),
+    ):
+        with pytest.raises(RefusedError, match="NCF324") as caught:
+            make(False)
+        assert {each.place.path for each in caught.value.messages if each.place} == {"odd.toml"}
+    assert not (shop / "out").exists()
+
+
+def test_tables_are_written_all_or_none(shop: Path) -> None:
+    made = ncfix.export("isg", "machine.toml", tool_length=120.0)
+    last = sorted(made.files)[-1]
+    (shop / "out").mkdir()
+    (shop / "out" / last).write_text("mine")
+    with pytest.raises(UsageError, match="NCF004"):
+        ncfix.export("isg", "machine.toml", tool_length=120.0, output="out")
+    assert [path.name for path in (shop / "out").iterdir()] == [last]
+    assert (shop / "out" / last).read_text() == "mine"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, overload
 from ncfix.batch.programs import subprograms
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message, Place, RefusedError
-from ncfix.files import read_bytes, write_whole
+from ncfix.files import read_bytes, write_folder, write_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,6 +86,17 @@ def _machine(machine: Machine | PathName) -> Machine:
     return load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
 
 
+def _sound(machine: Machine | PathName, force: bool) -> Machine:
+    """A machine for something to be made with it; raises `RefusedError` NCF320 to NCF324 if no machine can be so."""
+    from ncfix.machine.plausible import required
+
+    known = _machine(machine)
+    if not force:
+        path = os.fspath(machine) if isinstance(machine, (str, os.PathLike)) else known.name
+        required(known, path, "force=True makes it all the same")
+    return known
+
+
 def _program(program: Program | PathName, machine: Machine) -> Program:
     return read_program(program, machine=machine) if isinstance(program, (str, os.PathLike)) else program
 
@@ -142,13 +153,14 @@ def fix(
     tolerance_um   how far the tool tip may leave the intended path
     flatten        write loops, subprograms and cycles out where they cannot be corrected
     figures        the errors before and after along the path (`report.error_before_um`, ...)
-    force          correct a program that has been corrected; take the place of an existing output
+    force          correct a program that has been corrected, for a machine that no machine is like, too; take the
+                   place of an existing output
     allow_refused  write the output though motions had to be left uncorrected
     resolve        gives the text of a subprogram by its name; None: files beside the program, if that is one
     """
     from ncfix.compensate import FixOptions
 
-    known, own = _machine(machine), _setup(setup)
+    known, own = _sound(machine, force), _setup(setup)
     read = _program(program, known)
     options = FixOptions(strategy, tolerance_um, allow_refused, force, split_rapids, flatten, block_numbers, figures)
     found = fixed(read, known, own, options, resolve or _resolve(own, read))
@@ -378,7 +390,8 @@ def diagnose(
 
     known = _machine(machine)
     found = diagnosed(_measurements(measured, known), known, tuple(without))
-    if found.machine is not None:
+    if found.machine is not None and output is not None:
+        _sound(found.machine, force)
         _write(output, dumps(with_provenance(found)).encode(), force)
     return found
 
@@ -425,11 +438,10 @@ def export(
     from ncfix.tables.export import export as exported
 
     chosen = get_control(control) if isinstance(control, str) else control
-    request = table_request(chosen, _machine(machine), tool_length, target_um, ranges, settings or {})
+    request = table_request(chosen, _sound(machine, force), tool_length, target_um, ranges, settings or {})
     made = exported(chosen, request)
     if output is not None:
-        for name, content in made.files.items():
-            _write(os.path.join(os.fspath(output), name), content, force)
+        write_folder(os.fspath(output), made.files, force)
     return made
 
 

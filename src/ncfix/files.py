@@ -20,7 +20,7 @@ import os
 import re
 import stat
 import unicodedata
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -177,6 +177,30 @@ def write_whole(
         like = _as_it_is(name, folder)
         _put(folder, name, data, mode if like is None else like, replace)
         _sync(folder)
+
+
+def write_folder(folder: str, contents: Mapping[str, bytes], replace: bool = False) -> None:
+    """Write all files of a folder, or none if one is there already or must not be, or there is no room.
+
+    contents  name of a file -> what is in it
+
+    Raises `UsageError` NCF004, NCF005, NCF007, NCF023.
+    """
+    check_folder(folder)
+    paths = {os.path.join(folder, name): content for name, content in contents.items()}
+    for path in paths:
+        check_output(path, folder, replace)
+        if os.path.lexists(path) and not replace:
+            raise exists_already(path)
+    fresh = [path for path in paths if not os.path.lexists(path)]
+    try:
+        for path, content in paths.items():
+            write_whole(path, content, replace, folder)
+    except UsageError:
+        for path in fresh:
+            with suppress(OSError):
+                os.unlink(path)
+        raise
 
 
 def replace_keeping(path: str, backup: str, data: bytes | Iterable[bytes]) -> None:
@@ -429,6 +453,12 @@ def check_output(path: str, root: str | None = None, replace: bool = False) -> N
         text = f"would be replaced through the symbolic link {link}"
         hint = f"name the folder itself: {os.path.realpath(folder)}"
         raise UsageError.of("NCF005", text, Place(path), hint)
+
+
+def check_folder(folder: str) -> None:
+    """Refuse what is there and is no folder: NCF007."""
+    if os.path.lexists(folder) and not os.path.isdir(folder):
+        raise UsageError.of("NCF007", "is not a folder", Place(folder), "-o FOLDER")
 
 
 def check_own(path: str) -> None:

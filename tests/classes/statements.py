@@ -20,6 +20,7 @@ from ncfix.compensate.following import kinematics_of
 from ncfix.control.moves import MotionKind
 from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
+from ncfix.testing.language import address
 from ncfix.text.reader import read
 
 MACHINE = machine()
@@ -85,11 +86,6 @@ class Family:
         if dice.random() < self.stray:
             chosen.append(dice.choice(others))
         return Case(self, head, tuple(chosen), mode)
-
-
-def address(word: str) -> str:
-    """What a word says: its axis or address, as increment or not; `I1=` is one, `X10` says X."""
-    return re.match(r"(?:I(?=[A-Z]))?([A-Z]+(?:\d(?==))?(?:\[.\])?)", word)[1]
 
 
 @dataclass(frozen=True, slots=True)

@@ -328,8 +328,9 @@ def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> No
         off = float(np.linalg.norm(wanted.tip[-1] - made.tip[-1]))
         turned = language.turned if strategy == "full" else 0.0
         allowed = language.at_ends + turned + claims.left.get(wanted.line, 0.0)
-        if wanted.sort == "cut" and not fresh and language.tolerance_um < 10 and wanted.line not in claims.whole:
-            allowed_along = language.on_the_way + turned + claims.left.get(wanted.line, 0.0)
+        if wanted.sort == "cut" and language.tolerance_um < 10 and wanted.line not in claims.whole:
+            begins = float(np.linalg.norm(wanted.tip[0] - made.tip[0])) if fresh else 0.0
+            allowed_along = language.on_the_way + turned + claims.left.get(wanted.line, 0.0) + begins
             along = max(apart(wanted.tip, made.tip[1:]), apart(made.tip, wanted.tip[1:]))
             off = max(off, allowed * along / allowed_along)
         found.worst = max(found.worst, off - allowed + language.at_ends)

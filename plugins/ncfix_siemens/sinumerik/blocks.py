@@ -13,6 +13,7 @@ from lark import Token, UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
 from ncfix.text.build import (
+    MAX_DEPTH,
     NUMBERS,
     Branch,
     Node,
@@ -57,8 +58,6 @@ BRACKET = "("
 """The operator of a `Unary` that is nothing but a pair of brackets."""
 
 BASES = {"H": 16, "B": 2, "D": 10}
-MAX_DEPTH = 150
-"""How deep expressions may be nested."""
 
 
 def build(tree: Branch, text: str) -> Parsed:

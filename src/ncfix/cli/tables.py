@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Container, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -93,16 +92,12 @@ def along(
 def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
     """The program as `ncfix fix` rewrites it under these settings of the control."""
     from ncfix import api
+    from ncfix.compensate import FixOptions
 
     assert following.machine is not None
-    return api.fix(
-        following.read(path),
-        following.machine,
-        setup=following.setup,
-        strategy=settings["strategy"],
-        tolerance_um=float(settings["tolerance_um"]),
-        resolve=subprograms(following.setup, path),
-    )
+    options = FixOptions(settings["strategy"], float(settings["tolerance_um"]))
+    find = subprograms(following.setup, path)
+    return api.fixed(following.read(path), following.machine, following.setup, options, find)
 
 
 def rewritten_file(following: Following, settings: Mapping[str, str], path: str) -> dict[str, bytes]:
@@ -181,7 +176,6 @@ def export(
     from ncfix import api
     from ncfix.plugins import called
     from ncfix.tables.control import Written, get_control
-    from ncfix.tables.correction import ranges_of
     from ncfix.tables.export import export as exported
 
     chosen = get_control(control)
@@ -191,12 +185,11 @@ def export(
     assert machine is not None
     sound(machine, machine_path, force)
     covered = given_ranges(machine, ranges)
-    ranges_of(machine, covered)
     pairs = dict(_pair(each, "--set NAME=VALUE") for each in settings)
     request = api.table_request(chosen, machine, tool_length, target_um, covered, pairs, complete=not probe)
     if probe:
         found = called("controls", chosen.name, chosen.probe, request, gives=Written)
-        write_folder(output, found, force)
+        files.write_folder(output, found.files, force)
         _tell_of_probe(found, chosen.name, as_json)
         return ExitCode.DONE
     more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
@@ -206,7 +199,7 @@ def export(
             more["program"] = along(following, chosen, made.tables, request.settings, program, tool_length)
         if program is not None and chosen.rewrites:
             made = replace(made, files={**made.files, **rewritten_file(following, request.settings, program)})
-    write_folder(output, made, force)
+    files.write_folder(output, made.files, force)
     console.tell_some(made.messages)
     tell(made, as_json, control=chosen.name, reaches=made.reaches, **more)
     return ExitCode.DONE
@@ -245,30 +238,7 @@ def check_folder(folder: str) -> None:
     """Refuse what cannot be a folder of tables: NCF003 or NCF007."""
     if folder in ("", STREAM):
         raise UsageError.of("NCF003", "tables are several files, which go to a folder", hint="-o FOLDER")
-    if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise UsageError.of("NCF007", "is not a folder", Place(folder), "-o FOLDER")
-
-
-def write_folder(folder: str, made: Exported | Written, force: bool) -> None:
-    """Write all files, or none if one is there already or must not be, or there is no room.
-
-    Raises `UsageError` NCF004, NCF005, NCF007, NCF023.
-    """
-    check_folder(folder)
-    paths = {os.path.join(folder, name): content for name, content in made.files.items()}
-    for path in paths:
-        files.check_output(path, folder, force)
-        if os.path.lexists(path) and not force:
-            raise files.exists_already(path)
-    fresh = [path for path in paths if not os.path.lexists(path)]
-    try:
-        for path, content in paths.items():
-            files.write_whole(path, content, force, folder)
-    except UsageError:
-        for path in fresh:
-            with suppress(OSError):
-                os.unlink(path)
-        raise
+    files.check_folder(folder)
 
 
 def tell(made: Exported, as_json: bool, **more: object) -> None:

@@ -266,10 +266,9 @@ Block = tuple[int, str, tuple[str, ...]]
 
 
 def address(word: str) -> str:
-    """What a word says: its axis or address, however it says it."""
-    rest = word[1:] if re.match(r"I(?=[A-Z])", word) else word
-    named = re.match(r"[A-Z]+\d?(?:\[.\])?", rest)
-    return named[0] if named else word
+    """What a word says: its axis or address, as increment or not; `I1=` is one, `X10` says X."""
+    found = re.match(r"(?:I(?=[A-Z]))?([A-Z]+(?:\d(?==))?(?:\[.\])?)", word)
+    return found[1] if found else word
 
 
 def agree(words: Sequence[str]) -> bool:
