@@ -8,7 +8,7 @@ import pytest
 
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow, kinematics_of
-from ncfix.control.moves import Rule, TcpState
+from ncfix.control.moves import MotionKind, Rule, TcpState
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import UsageError
 from ncfix.machine import load, loads
@@ -140,3 +140,64 @@ def test_a_stamp_fits_on_a_line_of_any_control_whatever_was_assumed() -> None:
     stamp = next(line for line in fix_program(program, machine, SETUP).text.splitlines() if b"ncfix" in line)
     assert b"work offset G54" in stamp
     assert len(stamp) <= 250
+
+
+LOST = {
+    "M92 in a tilted plane": (
+        "a.h",
+        "heidenhain",
+        "BEGIN PGM A MM\nTOOL CALL 1 Z S1000\nL X+10 Y+20 Z+100 A+0 C+0 R0 FMAX\nPLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN "
+        "FMAX\nL X+1 Y+2 Z+100 R0 FMAX\nL Z-50 R0 FMAX M92\nL X+0 R0 FMAX\nL Z+10 R0 F500\nEND PGM A MM",
+    ),
+    "a turn of a plane whose way is not known, under M128": (
+        "a.h",
+        "heidenhain",
+        "BEGIN PGM A MM\nTOOL CALL 1 Z S1000\nL X+10 Y+20 Z+100 A+0 C+0 R0 FMAX\nM128\nPLANE SPATIAL SPA+30 SPB+0 "
+        "SPC+30 TURN FMAX\nL X+10 Y+20 Z+100 R0 FMAX\nPLANE SPATIAL SPA+0 SPB+0 SPC+0 TURN FMAX\nL A+0 C+0 R0 FMAX\n"
+        "L X+0 R0 FMAX\nL Z+0 R0 F500\nEND PGM A MM",
+    ),
+    "a fixed point of a linear axis in a swivelled plane": (
+        "a.mpf",
+        "siemens",
+        'G71 G90 G17\nT1 M6 D1\nG0 X10 Y20 Z100 A0 C0\nCYCLE800(0,"T",0,57,0,0,0,0,0,0,0,0,0,1)\nG0 X10 Y20 Z100\n'
+        "G0 C90\nG75 X1=0\nG0 X10\nG1 Z50 F500\nM30",
+    ),
+    "a fixed point of a rotary axis in a swivelled plane": (
+        "a.mpf",
+        "siemens",
+        'G71 G90 G17\nT1 M6 D1\nG0 X10 Y20 Z100 A0 C0\nCYCLE800(0,"T",0,57,0,0,0,30,0,0,0,0,0,1)\nG0 X10 Y20 Z100 C45\n'
+        "G75 C1=0\nG0 C0\nG1 Z50 F500\nM30",
+    ),
+    "increments in machine coordinates under G43.4": (
+        "a.nc",
+        "fanuc",
+        "G21 G90 G0 G43.4 H1 X10. Y0. Z5. A12. C20.\nG91 G53 X3.\nG90 G1 Z4. F100.\nM30",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_where_an_axis_of_the_machine_is_lost_the_tip_is(root: Path, name: str) -> None:
+    path, dialect, text = LOST[name]
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    setup = replace(SETUP, initial={"Z": 290.0}, no_point="calculator")
+    moves = follow(read(f"{text}\n".encode(), path, dialect), machine, setup).trace.moves
+    assert moves.rule[moves.kind == MotionKind.FEED].tolist() == [Rule.REFUSE]
+    tip = [moves.axes.index(letter) for letter in "XYZ"]
+    assert np.isnan(moves.end[-2 if dialect != "fanuc" else -1, tip]).any()
+
+
+@pytest.mark.parametrize(("mode", "far"), [("G70", 25.4), ("G71", 1.0)])
+def test_increments_in_machine_coordinates_have_the_unit_of_the_program(mode: str, far: float) -> None:
+    text = f"{mode} G90\nG0 X1 Y1 Z1 C0\nG91 SUPA Z1\nM30\n"
+    moves = follow(read(text.encode(), "a.mpf", "siemens"), loads(ROTARY_TABLE), SETUP).trace.moves
+    z = moves.axes.index("Z")
+    assert moves.end[-1, z] - moves.end[-2, z] == pytest.approx(far)
+
+
+def test_g10_l20_under_tcp_counts_from_the_tip() -> None:
+    text = "G21 G90 G54 G43 H1 G0 X10. Y0. Z5. C0.\nG10 L20 P1 Z0.\nG0 Z7.\nM2\n"
+    setup = replace(SETUP, tcp=True)
+    moves = follow(read(text.encode(), "a.ngc", "linuxcnc"), loads(ROTARY_TABLE), setup).trace.moves
+    z = moves.axes.index("Z")
+    assert moves.end[-1, z] - moves.end[-2, z] == pytest.approx(7.0)

@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 
-from ncfix.control.coordinates import Rotation
+from ncfix.control.coordinates import PLANES, Rotation
 from ncfix.control.frames import (
     Affine,
     FrameStack,
@@ -22,6 +22,7 @@ from ncfix.control.frames import (
     spatial,
     turned,
     turned_about,
+    turned_in,
 )
 
 
@@ -46,7 +47,7 @@ def test_a_stack_is_the_product_of_its_parts_from_outside_in() -> None:
     parts = (stack.datum, stack.plane, stack.rotation, stack.scaling)
     assert matrix(stack.whole) == pytest.approx(np.linalg.multi_dot([matrix(part) for part in parts]))
     assert stack.whole.shift[5] == 0.5
-    assert stack.whole.unknown == {1: "why"}
+    assert stack.whole.unknown == {0: "why"}  # Y of the plane is X behind the turn
     assert pickle.loads(pickle.dumps(stack)) == stack
 
 
@@ -75,3 +76,10 @@ def test_the_forms_of_a_tilted_plane_agree() -> None:
         assert np.array(form) == pytest.approx(np.column_stack([x, along_y, normal]), abs=1e-12)
     assert from_vectors(x, (2.0, 0.0, 0.0)) is None
     assert spatial({"X": 10.0, "Z": 20.0}) != turned({"X": 10.0, "Z": 20.0}, "XZ").rotation
+
+
+def test_what_is_not_known_of_an_outer_frame_turns_with_the_inner_one() -> None:
+    """A work offset that is not known along X hides the numbers of Y in a frame that is turned by 90 degrees."""
+    outer, turn = Affine(unknown={0: "why", 4: "C"}), turned_in(PLANES[170], 90.0)
+    assert outer.then(turn).unknown == {1: "why", 4: "C"}
+    assert outer.then(turned_in(PLANES[170], 30.0)).unknown == {0: "why", 1: "why", 4: "C"}

@@ -13,6 +13,7 @@ import pytest
 from ncfix.cli.listings import own_codes
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Fixed, fix_program
+from ncfix.compensate.following import follow
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.operations import ALL_AXES, CycleTable, Lose, Rapid, Refuse, Resume, SetTool, Suspend, like
 from ncfix.control.setup import Setup
@@ -237,3 +238,29 @@ def test_dialects_of_a_derived_one() -> None:
     assert dict(again.codes)["G187"] == (Refuse("no"),)
     assert "G121" not in dict(again.codes)
     assert again.variant_of == "fanuc"
+
+
+@pytest.mark.parametrize(("code", "words"), [("G1", {"X": "U"}), ("G01", {"Z": -5})])
+def test_words_of_places_keep_their_addresses(code: str, words: dict[str, str | float]) -> None:
+    """The writer rewrites them, so a block has to show them."""
+    with pytest.raises(ValueError, match="stay as they are"):
+        like(code, **words)
+
+
+def test_an_alias_means_the_same_in_short_and_long_programs(dmu50: Machine) -> None:
+    dialect = family("fanuc").derive("fed", title="Fed", codes={"G101": [like("G1", F=500)]})
+    head = "G21G90G54G0X0.Y0.Z5.B0.C0.\nG1X1.F100.\n"
+    for count in (5, 500):
+        moves = moves_of(head + "G101X2.\nG1X3.\n" * count, dmu50, dialect)
+        assert set(moves.feed[2:].tolist()) == {500.0}
+
+
+@pytest.mark.parametrize("axis", ["C", "Z"])
+def test_under_tcp_a_lost_axis_loses_the_tip(root: Path, axis: str) -> None:
+    dialect = family("fanuc").derive("lost", title="Lost", codes={"G131": [Lose(axis, "the change of pallets (G131)")]})
+    machine = load(root / "examples/machines/wCAYFXZSt.toml")
+    text = f"G21G90G43.4H1G0X0.Y0.Z5.A30.C40.\nG131\nG0{axis}4.\nG1Y5.F100.\nM30\n"
+    program = read(text.encode(), "part.nc", dialect=dialect)
+    setup = Setup(assume_zero=True, no_point="calculator")
+    moves = follow(program, machine, setup).trace.moves
+    assert moves.rule[-1] == Rule.REFUSE

@@ -7,7 +7,7 @@ from collections.abc import Collection, Hashable
 from dataclasses import dataclass, field, replace
 
 from ncfix.control import control as base
-from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, X, Y, Z, mask_of, zeros
+from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, X, Y, Z, mask_of
 from ncfix.control.frames import shifted
 from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Passing, UnknownAxes, first_reason
 from ncfix.control.setup import WORK_OFFSET, Setup, Tool
@@ -158,7 +158,7 @@ class KlartextControl(base.ProgramControl):
 
     def anchors(self) -> list[Hashable]:
         """As of every control; shift, rotation, mirror and scale are stated by the program in numbers."""
-        frames, tool = self.frames, zeros() if self.tcp else self.tools.vector
+        frames, tool = self.frames, self.tool_shift
         stated = self.tcp, frames.plane.rotation if self.plane_tilted else None
         length = [self.tools.offset if self.tcp or index == Z else None for index in (X, Y, Z)]
         return [

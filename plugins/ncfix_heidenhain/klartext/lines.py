@@ -165,15 +165,14 @@ def own(unknown: UnknownAxes, index: int) -> UnknownAxes:
 
 def at_machine(control: KlartextControl, step: Step) -> None:
     """A motion in machine coordinates: M91, or M92."""
-    target, unknown = in_machine(control, step.words)
-    code = "M91" if 91 in step.codes else "M92"
-    if code == "M92":
-        unknown |= {i: NOT_GIVEN for i in control.machine if step.words.axes >> i & 1}
     was = control.tcp
     if was:
         switch(control, control.tools.vector, False)
         control.refresh()
-        target, unknown = in_machine(control, step.words)
+    target, unknown = in_machine(control, step.words)
+    code = "M91" if 91 in step.codes else "M92"
+    if code == "M92":
+        unknown |= {i: NOT_GIVEN for i in control.machine if step.words.axes >> i & 1}
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
         unknown |= {i: NOT_STRAIGHT for i in control.machine if not control.rotary[i]}
     passing = Passing(Pass.MACHINE_COORDINATES, MACHINE_COORDINATES.format(code))

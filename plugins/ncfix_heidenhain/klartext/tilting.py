@@ -182,12 +182,12 @@ def way_home(control: KlartextControl) -> dict[int, float] | None:
 
 def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
     """TURN and MOVE: the control positions the rotary axes."""
-    if way is None:
-        control.pass_here(TURNED, POSITIONED, rotary_letters(control))
-        return
     if control.tcp:
         switch(control, control.tools.vector, False)
         control.refresh()
+    if way is None:
+        control.pass_here(TURNED, POSITIONED, rotary_letters(control))
+        return
     target, unknown = control.position[:], {k: why for k, why in control.unknown.items() if k not in way}
     for index, angle in way.items():
         target[index] = angle

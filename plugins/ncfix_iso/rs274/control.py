@@ -6,7 +6,7 @@ from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass, replace
 
 from ncfix.control import control as shared
-from ncfix.control.coordinates import INCH, LETTERS, zeros
+from ncfix.control.coordinates import INCH, LETTERS
 from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
 from ncfix.control.state import Saved
 from ncfix.control.turns import watch
@@ -132,7 +132,7 @@ class RS274Control(shared.ProgramControl):
 
     def anchors(self) -> list[Hashable]:
         """As of every control; the parameters of the work offset and of G92 are not the program's numbers."""
-        frames, tool = self.frames, zeros() if self.tcp else self.tools.vector
+        frames, tool = self.frames, self.tool_shift
         own = [a + b for a, b in zip(frames.datum.shift, frames.additive.shift, strict=True)]
         system = self.modal.system, self.extended_name
         return [

@@ -126,7 +126,7 @@ def in_machine_coordinates(control: RS274Control, block: Block, code: int) -> No
         kind = MotionKind.FEED if code else MotionKind.RAPID
         control.make(Motion(kind, block.axes, target, unknown, code, passing=MACHINE_COORDINATES))
         if control.modal.incremental:
-            control.lose([index for index in range(N_LETTERS) if block.axes >> index & 1], AFTER_G53)
+            control.lose_in_machine([index for index in range(N_LETTERS) if block.axes >> index & 1], AFTER_G53)
 
 
 def one_way(control: RS274Control, block: Block, code: int) -> None:
@@ -169,7 +169,7 @@ def reference_target(control: RS274Control, name: str, axes: int) -> tuple[Vecto
 
 def along(control: RS274Control, point: Vector, axes: int) -> Vector:
     """The position moved to a point along some letters of the program's frame, turned as that is (LinuxCNC)."""
-    if not control.is_rotated or axes & 3 in (0, 3):
+    if control.tcp or not control.is_rotated or axes & 3 in (0, 3):
         return [point[i] if axes >> i & 1 else value for i, value in enumerate(control.position)]
     here = control.program_position()
     there = rotated(control.inverse, [p - o for p, o in zip(point, control.offset, strict=True)])

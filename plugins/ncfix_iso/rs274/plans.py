@@ -351,7 +351,7 @@ def lane_of(plan: RS274Plan) -> Lane | None:
 
 def is_plain(plan: RS274Plan) -> bool:
     """Whether a block has words of motions only, with plain numbers, and no place without a point that it needs."""
-    if plan.unread or plan.command or plan.computed or not plan.letters <= LANE_LETTERS | ARC_LETTERS:
+    if plan.fixed or plan.unread or plan.command or plan.computed or not plan.letters <= LANE_LETTERS | ARC_LETTERS:
         return False
     points = PLACES.isdisjoint(plan.pointless)
     return points and all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)

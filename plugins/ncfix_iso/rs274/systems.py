@@ -262,7 +262,7 @@ def origin_for_position(control: RS274Control, block: Block, system: int, origin
     turn = turn_of(control, system)
     involved = {*words_of(block), *((X, Y) if turn is not IDENTITY and block.axes & 3 else ())}
     control.use_start_positions(tuple(involved))
-    outer = [p - o - t for p, o, t in zip(control.position, origin, control.tools.vector, strict=True)]
+    outer = [p - o - t for p, o, t in zip(control.position, origin, control.tool_shift, strict=True)]
     shifts = zip(control.frames.additive.shift, control.frames.local.shift, strict=True)
     now = [a - s - local for a, (s, local) in zip(rotated(transposed(turn), outer), shifts, strict=True)]
     wanted = now[:]

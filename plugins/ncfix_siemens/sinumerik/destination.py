@@ -290,8 +290,7 @@ def axes_of_machine(control: Sinumerik, words: BlockWordValues) -> tuple[dict[in
     for letter in LETTERS:
         if letter in words.values:
             index, value = INDEX[letter], words.values[letter]
-            axes[index] = control.tools.vector[index]
-            axes[index] += control.of_setup(letter) * control_unit(control, index) * (value or 0.0)
+            axes[index] = control.tools.vector[index] + step_of(control, letter, value)
             if value is None:
                 unsure[index] = RUNTIME
             elif counts_on(control, words.forms.get(letter, "")):
@@ -305,12 +304,13 @@ def place_at_machine(
     """Take one axis word in machine coordinates."""
     index, value = INDEX[letter], words.values[letter]
     if counts_on(control, words.forms.get(letter, "")):
-        target[index] += control.of_setup(letter) * (value or 0.0)
+        target[index] += step_of(control, letter, value)
+        if index == 0 and control.modes.diameter == "DIAM90":
+            unknown[index] = RADIUS
         if why := unsteady(control, index, by_machine=True):
             unknown[index] = why
     else:
-        tool = 0.0 if control.tcp else control.tools.vector[index]
-        target[index] = tool + control.of_setup(letter) * control_unit(control, index) * (value or 0.0)
+        target[index] = control.tool_shift[index] + step_of(control, letter, value)
         unknown.pop(index, None)
     if value is None:
         unknown[index] = RUNTIME
@@ -325,8 +325,9 @@ def lost_in_frame(control: Sinumerik, unknown: UnknownAxes) -> UnknownAxes:
     return lost if why is None else lost | {index: why for index in GEOMETRY if index in control.machine}
 
 
-def control_unit(control: Sinumerik, index: int) -> float:
-    """mm per program unit of a linear axis in machine coordinates; 1 for rotary axes."""
+def step_of(control: Sinumerik, letter: str, value: float | None) -> float:
+    """What a word in machine coordinates says, mm and rad: no frame scales it."""
+    index = INDEX[letter]
     if control.rotary[index]:
-        return 1.0
-    return control.modal.unit / (2.0 if index == 0 and control.modal.diameter else 1.0)
+        return control.of_setup(letter) * (value or 0.0)
+    return control.modal.unit * (value or 0.0) / (2.0 if index == 0 and control.modal.diameter else 1.0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
+from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, mask_of
 from ncfix.control.moves import MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, tangential, through_point
 from ncfix_siemens.sinumerik.cycles import TO_A_HOLE, drill, hole_after
@@ -192,10 +192,11 @@ def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """G74 and G75: the axes named, `X1=0` among them, go to a point that the machine knows."""
     named = [INDEX[address[0]] for address in words.values if address[:1] in INDEX]
     gone = tuple(index for index in dict.fromkeys(named) if index in control.machine)
-    unknown = dict(control.unknown) | dict.fromkeys(gone, AFTER_REFERENCE)
-    lost = dict(control.lost) | dict.fromkeys(spread(control, dict.fromkeys(gone, "")), AFTER_REFERENCE)
-    words = BlockWordValues(words.block, {}, {}, sum(1 << index for index in gone))
-    end = End(control.position[:], unknown, lost)
+    reasons = dict.fromkeys((*gone, *(GEOMETRY if gone and control.tcp else ())), AFTER_REFERENCE)
+    reasons = {index: why for index, why in reasons.items() if index in control.machine}
+    lost = dict(control.lost) | dict.fromkeys(spread(control, reasons), AFTER_REFERENCE)
+    words = BlockWordValues(words.block, {}, {}, mask_of(gone))
+    end = End(control.position[:], dict(control.unknown) | reasons, lost)
     control.go(
         ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True)
     )

@@ -25,7 +25,6 @@ from ncfix.control.coordinates import (
     Y,
     Z,
     mask_of,
-    zeros,
 )
 from ncfix.control.expressions import Unknown, Value
 from ncfix.control.frames import ZEROS, FrameStack, shifted
@@ -182,7 +181,7 @@ class Sinumerik(ProgramControl):
 
     def anchors(self) -> list[Hashable]:
         """As for all controls, but shifts of the programmable frame (TRANS) are stated by the program."""
-        frames, tool = self.frames, zeros() if self.tcp else self.tools.vector
+        frames, tool = self.frames, self.tool_shift
         return [
             (frames.name, frames.datum.shift[i], frames.plane.shift[i], tool[i], self.spatial_anchor(i))
             for i in range(len(LETTERS))

@@ -206,7 +206,10 @@ class ProgramControl(ControlState):
             everywhere = tuple(self.unknown) if kind != MotionKind.RAPID else tuple(unknown)
             self.use_start_positions(everywhere)
             for index in [index for index, why in unknown.items() if why is AT_START]:
-                del unknown[index]
+                if index in self.unknown:
+                    unknown[index] = self.unknown[index]
+                else:
+                    del unknown[index]
 
     def _placed_by(self, motion: Motion) -> int:
         """The axes whose words say where they stand behind the motion."""

@@ -22,6 +22,7 @@ from ncfix.control.coordinates import (
     dot,
     product,
     rotated,
+    transposed,
 )
 from ncfix.control.moves import UnknownAxes
 from ncfix.control.pointing import Triple, cross
@@ -31,6 +32,16 @@ AROUND = {"X": PLANES[190], "Y": PLANES[180], "Z": PLANES[170]}
 """The plane in which a rotation about an axis turns."""
 
 
+def mixed_into(unknown: UnknownAxes, rotation: Rotation) -> UnknownAxes:
+    """What is not known of turned axes, each of which is made of those in its row: of one of them it is enough."""
+    mixed = {index: why for index, why in unknown.items() if index > 2}
+    for index in range(3):
+        why = next((unknown[k] for k in range(3) if rotation[index][k] != 0.0 and k in unknown), None)
+        if why is not None:
+            mixed[index] = why
+    return mixed
+
+
 @dataclass(frozen=True, slots=True)
 class Affine:
     """One frame.
@@ -38,7 +49,8 @@ class Affine:
     shift     nine numbers in the order of the axis letters, mm and rad
     rotation  of X Y Z; a mirrored axis makes its determinant negative
     scale     one factor for X Y Z
-    unknown   letter index -> why what the frame adds to the numbers of this letter is not known
+    unknown   letter index -> why what the frame adds to the numbers of this letter is not known; of X Y Z along the
+              axes of the frame itself
     """
 
     shift: Sequence[float] = ZEROS
@@ -58,7 +70,8 @@ class Affine:
             x, y, z = (self.scale * dot(row, inner.shift) for row in self.rotation)
             moved, rotation = (x, y, z, *inner.shift[3:]), product(self.rotation, inner.rotation)
         shift = tuple([a + b for a, b in zip(self.shift, moved, strict=True)])
-        return Affine(shift, rotation, self.scale * inner.scale, {**self.unknown, **inner.unknown})
+        mine = mixed_into(self.unknown, transposed(inner.rotation)) if self.unknown else self.unknown
+        return Affine(shift, rotation, self.scale * inner.scale, {**mine, **inner.unknown})
 
     def shifted_to(self, values: Mapping[int, float]) -> Affine:
         """The frame with some of its shifts replaced."""

@@ -36,6 +36,8 @@ NO_WORDS = "GMNO"
 """Addresses of codes and of names of blocks and programs."""
 ALL_AXES = LETTERS
 """For `Lose`: all axes that the machine has."""
+MOTION = re.compile(r"G0*[0-3]|G7[346]|G8[1-9]")
+"""Codes whose words lead axes, and are rewritten."""
 LOST = "where the axis {{}} stands after {} is not known"
 NOT_FOLLOWED = "{} is in force, which ncfix does not follow"
 AFTER = "where the axis {{}} stands after {} is not followed"
@@ -86,6 +88,11 @@ class Like(Operation):
 
     code: str
     words: tuple[tuple[str, str | float], ...] = ()
+
+    def __post_init__(self) -> None:
+        places = {*LETTERS, *"IJKR"}
+        if MOTION.fullmatch(self.code) and any(places & {known, own} for known, own in self.words):
+            raise ValueError(f"like({self.code!r}): the words of a motion's place are corrected, and stay as they are")
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """The family's code stands in its place wherever blocks are read: there is nothing left to do."""
@@ -147,9 +154,8 @@ class Lose(Operation):
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
-        indices = [INDEX[letter] for letter in self.axes if INDEX[letter] in control.machine]
-        control.lose(indices, LOST.format(self.after))
-        control.places.lose(mask_of(indices))
+        control.lose_in_machine([INDEX[letter] for letter in self.axes], LOST.format(self.after))
+        control.places.lose(mask_of(control.unknown))
 
     def __str__(self) -> str:
         axes = "the axes" if self.axes == ALL_AXES else f"the axes {' '.join(self.axes)}"

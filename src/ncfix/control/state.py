@@ -29,7 +29,7 @@ from ncfix.control.coordinates import (
     transposed,
     zeros,
 )
-from ncfix.control.frames import WORLD, FrameStack
+from ncfix.control.frames import WORLD, FrameStack, mixed_into
 from ncfix.control.moves import AT_START, UnknownAxes
 from ncfix.control.setup import Knowledge
 from ncfix.diagnostics import Message, Place
@@ -139,16 +139,6 @@ def named_switches(switches: Collection[int]) -> str:
     return " ".join(f"/{number}" for number in sorted(switches))
 
 
-def mixed_into(unknown: UnknownAxes, rotation: Rotation) -> UnknownAxes:
-    """What is not known of turned axes, each of which is made of those in its row: of one of them it is enough."""
-    mixed = {index: why for index, why in unknown.items() if index > Z}
-    for index in XYZ:
-        why = next((unknown[k] for k in XYZ if rotation[index][k] != 0.0 and k in unknown), None)
-        if why is not None:
-            mixed[index] = why
-    return mixed
-
-
 class ControlState(ABC):
     """Where the axes stand, in commands and in the coordinates of the program.
 
@@ -243,8 +233,7 @@ class ControlState(ABC):
     def refresh(self) -> None:
         """Compose the frames; to be called after any of them, the tool, the unit or the diameter mode has changed."""
         whole = self.composed = self.frames.whole
-        tool = zeros() if self.tcp else self.tools.vector
-        self.offset: Vector = [a + b for a, b in zip(whole.shift, tool, strict=True)]
+        self.offset: Vector = [a + b for a, b in zip(whole.shift, self.tool_shift, strict=True)]
         if self.rotation != whole.rotation:
             self.frame_unknown = None
         self.rotation = whole.rotation
@@ -256,6 +245,11 @@ class ControlState(ABC):
             self.scale[0] /= 2
         self._frame = -1
         self.places.watch(self.anchors(), self.rotation)
+
+    @property
+    def tool_shift(self) -> Vector:
+        """What the tool length adds to the numbers of the program; under TCP they are those of the tip."""
+        return zeros() if self.tcp else self.tools.vector
 
     @abstractmethod
     def anchors(self) -> list[Hashable]:
@@ -313,6 +307,11 @@ class ControlState(ABC):
         for index in indices:
             if index in self.machine:
                 self.unknown[index] = reason
+
+    def lose_in_machine(self, indices: Sequence[int], reason: str) -> None:
+        """These axes of the machine stand somewhere that is not known: under TCP so does the tip, in X, Y and Z."""
+        gone = {index for index in indices if index in self.machine}
+        self.lose(sorted(gone | {*XYZ} if gone and self.tcp else gone), reason)
 
     def lost_in_frame(self) -> UnknownAxes:
         """What is not known along the axes of the program's frame."""
