@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
-from ncfix.control.coordinates import IDENTITY, Plane, Vector, X, Y, dot, rotated
+from ncfix.control.coordinates import IDENTITY, LETTERS, Plane, Vector, X, Y, dot, rotated
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
 from ncfix.control.moves import Arc, Motion, MotionKind, UnknownAxes
@@ -251,7 +251,7 @@ def give_up(control: KlartextControl, step: Step, where: Where) -> bool:
     """Refuse an arc of which an end is not known; True if that is so."""
     if not starts_unknown(control) and not where.unknown and not step.words.runtime:
         return False
-    reasons = [why.format("XYZABCUVW"[i]) for i, why in {**control.unknown, **where.unknown}.items()]
+    reasons = [why.format(LETTERS[i]) for i, why in {**control.unknown, **where.unknown}.items()]
     reason = reasons[0] if reasons else "a word of the arc depends on a Q parameter that is known only at run time"
     if step.words.runtime:
         axes = step.words.axes or 3

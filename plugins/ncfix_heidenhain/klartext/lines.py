@@ -60,7 +60,7 @@ def straight(control: KlartextControl, step: Step) -> None:
     for index, angle in way.items():
         target[index] = angle
         unknown.pop(index, None)
-    run(control, step, target, unknown, step.words.axes | sum(1 << index for index in way))
+    run(control, step, target, unknown, step.words.axes | mask_of(way))
 
 
 def pointed(control: KlartextControl, words: MotionWords) -> dict[int, float] | None:

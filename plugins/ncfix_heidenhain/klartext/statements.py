@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Callable
 
-from ncfix.control.coordinates import Z, mask_of, zeros
+from ncfix.control.coordinates import LETTERS, Z, mask_of, zeros
 from ncfix.control.expressions import Fault
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, OpenCall, Operation, ProgramFlow, Repeat, Return
 from ncfix.control.moves import Pass, Passing
@@ -140,7 +140,7 @@ def end_of_short_ways(control: KlartextControl, on: bool) -> None:
 def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
     """M138: the rotary axes that tilted planes and control of the tip take into account, those of the machine again."""
     control.suspended.pop("M138", None)
-    turning = {"XYZABCUVW"[index].lower() for index in control.turning}
+    turning = {LETTERS[index].lower() for index in control.turning}
     if flags & set("abc") not in (set(), turning):
         control.suspended["M138"] = CHOSEN
 
@@ -149,7 +149,7 @@ def reduce_turns(control: KlartextControl, flags: frozenset[str]) -> None:
     """M94: rotary axes, those that are named if any is, are said by an angle below a turn from here on."""
     named = flags & set("abc")
     for index in control.turning:
-        if not named or "XYZABCUVW"[index].lower() in named:
+        if not named or LETTERS[index].lower() in named:
             control.position[index] %= 2 * math.pi
 
 

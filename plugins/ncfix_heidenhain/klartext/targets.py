@@ -56,7 +56,7 @@ def axis_letters(words: MotionWords) -> tuple[str, ...]:
 @lru_cache(maxsize=1024)
 def _axes_of(addresses: tuple[str, ...]) -> int:
     letters = {address.removeprefix("I") for address in addresses if address not in ("PA", "PR", "IPA", "IPR")}
-    return sum(1 << INDEX[letter] for letter in letters if letter in INDEX)
+    return mask_of(INDEX[letter] for letter in letters if letter in INDEX)
 
 
 @lru_cache(maxsize=1024)

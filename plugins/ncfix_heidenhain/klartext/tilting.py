@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
+from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, LETTERS, Rotation, product
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import euler, from_points, from_vectors, projected, spatial
 from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Passing
-from ncfix.control.posture import WayRules, machine_directions, normal_of, postures, stands_square
+from ncfix.control.posture import AT_ZERO, WayRules, machine_directions, normal_of, postures, stands_square
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import MOVED_ALONG, TILTED, KlartextControl
 from ncfix_heidenhain.klartext.targets import MotionWords
@@ -23,8 +23,6 @@ BAD_PLANE = "NCF273"
 RETRACTING = "mb max"
 """The tool is drawn back before the axes turn."""
 
-NONE = 1e-9
-"""rad; an axis that is said to stand at zero."""
 
 POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
 NOT_NORMAL = "the tool does not stand normal to the tilted plane, by the axis positions of the program"
@@ -164,7 +162,7 @@ def chosen_way(control: KlartextControl, tilt: Rotation | None, flags: frozenset
         return None
     if found.at_pole:
         turned = "table rot" in flags and tilt is not None and tilt != IDENTITY
-        at_zero = abs(found.ways[0][0]) < NONE
+        at_zero = abs(found.ways[0][0]) < AT_ZERO
         return found.chosen if at_zero and not turned else None
     if len(found.ways) > 1:
         control.warn(WAY, f"the rotary axes are taken to turn to {found}, the nearest of several ways", WAY_HINT)
@@ -175,7 +173,7 @@ def way_home(control: KlartextControl) -> dict[int, float] | None:
     """PLANE RESET with TURN or MOVE: the rotary axes go to their basic position, zero; None where zero is shifted."""
     if any(control.offset[index] for index in control.turning):
         return None
-    if any(index in control.unknown or abs(control.position[index]) > NONE for index in control.turning):
+    if any(index in control.unknown or abs(control.position[index]) > AT_ZERO for index in control.turning):
         control.warn(WAY, HOME, "state the rotary axes in the next block")
     return dict.fromkeys(control.turning, 0.0)
 
@@ -196,7 +194,7 @@ def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
 
 def rotary_letters(control: KlartextControl) -> str:
     """The machine's rotary axes."""
-    return "".join("XYZABCUVW"[index] for index in control.turning)
+    return "".join(LETTERS[index] for index in control.turning)
 
 
 def cycle_19(control: KlartextControl, words: MotionWords) -> None:

@@ -148,7 +148,7 @@ def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
     control.offset_checked = checked
     if way != control.position or (block.axes and not control.modal.incremental):
         control.make(Motion(MotionKind.RAPID, block.axes, way, unknown, modal, passing=passing))
-    axes = block.axes or sum(1 << index for index in control.machine)
+    axes = block.axes or mask_of(control.machine)
     target, unknown = reference_target(control, name, axes)
     control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, modal, passing=passing))
 

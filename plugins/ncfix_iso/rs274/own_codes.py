@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ncfix.control.operations import Like
+from ncfix.text.dialect import tenths
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.groups import OWN, Rules
 
@@ -27,11 +28,6 @@ def with_own_codes(rules: Rules, dialect: Dialect) -> Rules:
     for name, table in dialect.cycles:
         rules = with_cycle(rules, tenths(name), table)
     return rules
-
-
-def tenths(name: str) -> int:
-    """A code in tenths: "G54.1" is 541."""
-    return round(10 * float(name[1:]))
 
 
 def with_m_code(rules: Rules, code: int, operations: tuple[Operation, ...]) -> Rules:

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.coordinates import INDEX
+from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.expressions import Evaluate, Fault
 from ncfix.control.interpreter import TextUnit
 from ncfix.control.lanes.lane_tables import Lane
 from ncfix.control.state import NO_MOTION
+from ncfix.text.dialect import tenths
 from ncfix.text.reach import UNREAD, Deletable, deletable
 from ncfix.text.tree import (
     Assignment,
@@ -194,7 +195,7 @@ def take_values(plan: RS274Plan, rules: Rules) -> None:
     plan.letters = frozenset(word.address for word in values)
     if rules.aliases:
         take_aliases(plan, rules)
-    plan.axes = sum(1 << INDEX[letter] for letter in plan.letters if letter in INDEX)
+    plan.axes = mask_of(INDEX[letter] for letter in plan.letters if letter in INDEX)
     if plan.letters & POLAR:
         plan.axes |= 1 << INDEX["X"] | 1 << INDEX["Y"]
 
@@ -266,7 +267,7 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
     for word, code in pairs:
         if (word.address, code) in rules.aliases:
             like = rules.aliases[word.address, code].code
-            code = round(10 * float(like[1:]))
+            code = tenths(like)
         if word.address == "G":
             named |= code == SMOOTHING and "Q" in letters
             if code in rules.harmless_g and not (code in groups.SPLINES and is_spline(letters)):

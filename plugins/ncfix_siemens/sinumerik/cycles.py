@@ -252,7 +252,7 @@ def drill(
         refusal = refusal or drilling.fault
     depth, clear = drilling.depth, drilling.clear
     bottom = over if depth is None else at_height(control, over, depth)
-    counted = sum(1 << index for index in control.counted_words(words))
+    counted = mask_of(control.counted_words(words))
     placed = (stated & ~counted) | (1 << across if depth is not None else 0)
     control.builder.called(drilling.call(control, words.block, modal=modal))
     code = control.modal.motion
@@ -288,6 +288,6 @@ def refuse(control: Sinumerik, block: int, why: str) -> None:
     """Motions that are not followed: where the axes stand after them is not known."""
     gone = [index for index in GEOMETRY if index in control.machine]
     lost = dict(control.lost) | dict.fromkeys(gone, AFTER_CYCLE)
-    words = BlockWordValues(block, {}, {}, sum(1 << index for index in gone))
+    words = BlockWordValues(block, {}, {}, mask_of(gone))
     end = End(control.position[:], control.axes_of(lost), lost)
     control.go(ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, refusal=why))

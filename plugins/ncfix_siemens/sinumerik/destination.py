@@ -29,7 +29,9 @@ NEAR_POLE = 1e-6
 """mm"""
 STILL = 1e-9
 """rad; an axis that is nearer to where it shall be stands there already."""
-IN_PLANE = "where the axis {} stands after increments in machine coordinates in a swivelled plane is not followed"
+INCREMENT_IN_PLANE = "where the axis {} stands after an increment in machine coordinates in a swivelled plane is not sure"
+    "where the axis {} stands after increments in machine coordinates in a swivelled plane is not followed"
+)
 
 
 @dataclass(slots=True)
@@ -294,7 +296,7 @@ def axes_of_machine(control: Sinumerik, words: BlockWordValues) -> tuple[dict[in
             if value is None:
                 unsure[index] = RUNTIME
             elif counts_on(control, words.forms.get(letter, "")):
-                unsure[index] = IN_PLANE
+                unsure[index] = INCREMENT_IN_PLANE
     return axes, unsure
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ncfix.control.coordinates import INCH, INDEX, PLANES, Vector, mask_of, zeros
+from ncfix.control.coordinates import INCH, INDEX, LETTERS, PLANES, Vector, mask_of, zeros
 from ncfix.control.expressions import Unknown
 from ncfix.control.frames import WORLD, ZEROS, Affine, mirrored, shifted, turned, turned_in
 from ncfix_siemens.sinumerik.destination import BlockWordValues
@@ -118,7 +118,7 @@ def axis_values(words: BlockWordValues) -> dict[str, float]:
 
 def unit(control: Sinumerik, index: int) -> float:
     """mm or rad per unit of a shift; a shift of X is no diameter."""
-    return control.of_setup("XYZABCUVW"[index]) * (1.0 if control.rotary[index] else control.modal.unit)
+    return control.of_setup(LETTERS[index]) * (1.0 if control.rotary[index] else control.modal.unit)
 
 
 def programmed_shift(control: Sinumerik, words: BlockWordValues, code: int) -> None:

@@ -9,7 +9,6 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import INDEX
 from ncfix.control.expressions import Evaluate, Fault, number
@@ -35,10 +34,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
     UNFOLLOWED,
     UNFOLLOWED_MOTIONS,
 )
-
-if TYPE_CHECKING:
-    pass
-
 
 Find = Callable[[str], SinumerikUnit | None]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ncfix.control.coordinates import INDEX, LETTERS
+from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.expressions import number
 from ncfix.control.moves import MotionKind, Moves, Pass, Passing, Rule
 from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion, destination
@@ -57,7 +57,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
         return
     why = ASYNCHRONOUS.get(step.name, "a positioning axis (POS)")
     if step.name in GO_SOMEWHERE:
-        still = BlockWordValues(turn.words.block, {}, {}, sum(1 << index for index in gone))
+        still = BlockWordValues(turn.words.block, {}, {}, mask_of(gone))
         lost = dict(control.lost) | dict.fromkeys(gone, AFTER_POSITIONING)
         control.go(
             ProgrammedMotion(
@@ -75,7 +75,7 @@ def follow_polynomial(control: Sinumerik, turn: Turn, step: Letting, letter: str
     letters = LETTERS if letter is None else letter
     axes = [each for each in letters if INDEX[each] in control.machine]
     ends: dict[str, float | None] = dict.fromkeys(axes, None if value is None else number(value))
-    words = BlockWordValues(turn.words.block, ends, {}, sum(1 << INDEX[each] for each in axes))
+    words = BlockWordValues(turn.words.block, ends, {}, mask_of(INDEX[each] for each in axes))
     control.go(
         ProgrammedMotion(MotionKind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS)
     )

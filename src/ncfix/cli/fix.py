@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -23,9 +23,6 @@ from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, targets
 from ncfix.host import processors
 from ncfix.plugins import registry
-
-if TYPE_CHECKING:
-    pass
 
 AUTO = 0
 """`--jobs auto` as a number: as many as pay."""

@@ -50,6 +50,11 @@ HINTS = {LATHE: "lathe programs are followed where they say what X is: LinuxCNC 
 """What helps with a language that is refused by name, where it is another thing than to name the dialect."""
 
 
+def tenths(name: str) -> int:
+    """A code in tenths: "G54.1" is 541."""
+    return round(10 * float(name[1:]))
+
+
 @dataclass(frozen=True, slots=True)
 class Dialect:
     """One control's language, as data; the grammar says what a block is, this says what the control makes of it.
@@ -105,7 +110,7 @@ class Dialect:
 
     def level_of(self, code: int) -> str:
         """The address of the level of a drilling cycle; `code` in tenths."""
-        return next((table.level for name, table in self.cycles if round(10 * float(name[1:])) == code), "R")
+        return next((table.level for name, table in self.cycles if tenths(name) == code), "R")
 
     def derive(
         self,
