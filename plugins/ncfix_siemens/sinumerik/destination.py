@@ -29,7 +29,7 @@ NEAR_POLE = 1e-6
 """mm"""
 STILL = 1e-9
 """rad; an axis that is nearer to where it shall be stands there already."""
-INCREMENT_IN_PLANE = "where the axis {} stands after an increment in machine coordinates in a swivelled plane is not sure"
+INCREMENT_IN_PLANE = (
     "where the axis {} stands after increments in machine coordinates in a swivelled plane is not followed"
 )
 
