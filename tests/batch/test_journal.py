@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.batch.work import Journal, JournalRecord, RecordingFinder, digest_of, text_digest
+from ncfix.batch import journal as journals
+from ncfix.batch.journal import Journal, JournalRecord, RecordingFinder, announce, digest_of, text_digest
+from ncfix.diagnostics import UsageError
 
 
 @pytest.fixture
@@ -31,10 +33,9 @@ def test_what_was_noted_is_read_again(tmp_path: Path, record: JournalRecord) -> 
     journal = Journal(str(tmp_path))
     journal.add(JournalRecord("part.nc", "old", "0"))
     journal.add(record)
-    assert journal.records() == {"part.nc": record}
-    journal.finish()
-    assert not Path(journal.path).exists()
-    assert journal.records() == {}
+    again = Journal(str(tmp_path))
+    assert again.records == journal.records == {"part.nc": record}
+    assert set(again.written["part.nc"]) == {"0", record.digest}
 
 
 @pytest.mark.parametrize("cut", [1, 20, 60])
@@ -44,7 +45,46 @@ def test_a_line_that_was_cut_off_spoils_no_other(tmp_path: Path, record: Journal
     whole = Path(journal.path).read_bytes()
     Path(journal.path).write_bytes(whole + whole[:cut])
     journal.add(JournalRecord("other.nc", "key", "0"))
-    assert set(journal.records()) == {"part.nc", "other.nc"}
+    assert set(Journal(str(tmp_path)).records) == {"part.nc", "other.nc"}
+
+
+@pytest.mark.parametrize("line", [b"[]", b"null", b'{"schema": 2}', b'{"schema": 2, "name": []}', b"\xff\0", b'{"a"'])
+def test_what_is_no_line_of_a_journal_does_not_count(tmp_path: Path, record: JournalRecord, line: bytes) -> None:
+    journal = Journal(str(tmp_path))
+    journal.add(record)
+    with open(journal.path, "ab") as handle:
+        handle.write(b"\n" + line)
+    assert Journal(str(tmp_path)).records == {"part.nc": record}
+
+
+def test_what_is_announced_counts_as_written(tmp_path: Path) -> None:
+    announce(Journal(str(tmp_path)).path, "part.nc", "12")
+    assert Journal(str(tmp_path)).written == {"part.nc": {"12": None}}
+
+
+def test_a_journal_does_not_grow_for_ever(
+    tmp_path: Path, record: JournalRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(journals, "ROOM_BYTES", 100)
+    with Journal.opened(str(tmp_path)) as journal:
+        announce(journal.path, "new.nc", "34")
+    for _ in range(5):
+        with Journal.opened(str(tmp_path)) as journal:
+            journal.add(record)
+    assert len(Path(journal.path).read_bytes().split(b"\n")) <= 5
+    again = Journal(str(tmp_path))
+    assert again.records == {"part.nc": record}
+    assert again.written == {"part.nc": {record.digest: None}, "new.nc": {"34": None}}
+
+
+def test_one_batch_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(journals, "PATIENCE_S", 0.1)
+    with Journal.opened(str(tmp_path)):
+        with pytest.raises(UsageError) as caught, Journal.opened(str(tmp_path)):
+            pass
+        assert caught.value.code == "NCF026"
+    with Journal.opened(str(tmp_path)):
+        pass
 
 
 def test_a_record_holds_while_nothing_has_changed(output: Path, record: JournalRecord) -> None:
@@ -56,6 +96,14 @@ def test_a_record_holds_while_nothing_has_changed(output: Path, record: JournalR
     assert not record.holds("key", str(output), find)
     output.unlink()
     assert not record.holds("key", str(output), find)
+
+
+def test_what_failed_holds_while_nothing_has_changed(output: Path) -> None:
+    record = JournalRecord("part.nc", "key", "", {"100": text_digest(b"M99\n")}, code=3, limits="10 s")
+    assert record.holds("key", str(output), find, "10 s")
+    assert not record.holds("key", str(output), find, "20 s")
+    assert not record.holds("key", str(output), lambda _: None, "10 s")
+    assert not JournalRecord("part.nc", "", "").holds("", str(output), find)
 
 
 def test_subprograms_that_were_looked_for_are_noted() -> None:

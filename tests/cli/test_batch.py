@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
+import random
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from ncfix.batch.work import JOURNAL
+from ncfix.batch.journal import JOURNAL, Journal
 from ncfix.diagnostics import ExitCode
 
 COUNT = 6
@@ -30,7 +33,9 @@ def parts(shop: Any) -> Path:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    """All files but the journal."""
+    found = (path for path in folder.rglob("*") if path.is_file() and path.name != JOURNAL)
+    return {str(path.relative_to(folder)): path.read_bytes() for path in found}
 
 
 def test_a_folder_keeps_its_shape(ncfix: Any, shop: Any, parts: Path) -> None:
@@ -53,13 +58,6 @@ def test_outputs_and_messages_do_not_depend_on_the_jobs(ncfix: Any, shop: Any, p
         said[jobs] = (contents(out), (result.err + result.out.decode()).replace(str(out), "OUT"))
     assert said[1] == said[2]
     assert f"{COUNT + 1} programs: {COUNT} written, 1 not\n" in said[1][1]
-
-
-def test_a_batch_that_is_over_leaves_no_journal(ncfix: Any, shop: Any, parts: Path) -> None:
-    out = shop.folder / "out"
-    (parts / "bad.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
-    ncfix("fix", parts, "-m", shop.machine, "-o", out, "--assume-zero")
-    assert len(contents(out)) == COUNT
 
 
 def test_what_is_there_already_stays_if_it_is_right(ncfix: Any, shop: Any, parts: Path) -> None:
@@ -89,39 +87,197 @@ def test_resuming_needs_a_folder(ncfix: Any, shop: Any) -> None:
     assert "NCF016" in result.err
 
 
-def test_a_killed_batch_goes_on_to_the_same_bytes(ncfix: Any, shop: Any, parts: Path) -> None:
-    whole, out = shop.folder / "whole", shop.folder / "out"
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_a_killed_batch_goes_on_to_the_same_bytes(ncfix: Any, shop: Any, parts: Path, jobs: int) -> None:
+    """Killed at random moments until it is done, `NCFIX_MOMENTS` times at most; programs change meanwhile."""
+    whole, out, chance = shop.folder / "whole", shop.folder / "out", random.Random(jobs)
+    command = ["fix", str(parts), "-m", str(shop.machine), "-o", str(out), "--assume-zero", "--resume", "-j", str(jobs)]
+    for _ in range(int(os.environ.get("NCFIX_MOMENTS", "4"))):
+        running = subprocess.Popen([sys.executable, "-m", "ncfix", *command], stderr=subprocess.DEVNULL)
+        while running.poll() is None and not (out / JOURNAL).exists():
+            time.sleep(0.001)
+        with suppress(subprocess.TimeoutExpired):
+            running.wait(chance.random() * 0.8)
+        os.kill(running.pid, signal.SIGKILL)
+        running.wait()
+        changed = chance.choice(sorted(parts.rglob("*.ngc")))
+        changed.write_bytes(changed.read_bytes().replace(b"M2", b"G1 X%d\r\nM2" % chance.randrange(100, 200)))
+    assert ncfix(*command).code == ExitCode.DONE
     ncfix("fix", parts, "-m", shop.machine, "-o", whole, "--assume-zero")
-    command = ["fix", str(parts), "-m", str(shop.machine), "-o", str(out), "--assume-zero", "--json"]
-    running = subprocess.Popen(
-        [sys.executable, "-m", "ncfix", *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    while running.poll() is None and not (out / JOURNAL).exists():
-        time.sleep(0.001)
-    os.kill(running.pid, signal.SIGKILL)
-    running.wait()
-    done = set(contents(out)) & set(contents(whole))
-    assert all(contents(out)[name] == contents(whole)[name] for name in done)
-    result = ncfix(*command, "--resume")
-    assert result.code == ExitCode.DONE
     assert contents(out) == contents(whole)
 
 
-def test_the_journal_says_what_need_not_be_done_again(ncfix: Any, shop: Any, parts: Path) -> None:
-    from ncfix.batch.work import Journal
+@pytest.fixture
+def night(ncfix: Any, shop: Any, parts: Path) -> Any:
+    """Runs the batch of a night: its entries by the names of the programs, and the result."""
 
+    def run(*more: object) -> tuple[dict[str, Any], Any]:
+        options = ("-m", shop.machine, "-o", shop.folder / "out", "--resume", "--json", *more)
+        result = ncfix("fix", parts, "--assume-zero", *options)
+        return {Path(each["path"]).name: each for each in result.json()["files"]}, result
+
+    return run
+
+
+def resumed(entries: dict[str, Any]) -> set[str]:
+    return {name.removesuffix(".ngc")[-1] for name, entry in entries.items() if entry.get("resumed")}
+
+
+def test_the_next_night_does_what_has_changed(night: Any, shop: Any, parts: Path) -> None:
+    first, _ = night()
     out = shop.folder / "out"
-    command = ("fix", parts, "-m", shop.machine, "-o", out, "--assume-zero", "--json")
-    finish, Journal.finish = Journal.finish, lambda self: None  # type: ignore[method-assign]
-    try:
-        first = ncfix(*command).json()["files"]
-    finally:
-        Journal.finish = finish  # type: ignore[method-assign]
-    assert len(Journal(str(out)).records()) == COUNT
+    assert resumed(first) == set()
+    assert len(Journal(str(out)).records) == COUNT
     (out / "part0.ngc").unlink()
     (parts / "part2.ngc").write_bytes(shop.program.read_bytes())
-    result = ncfix(*command, "--resume")
-    again = result.json()["files"]
-    assert [each.get("resumed", False) for each in again] == [False, False, True, True, True, True]
-    assert again[2] == {**first[2], "resumed": True}
-    assert "NCF004" in result.err  # part2 is another program now, and its old output is not replaced unasked
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*.ngc") if path.name != "part2.ngc"}
+    again, result = night()
+    assert result.code == ExitCode.DONE
+    assert resumed(again) == set("1345")
+    assert again["part1.ngc"] == {**first["part1.ngc"], "resumed": True}
+    assert b"X109.989" in (out / "part2.ngc").read_bytes()
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+def test_nothing_is_done_for_another_reason(night: Any, shop: Any) -> None:
+    night()
+    assert resumed(night()[0]) == set("012345")
+    assert resumed(night("--tolerance-um", "2")[0]) == set()
+    shop.machine.write_text(shop.machine.read_text().replace("1e-4", "2e-4"))
+    assert resumed(night()[0]) == set()
+    assert resumed(night()[0]) == set("012345")
+
+
+def test_an_output_that_somebody_changed_is_never_trusted_nor_replaced(night: Any, shop: Any) -> None:
+    night()
+    output = shop.folder / "out" / "part0.ngc"
+    mine = output.read_bytes()
+    output.write_bytes(b"by hand\n")
+    entries, result = night()
+    assert result.code == ExitCode.USAGE
+    assert resumed(entries) == set("12345")
+    assert entries["part0.ngc"]["errors"][0]["code"] == "NCF004"
+    assert output.read_bytes() == b"by hand\n"
+    output.write_bytes(mine)
+    assert resumed(night()[0]) == set("012345")
+
+
+def test_a_failure_is_remembered_until_something_changes(night: Any, parts: Path) -> None:
+    bad = parts / "bad.ngc"
+    bad.write_bytes(b"G1 X1 Y..2\nM2\n")
+    first, result = night()
+    assert result.code == ExitCode.UNREADABLE
+    again, result = night()
+    assert result.code == ExitCode.UNREADABLE
+    assert again["bad.ngc"] == {**first["bad.ngc"], "resumed": True}
+    assert ", as before" in result.err
+    assert "resumed" not in night("--retry")[0]["bad.ngc"]
+    assert resumed(night("--retry")[0]) == set("012345")
+    bad.write_bytes(b"G1 X1 Y.2 F100\nM2\n")
+    assert night()[1].code == ExitCode.DONE
+
+
+def test_a_disk_that_was_full_is_not_remembered(night: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from ncfix import files
+
+    def full(*_: Any) -> None:
+        raise files.unwritable("out", OSError(28, "No space left on device"))
+
+    with monkeypatch.context() as broken:
+        broken.setattr(files, "write_whole", full)
+        entries, result = night("--jobs", 1)
+    assert result.code == ExitCode.USAGE
+    assert {entry["errors"][0]["code"] for entry in entries.values()} == {"NCF007"}
+    entries, result = night()
+    assert result.code == ExitCode.DONE
+    assert resumed(entries) == set()
+
+
+def test_the_output_of_an_earlier_state_is_named(night: Any, shop: Any, parts: Path) -> None:
+    night()
+    output = shop.folder / "out" / "part0.ngc"
+    before = output.read_bytes()
+    (parts / "part0.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
+    for _ in range(2):
+        entries, result = night()
+        assert entries["part0.ngc"]["stale"]
+        assert "the output is of an earlier state of it" in result.err
+        assert output.read_bytes() == before
+
+
+def test_a_subprogram_that_changed_counts(night: Any, parts: Path) -> None:
+    (parts / "part0.ngc").write_bytes(b"G21 G90 G94 G0 X0 Y0 Z0\no<sub> call\nM2\n")
+    (parts / "sub.ngc").write_bytes(b"o<sub> sub\nG1 X10 F100\no<sub> endsub\nM2\n")
+    night("--flatten")
+    assert "resumed" in night("--flatten")[0]["part0.ngc"]
+    (parts / "sub.ngc").write_bytes(b"o<sub> sub\nG1 X20 F100\no<sub> endsub\nM2\n")
+    assert "resumed" not in night("--flatten")[0]["part0.ngc"]
+
+
+def test_what_is_said_of_many(ncfix: Any, shop: Any, parts: Path) -> None:
+    (parts / "bad.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
+    command = ("fix", parts, "-m", shop.machine, "--assume-zero", "-o")
+    lines = ncfix(*command, shop.folder / "a").err.splitlines()
+    of_machine, usual = lines[:2], lines[2:]
+    assert "NCF320" in of_machine[0]
+    assert "bad.ngc:1: NCF1" in usual[0]
+    assert usual[1].split() == ["programs", "outcome", "reason"]
+    assert usual[2].split() == [str(COUNT), "written"]
+    assert usual[3].split()[:2] == ["1", "failed"]
+    assert usual[-1] == f"{COUNT + 1} programs: {COUNT} written, 1 not"
+    quiet = ncfix(*command, shop.folder / "b", "-q").err.splitlines()
+    assert quiet == [*of_machine, usual[0]]
+    full = ncfix(*command, shop.folder / "c", "-v").err
+    assert full.count("largest correction") == COUNT
+    assert full.endswith("\n".join(usual[1:]) + "\n")
+    one = ("fix", parts / "part0.ngc", "-m", shop.machine, "--assume-zero", "-o", shop.folder / "d.ngc", "--force")
+    assert "largest correction" in ncfix(*one).err
+    assert ncfix(*one, "-q").err.splitlines() == of_machine
+
+
+def test_json_lines(ncfix: Any, shop: Any, parts: Path) -> None:
+    (parts / "bad.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
+    result = ncfix("fix", parts, "-m", shop.machine, "-o", shop.folder / "out", "--assume-zero", "--json-lines", "-q")
+    *found, last = [json.loads(line) for line in result.out.splitlines()]
+    assert [each["outcome"] for each in found] == ["failed", *["written"] * COUNT]
+    assert {each["schema"] for each in found} == {1}
+    outcomes = [{"outcome": "written", "code": None, "programs": COUNT}]
+    outcomes.append({"outcome": "failed", "code": found[0]["errors"][0]["code"], "programs": 1})
+    remarks = last["summary"].pop("remarks")
+    assert last == {"schema": 1, "summary": {"programs": COUNT + 1, "written": COUNT, "outcomes": outcomes}}
+    assert remarks.keys() == {each["code"] for each in found[1]["warnings"]}
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_program_that_takes_too_long(
+    ncfix: Any, shop: Any, parts: Path, jobs: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ncfix.cli.batch import FixJob
+
+    fixed = FixJob.fixed
+
+    def slow(job: FixJob, target: Any, *rest: Any) -> Any:
+        until = time.monotonic() + (60 if target.source.endswith("part2.ngc") else 0)
+        while time.monotonic() < until:
+            time.sleep(0.01)
+        return fixed(job, target, *rest)
+
+    monkeypatch.setattr(FixJob, "fixed", slow)
+    command = ("fix", parts, "-m", shop.machine, "-o", shop.folder / "out", "--assume-zero", "--json", "--resume")
+    result = ncfix(*command, "--jobs", jobs, "--time-limit-s", "1")
+    assert result.code == ExitCode.FAULT
+    failed = [each for each in result.json()["files"] if "errors" in each]
+    assert [(Path(each["path"]).name, each["errors"][0]["code"]) for each in failed] == [("part2.ngc", "NCF025")]
+    begun = time.monotonic()
+    assert ncfix(*command, "--time-limit-s", "1").code == ExitCode.FAULT
+    assert time.monotonic() - begun < 1
+    monkeypatch.undo()
+    assert ncfix(*command).code == ExitCode.DONE
+
+
+def test_a_program_that_takes_too_much_memory(ncfix_process: Any, shop: Any) -> None:
+    command = ("fix", shop.program, "-m", shop.machine, "-o", shop.folder / "out.ngc", "--assume-zero")
+    result = ncfix_process(*command, "--memory-limit-mb", 5)
+    assert result.code == ExitCode.FAULT
+    assert "NCF024" in result.err
+    assert ncfix_process(*command, "--memory-limit-mb", 1000).code == ExitCode.DONE

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -15,23 +15,18 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from ncfix import fast, files
+from ncfix.batch.journal import JOURNAL, Find, Journal, JournalRecord, RecordingFinder, announce, digest_of, text_digest
 from ncfix.batch.programs import subprograms
-from ncfix.batch.work import (
-    ExecutorMaker,
-    Find,
-    Journal,
-    JournalRecord,
-    RecordingFinder,
-    digest_of,
-    results_in_order,
-    text_digest,
-)
+from ncfix.batch.work import ExecutorMaker, results_in_order
 from ncfix.cli import console
 from ncfix.cli.console import owned
 from ncfix.cli.options import dialect_of
 from ncfix.cli.streams import FixedText, Outlet, Source, outlet_for, part_bytes, source_of
+from ncfix.cli.summary import Loudness, brief, progress, told
 from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
+from ncfix.host import limited
+from ncfix.plugins import load_plugins
 from ncfix.version import __version__
 
 if TYPE_CHECKING:
@@ -42,16 +37,30 @@ if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect
 
 FLATTEN = "--flatten may correct more: it writes out what cycles, loops and subprograms repeat; "
+STALE = "is of an earlier state of the program, the machine, the set-up or the options, and was left as it is"
 ACCEPT = "--allow-refused writes the program with the refused motions as they were"
+OF_PROGRAMS = 100
+"""Messages with this number and above are about programs, machines and set-ups; those below about files and use."""
+LASTING = frozenset({"NCF000", "NCF017", "NCF024", "NCF025"})
+"""Failures of ncfix on a program that would come again."""
 
 
 @dataclass(frozen=True, slots=True)
 class FixOutcome:
-    """What became of one program: its exit code, its entry in the JSON object, and the subprograms looked for."""
+    """What became of one program.
+
+    code    the exit code
+    entry   its entry in the JSON object
+    called  the subprograms looked for, as in the journal
+    key     what the result depends on, see `FixJob.key`; empty if it is not asked for, or has changed meanwhile
+    digest  of the output, if there is one and it is asked for
+    """
 
     code: int
     entry: dict[str, Any]
     called: Mapping[str, str] = field(default_factory=dict)
+    key: str = ""
+    digest: str = ""
 
     @classmethod
     def failed(cls, target: OutputTarget, error: NcfixError) -> FixOutcome:
@@ -61,36 +70,69 @@ class FixOutcome:
 
 
 @dataclass(frozen=True, slots=True)
+class ProgramLimits:
+    """How much time and memory a program may take; None: as much as there is."""
+
+    seconds: float | None = None
+    megabytes: int | None = None
+
+    def __bool__(self) -> bool:
+        return self != ProgramLimits()
+
+
+@dataclass(frozen=True, slots=True)
 class FixJob:
-    """What is the same for all programs."""
+    """What is the same for all programs.
+
+    journal  where outputs are announced; None: nowhere
+    basis    a digest of all that a result depends on besides program and subprograms, with a journal
+    """
 
     machine: Machine
     setup: Setup
     dialect: str | None
     options: FixOptions
+    limits: ProgramLimits = ProgramLimits()
+    journal: str | None = None
+    basis: str = ""
+
+    def noted_in(self, journal: str) -> FixJob:
+        """The same with a journal."""
+        versions = [(plugin.name, plugin.version) for plugin in load_plugins().loaded]
+        machine = (self.machine.hash, self.machine.name, self.machine.control)
+        how = (__version__, versions, machine, self.setup, self.dialect, self.options)
+        return replace(self, journal=journal, basis=text_digest(repr(how).encode()))
 
     def key(self, target: OutputTarget) -> str:
-        """A digest of what the result for a program depends on, subprograms apart."""
-        options = (__version__, self.machine.hash, self.setup, self.dialect, self.options, digest_of(target.source))
-        return text_digest(repr(options).encode())
+        """A digest of what the result for a program depends on, subprograms and limits apart."""
+        return text_digest(f"{self.basis} {digest_of(target.source)}".encode())
 
-    def outcome_and_messages(self, target: OutputTarget) -> tuple[FixOutcome, list[str]]:
+    def outcome_and_messages(self, target: OutputTarget, jobs: int = 1) -> Finished:
         """Fix one program elsewhere: what came of it, and what there is to say."""
         with console.keeping() as said:
-            return self.outcome(target), said
+            return self.outcome(target, jobs), said
 
     def outcome(self, target: OutputTarget, jobs: int = 1) -> FixOutcome:
         """Fix one program and say what came of it; an error, and a fault of ncfix, ends this program only."""
         find = RecordingFinder(subprograms(self.setup, target.source))
+        key = self.key(target) if self.journal else ""
         try:
-            with console.busy(f"fixing {shown(target.source)}"), self.fixed(target, find, jobs) as fixed:
-                return replace(_written(fixed, target, self.options), called=find.called)
+            with (
+                limited(self.limits.seconds, self.limits.megabytes),
+                console.busy(f"fixing {shown(target.source)}"),
+                self.fixed(target, find, jobs) as fixed,
+            ):
+                done = self._written(fixed, target)
         except console.ReaderGoneError:
             raise
         except Exception as error:
             own = owned(error)
             console.tell(*own.messages)
-            return FixOutcome.failed(target, own)
+            done = FixOutcome.failed(target, own)
+        if done.entry["output"] is None and target.is_own:
+            done.entry["stale"] = True
+            console.tell(Message("NCF027", STALE, Place(target.path)))
+        return replace(done, called=find.called, key=key if key and key == self.key(target) else "")
 
     @contextmanager
     def fixed(self, target: OutputTarget, find: Find, jobs: int) -> Iterator[FixedText]:
@@ -147,28 +189,30 @@ class FixJob:
         source.check_unchanged()
         return FixedText(outlet.remaining(done.stamp), done.report.changed, done.report)
 
+    def _written(self, fixed: FixedText, target: OutputTarget) -> FixOutcome:
+        entry: dict[str, Any] = fixed.report.as_dict()
+        path, digest = shown(target.source), ""
+        refusals = (Message(each["code"], each["reason"], Place(path, each["line"])) for each in entry["refused"])
+        console.tell_some([*fixed.report.warnings, *refusals], partial(_with_lines, source=target.source))
+        refused = bool(entry["refused"]) and not self.options.allow_refused
+        if not refused:
+            if self.journal:
+                digest = text_digest(fixed.text)
+                announce(self.journal, target.name, digest)
+            if fixed.changed or not target.in_place:
+                target.write(fixed.text, files.mode_of(target.source))
+            entry["output"] = target.path
+        for line in _summary(entry, refused):
+            console.say(line)
+        if refused:
+            console.say(f"  {ACCEPT if self.options.flatten else FLATTEN + ACCEPT}")
+        return FixOutcome(ExitCode.REFUSED if refused else ExitCode.DONE, entry, digest=digest)
+
 
 @cache
 def _let_stay() -> None:
     """Spare the garbage collector what is loaded by now, once in a process: it stays, and is much to go through."""
     gc.freeze()
-
-
-def _written(fixed: FixedText, target: OutputTarget, options: FixOptions) -> FixOutcome:
-    entry: dict[str, Any] = fixed.report.as_dict()
-    path = shown(target.source)
-    refusals = (Message(each["code"], each["reason"], Place(path, each["line"])) for each in entry["refused"])
-    console.tell_some([*fixed.report.warnings, *refusals], partial(_with_lines, source=target.source))
-    refused = bool(entry["refused"]) and not options.allow_refused
-    if not refused:
-        if fixed.changed or not target.in_place:
-            target.write(fixed.text, files.mode_of(target.source))
-        entry["output"] = target.path
-    for line in _summary(entry, refused):
-        console.say(line)
-    if refused:
-        console.say(f"  {ACCEPT if options.flatten else FLATTEN + ACCEPT}")
-    return FixOutcome(ExitCode.REFUSED if refused else ExitCode.DONE, entry)
 
 
 def _with_lines(messages: Sequence[Message], source: str) -> list[Message]:
@@ -224,53 +268,106 @@ def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
 class Batch:
     """Programs that are fixed one after another, or several at a time.
 
-    folder  where their outputs go together; None: each has its own place
-    resume  what an earlier run has done stays
+    folder    where their outputs go together; None: each has its own place
+    resume    what an earlier run has done stays, and what failed then is not tried again
+    retry     what failed is tried again
+    loudness  how much is said
     """
 
     job: FixJob
     targets: Sequence[OutputTarget]
     folder: str | None
     resume: bool
+    retry: bool = False
+    loudness: Loudness = Loudness.USUAL
 
     def run(self, jobs: int, make: ExecutorMaker) -> Iterator[FixOutcome]:
         """What becomes of them, in their order; each is noted as soon as it is done."""
-        journal = Journal(self.folder) if self.folder is not None and len(self.targets) > 1 else None
-        if journal is not None:
-            journal.check()
-        done = {} if journal is None or not self.resume else journal.records()
-        kept = {target: done[target.name] for target in self.targets if self._holds(target, done.get(target.name))}
-        fresh = self._fresh([target for target in self.targets if target not in kept], jobs, make)
-        for target in self.targets:
-            if target in kept:
-                console.say(f"{visible(shown(target.source))} -> {visible(target.path)}: done before")
-                yield FixOutcome(ExitCode.DONE, {**kept[target].entry, "resumed": True}, kept[target].called)
-                continue
-            outcome = next(fresh)
-            if journal is not None and outcome.entry["output"] is not None:
-                digest = digest_of(target.path) or ""
-                journal.add(JournalRecord(target.name, self.job.key(target), digest, outcome.called, outcome.entry))
-            yield outcome
-        if journal is not None:
-            journal.finish()
-
-    def _fresh(self, rest: Sequence[OutputTarget], jobs: int, make: ExecutorMaker) -> Iterator[FixOutcome]:
-        if jobs == 1 or len(rest) <= 1 or any(target.source == STREAM for target in rest):
-            for target in rest:
-                yield self.job.outcome(target, jobs)
+        if self.folder is None or not (self.resume or self.many or os.path.exists(os.path.join(self.folder, JOURNAL))):
+            yield from self._told(self.targets, {}, self._fresh(self.job, self.targets, jobs, make, _forget))
             return
-        for outcome, said in results_in_order(self.job.outcome_and_messages, rest, make, jobs, _lost):
-            for line in said:
-                console.say(line)
-            yield outcome
+        with Journal.opened(self.folder) as journal:
+            job = self.job.noted_in(journal.path)
+            targets = [self._known(target, journal) for target in self.targets]
+            kept = {target: record for target in targets if (record := self._kept(job, target, journal))}
+            rest = [target for target in targets if target not in kept]
+            fresh = self._fresh(job, rest, jobs, make, partial(_note, journal, repr(job.limits)))
+            yield from self._told(targets, kept, fresh)
 
-    def _holds(self, target: OutputTarget, record: JournalRecord | None) -> bool:
-        if record is None:
-            return False
-        return record.holds(self.job.key(target), target.path, subprograms(self.job.setup, target.source))
+    @property
+    def many(self) -> bool:
+        """Whether there are several programs."""
+        return len(self.targets) > 1
+
+    def _told(
+        self, targets: Sequence[OutputTarget], kept: Mapping[OutputTarget, JournalRecord], fresh: Iterator[Finished]
+    ) -> Iterator[FixOutcome]:
+        """All outcomes in their order, each with what there is to say of it."""
+        with progress(len(targets)) as step:
+            for target in targets:
+                if target in kept:
+                    outcome, said = _done_before(target, kept[target])
+                else:
+                    outcome, said = next(fresh)
+                told(outcome.entry, said, self.loudness, self.many)
+                step()
+                yield outcome
+
+    def _known(self, target: OutputTarget, journal: Journal) -> OutputTarget:
+        return replace(target, made=frozenset(journal.written.get(target.name, ()))) if self.resume else target
+
+    def _kept(self, job: FixJob, target: OutputTarget, journal: Journal) -> JournalRecord | None:
+        """The record of a program that need not be fixed again; None if it is to be fixed."""
+        record = journal.records.get(target.name) if self.resume else None
+        if record is None or (self.retry and not record.digest):
+            return None
+        find = subprograms(job.setup, target.source)
+        return record if record.holds(job.key(target), target.path, find, repr(job.limits)) else None
+
+    def _fresh(
+        self, job: FixJob, rest: Sequence[OutputTarget], jobs: int, make: ExecutorMaker, note: Note
+    ) -> Iterator[Finished]:
+        alone = len(rest) <= 1 or any(target.source == STREAM for target in rest)
+        if not alone and (jobs > 1 or job.limits):
+            yield from results_in_order(job.outcome_and_messages, rest, make, jobs, _lost, note)
+            return
+        for target in rest:
+            if self.many or self.loudness == Loudness.QUIET:
+                finished = job.outcome_and_messages(target, jobs)
+            else:
+                finished = job.outcome(target, jobs), []
+            note(target, finished)
+            yield finished
 
 
-def _lost(target: OutputTarget) -> tuple[FixOutcome, list[str]]:
+Finished = tuple[FixOutcome, list[str]]
+"""What became of a program, and what is still to be said of it."""
+Note = Callable[[OutputTarget, Finished], None]
+
+
+def _forget(target: OutputTarget, finished: Finished) -> None:
+    """Where there is no journal."""
+
+
+def _note(journal: Journal, limits: str, target: OutputTarget, finished: Finished) -> None:
+    """Put into a journal what became of a program, unless something else than what the key holds may be the reason."""
+    outcome, _ = finished
+    codes = [error["code"] for error in outcome.entry.get("errors", ())]
+    faulty = outcome.code == ExitCode.FAULT
+    if outcome.key and all(code in LASTING or (int(code[3:]) >= OF_PROGRAMS and not faulty) for code in codes):
+        entry, called = outcome.entry, outcome.called
+        journal.add(JournalRecord(target.name, outcome.key, outcome.digest, called, entry, outcome.code, limits))
+
+
+def _done_before(target: OutputTarget, record: JournalRecord) -> Finished:
+    entry = {**record.entry, "path": shown(target.source), "resumed": True}
+    entry["output"] = target.path if record.digest else None
+    line = f"{visible(shown(target.source))} -> {visible(target.path)}: done before"
+    outcome = FixOutcome(record.code, entry, record.called)
+    return outcome, [line] if record.digest else [brief(entry)]
+
+
+def _lost(target: OutputTarget) -> Finished:
     """What to say of a program over which two processes died: too large for the memory, or a fault in compiled code."""
     text = "the process that worked on it was killed, and so was another one"
     error = FaultError.of("NCF017", text, Place(shown(target.source)), "fix it alone, where there is more memory")

@@ -109,4 +109,23 @@ CODES = {
         "can be; what has to be looked at as a whole takes many times the memory of its text.",
         "Do it on a computer with more memory, or in smaller pieces; `--jobs 1` takes the least.",
     ),
+    "NCF025": Code(
+        "a program took too long",
+        "`--time-limit-s` says how many seconds a program of a batch may take. Nothing was written for it; the other "
+        "programs are not concerned. It is not tried again by `--resume` until something changes.",
+        "Give it more time, or fix it alone; `--retry` tries again.",
+    ),
+    "NCF026": Code(
+        "two batches for one folder",
+        "While a batch runs, its journal (`.ncfix-journal.jsonl` in the folder of the outputs) is locked, so that two "
+        "do not write the same files.",
+        "Wait until the other one is done, or give another `-o`.",
+    ),
+    "NCF027": Code(
+        "an output of an earlier state",
+        "A program was corrected, then it was changed, or the machine, the set-up or the options were; and now it "
+        "fails or is refused. The output in the folder is the correction of the earlier state. ncfix removes no "
+        "output.",
+        "Do not use this output: remove it, or put right what the program fails of.",
+    ),
 }

@@ -180,9 +180,12 @@ def put_json(**content: object) -> None:
     put(json_text(**content))
 
 
-def json_text(**content: object) -> str:
-    """One JSON object with its schema version, in visible ASCII; numbers that are not finite become null."""
-    text = json.dumps({"schema": SCHEMA, **{key: _plain(value) for key, value in content.items()}}, indent=1)
+def json_text(indent: int | None = 1, /, **content: object) -> str:
+    """One JSON object with its schema version, in visible ASCII; numbers that are not finite become null.
+
+    indent  of its lines; None: it is on one line
+    """
+    text = json.dumps({"schema": SCHEMA, **{key: _plain(value) for key, value in content.items()}}, indent=indent)
     return text.replace("\x7f", "\\u007f") + "\n"
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +12,7 @@ from ncfix.cli import console
 from ncfix.cli.options import (
     PATH,
     OneOf,
+    Positive,
     dialect_option,
     json_option,
     load_machine,
@@ -21,8 +22,12 @@ from ncfix.cli.options import (
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, targets
+from ncfix.diagnostics import UsageError
 from ncfix.host import processors
 from ncfix.plugins import registry
+
+if TYPE_CHECKING:
+    from ncfix.cli.batch import Batch, FixOutcome
 
 AUTO = 0
 """`--jobs auto` as a number: as many as pay."""
@@ -86,7 +91,8 @@ def _executors() -> Iterable[str]:
 @click.option(
     "--force", is_flag=True, help="Replace an output; correct a stamped program; take a machine that cannot be."
 )
-@click.option("--resume", is_flag=True, help="Go on with a batch where it stopped: what is done in -o DIR stays.")
+@click.option("--resume", is_flag=True, help="Go on with a batch: what is done in -o DIR and has not changed stays.")
+@click.option("--retry", is_flag=True, help="With --resume, try again what failed, though nothing has changed.")
 @click.option(
     "--strategy",
     type=OneOf(_strategies),
@@ -127,7 +133,12 @@ def _executors() -> Iterable[str]:
     metavar="NAME",
     help="What runs the programs of a batch.",
 )
+@click.option("--time-limit-s", type=Positive(), metavar="S", help="Seconds that one program may take.")
+@click.option("--memory-limit-mb", type=click.IntRange(1), metavar="MB", help="Memory that one program may take.")
+@click.option("-q", "--quiet", is_flag=True, help="Say only of which programs nothing was written, and why.")
+@click.option("-v", "--verbose", is_flag=True, help="Of many programs, say all of each.")
 @json_option
+@click.option("--json-lines", is_flag=True, help="Print one JSON object for each program as soon as it is done.")
 def fix(
     programs: tuple[str, ...],
     machine_path: str,
@@ -135,11 +146,17 @@ def fix(
     in_place: bool,
     force: bool,
     resume: bool,
+    retry: bool,
+    time_limit_s: float | None,
+    memory_limit_mb: int | None,
+    quiet: bool,
+    verbose: bool,
     dialect: str | None,
     given: SetupOptions,
     jobs: int,
     executor: str,
     as_json: bool,
+    json_lines: bool,
     **choices: Any,
 ) -> int:
     """Rewrite each PROGRAM so that this machine cuts what was meant; of a folder, all programs below it.
@@ -148,24 +165,47 @@ def fix(
     was written.
     """
     from ncfix.batch.work import executor_of
-    from ncfix.cli.batch import Batch, FixJob
+    from ncfix.cli.batch import Batch, FixJob, ProgramLimits
+    from ncfix.cli.summary import Loudness
 
+    if as_json and json_lines:
+        raise UsageError.of("NCF001", "--json and --json-lines are two forms of one output", hint="leave one out")
     outputs = Outputs(output, in_place, force, resume)
     wanted = targets(programs, outputs, (machine_path, *given.files), folders=True)
     for target in wanted:
-        check_streams(JSON if as_json else None, program=target)
+        check_streams(JSON if as_json or json_lines else None, program=target)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     from ncfix.compensate import FixOptions
 
     if choices.pop("thesis"):
         choices["strategy"] = "thesis"
     machine = sound(load_machine(machine_path), machine_path, force)
-    job = FixJob(machine, given.load(), dialect, FixOptions(**choices, force=force))
-    batch = Batch(job, wanted, outputs.folder(programs), resume)
-    outcomes = list(batch.run(processes_for(jobs, wanted), executor_of(executor)))
-    if len(outcomes) > 1:
-        written = sum(outcome.entry["output"] is not None for outcome in outcomes)
-        console.say(f"{len(outcomes)} programs: {written} written, {len(outcomes) - written} not")
+    options = FixOptions(**choices, force=force)
+    job = FixJob(machine, given.load(), dialect, options, ProgramLimits(time_limit_s, memory_limit_mb))
+    loudness = Loudness.ALL if verbose else Loudness.QUIET if quiet else Loudness.USUAL
+    batch = Batch(job, wanted, outputs.folder(programs), resume, retry, loudness)
+    return _reported(batch.run(processes_for(jobs, wanted), executor_of(executor)), batch, as_json, json_lines)
+
+
+def _reported(outcomes: Iterator[FixOutcome], batch: Batch, as_json: bool, json_lines: bool) -> int:
+    """Print what comes of programs, in the form asked for; the worst exit code."""
+    from ncfix.cli.summary import Became, Loudness, Summary
+
+    summary, entries, worst = Summary(), list[Mapping[str, Any]](), 0
+    for outcome in outcomes:
+        summary.add(outcome.entry)
+        worst = max(worst, outcome.code)
+        if json_lines:
+            console.put(console.json_text(None, outcome=Became.of(outcome.entry), **outcome.entry))
+        if as_json:
+            entries.append(outcome.entry)
+    if batch.many and batch.loudness != Loudness.QUIET:
+        from ncfix.cli.listings import all_codes
+
+        for line in summary.lines(all_codes()):
+            console.say(line)
     if as_json:
-        console.put_json(files=[outcome.entry for outcome in outcomes])
-    return max(outcome.code for outcome in outcomes)
+        console.put_json(files=entries)
+    if json_lines:
+        console.put(console.json_text(None, summary=summary.as_dict()))
+    return worst

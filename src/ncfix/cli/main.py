@@ -125,7 +125,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _run(arguments: Sequence[str]) -> int:
-    as_json = "--json" in arguments
+    as_json = "--json" in arguments or "--json-lines" in arguments
     try:
         if any("\0" in argument for argument in arguments):
             raise UsageError.of("NCF001", "an argument has a NUL character", hint="no name of a file has one")

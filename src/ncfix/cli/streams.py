@@ -203,7 +203,7 @@ class Outlet:
         if self.sent:
             return self._unsent()
         kept = files.Whole(self.kept)
-        return kept if stamp.written == stamp.wanted else _stamped(kept, stamp)
+        return kept if stamp.written == stamp.wanted else StampedText(kept, stamp)
 
     def after(self, text: bytes, path: str) -> bytes:
         """What is left of a text of which the beginning was sent; raises RefusedError NCF013 if it was another."""
@@ -215,11 +215,18 @@ class Outlet:
         return text[self.sent :]
 
 
-def _stamped(kept: Iterable[bytes], stamp: Stamp) -> Iterator[bytes]:
-    parts = iter(kept)
-    first = next(parts, b"")
-    yield first[: stamp.at] + stamp.wanted + first[stamp.at + len(stamp.written) :]
-    yield from parts
+@dataclass(frozen=True, slots=True)
+class StampedText:
+    """A text that is kept, with the stamp as it has to be."""
+
+    kept: Iterable[bytes]
+    stamp: Stamp
+
+    def __iter__(self) -> Iterator[bytes]:
+        parts, stamp = iter(self.kept), self.stamp
+        first = next(parts, b"")
+        yield first[: stamp.at] + stamp.wanted + first[stamp.at + len(stamp.written) :]
+        yield from parts
 
 
 @contextmanager

@@ -63,6 +63,7 @@ class OutputTarget:
     in_place  the output takes the input's name, which is kept as `backup`
     force     an existing output may be replaced
     resume    an existing output is left as it is, if it is what would be written
+    made      digests of what ncfix itself has written there: with `resume`, that may be replaced
     name      the output's way down from the output folder; empty if there is none
     root      the output folder, as the user named it; None if there is none
     """
@@ -74,6 +75,14 @@ class OutputTarget:
     resume: bool = False
     name: str = ""
     root: str | None = None
+    made: frozenset[str] = frozenset()
+
+    @property
+    def is_own(self) -> bool:
+        """Whether there is an output that ncfix has made, and nobody has changed since."""
+        from ncfix.batch.journal import digest_of
+
+        return bool(self.made) and digest_of(self.path) in self.made
 
     @property
     def backup(self) -> str:
@@ -96,7 +105,9 @@ class OutputTarget:
             files.replace_keeping(self.path, self.backup, data)
         elif self.resume and not self.force and os.path.lexists(self.path):
             if not files.holds(self.path, data):
-                raise files.exists_already(self.path)
+                if not self.is_own:
+                    raise files.exists_already(self.path)
+                files.write_whole(self.path, data, True, self.root, mode)
         else:
             files.write_whole(self.path, data, self.force, self.root, mode)
 

@@ -1,0 +1,153 @@
+"""What a batch says: a line for each program that was not written, a table of what became of all, progress meanwhile.
+
+`ncfix fix` says of one program all that there is to say. Of many it says what somebody has to look at, and how many of
+each kind there are; `--verbose` says all, and the JSON forms have all in any case.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from enum import IntEnum, StrEnum
+from typing import Any
+
+from ncfix.cli import console
+from ncfix.diagnostics import Code, visible
+
+WIDEST = 60
+"""Characters of an example's name in the table."""
+
+
+class Loudness(IntEnum):
+    """How much is said of programs."""
+
+    QUIET = 0
+    USUAL = 1
+    ALL = 2
+
+
+class Became(StrEnum):
+    """What can become of a program, as the table and JSON lines name it."""
+
+    WRITTEN = "written"
+    UNCHANGED = "unchanged"
+    DONE = "done before"
+    REFUSED = "refused"
+    FAILED = "failed"
+
+    @classmethod
+    def of(cls, entry: Mapping[str, Any]) -> Became:
+        """What became of the program of an entry in the JSON object."""
+        if "errors" in entry:
+            return cls.FAILED
+        if entry["output"] is None:
+            return cls.REFUSED
+        if entry.get("resumed"):
+            return cls.DONE
+        return cls.WRITTEN if entry["changed"] else cls.UNCHANGED
+
+
+def reasons(entry: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Why a program was not written: codes and what they say of it, the first reason first; empty of one that was."""
+    if "errors" in entry:
+        return [(error["code"], error["text"]) for error in entry["errors"]]
+    return [] if entry["output"] is not None else [(each["code"], each["reason"]) for each in entry["refused"]]
+
+
+def brief(entry: Mapping[str, Any]) -> str:
+    """A program that was not written, on one line."""
+    (code, text), *more = reasons(entry)
+    found = entry.get("errors") or entry["refused"]
+    line = f":{found[0]['line']}" if found[0].get("line") else ""
+    rest = f" (and {len(more)} more)" if more else ""
+    stale = "; the output is of an earlier state of it" if entry.get("stale") else ""
+    before = ", as before" if entry.get("resumed") else ""
+    return f"{visible(entry['path'])}{line}: {code}: {text.splitlines()[0]}{rest}{stale}{before}"
+
+
+@dataclass(slots=True)
+class Summary:
+    """Counts of what became of programs, and why.
+
+    became   how many programs, by outcome and code, "" for none, with the first of them
+    remarks  how many written programs have a remark of a code
+    """
+
+    became: dict[tuple[Became, str], list[Any]] = field(default_factory=dict)
+    remarks: Counter[str] = field(default_factory=Counter)
+    count: int = 0
+    written: int = 0
+
+    def add(self, entry: Mapping[str, Any]) -> None:
+        """Count a program."""
+        self.count += 1
+        self.written += entry["output"] is not None
+        code = next((code for code, _ in reasons(entry)), "")
+        found = self.became.setdefault((Became.of(entry), code), [0, entry["path"]])
+        found[0] += 1
+        if not code:
+            self.remarks.update({each["code"] for each in entry["warnings"]})
+
+    def as_dict(self) -> dict[str, Any]:
+        """The counts as plain data."""
+        rows = [{"outcome": became, "code": code or None, "programs": n} for became, code, n, _ in self._rows()]
+        return {"programs": self.count, "written": self.written, "outcomes": rows, "remarks": dict(self.remarks)}
+
+    def lines(self, titles: Mapping[str, Code]) -> list[str]:
+        """The table, for people; `titles`: what the codes mean."""
+        rows = [("programs", "outcome", "reason")]
+        for became, code, count, first in self._rows():
+            example = f" ({visible(first)[-WIDEST:]}{' ...' if count > 1 else ''})" if code else ""
+            rows.append((str(count), became, f"{code} {_title(titles, code)}{example}" if code else ""))
+        for code, count in sorted(self.remarks.items(), key=lambda item: (-item[1], item[0])):
+            rows.append((str(count), "with remark", f"{code} {_title(titles, code)}"))
+        wide = max(len(became) for _, became, _ in rows)
+        table = [f"{count:>8}  {became:<{wide}}  {reason}".rstrip() for count, became, reason in rows]
+        return [*table, f"{self.count} programs: {self.written} written, {self.count - self.written} not"]
+
+    def _rows(self) -> list[tuple[Became, str, int, str]]:
+        found = [(became, code, count, first) for (became, code), (count, first) in self.became.items()]
+        return sorted(found, key=lambda row: (list(Became).index(row[0]), -row[2], row[1]))
+
+
+def _title(titles: Mapping[str, Code], code: str) -> str:
+    return titles[code].title if code in titles else ""
+
+
+Advance = Callable[[], None]
+"""Says that one program more is done."""
+
+
+@contextmanager
+def progress(total: int) -> Iterator[Advance]:
+    """Show on a terminal how many of so many programs are done, how many a second, and how long the rest takes."""
+    if total == 1 or sys.stderr is None or not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    rate = TextColumn("{task.fields[rate]}")
+    columns = (BarColumn(), MofNCompleteColumn(), rate, TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+        task = shown.add_task("", total=total, rate="")
+
+        def step() -> None:
+            shown.advance(task)
+            speed = shown.tasks[0].finished_speed or shown.tasks[0].speed
+            shown.update(task, rate=f"{speed:.3g}/s" if speed else "")
+
+        yield step
+
+
+def told(entry: Mapping[str, Any], said: list[str], loudness: Loudness, many: bool) -> None:
+    """Say what there is to say of a program that is done; `said`: all of it."""
+    wrong = bool(reasons(entry))
+    if loudness == Loudness.ALL or (not many and (loudness == Loudness.USUAL or wrong)):
+        for line in said:
+            console.say(line)
+    elif many and wrong:
+        console.say(brief(entry))
