@@ -25,11 +25,11 @@ from ncfix.hookspecs import hookimpl as hookimpl
 from ncfix.plugins import nearest
 from ncfix.text.dialect import FOREIGN as FOREIGN
 from ncfix.text.dialect import TURNING as TURNING
+from ncfix.text.dialect import CycleTable as CycleTable
 from ncfix.text.dialect import Dialect as Dialect
 
 if TYPE_CHECKING:
     from ncfix.control.operations import ALL_AXES as ALL_AXES
-    from ncfix.control.operations import CycleTable as CycleTable
     from ncfix.control.operations import Like as Like
     from ncfix.control.operations import Lose as Lose
     from ncfix.control.operations import Operation as Operation
@@ -88,10 +88,10 @@ if TYPE_CHECKING:
     from ncfix.tables.table_files import messages_of as messages_of
     from ncfix.tables.table_files import unit_of as unit_of
 
-HERE = ("FOREIGN", "TURNING", "Dialect", "Register", "family", "hookimpl")
+HERE = ("FOREIGN", "TURNING", "CycleTable", "Dialect", "Register", "family", "hookimpl")
 ELSEWHERE = {
     "ncfix.control.operations": (
-        *("ALL_AXES", "CycleTable", "Like", "Lose", "Operation", "Rapid", "Refuse", "Resume", "SetTool", "Suspend"),
+        *("ALL_AXES", "Like", "Lose", "Operation", "Rapid", "Refuse", "Resume", "SetTool", "Suspend"),
         "like",
     ),
     "ncfix.diagnostics": (

@@ -224,9 +224,9 @@ def met(case: Case, tmp_path: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch)
 def forgotten() -> Iterator[None]:
     """The languages and grammars of these plugins are not kept."""
     from ncfix.text.grammar import parser
-    from ncfix.text.language import language_of
+    from ncfix.text.language import loaded
 
     yield
     parser.cache_clear()
-    language_of.cache_clear()
+    loaded.cache_clear()
     sys.modules.pop("third_party_broken", None)

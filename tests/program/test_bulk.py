@@ -25,6 +25,7 @@ from ncfix.writer import bulk
 from ncfix.writer.bulk import WrittenStretch
 from ncfix.writer.bulk_arcs import CentreWords
 from ncfix.writer.emit import Emission, emit
+from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 from program.arcs import full_of_arcs
 
@@ -66,7 +67,7 @@ def in_all_ways(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emissio
         with mock.patch.object(bulk, "SHORTEST", 1):
             found.append(emit(program, moves, pieces, STEPS))
     fast.disengage()
-    one_by_one = replace(language_of(program.dialect), bulk=None)
+    one_by_one = replace(language_of(program.dialect, WrittenLanguage), bulk=None)
     with mock.patch("ncfix.writer.emit.language_of", return_value=one_by_one):
         return *found, emit(program, moves, pieces, STEPS)
 
@@ -200,7 +201,11 @@ def test_straight_motions_with_a_direction_of_the_tool_go_one_by_one() -> None:
     program, moves = followed(
         "\n".join(["G21 G90 G94 F900", "G0 X0. Y0. Z0. B0. C0.", *body, "M2\n"]).encode(), "fanuc"
     )
-    pieces, first, rule = moved(moves, 1, 0.01), np.arange(len(moves) + 1), language_of(program.dialect).one_by_one
+    pieces, first, rule = (
+        moved(moves, 1, 0.01),
+        np.arange(len(moves) + 1),
+        language_of(program.dialect, WrittenLanguage).one_by_one,
+    )
     assert rule is not None
     assert not rule(program, moves, pieces, first).any()
     straight = replace(moves, kind=np.full_like(moves.kind, MotionKind.FEED))

@@ -15,7 +15,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.compensate.following import follow
 from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.control.operations import ALL_AXES, CycleTable, Lose, Rapid, Refuse, Resume, SetTool, Suspend, like
+from ncfix.control.operations import ALL_AXES, Lose, Rapid, Refuse, Resume, SetTool, Suspend, like
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import PluginError, SourceError
@@ -23,7 +23,7 @@ from ncfix.machine import Machine, load
 from ncfix.plugin import family
 from ncfix.testing import check_language, gcode_statements
 from ncfix.testing.language import Pair
-from ncfix.text.dialect import Dialect
+from ncfix.text.dialect import CycleTable, Dialect
 from ncfix.text.reader import read
 
 FIXTURE = "the fixture's frame (G120)"

@@ -7,10 +7,9 @@ from collections.abc import Callable, Collection, Iterable
 from ncfix.control.coordinates import INDEX
 from ncfix.control.moves import MotionKind, UnknownAxes
 from ncfix.control.posture import stands_square
-from ncfix.control.setup import POINTLESS
+from ncfix.control.setup import POINTLESS, Run
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
-from ncfix.text.language import Run
 from ncfix.text.tree import Template
 from ncfix_fanuc.macro.rules import RULES
 from ncfix_fanuc.macro.scaling import Scaling

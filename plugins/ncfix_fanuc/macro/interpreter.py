@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z, mask_of
 from ncfix.control.expressions import Fault, Unknown, nominal
+from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
-from ncfix.text.language import Run
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import polar, scaling, system, tilt, vectors
 from ncfix_fanuc.macro.blocks import G15, G16, is_angle, is_scaled

@@ -23,7 +23,7 @@ from ncfix_fanuc.macro.rules import RULES
 from ncfix_iso.rs274.language import RS274, writable
 
 if TYPE_CHECKING:
-    from ncfix.text.language import Language
+    from ncfix.writer.language import WrittenLanguage
 
 
 SPELLING = Spelling(vector=CENTRE_LETTERS, vector_length=True)
@@ -68,7 +68,7 @@ def layout(program: Program, block: int) -> Layout | None:
     return None if found is None else replace(found, allowed=axes_of_corner(program, block))
 
 
-FANUC: Language = replace(
+FANUC: WrittenLanguage = replace(
     RS274,
     scan=scanned,
     parse=parse_block,

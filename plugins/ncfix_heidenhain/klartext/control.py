@@ -10,10 +10,9 @@ from ncfix.control import control as base
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, X, Y, Z, mask_of
 from ncfix.control.frames import shifted
 from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Passing, UnknownAxes, first_reason
-from ncfix.control.setup import WORK_OFFSET, Setup, Tool
+from ncfix.control.setup import WORK_OFFSET, Run, Setup, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
-from ncfix.text.language import Run
 from ncfix_heidenhain.klartext.calculate import FormulaScope, QParameters
 from ncfix_heidenhain.klartext.free import ContourElement
 from ncfix_heidenhain.klartext.patterns import HolePosition

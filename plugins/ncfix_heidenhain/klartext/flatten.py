@@ -6,19 +6,17 @@ stays as it is; a jump that depends on it cannot be written out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 from ncfix.control.expressions import nominal
-from ncfix.control.flatten import Change, FlatLine, Flattener
+from ncfix.control.flatten import Change, Flattener
 from ncfix.text.spelling import Spelling, decimals_for
-from ncfix.text.tree import Assignment, Constant, Expression, Literal, Opaque, Span, StringLiteral, Word
+from ncfix.text.tree import Assignment, Constant, Expression, Literal, Span, StringLiteral, Word
 from ncfix_heidenhain.klartext.calculate import compiled
 from ncfix_heidenhain.klartext.contours import written_out
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING
-from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
-from ncfix_heidenhain.klartext.layout import uses_comma
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, HolePosition, pattern_of_cycle
 from ncfix_heidenhain.klartext.plans import KlartextPlan
 from ncfix_heidenhain.klartext.units import KlartextUnit
@@ -124,23 +122,3 @@ class KlartextFlattener(Flattener):
             return None
         write = self.style.short if digits == OTHERS else self.style.number
         return write(found, digits)
-
-
-def unrolled(interpreter: KlartextInterpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
-    """Follow a program and write down its blocks; raises SourceError NCF237 and NCF238."""
-    style = Spelling(signed=True, comma=uses_comma(interpreter.main.program.source), point=False)
-    flattener = KlartextFlattener(interpreter.control, steps, limit, style)
-    interpreter.watcher = flattener
-    interpreter.run()
-    program = interpreter.main.program
-    first = next(block for block in program if "BEGIN" in program.text_of(block).upper())
-    last = len(program) - 1
-    names = [
-        program.slice(block, item.span)
-        for block in (first, last)
-        for item in program.items_of(block)
-        if isinstance(item, Opaque) and item.kind == "program"
-    ]
-    head = FlatLine(names[0], program.line(first))
-    tail = FlatLine(names[0].upper().replace("BEGIN", "END", 1), program.line(last))
-    return [head, *flattener.lines, tail]

@@ -15,9 +15,9 @@ from ncfix.control.expressions import Evaluate, Fault, Unknown
 from ncfix.control.flow import Return
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.control.moves import Moves
+from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, SourceError
-from ncfix.text.language import Run
 from ncfix.text.reach import UNREAD
 from ncfix.text.tree import Command, Opaque, Program, Template
 from ncfix_heidenhain.klartext import cycles, lines, tilting, transformations

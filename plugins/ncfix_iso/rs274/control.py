@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from ncfix.control import control as shared
 from ncfix.control.coordinates import INCH, LETTERS
 from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
+from ncfix.control.setup import Run
 from ncfix.control.state import Saved
 from ncfix.control.turns import watch
 from ncfix.text.dialect import Dialect
-from ncfix.text.language import Run
 from ncfix_iso.rs274.groups import RULES, Rules
 from ncfix_iso.rs274.own_codes import with_own_codes
 from ncfix_iso.rs274.parameters import NumberedParameters, Store

@@ -9,21 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, mask_of
 from ncfix.control.expressions import Fault, nominal
-from ncfix.control.flatten import RUNTIME, Change, FlatLine, Flattener
+from ncfix.control.flatten import RUNTIME, Change, Flattener
 from ncfix.control.interpreter import TextUnit
-from ncfix.diagnostics import SourceError
 from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Literal, NumberedParameter, Opaque, Word
 from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
 from ncfix_iso.rs274.groups import Rules
 from ncfix_iso.rs274.plans import Codes, RS274Plan
-
-if TYPE_CHECKING:
-    from ncfix_iso.rs274.interpreter import RS274Interpreter
 
 DROPPED_CODES = {"G": frozenset({150, 160, 670}), "M": frozenset({970, 980, 990, 1980})}
 """Codes, in tenths, that a flat program has no use for."""
@@ -275,20 +270,6 @@ class RS274Flattener(Flattener):
         text = self.text(changes)
         if text.strip() or not (changes or text):
             self.write(text.strip() if changes else text)
-
-
-def unrolled(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int) -> list[FlatLine]:
-    """Run an interpreter and write down what it executes; raises SourceError where no flat program can say it."""
-    flattener = RS274Flattener(interpreter.control, steps, limit)
-    interpreter.watcher, interpreter.control.ends = flattener, []
-    interpreter.run()
-    if why := interpreter.control.unwritten:
-        raise SourceError.of(RUNTIME, f"{why}, so the program cannot be written out flat", interpreter.place())
-    lines = flattener.lines
-    begins, ends = (lines[at].text.lstrip()[:1] == "%" if lines else False for at in (0, -1))
-    if begins and (not ends or len(lines) == 1):
-        flattener.write("%")
-    return lines
 
 
 def is_setting(word: Word) -> bool:

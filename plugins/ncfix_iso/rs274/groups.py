@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ncfix.control.expressions import Evaluate
-from ncfix.control.operations import CycleTable, Like, Operation
+from ncfix.control.operations import Like
+from ncfix.text.dialect import CodeOperation, CycleTable
 from ncfix.text.tree import Expression
 from ncfix_iso.rs274.expressions import compiled
 
@@ -143,7 +144,7 @@ class Rules:
     lasting: Callable[[int], bool] = lambda number: False
     compiled: Callable[[Expression, str], Evaluate] = compiled
     aliases: Mapping[tuple[str, int], Like] = field(default_factory=dict)
-    operations: Mapping[tuple[str, int], tuple[Operation, ...]] = field(default_factory=dict)
+    operations: Mapping[tuple[str, int], tuple[CodeOperation, ...]] = field(default_factory=dict)
     tables: Mapping[int, CycleTable] = field(default_factory=dict)
 
     def level_of(self, code: int) -> str:

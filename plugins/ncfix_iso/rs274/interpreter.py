@@ -10,8 +10,8 @@ from ncfix.control.coordinates import LETTERS, N_LETTERS, mask_of
 from ncfix.control.expressions import Fault, Unknown
 from ncfix.control.flow import NEVER_ENDS, WAITS, ProgramFlow
 from ncfix.control.interpreter import NO_END, Interpreter
+from ncfix.control.setup import Run
 from ncfix.control.state import NO_MOTION
-from ncfix.text.language import Run
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
 from ncfix_iso.rs274.blocks import check_words
@@ -26,7 +26,7 @@ from ncfix_iso.rs274.plans import Codes, RS274Plan, RS274Unit, grouped_codes, ha
 from ncfix_iso.rs274.settings import unknown_code
 
 if TYPE_CHECKING:
-    from ncfix.control.operations import CycleTable
+    from ncfix.text.dialect import CycleTable
     from ncfix_iso.rs274.flatten import RS274Flattener
 
 

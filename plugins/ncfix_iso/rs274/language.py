@@ -6,20 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ncfix.text.language import BulkLayout, Language
+from ncfix.diagnostics import SourceError
+from ncfix.text.language import BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
 from ncfix.text.reach import tape_end
 from ncfix.text.shapes import scan, split_blocks
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Program, Word
 from ncfix.writer.block import BlockWriter
+from ncfix.writer.language import WrittenLanguage
 from ncfix_iso.rs274.blocks import parse_block
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.groups import RULES
 from ncfix_iso.rs274.interpreter import RS274Interpreter
 
 if TYPE_CHECKING:
-    from ncfix.control.flatten import FlatLine
+    from ncfix.control.language import FlatLine
 
 
 def writable(program: Program, block: int) -> Layout | None:
@@ -47,13 +49,23 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 
 def unroll(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
-    """See `Language`."""
-    from ncfix_iso.rs274.flatten import unrolled
+    """See `Language`; raises SourceError where no flat program can say what is executed."""
+    from ncfix.control.flatten import RUNTIME
+    from ncfix_iso.rs274.flatten import RS274Flattener
 
-    return unrolled(interpreter, steps, limit)
+    flattener = RS274Flattener(interpreter.control, steps, limit)
+    interpreter.watcher, interpreter.control.ends = flattener, []
+    interpreter.run()
+    if why := interpreter.control.unwritten:
+        raise SourceError.of(RUNTIME, f"{why}, so the program cannot be written out flat", interpreter.place())
+    lines = flattener.lines
+    begins, ends = (lines[at].text.lstrip()[:1] == "%" if lines else False for at in (0, -1))
+    if begins and (not ends or len(lines) == 1):
+        flattener.write("%")
+    return lines
 
 
-RS274 = Language(
+RS274 = WrittenLanguage(
     split=split_blocks,
     end=tape_end,
     scan=scan,

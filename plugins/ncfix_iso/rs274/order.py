@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from ncfix.control.operations import Operation
+from ncfix.text.dialect import CodeOperation
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.arc_motion import arc
 from ncfix_iso.rs274.control import Block, RS274Control
@@ -122,7 +122,7 @@ MOTIONS: Mapping[int, Step] = {
 Steps = tuple[tuple[Step, int], ...]
 
 
-def carry_out(operations: Sequence[Operation], control: RS274Control, block: Block, code: int) -> None:
+def carry_out(operations: Sequence[CodeOperation], control: RS274Control, block: Block, code: int) -> None:
     """A code of the dialect's own."""
     for operation in operations:
         operation.carry_out(control, block, partial(destination, control, block))

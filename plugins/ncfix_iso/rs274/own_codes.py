@@ -11,8 +11,7 @@ from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.groups import OWN, Rules
 
 if TYPE_CHECKING:
-    from ncfix.control.operations import CycleTable, Operation
-    from ncfix.text.dialect import Dialect
+    from ncfix.text.dialect import CodeOperation, CycleTable, Dialect
 
 
 def with_own_codes(rules: Rules, dialect: Dialect) -> Rules:
@@ -30,13 +29,13 @@ def with_own_codes(rules: Rules, dialect: Dialect) -> Rules:
     return rules
 
 
-def with_m_code(rules: Rules, code: int, operations: tuple[Operation, ...]) -> Rules:
+def with_m_code(rules: Rules, code: int, operations: tuple[CodeOperation, ...]) -> Rules:
     """An M code that is a few operations, or none."""
     m_groups = {**rules.m_groups, code: f"{OWN}M{code}"}
     return replace(rules, m_groups=m_groups, operations={**rules.operations, ("M", code): operations})
 
 
-def with_g_code(rules: Rules, code: int, operations: tuple[Operation, ...]) -> Rules:
+def with_g_code(rules: Rules, code: int, operations: tuple[CodeOperation, ...]) -> Rules:
     """A G code that is a few operations; one with none is passed over."""
     known = {known: group for known, group in rules.g_groups.items() if known != code}
     takes = {code} if any(operation.takes for operation in operations) else set[int]()

@@ -15,9 +15,9 @@ from ncfix.control.flatten import RUNTIME
 from ncfix.control.flow import Call
 from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Moves
+from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, SourceError
-from ncfix.text.language import Run
 from ncfix.text.tree import Program
 from ncfix_siemens.sinumerik.destination import BlockWordValues
 from ncfix_siemens.sinumerik.flatten import SinumerikFlattener

@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.flatten import FlatLine
+from ncfix.control.language import FlatLine
 from ncfix.control.moves import Moves
 from ncfix.text import reach
-from ncfix.text.language import ArcLayout, BulkLayout, Language
+from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.layout import CENTRE_LETTERS, arc_layout, bulk_layout
 from ncfix.text.reach import whole_text
 from ncfix.text.shapes import split_blocks
 from ncfix.text.tree import Program, Template, Word
+from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 from ncfix_siemens.sinumerik.blocks import parse_block
 from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
@@ -87,7 +88,7 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDAr
     return found
 
 
-SINUMERIK = Language(
+SINUMERIK = WrittenLanguage(
     split=split_blocks,
     end=whole_text,
     scan=scan,

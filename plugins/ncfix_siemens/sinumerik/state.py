@@ -29,12 +29,11 @@ from ncfix.control.coordinates import (
 from ncfix.control.expressions import Unknown, Value
 from ncfix.control.frames import ZEROS, FrameStack, shifted
 from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Rule, UnknownAxes
-from ncfix.control.setup import Tool
+from ncfix.control.setup import Run, Tool
 from ncfix.control.state import Modal
 from ncfix.control.tcp import switch
 from ncfix.control.turns import Winding, watch
 from ncfix.text.dialect import Dialect
-from ncfix.text.language import Run
 from ncfix_siemens.sinumerik import heading
 from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.increments import Footing, footings, stand

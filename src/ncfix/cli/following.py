@@ -145,8 +145,8 @@ def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Pa
     from ncfix.compensate.checking import OPTIONS
     from ncfix.compensate.following import follower_of
     from ncfix.compensate.parts import Parts
+    from ncfix.control.setup import Run
     from ncfix.control.trace import NotInPartsError, PartReader
-    from ncfix.text.language import Run
 
     reader = PartReader(shown(source.path), dialect, source.head)
     axes: tuple[str, ...] | None = None

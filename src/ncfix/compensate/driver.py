@@ -63,10 +63,11 @@ from ncfix.diagnostics import Message, Place
 from ncfix.files import put_at
 from ncfix.machine import Machine, State
 from ncfix.text import stamp
-from ncfix.text.language import language_of
+from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices, spliced
 from ncfix.writer.emit import Emission
+from ncfix.writer.language import WrittenLanguage
 
 ASTRAY = 1.0
 """mm; no correction and no remainder of one is so large."""
@@ -260,7 +261,7 @@ def fix_program(
     tally.blocks = len(program)
     report = tally.report(program.path, (*suspicion, *messages_of(positions)), options)
     report = replace(report, block_delete=tuple(sorted(each.on) for each in positions if each.on is not None))
-    renumber = language_of(program.dialect).renumber
+    renumber = language_of(program.dialect, Language).renumber
     if text == program.source or renumber is None or options.block_numbers != "renumber":
         return Fixed(text, text != program.source, report)
     return Fixed(renumber(text), True, report)
@@ -302,7 +303,7 @@ class PartCorrector(Corrector):
         self.units = units = Units.of(task, read)
         self.parts_proof = PartProof(task, units.reader)
         super().__init__(task, units.placed, self.parts_proof, lambda: ("", units.assumed))
-        self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect)
+        self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect, WrittenLanguage)
 
     def work(self, share: Share) -> Iterator[tuple[int, ProvedPart]]:
         """The number of each part of the share, and what it has become; the others are followed, or passed over.

@@ -24,14 +24,15 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.plan.arrays import Array, Mask
 from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
 from ncfix.compensate.plan.strategies import get_strategy
+from ncfix.control.language import FollowedLanguage
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState, Trace
-from ncfix.control.setup import PROBED, Setup
+from ncfix.control.setup import PROBED, Run, Setup
 from ncfix.control.trace import Follower, NotInPartsError, trace
 from ncfix.diagnostics import Message, Place, RefusedError, UsageError
 from ncfix.machine import Machine
 from ncfix.text import stamp
 from ncfix.text.dialect import Dialect
-from ncfix.text.language import Run, language_of
+from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
 from ncfix.version import __version__
 
@@ -193,13 +194,13 @@ class Task:
         strategy = get_strategy(self.options.strategy)
         if strategy.corrects_orientation or not strategy.follows_path or self.machine.is_perfect:
             raise NotInPartsError(f"the strategy {strategy.name} looks at the whole path at once")
-        if self.options.block_numbers == "renumber" and language_of(self.dialect).renumber is not None:
+        if self.options.block_numbers == "renumber" and language_of(self.dialect, Language).renumber is not None:
             raise NotInPartsError("all blocks get new numbers")
 
 
 def follower_of(dialect: Dialect, run: Run) -> Follower:
     """What follows a program part by part."""
-    language = language_of(dialect)
+    language = language_of(dialect, FollowedLanguage)
     return Follower(language.control(run, dialect), run, partial(language.interpreter, in_parts=True))
 
 

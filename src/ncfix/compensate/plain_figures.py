@@ -33,13 +33,13 @@ from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends_closely, e
 from ncfix.compensate.plan.segments import Segments
 from ncfix.compensate.plan.written import TURNED, Known, WrittenPieces, standing_still
 from ncfix.control.moves import MotionKind
-from ncfix.text.language import Language
 from ncfix.writer.bulk import Bulk
 from ncfix.writer.emit import Emission, emit
+from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 
 
-def written(language: Language, course: PlainPlan, position: Array, steps: Array) -> Emission | None:
+def written(language: WrittenLanguage, course: PlainPlan, position: Array, steps: Array) -> Emission | None:
     """Write a part; None if any of it cannot be written, or would not move.
 
     position  (n_axes,) the command at which the control stands

@@ -37,6 +37,7 @@ from ncfix.text.dialect import Dialect
 from ncfix.text.language import language_of
 from ncfix.text.tree import Program
 from ncfix.writer.emit import Emission, emit
+from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import SecondReading
 from ncfix.writer.pinning import LED, PINNED, closure_of_refusals
 
@@ -269,7 +270,7 @@ def accepted_plan(
             split_rapids=options.split_rapids,
             state=state,
             before=shift,
-            arc_pieces=language_of(dialect).arc_pieces,
+            arc_pieces=language_of(dialect, WrittenLanguage).arc_pieces,
         )
         if len(moves):  # of the last one
             off = planned.start[-1] - moves.start[-1]

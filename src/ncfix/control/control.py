@@ -29,10 +29,10 @@ from ncfix.control.moves import (
 )
 from ncfix.control.pointing import Pointing
 from ncfix.control.posture import MachineDirections, pointing_of
+from ncfix.control.setup import Run
 from ncfix.control.state import ControlState
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
-from ncfix.text.language import Run
 
 UNKNOWN_AXIS = "NCF206"
 NEITHER = 'all motions after it are refused; if it does neither, say passed_codes = ["{}"] in the setup file'

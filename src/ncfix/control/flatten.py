@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ncfix.control.expressions import Fault
+from ncfix.control.language import FlatLine, FollowedLanguage
 from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule
+from ncfix.control.setup import Resolve, Run
 from ncfix.control.trace import interpreter_of, trace
 from ncfix.diagnostics import RefusedError, SourceError
-from ncfix.text.language import Resolve, Run, language_of
+from ncfix.text.language import language_of
 from ncfix.text.reader import read
 from ncfix.text.tree import Assignment, Command, Item, Opaque, OWordLine, Program, Span, Word
 
@@ -34,13 +36,6 @@ LEADING = (MotionKind.RAPID, MotionKind.CYCLE)
 
 ROUNDINGS = 2.0
 """By so many least increments an end may be off: numbers are rounded to them, and several may add up."""
-
-
-class FlatLine(NamedTuple):
-    """A line of a flat program, and the line of the original that it comes from."""
-
-    text: str
-    line: int
 
 
 class Change(NamedTuple):
@@ -173,7 +168,7 @@ def flatten(
     Raises RefusedError NCF237 where what is executed depends on the machine at run time, NCF238 beyond the limit,
     NCF239 if the language cannot, or if the flat program would not make the same motions.
     """
-    unroll = language_of(program.dialect).unroll
+    unroll = language_of(program.dialect, FollowedLanguage).unroll
     if unroll is None:
         raise RefusedError.of(NOT_FLAT, f"programs in {program.dialect.title} cannot be written out flat")
     try:

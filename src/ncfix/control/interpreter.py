@@ -27,8 +27,8 @@ from ncfix.control.lanes.block_rows import Lookahead
 from ncfix.control.lanes.lane import run_lane
 from ncfix.control.lanes.lane_tables import LaneTables
 from ncfix.control.moves import Moves
+from ncfix.control.setup import Run
 from ncfix.diagnostics import Place, SourceError
-from ncfix.text.language import Run
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Span, Template, view
 

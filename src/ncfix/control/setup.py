@@ -6,9 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ncfix.diagnostics import Message, Place
+
+if TYPE_CHECKING:
+    from ncfix.control.moves import Kinematics
+    from ncfix.text.tree import Program
 
 MOST_BLOCKS = 1_000_000
 """Blocks that are executed beyond those of a program's own text before it counts as endless: under half a minute."""
@@ -155,3 +159,22 @@ class Knowledge:
         """The position of a reference point is used as a number and not given."""
         option = f"references.{code} in the setup file"
         self.lack(REFERENCE_POINT, f"reference point {code}", "is used", option)
+
+
+Resolve = Callable[[str], bytes | None]
+"""Gives the text of a subprogram file by its name; None if there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a program is followed with; see `trace`, which has the same arguments."""
+
+    setup: Setup
+    axes: tuple[str, ...]
+    rotary: frozenset[str]
+    resolve: Resolve | None = None
+    kinematics: Kinematics | None = None
+
+    def budget(self, program: Program) -> int:
+        """Blocks that may be executed before a program, or a part of one, counts as endless."""
+        return self.setup.most_blocks + len(program.blocks)

@@ -31,10 +31,9 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.frames import WORLD, FrameStack, mixed_into
 from ncfix.control.moves import AT_START, UnknownAxes
-from ncfix.control.setup import Knowledge
+from ncfix.control.setup import Knowledge, Run
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect
-from ncfix.text.language import Run
 from ncfix.text.reach import Deletable
 
 NO_MOTION = 800

@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 
 from ncfix.control.control import ProgramControl
 from ncfix.control.interpreter import Interpreter
+from ncfix.control.language import FollowedLanguage
 from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule, Trace
-from ncfix.control.setup import Setup
+from ncfix.control.setup import Run, Setup
 from ncfix.control.turns import remarks, say
 from ncfix.diagnostics import Message, SourceError, UsageError
 from ncfix.text import stamp
 from ncfix.text.dialect import Dialect
 from ncfix.text.dialects import check_content, check_zeros, header_length
-from ncfix.text.language import Language, Run, language_of
+from ncfix.text.language import Language, language_of
 from ncfix.text.layout import AXIS_LETTERS
 from ncfix.text.reader import ProgramReading
 from ncfix.text.tree import Program, Skip, Template
@@ -58,7 +59,7 @@ class PartReader:
     plain: dict[int, bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.language = language_of(self.dialect)
+        self.language = language_of(self.dialect, Language)
 
     def read(self, source: bytes) -> Program:
         """The part that begins on `first_line`; raises what `reader.read` raises, `NotInPartsError` for o-words."""
@@ -397,5 +398,5 @@ def trace(
 
 def interpreter_of(program: Program, run: Run) -> Interpreter[Any]:
     """The control's walk through a program, before its first step."""
-    language = language_of(program.dialect)
+    language = language_of(program.dialect, FollowedLanguage)
     return language.interpreter(language.control(run, program.dialect), program, run)

@@ -5,10 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from ncfix.control.operations import CycleTable, Operation
+from typing import Any, ClassVar, Literal, Protocol
 
 FOREIGN: tuple[tuple[str, bytes], ...] = (
     ("Heidenhain Klartext", rb"(?im)^[ \t]*(?:\d+[ \t]*)?BEGIN[ \t]+PGM\b"),
@@ -53,6 +50,71 @@ HINTS = {LATHE: "lathe programs are followed where they say what X is: LinuxCNC 
 def tenths(name: str) -> int:
     """A code in tenths: "G54.1" is 541."""
     return round(10 * float(name[1:]))
+
+
+LEVELS = "EIJQR"
+"""Addresses that may give the level of a cycle: no code of the families has another use for them in its block."""
+REPEATS = "EKLP"
+"""Addresses that may say how often a cycle drills: their numbers are no lengths."""
+NO_WORDS = "GMNO"
+"""Addresses of codes and of names of blocks and programs."""
+
+
+class CodeOperation(Protocol):
+    """Something that a code of a dialect's own does: the operations of `ncfix.control.operations`."""
+
+    takes: ClassVar[bool]
+    alone: ClassVar[bool]
+
+    def carry_out(self, control: Any, block: Any, destination: Any) -> None:
+        """Do it, before the motion of the block."""
+
+
+@dataclass(frozen=True, slots=True)
+class CycleTable:
+    """A drilling cycle: from the level to the depth and back, at each hole that the words of the plane name.
+
+    The depth is the word of the axis across the plane. It and the level count as in the family's cycles (G90, G91).
+
+    level    the address of the level from which it feeds
+    needs    addresses without which the control does not begin it
+    repeats  addresses that say how often it drills, of E K L P; empty: those of the family
+    returns  where it ends: "mode" (as G98 and G99 say), "level", or "initial" (where the series of holes began)
+    modal    it stays in force until G80 or another motion code
+    """
+
+    level: str = "R"
+    needs: str = ""
+    repeats: str = ""
+    returns: Literal["mode", "level", "initial"] = "mode"
+    modal: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.level, str) or len(self.level) != 1 or self.level not in LEVELS:
+            raise ValueError(f"{self.level!r} cannot be the address of the level of a cycle: one of {LEVELS}")
+        if self.needs != "" and not is_letters(self.needs, NO_WORDS):
+            raise ValueError(f'{self.needs!r} are not the addresses that a cycle needs: letters in a string, "QP"')
+        if self.repeats != "" and (not is_letters(self.repeats, self.level) or not {*self.repeats} <= {*REPEATS}):
+            text = f"{self.repeats!r} cannot be the addresses of the repeats of a cycle"
+            raise ValueError(f"{text}: letters of {REPEATS} in a string, not the level's")
+        if self.returns not in ("mode", "level", "initial"):
+            raise ValueError(f'a cycle returns to {self.returns!r}: "mode", "level" or "initial"')
+
+    def __str__(self) -> str:
+        needs = f", needs {' '.join(self.needs)}" if self.needs else ""
+        ends = {"mode": "as G98 and G99 say", "level": "to the level", "initial": "to the initial level"}[self.returns]
+        count = f", repeats by {' or '.join(self.repeats)}" if self.repeats else ""
+        once = "" if self.modal else ", in its block only"
+        return f"drilling cycle, level {self.level}{needs}{count}, returns {ends}{once}"
+
+    def ends_at_level(self, mode: bool) -> bool:
+        """Whether it ends at the level; `mode`: G99 is in force."""
+        return mode if self.returns == "mode" else self.returns == "level"
+
+
+def is_letters(text: object, but: str = "") -> bool:
+    """Whether it is a string of capital letters, one at least, none of these."""
+    return isinstance(text, str) and re.fullmatch("[A-Z]+", text) is not None and not {*text} & {*but}
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +166,7 @@ class Dialect:
     passes: tuple[str, ...] = ()
     refuses: tuple[str, ...] = ()
     semantics: str = ""
-    codes: tuple[tuple[str, tuple[Operation, ...]], ...] = ()
+    codes: tuple[tuple[str, tuple[CodeOperation, ...]], ...] = ()
     cycles: tuple[tuple[str, CycleTable], ...] = ()
     language: str = field(kw_only=True)
 
@@ -117,7 +179,7 @@ class Dialect:
         name: str,
         *,
         title: str,
-        codes: Mapping[str, Sequence[Operation]] | None = None,
+        codes: Mapping[str, Sequence[CodeOperation]] | None = None,
         cycles: Mapping[str, CycleTable] | None = None,
         **changes: Any,
     ) -> Dialect:

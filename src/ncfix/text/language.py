@@ -1,39 +1,30 @@
-"""A family of controls, as the functions in which they differ: how a text is read, followed and written.
+"""A family of controls, as the functions in which they differ: how its texts are read, and where their words stand.
 
 The tree, the motions, the frames and the walk of the emitter are the same for all. What a line is, what a number is,
 what a block means and how a corrected motion is put into words is a family's own, and a `Dialect` names its family.
+How programs are followed, `control.language` adds, and how they are written, `writer.language`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from ncfix.plugins import called, nearest, useless
+from ncfix.plugins import called, handed, nearest, useless
 from ncfix.text.reach import runs_straight_on
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ncfix.control.control import ProgramControl
-    from ncfix.control.flatten import FlatLine
-    from ncfix.control.interpreter import Interpreter
-    from ncfix.control.moves import Kinematics, Moves
-    from ncfix.control.setup import Setup
     from ncfix.text.build import Parsed
     from ncfix.text.dialect import Dialect
     from ncfix.text.shapes import Scan
     from ncfix.text.spelling import Spelling
     from ncfix.text.tree import Anchor, Program, Span, Template, Word
-    from ncfix.writer.pieces import Pieces
-    from ncfix.writer.target import Rendered, Target
-
-Resolve = Callable[[str], bytes | None]
-"""Gives the text of a subprogram file by its name; None if there is none."""
 
 
 class BlockLayout(Protocol):
@@ -42,13 +33,6 @@ class BlockLayout(Protocol):
     @property
     def motion(self) -> Word | None:
         """The word that says which kind of motion it is, if the block has one."""
-
-
-class Writer(Protocol):
-    """Writes one motion into one block."""
-
-    def write(self) -> Rendered:
-        """What is written; called once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,24 +81,9 @@ class BulkLayout:
     arc: ArcLayout | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
-    """What a program is followed with; see `trace`, which has the same arguments."""
-
-    setup: Setup
-    axes: tuple[str, ...]
-    rotary: frozenset[str]
-    resolve: Resolve | None = None
-    kinematics: Kinematics | None = None
-
-    def budget(self, program: Program) -> int:
-        """Blocks that may be executed before a program, or a part of one, counts as endless."""
-        return self.setup.most_blocks + len(program.blocks)
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Language:
-    """How one family of controls is read, followed and written.
+    """How the texts of one family of controls are read.
 
     split     source -> (n, 2) start and stop byte of each block, line ends not included
     end       (source, blocks) -> the block that ends the program's text: what follows is passed over; len(blocks) if
@@ -122,21 +91,12 @@ class Language:
     scan      (source, blocks) -> shapes and numbers of the blocks, without understanding them
     parse     (dialect, text) -> one block by its grammar; raises `BlockError`
     lenient   a block that cannot be read, and that the control may never get to, is no error until it does
-    control   what the control keeps while it follows a program of a dialect
-    interpreter  (control, program, run) -> the walk through a program; `in_parts`: this is the first of its parts
     layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
     same_per_shape  those of all blocks of a shape are the same
-    writer    (program, block, layout, target, spelling) -> what writes the motion of a block: `BlockWriter`, or a
-              class of its kind with what no other control has
     spelling  program -> how what is put into it is spelled
-    arc_pieces  `writer` can write an arc as several (`Target.arcs`)
     bulk      (program, block) -> what `writer` would need to know to write motions like this one many at a time; None
               for blocks that it has to write one by one
-    one_by_one  (program, moves, pieces, first piece of each motion) -> (n,) motions that `writer` has to write one by
-              one for what else there is about them; None: none
     renumber  a text with its blocks numbered anew; None where blocks need no numbers
-    unroll    (interpreter, least increments, limit) -> the blocks of a program as they are executed, see `flatten`;
-              None if the language cannot write them
     straight  a program with blocks of this shape may come in parts: they have nothing to do with others elsewhere
     semantics  the rule sets that the family has, by the names that `Dialect.semantics` may give
     own_codes  it takes the codes and cycles that a dialect adds (`Dialect.codes`, `Dialect.cycles`)
@@ -146,29 +106,35 @@ class Language:
     end: Callable[[bytes, NDArray[np.int64]], int]
     scan: Callable[[bytes, NDArray[np.int64]], Scan]
     parse: Callable[[Dialect, str], Parsed]
-    control: Callable[[Run, Dialect], ProgramControl]
-    interpreter: Callable[..., Interpreter[Any]]
     layout: Callable[[Program, int], BlockLayout | None]
-    writer: Callable[[Program, int, Any, Target, Spelling], Writer]
     spelling: Callable[[Program], Spelling]
     same_per_shape: bool = False
     lenient: bool = False
-    arc_pieces: bool = False
     bulk: Callable[[Program, int], BulkLayout | None] | None = None
-    one_by_one: Callable[[Program, Moves, Pieces, NDArray[np.int64]], NDArray[np.bool_]] | None = None
     renumber: Callable[[bytes], bytes] | None = None
-    unroll: Callable[[Any, Mapping[str, float], int], Sequence[FlatLine]] | None = None
     straight: Callable[[Template], bool] = runs_straight_on
     semantics: frozenset[str] = frozenset({""})
     own_codes: bool = False
 
 
-@lru_cache(maxsize=32)
-def language_of(dialect: Dialect) -> Language:
-    """The language of a dialect, imported when it is first needed.
+L = TypeVar("L", bound=Language)
 
-    Raises `PluginError`: NCF507 if the import fails, NCF508 if what it names is no `Language` or has no such semantics.
+
+def language_of(dialect: Dialect, part: type[L]) -> L:
+    """The language of a dialect, as far as its user needs to know it; imported when it is first needed.
+
+    Raises `PluginError`: NCF507 if the import fails, NCF508 if what it names is not that or has no such semantics.
     """
+    language = loaded(dialect)
+    if not isinstance(language, part):
+        handed("dialects", dialect.name, language, part)
+        raise TypeError(f"{dialect.language} is no {part.__name__}")
+    return language
+
+
+@lru_cache(maxsize=32)
+def loaded(dialect: Dialect) -> Language:
+    """What a dialect names as its language, imported once; raises as `language_of`."""
     language: Language = called("dialects", dialect.name, resolve_name, dialect.language, gives=Language)
     assert isinstance(language, Language), f"{dialect.language} is no Language"
     if dialect.semantics not in language.semantics:

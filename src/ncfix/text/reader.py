@@ -71,7 +71,7 @@ def texts_of(dialect: Dialect) -> Memory[Parsed]:
 
 def parse_block(dialect: Dialect, text: str) -> Parsed:
     """One block, by the grammar and the rules that a grammar cannot say; raises `BlockError`."""
-    return language_of(dialect).parse(dialect, text)
+    return language_of(dialect, Language).parse(dialect, text)
 
 
 PART_BYTES = 1 << 22
@@ -101,7 +101,7 @@ def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None =
     chosen = detect(source, path) if dialect is None else dialect
     known = get(chosen) if isinstance(chosen, str) else chosen
     check_content(source, path, known)
-    language = language_of(known)
+    language = language_of(known, Language)
     blocks = language.split(source)
     blocks[0, 0] = header_length(source)
     return ProgramReading(source, path, known, language, blocks, language.end(source, blocks)).program()

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ncfix import fast
 from ncfix.control.moves import Frame, MotionKind, Moves
-from ncfix.text.language import Language
 from ncfix.text.number_text import (
     ROUNDED,
     NumberColumns,
@@ -34,6 +33,7 @@ from ncfix.writer.bulk_arcs import CentreWords, OutputSteps, whole_arcs
 from ncfix.writer.bulk_fit import qualified, sound, with_dwells
 from ncfix.writer.bulk_layouts import CLOSING, NONE, OPENING, Layouts, lines_of, with_lines
 from ncfix.writer.frames import FrameMap
+from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 
 FloatArray = NDArray[np.float64]
@@ -68,7 +68,7 @@ class Bulk:
     @classmethod
     def of(
         cls,
-        language: Language,
+        language: WrittenLanguage,
         program: Program,
         moves: Moves,
         pieces: Pieces,
@@ -105,7 +105,7 @@ class Bulk:
     @classmethod
     def among(
         cls,
-        language: Language,
+        language: WrittenLanguage,
         program: Program,
         moves: Moves,
         pieces: Pieces,

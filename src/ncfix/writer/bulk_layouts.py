@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import Moves
-from ncfix.text.language import ArcLayout, BulkLayout, Language
+from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import START, Program
 from ncfix.text.writer import Splices
+from ncfix.writer.language import WrittenLanguage
 
 IntArray = NDArray[np.int64]
 
@@ -73,7 +74,7 @@ class Layouts:
     lined: bool = False
 
     @classmethod
-    def of(cls, language: Language, program: Program, moves: Moves) -> Layouts:
+    def of(cls, language: WrittenLanguage, program: Program, moves: Moves) -> Layouts:
         """The layouts of the shapes that occur and can be written in bulk."""
         n, axes = len(program.templates), moves.axes
         by_letter = np.array(sorted(range(len(axes)), key=lambda column: AXIS_LETTERS.index(axes[column])), np.int64)

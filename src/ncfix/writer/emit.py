@@ -23,6 +23,7 @@ from ncfix.text.writer import Edit, Splices, overlong
 from ncfix.writer.block import STRAIGHT_AND_ARCS
 from ncfix.writer.bulk import Bulk, write_alone
 from ncfix.writer.frames import FrameMap
+from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.levels import LevelBook
 from ncfix.writer.pieces import Pieces, SecondReading
 from ncfix.writer.target import TANGENTIAL, Rendered, Target, plane_across
@@ -109,7 +110,11 @@ class _Emitter:
         kinematics: Kinematics | None,
         bulk: Bulk | None,
     ) -> None:
-        self.program, self.language, self.kinematics = program, language_of(program.dialect), kinematics
+        self.program, self.language, self.kinematics = (
+            program,
+            language_of(program.dialect, WrittenLanguage),
+            kinematics,
+        )
         self.spelling = self.language.spelling(program)
         self.moves, self.pieces, self.reading = moves, pieces, reading
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
