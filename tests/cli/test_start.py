@@ -11,7 +11,7 @@ ELSEWHERE = {
     "scipy", "rich", "sympy", "numba", "llvmlite", "multiprocessing", "concurrent.futures", "numpy.ma",
     "ncfix.diagnosis", "ncfix.measure", "ncfix.reports", "ncfix.machine.symbolic", "ncfix.kernel",
     "ncfix_iso.rs274.flatten",
-    "ncfix.control.setup_file", "ncfix.control.tool_table",
+    "ncfix.control.setup_file",
 }  # fmt: skip
 """What none of the verbs below needs for a program of a page and a machine with a few errors."""
 

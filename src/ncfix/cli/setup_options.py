@@ -211,7 +211,7 @@ class SetupOptions:
             setup = load(self.setup_file)
         tools = dict(setup.tools)
         if self.tool_table is not None:
-            from ncfix.control.tool_table import load_tool_table
+            from ncfix.control.setup_file import load_tool_table
 
             tools |= load_tool_table(self.tool_table)
         given = {key.strip('"'): Tool(*values) for key, values in self.tools}
