@@ -11,20 +11,18 @@ import random
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
 
-from classes.judging import SETUP, machine
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import kinematics_of
 from ncfix.control.moves import MotionKind
 from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
-from ncfix.testing.language import address
+from ncfix.testing.judging import SETUP, shifted_machine
+from ncfix.testing.language import address, every_block
 from ncfix.text.reader import read
 
-MACHINE = machine()
-WORDS_AT_ONCE = 4
+MACHINE = shifted_machine()
 THERE = 0.6
 SURE = 0.95
 """How likely a word is there that a code takes, and one that it needs."""
@@ -54,12 +52,8 @@ class Family:
 
     def cases(self) -> Iterator[Case]:
         """Every head with every subset of the words, behind every mode."""
-        for mode in range(len(self.before)):
-            for head in self.heads:
-                for count in range(WORDS_AT_ONCE + 1):
-                    for words in combinations(self.words, count):
-                        if len({address(word) for word in words}) == count:
-                            yield Case(self, head, words, mode)
+        for mode, head, words in every_block(len(self.before), self.heads, self.words):
+            yield Case(self, head, words, mode)
 
     def some(self, count: int, seed: int) -> list[Case]:
         """So many of them at random; all for none."""

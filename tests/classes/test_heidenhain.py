@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from classes.judging import SHIFT, Case, followed, judged, machine
+from classes.judging import Case, followed, judged
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.control.moves import MotionKind
 from ncfix.control.setup import Setup, Tool
+from ncfix.testing.judging import SHIFT, shifted_machine
 from ncfix.text.reader import read
 
 HEAD = "BEGIN PGM C MM\nTOOL CALL 0 Z S1000\nL X+1 Y+2 Z+50 FMAX\n"
@@ -155,7 +156,7 @@ def test_classes_of_klartext(each: Case) -> None:
 def test_a_full_circle_needs_no_end_point(circle: str) -> None:
     text = f"{HEAD}CC X+11 Y+2\n{circle}\nL X+5\nC X+17 DR+\nM30\nEND PGM C MM\n".encode()
     setup = Setup(work_offsets={"PRESET": {}}, tools={0: Tool(0.0)}, initial={"X": 0.0, "Y": 0.0, "Z": 200.0})
-    known = machine()
+    known = shifted_machine()
     fixed = fix_program(read(text, "c.h"), known, setup, FixOptions(tolerance_um=50.0, verify=False))
     before, after = followed(text, known, "heidenhain"), followed(fixed.text, known, "heidenhain")
     assert fixed.report.refused == ()
@@ -188,7 +189,7 @@ CYCLES = {
     ],
 )
 def test_holes_are_right_down_to_their_bottom(name: str, holes: str) -> None:
-    known = machine()
+    known = shifted_machine()
     text = (HEAD + CYCLES[name] + "\n" + holes + "\nM30\nEND PGM C MM\n").encode()
     setup = Setup(work_offsets={"PRESET": {}}, tools={0: Tool(0.0)}, initial={"X": 0.0, "Y": 0.0, "Z": 200.0})
     fixed = fix_program(read(text, "c.h"), known, setup, FixOptions(tolerance_um=50.0, verify=False))

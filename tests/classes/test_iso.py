@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from classes.judging import Case, followed, judged, machine
+from classes.judging import Case, followed, judged
+from ncfix.testing.judging import shifted_machine
 
 HEAD = "G21 G90 G94 G17 G40 G54\nG0 X1. Y2. Z50.\n"
 """Two lines; the second is the motion to the start."""
@@ -109,7 +110,7 @@ BESIDE = {
 @pytest.mark.parametrize("dialect", ["iso", "fanuc"])
 @pytest.mark.parametrize("name", BESIDE)
 def test_words_beside_the_number_of_a_program(name: str, dialect: str) -> None:
-    assert followed(BESIDE[name].text.encode(), machine(), dialect).end[-1, 0] == 2.0
+    assert followed(BESIDE[name].text.encode(), shifted_machine(), dialect).end[-1, 0] == 2.0
     assert judged(BESIDE[name], dialect) == BESIDE[name].expected
 
 

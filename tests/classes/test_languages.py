@@ -9,9 +9,9 @@ import os
 
 import pytest
 
-from classes.judging import SETUP
 from classes.statements import KLARTEXT, SIEMENS, Family
 from ncfix.testing import Statements, check_language, check_strategy
+from ncfix.testing.judging import SETUP
 from ncfix.testing.language import Pair
 
 COUNT = int(os.environ.get("NCFIX_LANGUAGES", "6"))

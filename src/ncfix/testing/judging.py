@@ -120,10 +120,10 @@ def _by_line(lines: Sequence[str], fixed: Fixed, before: Moves, after: Moves) ->
         same = lines[block] == new[after.block[others[own[-1]]]]
         if block + 1 in refused:
             found[block + 1] = "refused" if same else "refused and changed"
-        elif most <= STEP:
-            found[block + 1] = "right"
         elif same and (before.rule[rows[own]] == Rule.PASS).all():
             found[block + 1] = "passed"
+        elif most <= STEP:
+            found[block + 1] = "right"
         else:
             found[block + 1] = f"off by {most:.4f} mm"
     return found

@@ -276,11 +276,16 @@ def agree(words: Sequence[str]) -> bool:
     return len({address(word) for word in words}) == len(words)
 
 
+def every_block(modes: int, heads: Sequence[str], words: Sequence[str]) -> Iterator[Block]:
+    """Every head with every subset of the words, behind every mode."""
+    for mode, head, size in product(range(modes), heads, range(WORDS_AT_ONCE + 1)):
+        yield from ((mode, head, some) for some in combinations(words, size) if agree(some))
+
+
 def _blocks(sample: Statements, count: int, chosen: random.Random) -> Iterator[Block]:
     """So many blocks at random: any head, with any subset of the words, behind any mode; all for none."""
     if not count:
-        for mode, head, size in product(range(len(sample.modes)), sample.heads, range(WORDS_AT_ONCE + 1)):
-            yield from ((mode, head, words) for words in combinations(sample.words, size) if agree(words))
+        yield from every_block(len(sample.modes), sample.heads, sample.words)
     while count:
         words = tuple(chosen.sample(sample.words, chosen.choice(SIZES)))
         if agree(words):

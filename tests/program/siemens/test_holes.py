@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import pytest
 
-from classes.judging import SETUP, machine
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Fixed, fix_flat, fix_program
+from ncfix.testing.judging import SETUP, shifted_machine
 from ncfix.text.reader import read
 
 MODAL = "MCALL CYCLE81(50,0,2,-20)"
@@ -20,7 +20,9 @@ def fixed(body: str, flat: bool = False) -> Fixed:
     """A body, behind a rapid to X1 Y2 Z50, corrected."""
     source = f"G54 G0 X1 Y2 Z50\n{body}\nG0 Z60\nM30\n".encode()
     program = read(source, "part.mpf", "siemens")
-    return (fix_flat if flat else fix_program)(program, machine(), SETUP, FixOptions(tolerance_um=50, verify=False))
+    return (fix_flat if flat else fix_program)(
+        program, shifted_machine(), SETUP, FixOptions(tolerance_um=50, verify=False)
+    )
 
 
 def written(body: str) -> str:

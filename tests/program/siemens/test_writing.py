@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from classes.judging import SETUP, machine
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import traced
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
+from ncfix.testing.judging import SETUP, shifted_machine
 from ncfix.text.reader import read
 
 
@@ -23,7 +23,7 @@ def written(body: str) -> str:
     """The body of a program, corrected by -12.4, 21.3 and 8.5 um."""
     source = f"G54 G0 X1 Y2 Z50\n{body}\nM30\n".encode()
     fixed = fix_program(
-        read(source, "part.mpf", "siemens"), machine(), SETUP, FixOptions(tolerance_um=50, verify=False)
+        read(source, "part.mpf", "siemens"), shifted_machine(), SETUP, FixOptions(tolerance_um=50, verify=False)
     )
     assert not fixed.report.refused
     lines = [line for line in fixed.text.decode().splitlines() if "ncfix" not in line]
