@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import inspect
-import os
+import math
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import ncfix
 from ncfix.control.setup import Setup
-from ncfix.diagnostics import RefusedError, UsageError
+from ncfix.diagnostics import RefusedError, SourceError, UsageError
+from ncfix.measure.candidates import Room
+from ncfix.measure.instruments import Faults
+from ncfix.measure.measurement import Measurement
+from ncfix.text import reader
+from ncfix.text.tree import Program
 
 SETUP = Setup(assume_zero=True, no_point="calculator")
 
@@ -78,7 +85,6 @@ def test_subprograms_beside_a_program_and_of_a_text(shop: Path) -> None:
     with pytest.raises(Exception, match="100"):
         ncfix.simulate(ncfix.read_program(text=main), "machine.toml", setup=SETUP)
     found = ncfix.simulate(ncfix.read_program(Path("main.nc")), Path("machine.toml"), setup=SETUP)
-    assert os.listdir(shop)
     assert found.max_um is not None
 
 
@@ -113,3 +119,162 @@ def test_tables_are_written_all_or_none(shop: Path) -> None:
         ncfix.export("isg", "machine.toml", tool_length=120.0, output="out")
     assert [path.name for path in (shop / "out").iterdir()] == [last]
     assert (shop / "out" / last).read_text() == "mine"
+
+
+# -- what the command line refuses the functions refuse ----------------------------------------------------------------
+
+MOVES = "G21 G90 G94\nG0 X1 Y1 Z1\nG1 X5 F100\nM2\n"
+NO_NUMBER = (math.nan, math.inf, -1.0)
+
+
+def code_of(make: Callable[[], object]) -> str:
+    with pytest.raises(UsageError) as caught:
+        make()
+    return caught.value.code
+
+
+@pytest.fixture
+def program(shop: Path) -> Program:
+    return ncfix.read_program(text=MOVES, dialect="linuxcnc")
+
+
+@pytest.fixture
+def measured(shop: Path) -> Measurement:
+    planned = ncfix.plan("machine.toml", count=8, effects="EXX")
+    return ncfix.simulate(planned.plan, "machine.toml", faults=Faults(noise_um=1.0))
+
+
+@pytest.mark.parametrize("number", [*NO_NUMBER, 0.001])
+def test_a_tolerance_that_is_none(program: Program, number: float) -> None:
+    assert code_of(lambda: ncfix.fix(program, "machine.toml", setup=SETUP, tolerance_um=number)) == "NCF025"
+    assert code_of(lambda: ncfix.verify(program, program, "machine.toml", setup=SETUP, tolerance_um=number)) == "NCF025"
+
+
+@pytest.mark.parametrize("number", NO_NUMBER)
+def test_numbers_of_tables_and_measurements_that_are_none(shop: Path, number: float) -> None:
+    for name in ("target_um", "tool_length"):
+        assert code_of(lambda name=name: ncfix.export("linuxcnc", "machine.toml", **{name: number})) == "NCF025"
+    for name in ("noise_um", "noise_urad", "drift_um", "quantum_um", "setup"):
+        assert code_of(lambda name=name: Faults(**{name: number})) == "NCF025"
+    assert code_of(lambda: ncfix.plan("machine.toml", room=Room(tool_lengths=(number,)))) == "NCF025"
+    assert code_of(lambda: ncfix.plan("machine.toml", count=number)) == "NCF636"
+    assert code_of(lambda: ncfix.plan("machine.toml", seed=number)) == "NCF025"
+
+
+@pytest.mark.parametrize("said", [{"loss": "foo"}, {"prune": 0.5}, {"prune": math.nan}, {"knots": -1}, {"knots": 1.5}])
+def test_choices_of_calibration_that_there_are_not(measured: Measurement, said: dict[str, Any]) -> None:
+    assert code_of(lambda: ncfix.calibrate(measured, "machine.toml", **said)) == "NCF025"
+
+
+def test_other_choices_that_there_are_not(program: Program, measured: Measurement) -> None:
+    assert code_of(lambda: ncfix.fix(program, "machine.toml", setup=SETUP, block_numbers="some")) == "NCF025"
+    assert code_of(lambda: ncfix.simulate(measured, "machine.toml", seed=-1)) == "NCF025"
+    assert code_of(lambda: ncfix.simulate(measured, "machine.toml", setup=SETUP)) == "NCF025"
+    assert code_of(lambda: ncfix.simulate(program, "machine.toml", setup=SETUP, faults=Faults())) == "NCF025"
+
+
+def test_no_output_takes_the_place_of_an_input(shop: Path, measured: Measurement) -> None:
+    from ncfix.measure.measurement import dumps
+
+    Path("part.ngc").write_text(MOVES)
+    Path("data.csv").write_text(dumps(measured))
+    Path("link.csv").hardlink_to("data.csv")
+    before = {path: path.read_bytes() for path in shop.iterdir()}
+    read = ncfix.read_program("part.ngc")
+    for make in (
+        lambda output: ncfix.fix("part.ngc", "machine.toml", setup=SETUP, output=output, force=True),
+        lambda output: ncfix.plan("machine.toml", existing="data.csv", output=output, force=True),
+        lambda output: ncfix.calibrate(["data.csv"], "machine.toml", output=output, force=True),
+        lambda output: ncfix.diagnose("link.csv", "machine.toml", output=output, force=True),
+        lambda output: ncfix.report("machine.toml", output=output, force=True),
+    ):
+        assert code_of(lambda make=make: make("./machine.toml")) == "NCF005"
+        assert code_of(lambda make=make: make("")) == "NCF003"
+    assert code_of(lambda: ncfix.fix(read, "machine.toml", output="part.ngc", force=True)) == "NCF005"
+    assert code_of(lambda: ncfix.calibrate("data.csv", "machine.toml", output="link.csv", force=True)) == "NCF005"
+    assert code_of(lambda: ncfix.plan("machine.toml", existing="data.csv", output="link.csv", force=True)) == "NCF005"
+    assert {path: path.read_bytes() for path in shop.iterdir()} == before
+
+
+def test_outputs_are_looked_at_before_anything_is_computed(shop: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: object) -> None:
+        raise AssertionError("nothing is to be computed")
+
+    monkeypatch.setattr("ncfix.measure.plan.plan", never)
+    monkeypatch.setattr("ncfix.tables.export.export", never)
+    Path("there.csv").write_text("mine")
+    assert code_of(lambda: ncfix.plan("machine.toml", output="there.csv")) == "NCF004"
+    assert code_of(lambda: ncfix.plan("machine.toml", output="there.csv/below")) == "NCF007"
+    for folder, code in (("", "NCF003"), ("there.csv", "NCF007")):
+        assert code_of(lambda folder=folder: ncfix.export("linuxcnc", "machine.toml", output=folder)) == code
+
+
+def test_tables_do_not_take_the_place_of_the_machine(shop: Path) -> None:
+    names = sorted(ncfix.export("linuxcnc", "machine.toml").files)
+    (shop / "out").mkdir()
+    machine = shop / "out" / names[-1]
+    machine.write_bytes(Path("machine.toml").read_bytes())
+    assert code_of(lambda: ncfix.export("linuxcnc", machine, output="out", force=True)) == "NCF005"
+    assert [path.name for path in (shop / "out").iterdir()] == [machine.name]
+
+
+def test_a_fixed_file_is_read_in_the_dialect_of_the_original(shop: Path) -> None:
+    original = ncfix.read_program(text="G21 G90 G94\nG0 X1 Y1 Z1\nG1 X5 F100\nM30\n", dialect="fanuc")
+    Path("fixed.ngc").write_bytes(ncfix.fix(original, "machine.toml", setup=SETUP).text)
+    read = []
+    whole = reader.read
+
+    def seen(source: bytes, path: str, dialect: Any) -> Program:
+        read.append(getattr(dialect, "name", dialect))
+        return whole(source, path, dialect)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reader, "read", seen)
+        assert ncfix.verify(original, "fixed.ngc", "machine.toml", setup=SETUP).within
+    assert read == ["fanuc"]
+
+
+def test_measurements_count_once(measured: Measurement) -> None:
+    from ncfix.measure.measurement import dumps
+
+    Path("data.csv").write_text(dumps(measured))
+    for function in (ncfix.calibrate, ncfix.diagnose):
+        for twice in ([measured, measured], ["data.csv", "./data.csv"]):
+            assert code_of(lambda twice=twice: function(twice, "machine.toml")) == "NCF020"  # noqa: B023
+        assert code_of(lambda: function([], "machine.toml")) == "NCF025"  # noqa: B023
+
+
+@pytest.mark.parametrize(
+    ("room", "said"),
+    [
+        (Room(ranges={"B": (0.0, 1.0)}), "the machine has no axis B, only"),
+        (Room(ranges={"X": (0.0, 1e6)}), "X goes from"),
+        (Room(ranges={"X": (5.0, 1.0)}), "is an empty range"),
+        (Room(ranges={"X": (math.nan, 1.0)}), "is an empty range"),
+        (Room(reach={"u": (0.0, 1.0)}), "u is none of x, y and z of the workpiece"),
+        (Room(reach={"x": (1.0, 1.0)}), "is an empty range"),
+        (Room(inputs={"load_kg": (0.0, math.inf)}), "is an empty range"),
+        (Room(balls={"one": (0.0, math.nan, 0.0)}), "the ball one stands nowhere"),
+        (Room(tool_lengths=()), "there is no tool"),
+    ],
+)
+def test_a_room_that_the_machine_does_not_have(shop: Path, room: Room, said: str) -> None:
+    with pytest.raises(UsageError, match="NCF636") as caught:
+        ncfix.plan("machine.toml", room=room)
+    assert said in str(caught.value)
+
+
+def test_what_is_not_there_has_a_code(shop: Path) -> None:
+    with pytest.raises(SourceError, match="nowhere: NCF002"):
+        ncfix.emulate("linuxcnc", "nowhere", "machine.toml")
+    with pytest.raises(SourceError, match="<program>:2:2: NCF101"):
+        ncfix.read_program(text="G0\n(\u2013)\n")
+    assert code_of(ncfix.report) == "NCF025"
+
+
+def test_what_was_assumed_is_said(program: Program) -> None:
+    assumed = ncfix.simulate(program, "machine.toml", setup=SETUP).messages
+    assert assumed
+    assert ncfix.verify(program, program, "machine.toml", setup=SETUP).messages == assumed
+    fixed = ncfix.read_program(text=ncfix.fix(program, "machine.toml", setup=SETUP).text, dialect="linuxcnc")
+    assert ncfix.simulate(fixed, "machine.toml", setup=SETUP).messages[0].code == "NCF430"

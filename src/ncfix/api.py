@@ -1,22 +1,35 @@
 """ncfix as functions: what the verbs of the command line do, on values.
 
 Programs, machines and measurements are values, or the paths of files with them. No file is touched unless its path is
-given: `output=` writes the result, whole or not at all, and never in the place of another file unless `force` says so.
-docs/api.md shows each function at work. What is refused stands in the result; to write a result of which something is
-refused raises `RefusedError`, unless it is allowed. All errors are `ncfix.diagnostics.NcfixError`, with codes.
+given: `output=` writes the result, whole or not at all; never in the place of an input, and in that of another file
+only if `force` says so. That is looked at before anything is computed. docs/api.md shows each function at work.
+
+What is refused stands in the result; to write a result of which something is refused raises `RefusedError`, unless it
+is allowed. All errors are `ncfix.diagnostics.NcfixError`, with codes; a function called as no function can be, with two
+sources for one, say, raises TypeError.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, overload
 
 from ncfix.batch.programs import subprograms
 from ncfix.control.setup import Setup
-from ncfix.diagnostics import Message, Place, RefusedError
-from ncfix.files import read_bytes, write_folder, write_whole
+from ncfix.diagnostics import Message, Place, RefusedError, UsageError
+from ncfix.files import (
+    check_folder,
+    check_target,
+    each_once,
+    given_twice,
+    identities,
+    read_bytes,
+    read_folder,
+    write_folder,
+    write_whole,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,14 +81,15 @@ def read_program(
 
     Raises `SourceError` NCF1xx for what cannot be read.
     """
-    from ncfix.text.dialects import detect
+    from ncfix.text.dialects import detect, encoded
     from ncfix.text.reader import read
 
     if source is not None and text is None:
         path = os.fspath(source)
         content = read_bytes(path)
     elif text is not None and source is None:
-        path, content = "<program>", text.encode("latin-1") if isinstance(text, str) else text
+        path = "<program>"
+        content = encoded(text, path) if isinstance(text, str) else text
     else:
         raise TypeError(ONE_SOURCE)
     chosen = detect(content, path, (machine and machine.control) or "") if dialect is None else dialect
@@ -121,8 +135,31 @@ def _measurements(measured: Measured | Sequence[Measured], machine: Machine) -> 
     from ncfix.measure.measurement import Measurement
     from ncfix.measure.reader import read
 
-    several = [measured] if isinstance(measured, (str, os.PathLike, Measurement)) else measured
+    several = [measured] if isinstance(measured, (str, os.PathLike, Measurement)) else list(measured)
+    if not several:
+        raise UsageError.of("NCF025", "no measurement is given", hint="one or more of them")
+    each_once(_read_paths(each for each in several if not isinstance(each, Measurement)))
+    for number, each in enumerate(several):
+        if isinstance(each, Measurement) and any(each is other for other in several[:number]):
+            raise given_twice(each.path)
     return [each if isinstance(each, Measurement) else read(os.fspath(each), machine) for each in several]
+
+
+def _read_paths(given: Iterable[object]) -> Iterator[str]:
+    """The paths of what is given: those of files, and of values that came from files."""
+    for each in given:
+        if isinstance(each, (str, os.PathLike)):
+            yield os.fspath(each)
+        elif isinstance(each, (list, tuple)):
+            yield from _read_paths(each)
+        elif isinstance(path := getattr(each, "path", None), str) and not path.startswith("<"):
+            yield path
+
+
+def _check_output(output: PathName | None, force: bool, *given: object) -> None:
+    """Refuse an output that must not be written, or is one of the inputs, before anything is computed."""
+    if output is not None:
+        check_target(os.fspath(output), identities(_read_paths(given)), force)
 
 
 def _write(output: PathName | None, content: bytes, force: bool) -> None:
@@ -160,9 +197,10 @@ def fix(
     """
     from ncfix.compensate import FixOptions
 
+    options = FixOptions(strategy, tolerance_um, allow_refused, force, split_rapids, flatten, block_numbers, figures)
+    _check_output(output, force, program, machine, setup)
     known, own = _sound(machine, force), _setup(setup)
     read = _program(program, known)
-    options = FixOptions(strategy, tolerance_um, allow_refused, force, split_rapids, flatten, block_numbers, figures)
     found = fixed(read, known, own, options, resolve or _resolve(own, read))
     if output is not None and found.report.refused and not allow_refused:
         refused = [Message(each.code, each.reason, Place(read.path, each.line)) for each in found.report.refused]
@@ -188,18 +226,37 @@ def verify(
 ) -> Compared:
     """Compare what this machine cuts with `fixed` (a program, or its text) with what `original` means.
 
-    `within` of the result is the verdict; its figures are in um.
+    `within` of the result is the verdict; its figures are in um; `messages` say what was assumed.
     """
-    from ncfix.compensate.figures.verification import Compared, FollowedProgram, side_by_side
+    from ncfix.arguments import TOLERANCE_UM
+    from ncfix.compensate.figures.verification import Compared, FollowedProgram, side_by_side, told_once
+    from ncfix.text.reader import read_like
 
+    TOLERANCE_UM.check("tolerance_um", tolerance_um)
     known, own = _machine(machine), _setup(setup)
     own = replace(own, assume_zero=True) if known.is_perfect else own
     first = _program(original, known)
-    second = read_program(text=fixed, dialect=first.dialect) if isinstance(fixed, bytes) else _program(fixed, known)
+    if isinstance(fixed, bytes):
+        second = read_program(text=fixed, dialect=first.dialect)
+    elif isinstance(fixed, (str, os.PathLike)):
+        path = os.fspath(fixed)
+        second = read_like(read_bytes(path), path, first, known.control or "")
+    else:
+        second = fixed
     meant = FollowedProgram.of(first, known, own, _resolve(own, first))
     done = FollowedProgram.of(second, known, own, _resolve(own, second, first))
-    found, _ = side_by_side(meant, done, known, own, tolerance_um)
-    return Compared.together([Compared.of(each) for each in found])
+    found, said = side_by_side(meant, done, known, own, tolerance_um)
+    messages = (*_remark_of_stamp(first), *told_once(*said))
+    return replace(Compared.together([Compared.of(each) for each in found]), messages=messages)
+
+
+def _remark_of_stamp(program: Program) -> Iterator[Message]:
+    """What is said of a program that is to be what is meant, and has been corrected."""
+    from ncfix.text import stamp
+
+    block = stamp.find(program)
+    if block is not None:
+        yield stamp.remark(program.place(block))
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +268,7 @@ class PathErrors:
     lines           (n,) the line of each sample
     intended        (n, 3) where the tip shall be in the workpiece, mm
     error_um        (n, 3) where it is, less that
+    messages        what there is to say of following the program
     """
 
     max_um: float | None
@@ -219,6 +277,7 @@ class PathErrors:
     lines: NDArray[Any] = field(repr=False)
     intended: NDArray[Any] = field(repr=False)
     error_um: NDArray[Any] = field(repr=False)
+    messages: tuple[Message, ...] = ()
 
 
 @overload
@@ -247,6 +306,10 @@ def simulate(
     """
     from ncfix.measure.measurement import Measurement
 
+    if isinstance(subject, Measurement) and setup is not None:
+        raise UsageError.of("NCF025", "a set-up is for a program", hint="a plan has columns for states")
+    if not isinstance(subject, Measurement) and (faults is not None or seed != 0):
+        raise UsageError.of("NCF025", "faults and seed are for a measurement plan, not for a program")
     known = _machine(machine)
     if isinstance(subject, Measurement):
         from ncfix.measure.instruments import simulate as filled
@@ -275,7 +338,8 @@ def _path_errors(program: Program, machine: Machine, setup: Setup) -> PathErrors
     meant = np.concatenate([nothing, *intended])
     gap = 1e3 * (np.concatenate([nothing, *actual]) - meant)
     every = np.concatenate([np.empty(0, dtype=np.intp), *lines])
-    return PathErrors(total["max"], total["rms"], total["where"], every, meant, gap)
+    messages = (*_remark_of_stamp(program), *found.trace.messages)
+    return PathErrors(total["max"], total["rms"], total["where"], every, meant, gap, messages)
 
 
 def plan(
@@ -294,7 +358,7 @@ def plan(
     """Choose the poses to be measured: those that tell most about the errors of a machine.
 
     kind      "tcp", "tcp6", "probe" or "length"
-    room      where axes and tip may go, tool lengths, balls
+    room      where axes (mm and degree) and tip (mm) may go, tool lengths, balls
     effects   those to be determined, as for `calibrate`; `separate`: those to be told apart
     existing  a measurement that the new poses complete
     """
@@ -302,6 +366,7 @@ def plan(
     from ncfix.measure.measurement import dumps
     from ncfix.measure.plan import plan as planned
 
+    _check_output(output, force, machine, existing)
     known = _machine(machine)
     before = None if existing is None else _measurements(existing, known)[0]
     found = planned(known, kind, count, room or Room(), effects, list(separate), before, seed)
@@ -358,6 +423,7 @@ def calibrate(
     from ncfix.measure.calibrate import guesses, over_the_travels
     from ncfix.measure.contradictions import refusals
 
+    _check_output(output, force, measured, machine)
     known = _machine(machine)
     found = calibrated(_measurements(measured, known), known, effects, loss, prune, knots, time_constants)
     over = over_the_travels(found)
@@ -388,6 +454,7 @@ def diagnose(
     from ncfix.diagnosis.presentation import with_provenance
     from ncfix.machine import dumps
 
+    _check_output(output, force, measured, machine)
     known = _machine(machine)
     found = diagnosed(_measurements(measured, known), known, tuple(without))
     if found.machine is not None and output is not None:
@@ -438,10 +505,12 @@ def export(
     from ncfix.tables.export import export as exported
 
     chosen = get_control(control) if isinstance(control, str) else control
+    if output is not None:
+        check_folder(os.fspath(output))
     request = table_request(chosen, _sound(machine, force), tool_length, target_um, ranges, settings or {})
     made = exported(chosen, request)
     if output is not None:
-        write_folder(os.fspath(output), made.files, force)
+        write_folder(os.fspath(output), made.files, force, identities(_read_paths([machine])))
     return made
 
 
@@ -465,8 +534,7 @@ def emulate(
     chosen = get_control(control) if isinstance(control, str) else control
     if isinstance(tables, (str, os.PathLike)):
         name = os.fspath(tables)
-        names = sorted(entry.name for entry in os.scandir(name) if entry.is_file())
-        tables = {each: read_bytes(os.path.join(name, each)) for each in names}
+        tables = read_folder(name)
     return emulated(chosen, tables, _machine(machine), name, other_machine)
 
 
@@ -483,6 +551,9 @@ def report(
     from ncfix.reports.document import Document
     from ncfix.reports.rendering import form_of
 
+    if not sources:
+        raise UsageError.of("NCF025", "a report is made of something", hint="machines, diagnoses or results")
+    _check_output(output, force, sources)
     render = form_of(os.fspath(output) if output is not None else f"page{form}")
     found = [section for source in sources for section in _sections(source)]
     title = found[0].heading if len(sources) == 1 else f"{len(sources)} machines and results"

@@ -1,4 +1,4 @@
-"""What the message codes of the ground floor mean: files (NCF002 ... NCF007, NCF023) and plugins (NCF5xx)."""
+"""What the message codes of the ground floor mean: files and arguments (NCF002 ... NCF025), plugins (NCF5xx)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,22 @@ CODES = {
         "long program was changed while it was corrected, so that its parts need not fit together.",
         "Check the path and the permissions.",
     ),
+    "NCF003": Code(
+        "no output given",
+        "Programs are never changed where they are unless you say so, and a folder needs a name to write under.",
+        "Say `-o FILE`, `-o FOLDER`, `-o -` for standard output, or `--in-place`, which keeps the original as "
+        "FILE.orig.",
+    ),
     "NCF004": Code(
         "the output exists already",
         "ncfix does not replace a file that it was not told to replace.",
         "Choose another `-o`, or say `--force`.",
+    ),
+    "NCF005": Code(
+        "an output that must not be written",
+        "The output is an input, a symbolic link, or not an ordinary file; or its folder below the output folder is a "
+        "symbolic link; or it would be replaced through one. Writing it could destroy what it stands for.",
+        "Choose another `-o`; `--in-place` keeps the original; `-o -` is standard output.",
     ),
     "NCF007": Code(
         "the output cannot be written",
@@ -23,12 +35,23 @@ CODES = {
         "nothing half written is left.",
         "Make room, or choose another `-o`.",
     ),
+    "NCF020": Code(
+        "an input given twice",
+        "The same file is named twice, perhaps under two names. Measurements that count twice look better.",
+        "Leave it out once; a measurement that was repeated is another file, or has a column `repeat`.",
+    ),
     "NCF023": Code(
         "a name that no output gets",
         "Programs are carried to controls, and those run Windows. There `CON.nc` is the console, a full stop or blank "
         "at the end of a name is dropped, and `\\` or `:` in it make a path of it. A name with a control character, or "
         "one that leads out of the output folder, is not written either. This holds on all systems.",
         "Give the program, or the output, another name.",
+    ),
+    "NCF025": Code(
+        "an argument that is none",
+        "A function was given a number outside the range that makes sense, a choice that there is not, or nothing "
+        "where something is needed. The command line refuses the same values of its options with NCF001.",
+        "The hint of the message says what there is; docs/api.md shows the functions at work.",
     ),
     "NCF501": Code(
         "a plugin cannot be imported",

@@ -20,7 +20,7 @@ import os
 import re
 import stat
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,6 +85,53 @@ def read_bytes(path: str, most: int = inputs.MOST) -> bytes:
         return inputs.taken(path, most)
     except OSError as error:
         raise unreadable(path, error) from error
+
+
+def read_folder(folder: str) -> dict[str, bytes]:
+    """All files of a folder, by their names; raises `SourceError` NCF002."""
+    try:
+        names = sorted(os.listdir(folder))
+    except OSError as error:
+        raise unreadable(folder, error) from error
+    paths = {name: os.path.join(folder, name) for name in names}
+    return {name: read_bytes(path) for name, path in paths.items() if os.path.isfile(path)}
+
+
+FileIdentity = tuple[int, int]
+"""Device and number of a file, whatever it is called."""
+
+
+def identity(path: str) -> FileIdentity | None:
+    """Which file is behind a name; None if there is none."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return found.st_dev, found.st_ino
+
+
+def identities(paths: Iterable[str]) -> frozenset[FileIdentity]:
+    """The files behind these names, however they are called."""
+    return frozenset(found for found in map(identity, paths) if found is not None)
+
+
+def each_once(given: Iterable[str], shown: Callable[[str], str] = str) -> None:
+    """Refuse a file that is named twice, under whatever names: `UsageError` NCF020.
+
+    shown  how messages name it
+    """
+    seen: set[object] = set()
+    for path in given:
+        key = identity(path) or path
+        if key in seen:
+            raise given_twice(shown(path))
+        seen.add(key)
+
+
+def given_twice(path: str) -> UsageError:
+    """The error NCF020 for an input that is there twice: what it says would count twice."""
+    text = "is given twice, and what it says would count twice"
+    return UsageError.of("NCF020", text, Place(path), "leave it out once")
 
 
 def unreadable(path: str, error: OSError) -> SourceError:
@@ -179,19 +226,20 @@ def write_whole(
         _sync(folder)
 
 
-def write_folder(folder: str, contents: Mapping[str, bytes], replace: bool = False) -> None:
+def write_folder(
+    folder: str, contents: Mapping[str, bytes], replace: bool = False, inputs: Collection[FileIdentity] = ()
+) -> None:
     """Write all files of a folder, or none if one is there already or must not be, or there is no room.
 
     contents  name of a file -> what is in it
+    inputs    files that are not replaced in any case
 
-    Raises `UsageError` NCF004, NCF005, NCF007, NCF023.
+    Raises `UsageError` NCF003, NCF004, NCF005, NCF007, NCF023.
     """
     check_folder(folder)
     paths = {os.path.join(folder, name): content for name, content in contents.items()}
     for path in paths:
-        check_output(path, folder, replace)
-        if os.path.lexists(path) and not replace:
-            raise exists_already(path)
+        check_target(path, inputs, replace, folder)
     fresh = [path for path in paths if not os.path.lexists(path)]
     try:
         for path, content in paths.items():
@@ -455,8 +503,44 @@ def check_output(path: str, root: str | None = None, replace: bool = False) -> N
         raise UsageError.of("NCF005", text, Place(path), hint)
 
 
+def check_target(
+    path: str,
+    inputs: Collection[FileIdentity] = (),
+    replace: bool = False,
+    root: str | None = None,
+    resume: bool = False,
+) -> None:
+    """Refuse an output that must not be written, as long as nothing has been computed.
+
+    inputs   files that are read, and not replaced in any case
+    replace  an existing output may be replaced
+    root     as in `check_output`
+    resume   an existing output is left as it is
+
+    Raises `UsageError` NCF003, NCF004, NCF005, NCF007, NCF023.
+    """
+    check_named(path)
+    check_output(path, root, replace)
+    if identity(path) in inputs:
+        hint = "--in-place, or another -o"
+        raise UsageError.of("NCF005", "is an input too, and inputs are not changed", Place(path), hint)
+    if os.path.lexists(path) and not (replace or resume):
+        raise exists_already(path)
+    folder = os.path.dirname(path) or "."
+    if os.path.lexists(folder) and not os.path.isdir(folder):
+        raise UsageError.of("NCF007", "is not a folder", Place(folder))
+
+
+def check_named(path: str | None) -> None:
+    """Refuse an empty name: `UsageError` NCF003; None is no name."""
+    if path == "":
+        raise UsageError.of("NCF003", "the name of the output is empty", hint="-o FILE, -o DIR or -o -")
+
+
 def check_folder(folder: str) -> None:
-    """Refuse what is there and is no folder: NCF007."""
+    """Refuse what cannot be a folder of several files: NCF003, or NCF007 for what is there and is none."""
+    if folder in ("", "-"):
+        raise UsageError.of("NCF003", "tables are several files, which go to a folder", hint="-o FOLDER")
     if os.path.lexists(folder) and not os.path.isdir(folder):
         raise UsageError.of("NCF007", "is not a folder", Place(folder), "-o FOLDER")
 

@@ -229,3 +229,11 @@ def test_tables_for_no_tool_are_remarked_on_if_the_error_depends_on_it(shop: Any
     assert any("--tool-length was not given" in note for note in found["notes"])
     found = ncfix("export", "isg", "-m", shop.perfect, "-o", shop.folder / "p", "--json").json()
     assert not any("--tool-length" in note for note in found["notes"])
+
+
+def test_tables_do_not_take_the_place_of_inputs(shop: Any, ncfix: Any, tables: Path) -> None:
+    machine = tables / "joint_0_X.comp"
+    machine.write_bytes(Path(shop.machine).read_bytes())
+    result = ncfix("export", "linuxcnc", "-m", machine, "-o", tables, "--force")
+    assert (result.code, "NCF005" in result.err) == (ExitCode.USAGE, True)
+    assert machine.read_bytes() == Path(shop.machine).read_bytes()

@@ -15,18 +15,6 @@ CODES = {
         "A verb or an option that does not exist, a value that is missing or of the wrong kind.",
         "`ncfix --help` and `ncfix VERB --help` show what there is.",
     ),
-    "NCF003": Code(
-        "no output given",
-        "Programs are never changed where they are unless you say so, and a folder needs a name to write under.",
-        "Say `-o FILE`, `-o FOLDER`, `-o -` for standard output, or `--in-place`, which keeps the original as "
-        "FILE.orig.",
-    ),
-    "NCF005": Code(
-        "an output that must not be written",
-        "The output is an input, a symbolic link, or not an ordinary file; or its folder below the output folder is a "
-        "symbolic link; or it would be replaced through one. Writing it could destroy what it stands for.",
-        "Choose another `-o`; `--in-place` keeps the original; `-o -` is standard output.",
-    ),
     "NCF006": Code(
         "two outputs of the same name",
         "Files of the same name from different folders would overwrite each other in one output folder. So would files "
@@ -92,11 +80,6 @@ CODES = {
         "not a result",
         "A report is made of machine files (TOML) and of what verbs print with `--json`: one object with a `schema`.",
         "Keep what the verb prints: `ncfix fix ... --json > result.json`.",
-    ),
-    "NCF020": Code(
-        "an input given twice",
-        "The same file is named twice, perhaps under two names. Measurements that count twice look better.",
-        "Leave it out once; a measurement that was repeated is another file, or has a column `repeat`.",
     ),
     "NCF022": Code(
         "standard input for two inputs",

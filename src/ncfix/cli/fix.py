@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ncfix.arguments import BLOCK_NUMBERS
 from ncfix.cli import console
 from ncfix.cli.options import (
     PATH,
@@ -109,7 +110,7 @@ def _executors() -> Iterable[str]:
 @click.option("--flatten", is_flag=True, help="Write loops, subprograms and cycles out where they cannot be corrected.")
 @click.option(
     "--block-numbers",
-    type=click.Choice(["same", "none", "renumber"]),
+    type=click.Choice(BLOCK_NUMBERS),
     default="same",
     show_default=True,
     help="Of blocks that are put in (Klartext), or all blocks anew (SINUMERIK, too).",

@@ -16,7 +16,7 @@ from ncfix.cli.options import dialect_of, load_machine, read_program
 from ncfix.cli.setup_options import SetupOptions
 from ncfix.cli.streams import Source, looked_bytes
 from ncfix.cli.targets import shown
-from ncfix.diagnostics import DifferenceError, Message, NcfixError, UsageError
+from ncfix.diagnostics import DifferenceError, NcfixError, UsageError
 
 if TYPE_CHECKING:
     from ncfix.compensate.checking import Checked
@@ -118,8 +118,9 @@ def through(sources: Sequence[Source], in_parts: Callable[[], Found], as_wholes:
 def tell_of_stamp(source: Source) -> None:
     """Say of a program whose numbers are to be what is meant that they have been corrected."""
     if source.stamp:
-        text = "the program has been corrected already, and its corrected numbers are taken for what is meant"
-        console.tell(Message("NCF430", text, source.stamp, "give the original program"))
+        from ncfix.text.stamp import remark
+
+        console.tell(remark(source.stamp))
 
 
 def dialect_in(following: Following, source: Source) -> Dialect:

@@ -12,36 +12,32 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ncfix.arguments import KNOTS, LOSSES, PLANS, POSES, PRUNE, SEED
 from ncfix.cli import console
 from ncfix.cli.options import (
     PATH,
-    FiniteRange,
     ToolLength,
     force_option,
     json_option,
     load_machine,
     machine_option,
+    numbers,
     sound,
     table_option,
 )
-from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, each_once, read, shown, targets
+from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, read, shown, targets
 from ncfix.diagnostics import ExitCode, RefusedError
+from ncfix.files import each_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from ncfix.cli.targets import OutputTarget
     from ncfix.diagnosis.diagnosis import Diagnosis
-    from ncfix.machine import Machine
     from ncfix.measure.calibrate import Prediction
     from ncfix.measure.candidates import Room
     from ncfix.measure.estimate import Calibration
     from ncfix.measure.plan import Planned
-
-LOSSES = ("auto", "none", "huber", "tukey")
-KINDS = ("tcp", "tcp6", "probe", "length")
-ROUNDING = 1e-9
-"""mm or degree: no way beyond the travel."""
 
 
 @click.command()
@@ -60,13 +56,13 @@ ROUNDING = 1e-9
 )
 @click.option(
     "--prune",
-    type=FiniteRange(0.5, 1.0, min_open=True, max_open=True),
+    type=numbers(PRUNE),
     metavar="LEVEL",
     help="Leave out coefficients that are not significant at this level, e.g. 0.999.",
 )
 @click.option(
     "--knots",
-    type=click.IntRange(min=0),
+    type=numbers(KNOTS),
     default=0,
     metavar="N",
     help="New error motions of linear axes are parabolas that join at N knots, not cubics; see --prune.",
@@ -97,7 +93,7 @@ def calibrate(
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
 
-    each_once(measured)
+    each_once(measured, shown)
     target = targets([measured[0]], Outputs(output, force=force), (machine_path, *measured[1:]))[0]
     check_streams(JSON if as_json else None, machine=target)
     machine = load_machine(machine_path)
@@ -225,8 +221,8 @@ def _say_bar(bar: dict[str, Any]) -> None:
 
 @click.command()
 @machine_option
-@click.option("--kind", type=click.Choice(KINDS), default="tcp", show_default=True, help="What will be measured.")
-@click.option("-n", "--count", type=click.IntRange(min=1), default=40, show_default=True, help="How many poses.")
+@click.option("--kind", type=click.Choice(PLANS), default="tcp", show_default=True, help="What will be measured.")
+@click.option("-n", "--count", type=numbers(POSES), default=40, show_default=True, help="How many poses.")
 @click.option("--effects", metavar="LIST", help="Effects to be determined, as for calibrate.")
 @click.option("--separate", metavar="EFFECT,EFFECT", help="Find poses that tell these effects apart.")
 @click.option("--existing", type=PATH, metavar="FILE", help="A measurement that the new poses complete.")
@@ -246,7 +242,7 @@ def _say_bar(bar: dict[str, Any]) -> None:
     "--input", "inputs", multiple=True, metavar="NAME=LOW,HIGH", help="What else can be set, e.g. load_kg (repeatable)."
 )
 @click.option("--gcode", type=PATH, metavar="FILE", help="Also write a skeleton of the program that goes to the poses.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, help="Other candidates.")
+@click.option("--seed", type=numbers(SEED), default=0, help="Other candidates.")
 @table_option
 @force_option
 @json_option
@@ -281,7 +277,7 @@ def plan(
     machine = load_machine(machine_path)
     before = reads(read(existing), machine, shown(existing)) if existing else None
     names = [name.strip() for name in separate.split(",")] if separate else []
-    room = _room(ranges, lengths, balls, reaches, inputs, machine)
+    room = _room(ranges, lengths, balls, reaches, inputs)
     with console.busy("choosing poses"):
         found = api.plan(
             machine,
@@ -327,38 +323,18 @@ def _room(
     balls: tuple[str, ...],
     reaches: tuple[str, ...],
     inputs: tuple[str, ...],
-    machine: Machine,
 ) -> Room:
     from ncfix.measure.candidates import Room
 
-    limits = _limits(ranges, "--range")
-    travels = {axis.name: tuple(limit / axis.unit for limit in axis.range) for axis in machine.axes}
-    for name, (low, high) in limits.items():
-        if name not in travels:
-            raise click.BadParameter(f"the machine has no axis {name}, only {' '.join(travels)}", param_hint="--range")
-        lowest, highest = travels[name]
-        if low < lowest - ROUNDING or high > highest + ROUNDING:
-            raise click.BadParameter(f"{name} goes from {lowest:g} to {highest:g} only", param_hint="--range")
-    reach = _limits(reaches, "--reach")
-    for name in reach:
-        if name not in ("x", "y", "z"):
-            raise click.BadParameter(f"{name} is none of x, y and z of the workpiece", param_hint="--reach")
-    places = {}
-    for text in balls:
-        name, values = _named(text, 3, "--ball")
-        places[name] = (values[0], values[1], values[2])
-    return Room(limits, lengths or (100.0,), places, reach, _limits(inputs, "--input"))
+    places = {name: (at[0], at[1], at[2]) for name, at in (_named(text, 3, "--ball") for text in balls)}
+    given = _limits(ranges, "--range"), _limits(reaches, "--reach"), _limits(inputs, "--input")
+    return Room(given[0], lengths or (100.0,), places, given[1], given[2])
 
 
 def _limits(texts: tuple[str, ...], option: str) -> dict[str, tuple[float, float]]:
     """NAME=LOW,HIGH or NAME=LOW:HIGH."""
-    found = {}
-    for text in texts:
-        name, (low, high) = _named(text.replace(":", ","), 2, option)
-        if low >= high:
-            raise click.BadParameter(f"{text!r} is an empty range", param_hint=option)
-        found[name] = (low, high)
-    return found
+    named = (_named(text.replace(":", ","), 2, option) for text in texts)
+    return {name: (limits[0], limits[1]) for name, limits in named}
 
 
 def _named(text: str, count: int, option: str) -> tuple[str, list[float]]:
@@ -408,7 +384,7 @@ def diagnose(
     from ncfix.reports.diagnosis import document
     from ncfix.reports.rendering import form_of
 
-    each_once(measured)
+    each_once(measured, shown)
     inputs = (*measured, machine_path)
     machine_target, next_target, page_target = (
         targets([STREAM], Outputs(path, force=force), inputs)[0] if path is not None else None

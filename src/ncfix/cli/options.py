@@ -11,6 +11,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from ncfix import fast
+from ncfix.arguments import TOLERANCE_UM, TOOL_LENGTH, NumberRange
 from ncfix.cli import console
 from ncfix.cli.streams import part_bytes
 from ncfix.cli.targets import STREAM, read, shown
@@ -22,10 +23,6 @@ if TYPE_CHECKING:
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
-LONGEST = 5000.0
-"""mm: no tool is longer."""
-FINEST_UM = 0.01
-"""No control has digits for a finer tolerance, and pieces without number would be sought for it."""
 
 
 class PathName(click.ParamType):  # type: ignore[type-arg]
@@ -139,6 +136,14 @@ class FiniteRange(click.FloatRange):
         return found
 
 
+def numbers(within: NumberRange) -> click.FloatRange | click.IntRange:
+    """The numbers of a range, as an option takes them."""
+    high = None if within.high == math.inf else within.high
+    if within.whole:
+        return click.IntRange(int(within.low))
+    return FiniteRange(within.low, high, min_open=within.inside, max_open=within.inside)
+
+
 class ToolLength(click.ParamType):  # type: ignore[type-arg]
     """A length in mm that a tool can have, or none at all."""
 
@@ -150,14 +155,14 @@ class ToolLength(click.ParamType):  # type: ignore[type-arg]
             found = float(value)
         except ValueError:
             found = math.nan
-        if not 0 <= found <= LONGEST:
-            self.fail(f"{value!r} is not a length from 0 to {LONGEST:g} mm", param, ctx)
+        if not TOOL_LENGTH.has(found):
+            self.fail(f"{value!r} is not a length from 0 to {TOOL_LENGTH.high:g} mm", param, ctx)
         return found
 
 
 tolerance_option = click.option(
     "--tolerance-um",
-    type=Positive(FINEST_UM),
+    type=Positive(TOLERANCE_UM.low),
     default=1.0,
     show_default=True,
     help="How far the tool tip may leave the intended path.",
@@ -185,16 +190,26 @@ def sound(machine: Machine, path: str, force: bool) -> Machine:
     return machine
 
 
-def read_program(path: str, dialect: str | None, machine: Machine | None = None, text: bytes | None = None) -> Program:
+def read_program(
+    path: str,
+    dialect: str | None,
+    machine: Machine | None = None,
+    text: bytes | None = None,
+    like: Program | None = None,
+) -> Program:
     """A program from a file or standard input, in the dialect given, else in that of the machine's control.
 
-    A control that has no dialect of its own leaves it to what the program looks like. `text`: what is in the file.
+    A control that has no dialect of its own leaves it to what the program looks like. `text`: what is in the file;
+    `like`: a program in whose dialect it is read if no dialect is given, and if it can be.
     """
     from ncfix.text.reader import read as read_source
+    from ncfix.text.reader import read_like
 
     source = read(path) if text is None else text
     if len(source) >= part_bytes():
         fast.engage(console.forewarn)
+    if dialect is None and like is not None:
+        return read_like(source, shown(path), like, (machine and machine.control) or "")
     return read_source(source, shown(path), dialect_of(source, shown(path), dialect, machine))
 
 

@@ -12,9 +12,18 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from ncfix.arguments import FAULT, SEED
 from ncfix.cli import console
 from ncfix.cli.following import Following, dialect_in, task_of, tell_of_stamp, through
-from ncfix.cli.options import PATH, FiniteRange, dialect_option, force_option, json_option, load_machine, machine_option
+from ncfix.cli.options import (
+    PATH,
+    dialect_option,
+    force_option,
+    json_option,
+    load_machine,
+    machine_option,
+    numbers,
+)
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.streams import Keep, Source, source_of
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, read, shown, targets
@@ -25,7 +34,7 @@ if TYPE_CHECKING:
     from ncfix.diagnostics import Message
     from ncfix.measure.instruments import Faults
 
-NOT_NEGATIVE = FiniteRange(min=0.0, max=1e6)
+NOT_NEGATIVE = numbers(FAULT)
 OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
 """Options that say nothing of a program."""
 
@@ -38,7 +47,7 @@ OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
 @click.option("--drift-um", type=NOT_NEGATIVE, default=0.0, help="Largest drift over the measurement (with --plan).")
 @click.option("--quantum-um", type=NOT_NEGATIVE, default=0.0, help="Step of the instrument (with --plan).")
 @click.option("--setup-error", type=NOT_NEGATIVE, default=1.0, help="How far the set-up is off (with --plan).")
-@click.option("--seed", type=click.IntRange(min=0), default=0, help="Other numbers, other noise (with --plan).")
+@click.option("--seed", type=numbers(SEED), default=0, help="Other numbers, other noise (with --plan).")
 @click.option(
     "-o", "--output", type=PATH, metavar="FILE", help="Write the error along the path, or the measurement (CSV)."
 )

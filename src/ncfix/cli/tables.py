@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix import files
+from ncfix.arguments import TARGET_UM
 from ncfix.batch.programs import subprograms
 from ncfix.cli import console
 from ncfix.cli.following import Following
@@ -29,7 +30,7 @@ from ncfix.cli.options import (
     sound,
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.targets import STREAM, shown
+from ncfix.cli.targets import shown
 from ncfix.diagnostics import ConfigError, ExitCode, Message, Place, RefusedError, UsageError
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def _followed(following: Following, path: str) -> tuple[Program, Followed]:
 )
 @click.option(
     "--target-um",
-    type=Positive(),
+    type=Positive(TARGET_UM.low),
     default=1.0,
     show_default=True,
     help="How much correction may be lost between the points of a table.",
@@ -179,7 +180,8 @@ def export(
     from ncfix.tables.export import export as exported
 
     chosen = get_control(control)
-    check_folder(output)
+    files.check_folder(output)
+    inputs = files.identities(each for each in (machine_path, program, *given.files) if each)
     following = Following.of(machine_path, dialect, given)
     machine = following.machine
     assert machine is not None
@@ -189,7 +191,7 @@ def export(
     request = api.table_request(chosen, machine, tool_length, target_um, covered, pairs, complete=not probe)
     if probe:
         found = called("controls", chosen.name, chosen.probe, request, gives=Written)
-        files.write_folder(output, found.files, force)
+        files.write_folder(output, found.files, force, inputs)
         _tell_of_probe(found, chosen.name, as_json)
         return ExitCode.DONE
     more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
@@ -199,7 +201,7 @@ def export(
             more["program"] = along(following, chosen, made.tables, request.settings, program, tool_length)
         if program is not None and chosen.rewrites:
             made = replace(made, files={**made.files, **rewritten_file(following, request.settings, program)})
-    files.write_folder(output, made.files, force)
+    files.write_folder(output, made.files, force, inputs)
     console.tell_some(made.messages)
     tell(made, as_json, control=chosen.name, reaches=made.reaches, **more)
     return ExitCode.DONE
@@ -232,13 +234,6 @@ def _tell_of_probe(written: Written, control: str, as_json: bool) -> None:
         console.put_json(control=control, files=sorted(written.files), notes=written.notes)
         return
     console.put("".join(f"{name}\n" for name in sorted(written.files)))
-
-
-def check_folder(folder: str) -> None:
-    """Refuse what cannot be a folder of tables: NCF003 or NCF007."""
-    if folder in ("", STREAM):
-        raise UsageError.of("NCF003", "tables are several files, which go to a folder", hint="-o FOLDER")
-    files.check_folder(folder)
 
 
 def tell(made: Exported, as_json: bool, **more: object) -> None:
@@ -299,7 +294,7 @@ def emulate(
     chosen = get_control(control)
     following = Following.of(machine_path, dialect, given)
     assert following.machine is not None
-    content = read_folder(folder)
+    content = files.read_folder(folder)
     more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
     with console.busy("running the tables"):
         try:
@@ -324,16 +319,6 @@ def _below(folder: str, messages: Iterable[Message], names: Container[str]) -> t
         else message
         for message in messages
     )
-
-
-def read_folder(folder: str) -> dict[str, bytes]:
-    """All files of a folder; raises `SourceError` NCF002."""
-    try:
-        names = sorted(os.listdir(folder))
-    except OSError as error:
-        raise files.unreadable(folder, error) from error
-    paths = {name: os.path.join(folder, name) for name in names}
-    return {name: files.read_bytes(path) for name, path in paths.items() if os.path.isfile(path)}
 
 
 @click.command()
@@ -372,7 +357,7 @@ def _gathered(paths: Sequence[str]) -> Iterator[tuple[str, dict[str, bytes]]]:
     found: dict[str, dict[str, bytes]] = {}
     for path in paths:
         if os.path.isdir(path):
-            found.setdefault(path.rstrip(os.sep) or os.sep, {}).update(read_folder(path))
+            found.setdefault(path.rstrip(os.sep) or os.sep, {}).update(files.read_folder(path))
         else:
             folder, name = os.path.split(path)
             found.setdefault(folder, {})[name] = files.read_bytes(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import IO
 from weakref import WeakSet
@@ -155,12 +155,12 @@ def targets(
     else:
         found = [_target(program, outputs, folder) for program in programs]
     _check_clash(found)
-    inputs = _files([*(program.path for program in programs), *(other for other in others if other)])
+    inputs = files.identities([*(program.path for program in programs), *(other for other in others if other)])
     for target in found:
         if target.in_place:
             _check_in_place(target)
         elif target.path != STREAM:
-            _check_output(target, inputs)
+            files.check_target(target.path, inputs, target.force, target.root, target.resume)
     return found
 
 
@@ -177,20 +177,8 @@ def check_streams(printed: str | None, **outputs: OutputTarget | None) -> None:
         raise UsageError.of("NCF010", f"{' and '.join(streamed)} would both go to standard output", hint="-o FILE")
 
 
-def each_once(given: Sequence[str]) -> None:
-    """Refuse a file that is named twice, under whatever names: what it says would count twice. NCF020."""
-    seen: dict[object, str] = {}
-    for path in given:
-        key = _file(path) or path
-        if key in seen:
-            text = "is given twice, and what it says would count twice"
-            raise UsageError.of("NCF020", text, Place(shown(path)), "leave it out once")
-        seen[key] = path
-
-
 def _check_choices(outputs: Outputs, folder: str | None) -> None:
-    if outputs.output == "":
-        raise UsageError.of("NCF003", "the name of the output is empty", hint="-o FILE, -o DIR or -o -")
+    files.check_named(outputs.output)
     if outputs.in_place and outputs.output is not None:
         raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
     if outputs.resume and folder is None:
@@ -213,7 +201,9 @@ def _check_clash(found: Sequence[OutputTarget]) -> None:
     """Refuse outputs that are one file, here or on a computer that does not tell large letters from small ones."""
     same: dict[object, list[OutputTarget]] = {}
     for target in found:
-        same.setdefault((target.in_place and _file(target.path)) or files.folded_name(target.path), []).append(target)
+        same.setdefault((target.in_place and files.identity(target.path)) or files.folded_name(target.path), []).append(
+            target
+        )
     for group in same.values():
         if len(group) > 1:
             sources = ", ".join(target.source for target in group)
@@ -233,28 +223,3 @@ def _check_in_place(target: OutputTarget) -> None:
     if os.path.lexists(target.backup):
         hint = "remove it, or bring it back and fix that"
         raise UsageError.of("NCF008", f"was fixed in place before: {target.backup} exists", place, hint)
-
-
-def _check_output(target: OutputTarget, inputs: Collection[tuple[int, int]]) -> None:
-    place = Place(target.path)
-    files.check_output(target.path, target.root, target.force)
-    if _file(target.path) in inputs:
-        raise UsageError.of("NCF005", "is an input too, and inputs are not changed", place, "--in-place, or another -o")
-    if os.path.lexists(target.path) and not (target.force or target.resume):
-        raise files.exists_already(target.path)
-    folder = os.path.dirname(target.path) or "."
-    if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise UsageError.of("NCF007", "is not a folder", Place(folder))
-
-
-def _files(paths: Iterable[str]) -> frozenset[tuple[int, int]]:
-    """The files behind these names, however they are called: device and number."""
-    return frozenset(found for found in map(_file, paths) if found is not None)
-
-
-def _file(path: str) -> tuple[int, int] | None:
-    try:
-        found = os.stat(path)
-    except (OSError, ValueError):
-        return None
-    return found.st_dev, found.st_ino

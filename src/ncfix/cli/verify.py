@@ -18,7 +18,7 @@ from ncfix.cli.options import PATH, dialect_option, json_option, machine_option,
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.streams import Source, source_of
 from ncfix.cli.targets import STREAM, shown
-from ncfix.diagnostics import ExitCode, Message, SourceError
+from ncfix.diagnostics import ExitCode, Message
 
 if TYPE_CHECKING:
     from ncfix.compensate.figures.comparison import SideBySide
@@ -77,17 +77,10 @@ class ProgramPair:
         return SideBySide(self.tolerance_um / 1e3, rounding(self.following.machine))
 
     def _read(self, source: Source, like: Program | None = None) -> Program:
-        """A program; if its text does not show that it is of another family, in the dialect of another one.
-
-        What was written out flat may have lost all that shows a dialect.
-        """
+        """A program; one from a file in the dialect of another one, if it can be."""
         text, following = source.everything(), self.following
-        if like is not None and following.dialect is None and source.path != STREAM:
-            try:
-                return read_program(source.path, like.dialect.name, following.machine, text)
-            except SourceError:
-                pass
-        return read_program(source.path, following.dialect, following.machine, text)
+        like = None if source.path == STREAM else like
+        return read_program(source.path, following.dialect, following.machine, text, like)
 
 
 def compared(following: Following, original: str, fixed: str, tolerance_um: float) -> Compared:
@@ -95,10 +88,9 @@ def compared(following: Following, original: str, fixed: str, tolerance_um: floa
     with source_of(original) as first, source_of(fixed) as second:
         found, (of_first, of_second) = ProgramPair(following, first, second, tolerance_um).compared()
         tell_of_stamp(first)
-    from ncfix.compensate.figures.verification import Compared
+    from ncfix.compensate.figures.verification import Compared, told_once
 
-    told = {(each.code, each.text) for each in of_first}
-    console.tell_some([*of_first, *(each for each in of_second if (each.code, each.text) not in told)])
+    console.tell_some(told_once(of_first, of_second))
     return Compared.together([Compared.of(each) for each in found])
 
 

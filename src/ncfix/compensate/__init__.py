@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ncfix.arguments import BLOCK_NUMBERS, TOLERANCE_UM, check_choice
+
 
 @dataclass(frozen=True, slots=True)
 class FixOptions:
@@ -17,6 +19,8 @@ class FixOptions:
     flatten        write the program out flat where blocks are executed from several states (`driver.fix_flat`)
     block_numbers  of blocks that are put in, in languages that number all: "same", "none", or "renumber" for all anew
     verify         simulate the written program along the whole path (before and after figures)
+
+    Raises `UsageError` NCF025.
     """
 
     strategy: str = "rotary-then-linear"
@@ -27,6 +31,10 @@ class FixOptions:
     flatten: bool = False
     block_numbers: str = "same"
     verify: bool = True
+
+    def __post_init__(self) -> None:
+        TOLERANCE_UM.check("tolerance_um", self.tolerance_um)
+        check_choice("block_numbers", self.block_numbers, BLOCK_NUMBERS)
 
     @property
     def tolerance_mm(self) -> float:

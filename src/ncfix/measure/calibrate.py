@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.arguments import KNOTS, LOSSES, PRUNE, check_choice
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.error_model import signals_of
@@ -52,8 +53,12 @@ def calibrate(
     knots    of new error motions of linear axes, which are cubics without; those that do not matter go with `prune`
     time_constants  estimate those of effects that lag, too
 
-    Raises `UsageError` NCF630, NCF635, NCF637, NCF639, and `RefusedError` NCF623.
+    Raises `UsageError` NCF025, NCF630, NCF635, NCF637, NCF639, and `RefusedError` NCF623.
     """
+    check_choice("loss", loss, LOSSES)
+    KNOTS.check("knots", knots)
+    if prune is not None:
+        PRUNE.check("prune", prune)
     nothing = [message for each in measurements if (message := contradictions.untouched(each)) is not None]
     if nothing:
         raise RefusedError(tuple(nothing))

@@ -6,12 +6,13 @@ distances: an error that repeats with a screw's pitch cannot hide (Soons, sectio
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arguments import PLANS, TOOL_LENGTH
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.axes import Axis
@@ -36,6 +37,8 @@ LOOKED_AT = 120
 """Places at which a ball might stand, and positions of the rotary axes at which it is seen whether it is reached."""
 APART = 60.0
 """mm: between balls."""
+ROUNDING = 1e-9
+"""mm or degree: no way beyond the travel."""
 UNLIMITED_MM = 100.0
 """Half the travel that is taken for a linear axis without a range."""
 FINEST = 2.0**-54
@@ -68,10 +71,39 @@ class Room:
             return low, high
         return (0.0, 360.0) if axis.rotary else (-UNLIMITED_MM, UNLIMITED_MM)
 
+    def check(self, machine: Machine) -> None:
+        """Refuse what this machine cannot measure in: `UsageError` NCF636, or NCF025 for a length that no tool has."""
+        for text, hint in self._faults(machine):
+            raise UsageError.of("NCF636", text, hint=hint)
+        for length in self.tool_lengths:
+            TOOL_LENGTH.check("tool_length", length)
+
+    def _faults(self, machine: Machine) -> Iterator[tuple[str, str]]:
+        """What is the matter, with what to do about it."""
+        for option, given in (("--range", self.ranges), ("--reach", self.reach), ("--input", self.inputs)):
+            for name, (low, high) in given.items():
+                if not -np.inf < low < high < np.inf:
+                    yield f"{name}={low:g},{high:g} is an empty range", f"{option} {name}=LOW,HIGH"
+        travels = {axis.name: [limit / axis.unit for limit in axis.range] for axis in machine.axes}
+        for name, (low, high) in self.ranges.items():
+            if name not in travels:
+                yield f"the machine has no axis {name}, only {' '.join(travels)}", "--range AXIS=LOW,HIGH"
+            elif low < travels[name][0] - ROUNDING or high > travels[name][1] + ROUNDING:
+                lowest, highest = travels[name]
+                yield f"{name} goes from {lowest:g} to {highest:g} only", f"--range {name}={lowest:g},{highest:g}"
+        for name in self.reach:
+            if name not in ("x", "y", "z"):
+                yield f"{name} is none of x, y and z of the workpiece", "--reach x=LOW,HIGH"
+        for name, at in self.balls.items():
+            if not np.isfinite(at).all():
+                yield f"the ball {name} stands nowhere", f"--ball {name}=X,Y,Z"
+        if not len(self.tool_lengths):
+            yield "there is no tool to measure with", "--tool-length MM"
+
 
 def candidates(machine: Machine, kind: str, count: int, room: Room, seed: int = 0) -> Measurement:
     """A plan of so many poses of this kind; fewer where probing cannot reach. Raises `UsageError` NCF636."""
-    if kind not in ("tcp", "tcp6", "probe", "length"):
+    if kind not in PLANS:
         raise UsageError.of("NCF636", f"there are no plans of kind {kind!r}", hint="tcp, tcp6, probe or length")
     random = np.random.default_rng(seed)
     columns = _within_reach(machine, kind, count, room, random)

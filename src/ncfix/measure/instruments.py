@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ncfix.arguments import FAULT, SEED
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.measure.direct import DirectReading
@@ -68,6 +69,8 @@ class Faults:
                     random between minus and plus this
     quantum_um      step of the instrument's display, 0 for none
     setup           how far the set-up is off, 1 for what is usual for the instrument, 0 for not at all
+
+    Raises `UsageError` NCF025.
     """
 
     noise_um: float = 0.0
@@ -76,9 +79,18 @@ class Faults:
     quantum_um: float = 0.0
     setup: float = 1.0
 
+    def __post_init__(self) -> None:
+        for name in ("noise_um", "noise_urad", "drift_um", "quantum_um", "setup"):
+            if (value := getattr(self, name)) is not None or name != "noise_urad":
+                FAULT.check(name, value)
+
 
 def simulate(plan: Measurement, machine: Machine, faults: Faults | None = None, seed: int = 0) -> Measurement:
-    """The plan filled in as this machine would have it, shape as the plan; the same seed gives the same values."""
+    """The plan filled in as this machine would have it, shape as the plan; the same seed gives the same values.
+
+    Raises `UsageError` NCF025 for a seed that is none.
+    """
+    SEED.check("seed", seed)
     faults = Faults() if faults is None else faults
     random = np.random.default_rng(seed)
     seen = observe(_started(plan), machine)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ncfix.arguments import POSES, SEED
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.effects import library
@@ -80,10 +81,12 @@ def plan(
     separate  effects whose coefficients are to be told apart, instead of predictions everywhere
     existing  poses that are measured already: the new ones complete them
 
-    Raises `UsageError` NCF635, NCF636.
+    Raises `UsageError` NCF025, NCF635, NCF636.
     """
     room = Room() if room is None else room
-    if count < 1:
+    room.check(machine)
+    SEED.check("seed", seed)
+    if not POSES.has(count):
         raise UsageError.of("NCF636", "a plan has at least one pose", hint="--count N")
     wanted = ",".join(separate) if separate and not machine.effects and effects is None else effects
     selection = select(machine, wanted)

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
+from ncfix.arguments import TARGET_UM, TOOL_LENGTH
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.plugins import called, registry
@@ -128,6 +129,8 @@ class Request:
     tool_length  the length for which they hold, mm
     target       how much correction may be lost between nodes, mm
     settings     the control's options, all of them
+
+    Raises `UsageError` NCF025.
     """
 
     machine: Machine
@@ -135,6 +138,10 @@ class Request:
     tool_length: float
     target: float
     settings: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        TOOL_LENGTH.check("tool_length", self.tool_length)
+        TARGET_UM.check("target_um", 1e3 * self.target)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,8 @@ from ncfix.diagnostics import Code
 CODES: dict[str, Code] = {
     "NCF101": Code(
         "Not a text file",
-        "The file holds bytes that no NC program has: zero bytes, or UTF-16 text.",
+        "It holds what no NC program has: zero bytes, or UTF-16 text; a text that is given to a function may have "
+        "characters of Latin-1 only.",
         "Save it as plain text (ASCII, Latin-1 or UTF-8).",
     ),
     "NCF102": Code(

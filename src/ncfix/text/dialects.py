@@ -99,6 +99,17 @@ def place_of(source: bytes, byte: int, path: str, encoding: str = "") -> Place:
     return Place(path, line, byte - start + 1, text)
 
 
+def encoded(text: str, path: str) -> bytes:
+    """A text as the bytes of a file, Latin-1; raises `SourceError` NCF101 for a character that has none."""
+    try:
+        return text.encode("latin-1")
+    except UnicodeEncodeError as error:
+        before, char = text[: error.start], text[error.start]
+        place = Place(path, before.count("\n") + 1, error.start - before.rfind("\n"))
+        hint = "give the text as bytes, as the control has it"
+        raise SourceError.of("NCF101", f"{char!r} is no character of Latin-1", place, hint) from error
+
+
 def header_length(source: bytes) -> int:
     """How many bytes stand before the first block: the mark of UTF-8, if it is there."""
     return len(UTF8_MARK) if source.startswith(UTF8_MARK) else 0

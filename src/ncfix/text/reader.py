@@ -107,6 +107,17 @@ def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None =
     return ProgramReading(source, path, known, language, blocks, language.end(source, blocks)).program()
 
 
+def read_like(source: bytes, path: str, like: Program, control: str = "") -> Program:
+    """Read a program in the dialect of another, or in its own if it shows that it is of another family.
+
+    What was written out flat may have lost all that shows a dialect. Raises what `read` raises.
+    """
+    try:
+        return read(source, path, like.dialect)
+    except SourceError:
+        return read(source, path, detect(source, path, control))
+
+
 def source_error(path: str, block: int, text: str, fault: BlockError) -> SourceError:
     """A fault of a block as an error with its place."""
     return SourceError.of(fault.code, fault.text, Place(path, block + 1, fault.place + 1, text), fault.hint)

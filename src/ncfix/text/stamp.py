@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 
+from ncfix.diagnostics import Message, Place
 from ncfix.text.tree import Comment, Opaque, OWordLine, Program, Tape, Word
 from ncfix.text.writer import Edit
 
@@ -27,6 +28,12 @@ def find(program: Program) -> int | None:
             if isinstance(item, (Comment, Opaque)) and SIGN.search(program.slice(block, item.span)):
                 return int(block)
     return None
+
+
+def remark(place: Place) -> Message:
+    """What is said of a program with a stamp whose numbers are to be what is meant: NCF430."""
+    text = "the program has been corrected already, and its corrected numbers are taken for what is meant"
+    return Message("NCF430", text, place, "give the original program")
 
 
 def insertion(program: Program, text: str) -> Edit:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ncfix.arguments import TOLERANCE_UM
 from ncfix.compensate.account import Why
 from ncfix.compensate.block_delete import SwitchSetting, in_pairs, messages_of, positions_of
 from ncfix.compensate.figures.comparison import SideBySide, whole
@@ -29,6 +30,7 @@ class Compared:
     left         linear axis -> lines of the original that cut, and nobody but the machine knows where that axis stands:
                  nothing can be corrected along it there
     rounding_um  what the control's digits may add to the path
+    messages     what there is to say of following the two
     """
 
     before: dict[str, Any]
@@ -41,6 +43,7 @@ class Compared:
     rounding_um: float
     no_figure: dict[str, int]
     blind: bool
+    messages: tuple[Message, ...] = ()
 
     @property
     def beyond_somewhere(self) -> bool:
@@ -121,7 +124,11 @@ class FollowedProgram:
 def side_by_side(
     original: FollowedProgram, other: FollowedProgram, machine: Machine, setup: Setup, tolerance_um: float
 ) -> tuple[list[SideBySide], tuple[Sequence[Message], Sequence[Message]]]:
-    """Two programs gone along side by side, once for each position of block delete; what is said of following them."""
+    """Two programs gone along side by side, once for each position of block delete; what is said of following them.
+
+    Raises `UsageError` NCF025 for a tolerance that is none.
+    """
+    TOLERANCE_UM.check("tolerance_um", tolerance_um)
     known = placed(machine, setup)
     found: list[SideBySide] = []
     for first, second in in_pairs(original.positions, other.positions):
@@ -129,3 +136,9 @@ def side_by_side(
         cuts = whole(known, original.program, first.trace.moves, meant=True)
         found[-1].run(cuts, whole(known, other.program, second.trace.moves))
     return found, (messages_of(original.positions), messages_of(other.positions))
+
+
+def told_once(of_first: Sequence[Message], of_second: Sequence[Message]) -> list[Message]:
+    """What is said of following two programs, without what is said of the first one already."""
+    told = {(each.code, each.text) for each in of_first}
+    return [*of_first, *(each for each in of_second if (each.code, each.text) not in told)]
