@@ -6,21 +6,14 @@ forced to the disk, and then given its name in one step. So a process that is ki
 
 Below a folder that the user named, no symbolic link is followed: every folder on the way down is opened from the one
 above it, and what is written is written into the folder that is open, wherever its name may lead by then.
-
-Controls run Windows, and programs go to them on sticks and shares. What is written under a name that Windows takes for
-something else is lost there, or lands where nobody meant it: `CON` is the console whatever its suffix, a full stop or a
-blank at the end is dropped, `\\` and `:` begin a folder, a disk or a hidden stream. So no output gets such a name, on
-any system. The names that Windows keeps for devices are listed in Microsoft's "Naming Files, Paths, and Namespaces".
 """
 
 from __future__ import annotations
 
 import errno
 import os
-import re
 import stat
-import unicodedata
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +21,8 @@ from typing import IO
 
 from ncfix import inputs
 from ncfix.diagnostics import Place, SourceError, UsageError
+from ncfix.inputs import FileIdentity
+from ncfix.outputs import check_folder, check_output, check_own, check_target, exists_already, linked, way_to
 
 READING = {
     errno.EACCES: "get the right to read it",
@@ -54,8 +49,6 @@ UNKNOWN = frozenset(
     }
 )
 """What systems and file systems say that have no links, no files without a name, or no way to name one."""
-DEVICE = re.compile(r"(?:CON|PRN|AUX|NUL|CLOCK\$|CONIN\$|CONOUT\$|(?:COM|LPT)[0-9\u00b9\u00b2\u00b3])", re.IGNORECASE)
-NAME_HINT = "give the output another name; controls and their computers run Windows"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,43 +90,6 @@ def read_folder(folder: str) -> dict[str, bytes]:
     return {name: read_bytes(path) for name, path in paths.items() if os.path.isfile(path)}
 
 
-FileIdentity = tuple[int, int]
-"""Device and number of a file, whatever it is called."""
-
-
-def identity(path: str) -> FileIdentity | None:
-    """Which file is behind a name; None if there is none."""
-    try:
-        found = os.stat(path)
-    except (OSError, ValueError):
-        return None
-    return found.st_dev, found.st_ino
-
-
-def identities(paths: Iterable[str]) -> frozenset[FileIdentity]:
-    """The files behind these names, however they are called."""
-    return frozenset(found for found in map(identity, paths) if found is not None)
-
-
-def each_once(given: Iterable[str], shown: Callable[[str], str] = str) -> None:
-    """Refuse a file that is named twice, under whatever names: `UsageError` NCF020.
-
-    shown  how messages name it
-    """
-    seen: set[object] = set()
-    for path in given:
-        key = identity(path) or path
-        if key in seen:
-            raise given_twice(shown(path))
-        seen.add(key)
-
-
-def given_twice(path: str) -> UsageError:
-    """The error NCF020 for an input that is there twice: what it says would count twice."""
-    text = "is given twice, and what it says would count twice"
-    return UsageError.of("NCF020", text, Place(path), "leave it out once")
-
-
 def unreadable(path: str, error: OSError) -> SourceError:
     """The error NCF002 for what the system says of an input."""
     hint = READING.get(error.errno or 0, "give an existing file's path")
@@ -144,11 +100,6 @@ def unwritable(path: str, error: OSError) -> UsageError:
     """The error NCF007 for what the system says of an output."""
     hint = WRITING.get(error.errno or 0, "make room, or another -o")
     return UsageError.of("NCF007", f"cannot be written: {error.strerror}", Place(path), hint)
-
-
-def exists_already(path: str) -> UsageError:
-    """The error NCF004."""
-    return UsageError.of("NCF004", "exists already", Place(path), "--force replaces an output")
 
 
 def put_at(handle: int, at: int, data: bytes) -> None:
@@ -451,147 +402,3 @@ def _sync(folder: int) -> None:
     except OSError as error:
         if error.errno != errno.EINVAL:
             raise
-
-
-# -- where an output may go --------------------------------------------------------------------------------------------
-
-
-def check_name(way: str, path: str) -> None:
-    """Refuse a way down from an output folder, or the name of a file, that cannot be carried: NCF023.
-
-    path  the output, for the message
-    """
-    if os.path.isabs(way):
-        raise UsageError.of("NCF023", "leads out of the output folder: it begins at the root", Place(path), NAME_HINT)
-    for name in way.split(os.sep):
-        if problem := _name_problem(name):
-            raise UsageError.of("NCF023", problem, Place(path), NAME_HINT)
-
-
-def folded_name(path: str) -> str:
-    """The same for all names that some file system takes for one: case and composed letters make no difference."""
-    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", path).casefold())
-
-
-def check_ordinary(path: str) -> None:
-    """Refuse an output that is there and is a symbolic link, a folder or a device: NCF005."""
-    if os.path.islink(path):
-        hint = f"name the file itself: {os.path.realpath(path)}"
-        raise UsageError.of("NCF005", "is a symbolic link, which is not written through", Place(path), hint)
-    if os.path.lexists(path) and not os.path.isfile(path):
-        raise UsageError.of("NCF005", "is not an ordinary file", Place(path), "-o - writes to standard output")
-
-
-def check_output(path: str, root: str | None = None, replace: bool = False) -> None:
-    """Refuse an output that must not be written: under a name that cannot be carried, or through a link.
-
-    root  the folder that the user named, if the way from there is that of an input: none of its folders may be a link
-
-    Raises `UsageError` NCF005, NCF023.
-    """
-    folder, way = way_to(path, root)
-    check_name(way, path)
-    check_ordinary(path)
-    here = folder
-    for name in way.split(os.sep)[:-1]:
-        here = os.path.join(here, name)
-        if os.path.islink(here):
-            raise linked(here)
-    if replace and os.path.lexists(path) and (link := _link_on_the_way(folder)):
-        text = f"would be replaced through the symbolic link {link}"
-        hint = f"name the folder itself: {os.path.realpath(folder)}"
-        raise UsageError.of("NCF005", text, Place(path), hint)
-
-
-def check_target(
-    path: str,
-    inputs: Collection[FileIdentity] = (),
-    replace: bool = False,
-    root: str | None = None,
-    resume: bool = False,
-) -> None:
-    """Refuse an output that must not be written, as long as nothing has been computed.
-
-    inputs   files that are read, and not replaced in any case
-    replace  an existing output may be replaced
-    root     as in `check_output`
-    resume   an existing output is left as it is
-
-    Raises `UsageError` NCF003, NCF004, NCF005, NCF007, NCF023.
-    """
-    check_named(path)
-    check_output(path, root, replace)
-    if identity(path) in inputs:
-        hint = "--in-place, or another -o"
-        raise UsageError.of("NCF005", "is an input too, and inputs are not changed", Place(path), hint)
-    if os.path.lexists(path) and not (replace or resume):
-        raise exists_already(path)
-    folder = os.path.dirname(path) or "."
-    if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise UsageError.of("NCF007", "is not a folder", Place(folder))
-
-
-def check_named(path: str | None) -> None:
-    """Refuse an empty name: `UsageError` NCF003; None is no name."""
-    if path == "":
-        raise UsageError.of("NCF003", "the name of the output is empty", hint="-o FILE, -o DIR or -o -")
-
-
-def check_folder(folder: str) -> None:
-    """Refuse what cannot be a folder of several files: NCF003, or NCF007 for what is there and is none."""
-    if folder in ("", "-"):
-        raise UsageError.of("NCF003", "tables are several files, which go to a folder", hint="-o FOLDER")
-    if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise UsageError.of("NCF007", "is not a folder", Place(folder), "-o FOLDER")
-
-
-def check_own(path: str) -> None:
-    """Refuse to write on in what is no file of ncfix's own: a link, a device, a file with another name, too. NCF005."""
-    check_ordinary(path)
-    with suppress(FileNotFoundError):
-        if os.stat(path).st_nlink != 1:
-            raise UsageError.of("NCF005", "is another file, too: it has two names", Place(path), "remove this one")
-
-
-def way_to(path: str, root: str | None) -> tuple[str, str]:
-    """The folder that the user named, and the way from there."""
-    if root is None:
-        return os.path.dirname(path), os.path.basename(path)
-    return root, os.path.relpath(path, root)
-
-
-def linked(path: str) -> UsageError:
-    """The error NCF005 for a folder below the output folder that is a symbolic link."""
-    hint = "take the link away, or another -o"
-    return UsageError.of("NCF005", "is a symbolic link, and leads out of the output folder", Place(path), hint)
-
-
-def _name_problem(name: str) -> str:
-    """What is the matter with a name; empty if nothing is."""
-    if name in ("", os.curdir):
-        return "has an empty name in it"
-    if name == os.pardir:
-        return "leads out of the output folder: it has .. in it"
-    if odd := next((char for char in name if unicodedata.category(char) == "Cc"), ""):
-        return f"has a control character in its name: {odd!r}"
-    if odd := next((char for char in "\\:" if char in name), ""):
-        return f"has a {odd} in its name, which is a path on Windows"
-    if name[-1] in ". ":
-        return f"ends in a {'full stop' if name[-1] == '.' else 'blank'}, which Windows leaves out"
-    stem = name.split(".", 1)[0].rstrip(" ")
-    if DEVICE.fullmatch(stem):
-        return f"{stem} is the name of a device on Windows, whatever its suffix"
-    return ""
-
-
-def _link_on_the_way(folder: str) -> str:
-    """The first symbolic link among the folders that the user named; empty if there is none.
-
-    Links at the root of the file system, as `/tmp` of macOS, are the system's own.
-    """
-    parts = folder.split(os.sep)
-    for count in range(3 if os.path.isabs(folder) else 1, len(parts) + 1):
-        here = os.sep.join(parts[:count])
-        if here and os.path.islink(here):
-            return here
-    return ""

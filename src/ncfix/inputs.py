@@ -10,9 +10,12 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from threading import Thread
 from typing import IO
+
+from ncfix.diagnostics import Place, UsageError
 
 MOST = 1 << 30
 """Bytes of a program or a measurement that is read as a whole, or comes through a pipe: some ten million blocks."""
@@ -78,6 +81,43 @@ def taken(path: str, most: int = MOST) -> bytes:
     """The content of a file. Raises OSError, in the words of the system or in plain ones."""
     with opened(path) as handle:
         return content(handle, most)
+
+
+FileIdentity = tuple[int, int]
+"""Device and number of a file, whatever it is called."""
+
+
+def identity(path: str) -> FileIdentity | None:
+    """Which file is behind a name; None if there is none."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return found.st_dev, found.st_ino
+
+
+def identities(paths: Iterable[str]) -> frozenset[FileIdentity]:
+    """The files behind these names, however they are called."""
+    return frozenset(found for found in map(identity, paths) if found is not None)
+
+
+def each_once(given: Iterable[str], shown: Callable[[str], str] = str) -> None:
+    """Refuse a file that is named twice, under whatever names: `UsageError` NCF020.
+
+    shown  how messages name it
+    """
+    seen: set[object] = set()
+    for path in given:
+        key = identity(path) or path
+        if key in seen:
+            raise given_twice(shown(path))
+        seen.add(key)
+
+
+def given_twice(path: str) -> UsageError:
+    """The error NCF020 for an input that is there twice: what it says would count twice."""
+    text = "is given twice, and what it says would count twice"
+    return UsageError.of("NCF020", text, Place(path), "leave it out once")
 
 
 def _size(handle: IO[bytes]) -> int | None:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from ncfix import files
+from ncfix import files, outputs
 from ncfix.cli.main import run
 from ncfix.diagnostics import ExitCode, UsageError
 
@@ -262,7 +262,7 @@ def test_nothing_gets_out(title: str, jobs: str, ground: Path, capfd: pytest.Cap
 
 def test_a_folder_that_becomes_a_link_meanwhile(ground: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Between the look at the way and the writing: what is open stays what it is."""
-    checked = files.check_output
+    checked = outputs.check_output
 
     def swapped(*given: Any) -> None:
         checked(*given)

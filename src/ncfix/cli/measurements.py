@@ -27,7 +27,7 @@ from ncfix.cli.options import (
 )
 from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, read, shown, targets
 from ncfix.diagnostics import ExitCode, RefusedError
-from ncfix.files import each_once
+from ncfix.inputs import each_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

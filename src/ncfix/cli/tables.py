@@ -32,6 +32,8 @@ from ncfix.cli.options import (
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import ConfigError, ExitCode, Message, Place, RefusedError, UsageError
+from ncfix.inputs import identities
+from ncfix.outputs import check_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -180,8 +182,8 @@ def export(
     from ncfix.tables.export import export as exported
 
     chosen = get_control(control)
-    files.check_folder(output)
-    inputs = files.identities(each for each in (machine_path, program, *given.files) if each)
+    check_folder(output)
+    inputs = identities(each for each in (machine_path, program, *given.files) if each)
     following = Following.of(machine_path, dialect, given)
     machine = following.machine
     assert machine is not None

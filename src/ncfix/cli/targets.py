@@ -14,6 +14,8 @@ from ncfix import files, inputs
 from ncfix.batch.programs import ProgramFile, program_files
 from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
+from ncfix.inputs import identities, identity
+from ncfix.outputs import check_named, check_output, check_target, exists_already, folded_name
 
 STREAM = "-"
 """Standard input or output as a file name."""
@@ -106,7 +108,7 @@ class OutputTarget:
         elif self.resume and not self.force and os.path.lexists(self.path):
             if not files.holds(self.path, data):
                 if not self.is_own:
-                    raise files.exists_already(self.path)
+                    raise exists_already(self.path)
                 files.write_whole(self.path, data, True, self.root, mode)
         else:
             files.write_whole(self.path, data, self.force, self.root, mode)
@@ -155,12 +157,12 @@ def targets(
     else:
         found = [_target(program, outputs, folder) for program in programs]
     _check_clash(found)
-    inputs = files.identities([*(program.path for program in programs), *(other for other in others if other)])
+    read = identities([*(program.path for program in programs), *(other for other in others if other)])
     for target in found:
         if target.in_place:
             _check_in_place(target)
         elif target.path != STREAM:
-            files.check_target(target.path, inputs, target.force, target.root, target.resume)
+            check_target(target.path, read, target.force, target.root, target.resume)
     return found
 
 
@@ -178,7 +180,7 @@ def check_streams(printed: str | None, **outputs: OutputTarget | None) -> None:
 
 
 def _check_choices(outputs: Outputs, folder: str | None) -> None:
-    files.check_named(outputs.output)
+    check_named(outputs.output)
     if outputs.in_place and outputs.output is not None:
         raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
     if outputs.resume and folder is None:
@@ -201,9 +203,7 @@ def _check_clash(found: Sequence[OutputTarget]) -> None:
     """Refuse outputs that are one file, here or on a computer that does not tell large letters from small ones."""
     same: dict[object, list[OutputTarget]] = {}
     for target in found:
-        same.setdefault((target.in_place and files.identity(target.path)) or files.folded_name(target.path), []).append(
-            target
-        )
+        same.setdefault((target.in_place and identity(target.path)) or folded_name(target.path), []).append(target)
     for group in same.values():
         if len(group) > 1:
             sources = ", ".join(target.source for target in group)
@@ -219,7 +219,7 @@ def _check_in_place(target: OutputTarget) -> None:
     place = Place(target.path)
     if target.path == STREAM:
         raise UsageError.of("NCF005", "standard input cannot be changed in place", hint="-o FILE")
-    files.check_output(target.path)
+    check_output(target.path)
     if os.path.lexists(target.backup):
         hint = "remove it, or bring it back and fix that"
         raise UsageError.of("NCF008", f"was fixed in place before: {target.backup} exists", place, hint)

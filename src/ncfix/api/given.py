@@ -1,0 +1,141 @@
+"""What functions are given: values, or the paths of files with them; and where results may go."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from ncfix.batch.programs import subprograms
+from ncfix.control.setup import Setup
+from ncfix.diagnostics import UsageError
+from ncfix.files import read_bytes, write_whole
+from ncfix.inputs import each_once, given_twice, identities
+from ncfix.outputs import check_target
+
+if TYPE_CHECKING:
+    from ncfix.compensate.following import Resolve
+    from ncfix.machine import Machine
+    from ncfix.measure.measurement import Measurement
+    from ncfix.text.dialect import Dialect
+    from ncfix.text.tree import Program
+
+    Measured = Measurement | str | os.PathLike[str]
+
+PathName = str | os.PathLike[str]
+ONE_SOURCE = "a path or a text is needed, and not both"
+
+
+def load_machine(source: PathName | None = None, *, text: str | None = None) -> Machine:
+    """The machine that a file, or a text in TOML, describes; raises `ConfigError` NCF3xx with all that is wrong."""
+    from ncfix.machine import load, loads
+
+    if source is not None and text is None:
+        return load(os.fspath(source))
+    if text is not None and source is None:
+        return loads(text)
+    raise TypeError(ONE_SOURCE)
+
+
+def read_program(
+    source: PathName | None = None,
+    *,
+    text: bytes | str | None = None,
+    dialect: Dialect | str | None = None,
+    machine: Machine | None = None,
+) -> Program:
+    """The program in a file, or in a text.
+
+    dialect  its language; None: what the text shows, else that of the machine's control, else what the suffix shows
+
+    Raises `SourceError` NCF1xx for what cannot be read.
+    """
+    from ncfix.text.dialects import detect, encoded
+    from ncfix.text.reader import read
+
+    if source is not None and text is None:
+        path = os.fspath(source)
+        content = read_bytes(path)
+    elif text is not None and source is None:
+        path = "<program>"
+        content = encoded(text, path) if isinstance(text, str) else text
+    else:
+        raise TypeError(ONE_SOURCE)
+    chosen = detect(content, path, (machine and machine.control) or "") if dialect is None else dialect
+    return read(content, path, chosen)
+
+
+def as_machine(machine: Machine | PathName) -> Machine:
+    """A machine, or that of a file."""
+    return load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
+
+
+def sound_machine(machine: Machine | PathName, force: bool) -> Machine:
+    """A machine for something to be made with it; raises `RefusedError` NCF320 to NCF324 if no machine can be so."""
+    from ncfix.machine.plausible import required
+
+    known = as_machine(machine)
+    if not force:
+        path = os.fspath(machine) if isinstance(machine, (str, os.PathLike)) else known.name
+        required(known, path, "force=True makes it all the same")
+    return known
+
+
+def as_program(program: Program | PathName, machine: Machine) -> Program:
+    """A program, or that of a file, for this machine's control if it does not show its language."""
+    return read_program(program, machine=machine) if isinstance(program, (str, os.PathLike)) else program
+
+
+def as_setup(setup: Setup | PathName | None) -> Setup:
+    """A set-up, or that of a file; without one nothing is given."""
+    if setup is None:
+        return Setup()
+    if isinstance(setup, Setup):
+        return setup
+    from ncfix.control.setup_file import load
+
+    return load(os.fspath(setup))
+
+
+def subprograms_of(setup: Setup, *programs: Program) -> Resolve | None:
+    """What gives the files of subprograms: beside programs that came from files, and where the setup says."""
+    paths = [program.path for program in programs if not program.path.startswith("<")]
+    return subprograms(setup, *paths) if paths or setup.subprograms else None
+
+
+def as_measurements(measured: Measured | Sequence[Measured], machine: Machine) -> list[Measurement]:
+    """One measurement or several, or those of files; raises `UsageError` NCF020 for one twice, NCF025 for none."""
+    from ncfix.measure.measurement import Measurement
+    from ncfix.measure.reader import read
+
+    several = [measured] if isinstance(measured, (str, os.PathLike, Measurement)) else list(measured)
+    if not several:
+        raise UsageError.of("NCF025", "no measurement is given", hint="one or more of them")
+    each_once(paths_of(each for each in several if not isinstance(each, Measurement)))
+    for number, each in enumerate(several):
+        if isinstance(each, Measurement) and any(each is other for other in several[:number]):
+            raise given_twice(each.path)
+    return [each if isinstance(each, Measurement) else read(os.fspath(each), machine) for each in several]
+
+
+def paths_of(given: Iterable[object]) -> Iterator[str]:
+    """The paths of what is given: those of files, and of values that came from files."""
+    for each in given:
+        if isinstance(each, (str, os.PathLike)):
+            yield os.fspath(each)
+        elif isinstance(each, (list, tuple)):
+            yield from paths_of(each)
+        elif isinstance(path := getattr(each, "path", None), str) and not path.startswith("<"):
+            yield path
+
+
+def check_writable(output: PathName | None, force: bool, *given: object) -> None:
+    """Refuse an output that must not be written, or is one of the inputs, before anything is computed."""
+    if output is not None:
+        check_target(os.fspath(output), identities(paths_of(given)), force)
+
+
+def write_output(output: PathName | None, content: bytes, force: bool) -> None:
+    """Write a result, if a path for it is given."""
+    if output is not None:
+        write_whole(os.fspath(output), content, force)

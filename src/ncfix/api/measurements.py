@@ -1,0 +1,142 @@
+"""Measurements: planned, and what they say of a machine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ncfix.api.given import PathName, as_machine, as_measurements, check_writable, sound_machine, write_output
+from ncfix.diagnostics import Message, RefusedError
+
+if TYPE_CHECKING:
+    from ncfix.api.given import Measured
+    from ncfix.diagnosis.diagnosis import Diagnosis
+    from ncfix.machine import Machine
+    from ncfix.measure.calibrate import Prediction
+    from ncfix.measure.candidates import Room
+    from ncfix.measure.estimate import Calibration
+    from ncfix.measure.measurement import Measurement
+    from ncfix.measure.plan import Planned
+
+
+def plan(
+    machine: Machine | PathName,
+    *,
+    kind: str = "tcp",
+    count: int = 40,
+    room: Room | None = None,
+    effects: str | None = None,
+    separate: Sequence[str] = (),
+    existing: Measurement | PathName | None = None,
+    seed: int = 0,
+    output: PathName | None = None,
+    force: bool = False,
+) -> Planned:
+    """Choose the poses to be measured: those that tell most about the errors of a machine.
+
+    kind      "tcp", "tcp6", "probe" or "length"
+    room      where axes (mm and degree) and tip (mm) may go, tool lengths, balls
+    effects   those to be determined, as for `calibrate`; `separate`: those to be told apart
+    existing  a measurement that the new poses complete
+    """
+    from ncfix.measure.candidates import Room
+    from ncfix.measure.measurement import dumps
+    from ncfix.measure.plan import plan as planned
+
+    check_writable(output, force, machine, existing)
+    known = as_machine(machine)
+    before = None if existing is None else as_measurements(existing, known)[0]
+    found = planned(known, kind, count, room or Room(), effects, list(separate), before, seed)
+    write_output(output, dumps(found.plan, found.plan.form.measured if kind != "probe" else ()).encode(), force)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrated:
+    """What measurements say of the errors of a machine.
+
+    calibration  the estimate, with its covariance
+    prediction   how well the tip error is known over the travels
+    refused      why the result describes no machine, or not these measurements; empty if it does
+    remarks      what there is to say of the estimate
+    doubts       what is odd about the machine
+    """
+
+    calibration: Calibration
+    prediction: Prediction
+    refused: tuple[Message, ...]
+    remarks: tuple[Message, ...]
+    doubts: tuple[Message, ...]
+
+    @property
+    def machine(self) -> Machine:
+        """The machine with the errors that were estimated."""
+        return self.calibration.machine
+
+
+def calibrate(
+    measured: Measured | Sequence[Measured],
+    machine: Machine | PathName,
+    *,
+    effects: str | None = None,
+    loss: str = "auto",
+    prune: float | None = None,
+    knots: int = 0,
+    time_constants: bool = False,
+    allow_misfit: bool = False,
+    path: str = "<machine>",
+    output: PathName | None = None,
+    force: bool = False,
+) -> Calibrated:
+    """Estimate the errors of a machine from measurements.
+
+    effects  names or patterns, or a model; None: those of the machine file, or of one without, all that can be
+    loss     "auto", "none", "huber" or "tukey"; the other arguments are those of `ncfix calibrate`
+    path     what the machine is called in messages
+    """
+    from ncfix.machine import dumps
+    from ncfix.machine.plausible import doubts
+    from ncfix.measure.calibrate import calibrate as calibrated
+    from ncfix.measure.calibrate import guesses, over_the_travels
+    from ncfix.measure.contradictions import refusals
+
+    check_writable(output, force, measured, machine)
+    known = as_machine(machine)
+    found = calibrated(as_measurements(measured, known), known, effects, loss, prune, knots, time_constants)
+    over = over_the_travels(found)
+    odd = doubts(found.machine, path if output is None else os.fspath(output))
+    refused = tuple(refusals(found, odd))
+    remarks = (*found.remarks, *guesses(found, over))
+    result = Calibrated(found, over, refused, remarks, tuple(each.message for each in odd))
+    if output is not None and refused and not allow_misfit:
+        raise RefusedError(refused)
+    write_output(output, dumps(found.machine).encode(), force)
+    return result
+
+
+def diagnose(
+    measured: Measured | Sequence[Measured],
+    machine: Machine | PathName,
+    *,
+    without: Sequence[str] = (),
+    output: PathName | None = None,
+    force: bool = False,
+) -> Diagnosis:
+    """Say where machine and model disagree, and name the effect that is missing.
+
+    without  effects that are not to be considered
+    output   where the machine with the effects added goes; nothing is written where there is nothing to add
+    """
+    from ncfix.diagnosis.diagnosis import diagnose as diagnosed
+    from ncfix.diagnosis.presentation import with_provenance
+    from ncfix.machine import dumps
+
+    check_writable(output, force, measured, machine)
+    known = as_machine(machine)
+    found = diagnosed(as_measurements(measured, known), known, tuple(without))
+    if found.machine is not None and output is not None:
+        sound_machine(found.machine, force)
+        write_output(output, dumps(with_provenance(found)).encode(), force)
+    return found

@@ -1,0 +1,210 @@
+"""Programs: corrected, compared, and how far the tool tip is off along them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, overload
+
+from ncfix.api.given import (
+    PathName,
+    as_machine,
+    as_program,
+    as_setup,
+    check_writable,
+    read_program,
+    sound_machine,
+    subprograms_of,
+    write_output,
+)
+from ncfix.control.setup import Setup
+from ncfix.diagnostics import Message, Place, RefusedError, UsageError
+from ncfix.files import read_bytes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ncfix.compensate import FixOptions
+    from ncfix.compensate.driver import Fixed
+    from ncfix.compensate.figures.verification import Compared
+    from ncfix.compensate.following import Resolve
+    from ncfix.machine import Machine
+    from ncfix.measure.instruments import Faults
+    from ncfix.measure.measurement import Measurement
+    from ncfix.text.tree import Program
+
+
+def fix(
+    program: Program | PathName,
+    machine: Machine | PathName,
+    *,
+    setup: Setup | PathName | None = None,
+    strategy: str = "rotary-then-linear",
+    tolerance_um: float = 1.0,
+    flatten: bool = False,
+    split_rapids: bool = False,
+    block_numbers: str = "same",
+    figures: bool = True,
+    force: bool = False,
+    allow_refused: bool = False,
+    resolve: Resolve | None = None,
+    output: PathName | None = None,
+) -> Fixed:
+    """Rewrite a program so that this machine cuts what was meant.
+
+    setup          offsets, tools and where axes start, or a setup file; what it lacks raises `UsageError` NCF2xx
+    strategy       `ncfix fix --strategy`
+    tolerance_um   how far the tool tip may leave the intended path
+    flatten        write loops, subprograms and cycles out where they cannot be corrected
+    figures        the errors before and after along the path (`report.error_before_um`, ...)
+    force          correct a program that has been corrected, for a machine that no machine is like, too; take the
+                   place of an existing output
+    allow_refused  write the output though motions had to be left uncorrected
+    resolve        gives the text of a subprogram by its name; None: files beside the program, if that is one
+    """
+    from ncfix.compensate import FixOptions
+
+    options = FixOptions(strategy, tolerance_um, allow_refused, force, split_rapids, flatten, block_numbers, figures)
+    check_writable(output, force, program, machine, setup)
+    known, own = sound_machine(machine, force), as_setup(setup)
+    read = as_program(program, known)
+    found = fixed(read, known, own, options, resolve or subprograms_of(own, read))
+    if output is not None and found.report.refused and not allow_refused:
+        refused = [Message(each.code, each.reason, Place(read.path, each.line)) for each in found.report.refused]
+        raise RefusedError.collected(refused)
+    write_output(output, found.text, force)
+    return found
+
+
+def fixed(program: Program, machine: Machine, setup: Setup, options: FixOptions, resolve: Resolve | None) -> Fixed:
+    """A program corrected with these options, flat where they say so."""
+    from ncfix.compensate.driver import fix_flat, fix_program
+
+    return (fix_flat if options.flatten else fix_program)(program, machine, setup, options, resolve)
+
+
+def verify(
+    original: Program | PathName,
+    fixed: Program | PathName | bytes,
+    machine: Machine | PathName,
+    *,
+    setup: Setup | PathName | None = None,
+    tolerance_um: float = 1.0,
+) -> Compared:
+    """Compare what this machine cuts with `fixed` (a program, or its text) with what `original` means.
+
+    `within` of the result is the verdict; its figures are in um; `messages` say what was assumed.
+    """
+    from ncfix.arguments import TOLERANCE_UM
+    from ncfix.compensate.figures.verification import Compared, FollowedProgram, side_by_side, told_once
+    from ncfix.text.reader import read_like
+
+    TOLERANCE_UM.check("tolerance_um", tolerance_um)
+    known, own = as_machine(machine), as_setup(setup)
+    own = replace(own, assume_zero=True) if known.is_perfect else own
+    first = as_program(original, known)
+    if isinstance(fixed, bytes):
+        second = read_program(text=fixed, dialect=first.dialect)
+    elif isinstance(fixed, (str, os.PathLike)):
+        path = os.fspath(fixed)
+        second = read_like(read_bytes(path), path, first, known.control or "")
+    else:
+        second = fixed
+    meant = FollowedProgram.of(first, known, own, subprograms_of(own, first))
+    done = FollowedProgram.of(second, known, own, subprograms_of(own, second, first))
+    found, said = side_by_side(meant, done, known, own, tolerance_um)
+    messages = (*_remark_of_stamp(first), *told_once(*said))
+    return replace(Compared.together([Compared.of(each) for each in found]), messages=messages)
+
+
+def _remark_of_stamp(program: Program) -> Iterator[Message]:
+    """What is said of a program that is to be what is meant, and has been corrected."""
+    from ncfix.text import stamp
+
+    block = stamp.find(program)
+    if block is not None:
+        yield stamp.remark(program.place(block))
+
+
+@dataclass(frozen=True, slots=True)
+class PathErrors:
+    """How far the tool tip of a machine is from where a program means it to be, n samples along the path.
+
+    max_um, rms_um  the largest error, and the root mean square along the path; None where nothing was looked at
+    line            the line of the largest
+    lines           (n,) the line of each sample
+    intended        (n, 3) where the tip shall be in the workpiece, mm
+    error_um        (n, 3) where it is, less that
+    messages        what there is to say of following the program
+    """
+
+    max_um: float | None
+    rms_um: float | None
+    line: int | None
+    lines: NDArray[Any] = field(repr=False)
+    intended: NDArray[Any] = field(repr=False)
+    error_um: NDArray[Any] = field(repr=False)
+    messages: tuple[Message, ...] = ()
+
+
+@overload
+def simulate(
+    subject: Measurement, machine: Machine | PathName, *, faults: Faults | None = ..., seed: int = ...
+) -> Measurement: ...
+
+
+@overload
+def simulate(
+    subject: Program | PathName, machine: Machine | PathName, *, setup: Setup | PathName | None = ...
+) -> PathErrors: ...
+
+
+def simulate(
+    subject: Program | PathName | Measurement,
+    machine: Machine | PathName,
+    *,
+    setup: Setup | PathName | None = None,
+    faults: Faults | None = None,
+    seed: int = 0,
+) -> PathErrors | Measurement:
+    """Say how far the tool tip of this machine is from where a program means it to be, along the whole path.
+
+    Of a measurement plan: the plan filled in as this machine would be measured, with the `faults` of measuring.
+    """
+    from ncfix.measure.measurement import Measurement
+
+    if isinstance(subject, Measurement) and setup is not None:
+        raise UsageError.of("NCF025", "a set-up is for a program", hint="a plan has columns for states")
+    if not isinstance(subject, Measurement) and (faults is not None or seed != 0):
+        raise UsageError.of("NCF025", "faults and seed are for a measurement plan, not for a program")
+    known = as_machine(machine)
+    if isinstance(subject, Measurement):
+        from ncfix.measure.instruments import simulate as filled
+
+        return filled(subject, known, faults, seed)
+    own = as_setup(setup)
+    own = replace(own, assume_zero=True) if known.is_perfect else own
+    return _path_errors(as_program(subject, known), known, own)
+
+
+def _path_errors(program: Program, machine: Machine, setup: Setup) -> PathErrors:
+    import numpy as np
+
+    from ncfix.compensate.figures.simulation import Along, tip_errors
+    from ncfix.compensate.following import follow
+    from ncfix.compensate.plan.intent import Intent
+    from ncfix.machine import State
+
+    found = follow(program, machine, setup, subprograms_of(setup, program))
+    moves, along = found.trace.moves, Along()
+    parts = list(along.adding(tip_errors(Intent(found.machine, moves, State()), program.lines(moves.block))))
+    total = along.figures()
+    lines = [each.lines for each in parts]
+    intended, actual = ([getattr(each, name) for each in parts] for name in ("intended", "actual"))
+    nothing = np.empty((0, 3))
+    meant = np.concatenate([nothing, *intended])
+    gap = 1e3 * (np.concatenate([nothing, *actual]) - meant)
+    every = np.concatenate([np.empty(0, dtype=np.intp), *lines])
+    messages = (*_remark_of_stamp(program), *found.trace.messages)
+    return PathErrors(total["max"], total["rms"], total["where"], every, meant, gap, messages)
