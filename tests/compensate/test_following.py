@@ -201,3 +201,60 @@ def test_g10_l20_under_tcp_counts_from_the_tip() -> None:
     moves = follow(read(text.encode(), "a.ngc", "linuxcnc"), loads(ROTARY_TABLE), setup).trace.moves
     z = moves.axes.index("Z")
     assert moves.end[-1, z] - moves.end[-2, z] == pytest.approx(7.0)
+
+
+TOOL_OF_RUN_TIME = {
+    "linuxcnc": "G21 G54 G0 X0 Y0 Z50\nG38.2 Z0 F100\nG90 T[ROUND[#5063]] M6\n{}G1 X10 F100\nM2\n",
+    "fanuc": "%\nO1\nG21 G54 G90 G0 X0. Y0. Z50.\nT#500 M6\n{}G1 X10. F100.\nM30\n%\n",
+    "siemens": "G54 G0 X0 Y0 Z50\nT=R99 M6\n{}G1 X10 F100\nM30\n",
+}
+
+
+@pytest.mark.parametrize(
+    ("dialect", "length"),
+    [
+        *(("linuxcnc", length) for length in ("", "G43 Z60\n", "#1=#5400\nG43 H#1 Z60\n")),
+        *(("fanuc", length) for length in ("", "G43 Z60.\n", "#1=#4120\nG43 H#1 Z60.\n")),
+        *(("siemens", length) for length in ("", "D1\n")),
+    ],
+)
+def test_a_tool_known_only_at_run_time_has_no_length(dialect: str, length: str) -> None:
+    text = TOOL_OF_RUN_TIME[dialect].format(length)
+    setup = replace(SETUP, no_point="calculator")
+    moves = follow(read(text.encode(), "a", dialect), loads(ROTARY_TABLE), setup).trace.moves
+    assert moves.rule[-1] == Rule.REFUSE
+    assert "known only at run time" in moves.reasons[moves.reason[-1]]
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc"])
+def test_a_length_that_is_named_is_known_with_any_tool(dialect: str) -> None:
+    text = TOOL_OF_RUN_TIME[dialect].format("G43 H1\nG0 X0. Y0. Z60.\n")
+    setup = replace(SETUP, no_point="calculator")
+    moves = follow(read(text.encode(), "a", dialect), loads(ROTARY_TABLE), setup).trace.moves
+    assert moves.rule[-1] == Rule.CORRECT
+    assert moves.tool_length[-1] == 100.0
+
+
+def test_a_length_that_is_defined_at_run_time_is_asked_for() -> None:
+    text = "BEGIN PGM A MM\nTOOL DEF 7 L+Q1601 R+2\nTOOL CALL 7 Z S100\nL X+0 Y+0 Z+50 FMAX\nEND PGM A MM\n"
+    with pytest.raises(UsageError, match="length of tool 7"):
+        follow(read(text.encode(), "a.h", "heidenhain"), loads(ROTARY_TABLE), Setup(work_offsets={"PRESET": {}}))
+
+
+def test_an_axis_of_the_machine_hides_those_of_the_frame_that_it_has_a_part_in() -> None:
+    """G74 leads Z to a place that is not known: X and Y of a frame that is turned about Z do not depend on it."""
+    text = "G54 G0 X0 Y0 Z50 C0\n{}\nG74 Z1=0\nG1 X10 Y5 F200\nG1 X20\nM30\n"
+    for frame, sure in (("ROT Z30", True), ("MIRROR X0", True), ("ROT X30", False)):
+        program = read(text.format(frame).encode(), "a.mpf", "siemens")
+        moves = follow(program, loads(ROTARY_TABLE), SETUP).trace.moves
+        known = ~np.isnan(moves.end[-1])
+        assert known[[moves.axes.index(letter) for letter in "XY"]].tolist() == [True, sure]
+
+
+@pytest.mark.parametrize("first", ["TRAORI", 'CYCLE800(1,"T",0,57,0,0,0,10,20,0,0,0,0,-1)'])
+def test_with_d0_the_spindle_reference_is_led_and_the_tip_is_corrected(root: Path, first: str) -> None:
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    text = f"G54 G71 T1 D1 M6\nG0 X0 Y0 Z80 A0 C0\n{first}\nD0\nG0 X0 Y0 Z75\nG1 X5 Y5 Z70 F500\nM30\n"
+    moves = follow(read(text.encode(), "a.mpf", "siemens"), machine, SETUP).trace.moves
+    assert moves.rule[-1] == Rule.CORRECT
+    assert (moves.tcp[-1], moves.tool_length[-1], moves.led_length[-1]) == (True, 100.0, 0.0)

@@ -101,8 +101,8 @@ class Standing:
 
     @property
     def real_length(self) -> float:
-        """Of the tool; with D0 a transformation leads the point where a tool of no length has its tip."""
-        return self.length if self.modes["tcp"] else self.gauge
+        """Of the tool, also where a transformation leads the spindle reference, since no length is in force."""
+        return (self.length or self.gauge) if self.modes["tcp"] else self.gauge
 
     def pointing(self, a: float, c: float) -> Floats:
         """The direction from the tip to the spindle in the workpiece."""

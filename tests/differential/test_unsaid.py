@@ -12,11 +12,15 @@ from collections.abc import Callable
 import pytest
 
 from differential import unsaid
+from ncfix.control import tcp
+from ncfix.control.control import ProgramControl
+from ncfix.control.coordinates import Vector
+from ncfix.control.moves import TcpState, UnknownAxes
 
 FIRST = int(os.environ.get("NCFIX_SEED", "0"))
 SEEDS = range(FIRST, FIRST + int(os.environ.get("NCFIX_UNSAID", "1")))
 KINDS = None if os.environ.get("NCFIX_UNSAID") else 8
-"""Of the 32 kinds of programs so many are judged by default, others with each strategy."""
+"""Of the 32 or 40 kinds of programs so many are judged by default, others with each strategy."""
 
 
 @pytest.mark.parametrize("strategy", unsaid.STRATEGIES)
@@ -44,3 +48,21 @@ def test_the_judge_sees_what_was_not_corrected(dialect: str) -> None:
     _, text = next(unsaid.texts(dialect, range(1)))
     meant, done = language.steps(text, False), language.steps(text, True)
     assert sum(abs(a.tip[-1] - b.tip[-1]).max() > 2e-3 for a, b in zip(meant, done, strict=True)) > 3
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "iso", "siemens"])
+def test_the_judge_sees_motions_that_are_believed_to_begin_elsewhere(
+    dialect: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fault that was there: axes that machine coordinates (G53, SUPA) do not name had the numbers of the tip."""
+    converted = tcp.converted
+
+    def left_as_it_was(control: ProgramControl, position: Vector, unknown: UnknownAxes, *states: TcpState) -> bool:
+        return states[1] is tcp.MACHINE or converted(control, position, unknown, *states)
+
+    monkeypatch.setattr(tcp, "converted", left_as_it_was)
+    found = unsaid.Found()
+    for name, text in unsaid.texts(dialect, range(61000, 61002)):
+        if ", machine, " in name and not found.faults:
+            unsaid.judge(dialect, "position", name, text, found)
+    assert found.faults

@@ -1,8 +1,9 @@
 """Programs in which an axis is not said again after something has led it elsewhere, and a judge of their corrections.
 
 Every frame (a plane, a swivelled head or table, a rotation, the tip led) meets everything that leaves axes unsaid (a
-cycle, the end of radius compensation, machine coordinates, a change of tool), and then go motions that name one axis
-each, or all of them. Both texts are followed by the second controls, with the second model of the machine.
+cycle, the end of radius compensation, machine coordinates, a change of tool, the end of its length), and then go
+motions that name one axis each, or all of them. Both texts are followed by the second controls, with the second model
+of the machine.
 """
 
 from __future__ import annotations
@@ -37,9 +38,8 @@ from ncfix.machine import Machine, load
 from ncfix.text.reader import read
 from ncfix.text.tree import Program
 
-ROOT = Path(__file__).resolve().parents[2]
 FRAMES = ("plane", "swivel", "rotation", "tcp")
-EVENTS = ("cycle", "side", "machine", "tool")
+EVENTS = ("cycle", "side", "machine", "tool", "length")
 NAMED = ("one", "all")
 STRATEGIES = ("position", "rotary-then-linear", "full")
 
@@ -59,6 +59,7 @@ class Language:
 
     at_ends  mm: rounding of three linear axes, and what half a step of a rotary axis moves the tip by
     frames   the frames that the language has
+    events   what leaves axes unsaid in it
     on_the_way  mm: the tolerance asked for, rounding, and the chords of the samples
     turned   mm: what half a step of a rotary axis that the strategy moves comes to
     """
@@ -71,6 +72,7 @@ class Language:
     tolerance_um: float
     at_ends: float
     frames: tuple[str, ...] = FRAMES
+    events: tuple[str, ...] = EVENTS
     on_the_way: float = 1.8e-3
     turned: float = 0.0
 
@@ -117,6 +119,7 @@ def fanuc_text(frame: str, event: str, many: str, dice: random.Random) -> list[s
         "side": [f"G41 D1 G1 X{number(dice)} Y{number(dice)}", f"X{number(dice)}", dice.choice(("G40 Z25.", "G40"))],
         "machine": [f"G53 G{dice.choice('001')} {machine}"],
         "tool": ["T2 M6", "G43.4 H2" if frame == "tcp" else "G43 H2"],
+        "length": ["G49"],
     }
     tail = [f"G{dice.choice('0111')} {words(given)}" for given in singly(dice, many)]
     if event == "cycle" or dice.random() < 0.3:
@@ -146,6 +149,7 @@ def siemens_text(frame: str, event: str, many: str, dice: random.Random) -> list
         "side": [f"G41 G1 X{number(dice)} Y{number(dice)}", f"X{number(dice)}", dice.choice(("G40 Z25", "G40"))],
         "machine": [f"{where} G{dice.choice('001')} {machine}"],
         "tool": ["T2 D1 M6"],
+        "length": ["D0"],
     }
     tail = [f"G{dice.choice('0111')} {words(given)}" for given in singly(dice, many)]
     start = f"G0 X{number(dice)} Y{number(dice)} Z30" + ("" if frame == "swivel" else " A=12 C=20")
@@ -237,13 +241,14 @@ LINUXCNC_SETUP = Setup(
     tools={number: Tool(length, 0.0) for number, length in unsaid_rs274.LENGTHS.items()},
     initial=dict(zip("XYZAC", (0.0, 0.0, 250.0, 0.0, 0.0), strict=True)),
 )
-CRADLE = errors.load(ROOT / test_siemens.MACHINE)
+STEEP = Path(__file__).parent / "machines" / "steep_ca.toml"
+CRADLE = errors.load(STEEP)
 TABLES = test_tnc_swivel.MODEL
 LANGUAGES = {
     "fanuc": Language(
         fanuc_text,
         test_fanuc_control.SETUP,
-        ROOT / test_fanuc_control.MACHINE,
+        STEEP,
         partial(by_cradle, test_fanuc_control),
         fanuc.marked,
         1.0,
@@ -252,13 +257,15 @@ LANGUAGES = {
     "siemens": Language(
         siemens_text,
         test_siemens.SETUP,
-        ROOT / test_siemens.MACHINE,
+        STEEP,
         partial(by_cradle, test_siemens),
         sinumerik.marked,
         1.0,
         0.4e-3,
     ),
-    "heidenhain": Language(klartext, test_tnc_swivel.SETUP, test_tnc_swivel.FILE, by_tnc, str, 2000.0, 1e-3),
+    "heidenhain": Language(
+        klartext, test_tnc_swivel.SETUP, test_tnc_swivel.FILE, by_tnc, str, 2000.0, 1e-3, events=EVENTS[:-1]
+    ),
     "linuxcnc": Language(
         unsaid_rs274.text,
         LINUXCNC_SETUP,
@@ -268,6 +275,7 @@ LANGUAGES = {
         1.0,
         1e-3,
         unsaid_rs274.FRAMES,
+        EVENTS[:-1],
         1.95e-3,
         1e-3,
     ),
@@ -291,13 +299,15 @@ class Found:
 def texts(dialect: str, seeds: range) -> Iterator[tuple[str, str]]:
     """Names and texts of programs: all that meets all, for each seed."""
     language = LANGUAGES[dialect]
-    for seed, frame, event, many in product(seeds, language.frames, EVENTS, NAMED):
+    for seed, frame, event, many in product(seeds, language.frames, language.events, NAMED):
         name = f"{frame}, {event}, {many}, {seed}"
         yield name, language.marked("\n".join(language.write(frame, event, many, random.Random(name))) + "\n")
 
 
 JUMP = 0.1
 """mm: farther than any correction here."""
+FIGURE = 0.05e-3
+"""mm: to so much figures in messages are rounded."""
 
 
 def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> None:
@@ -325,12 +335,13 @@ def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> No
         if fate != "corrected":
             fresh = True
             continue
-        off = float(np.linalg.norm(wanted.tip[-1] - made.tip[-1]))
-        turned = language.turned if strategy == "full" else 0.0
-        allowed = language.at_ends + turned + claims.left.get(wanted.line, 0.0)
-        if wanted.sort == "cut" and language.tolerance_um < 10 and wanted.line not in claims.whole:
+        turned, left = language.turned if strategy == "full" else 0.0, claims.left.get(wanted.line, {})
+        off, excused = beyond(wanted.tip[-1] - made.tip[-1], left, led=name.startswith("tcp") and "length" not in name)
+        allowed = language.at_ends + turned + excused
+        if wanted.sort == "cut" and language.tolerance_um < 10:
             begins = float(np.linalg.norm(wanted.tip[0] - made.tip[0])) if fresh else 0.0
-            allowed_along = language.on_the_way + turned + claims.left.get(wanted.line, 0.0) + begins
+            allowed_along = language.on_the_way + turned + sum(left.values()) + begins
+            allowed_along += claims.whole.get(wanted.line, 0.0)
             along = max(apart(wanted.tip, made.tip[1:]), apart(made.tip, wanted.tip[1:]))
             off = max(off, allowed * along / allowed_along)
         found.worst = max(found.worst, off - allowed + language.at_ends)
@@ -339,29 +350,45 @@ def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> No
         fresh = wanted.sort == "hole" or wanted.line in claims.left  # what follows begins beside its way
 
 
+def beyond(off: Floats, left: dict[str, float], *, led: bool) -> tuple[float, float]:
+    """How far off a tip is, mm, and how far it may be for axes that were left where they stand.
+
+    If the tip is led, these axes are known to be X, Y and Z of the workpiece: nothing is excused across them.
+    """
+    if not led:
+        return float(np.linalg.norm(off)), sum(left.values())
+    most = np.array([left.get(letter, 0.0) for letter in "XYZ"])
+    return float(np.linalg.norm(np.maximum(np.abs(off) - most, 0.0))), 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class Claims:
-    """What the product says that it did not do, by lines; `left`: mm; `whole`: it says that the way leaves its path."""
+    """What the product says that it did not do, by lines.
+
+    left   mm, by axes
+    whole  mm: by so much it says that the way leaves its path
+    """
 
     refused: frozenset[int]
     passed: frozenset[int]
     unlawful: frozenset[int]
-    left: dict[int, float]
-    whole: frozenset[int]
+    left: dict[int, dict[str, float]]
+    whole: dict[int, float]
 
     @classmethod
     def of(cls, program: Program, machine: Machine, setup: Setup, fixed: Fixed) -> Claims:
         report, moves = fixed.report, follow(program, machine, setup).trace.moves
         lines, passed = program.lines(moves.block), (moves.rule == Rule.PASS) & (moves.kind != MotionKind.DWELL)
-        left: dict[int, float] = {}
+        left: dict[int, dict[str, float]] = {}
         for axis in report.left:
-            for first, last in axis.stretches:
-                left |= {line: left.get(line, 0.0) + axis.most for line in range(first, last + 1) if not axis.rotary}
-        whole = (
-            note.place.line
-            for note in report.warnings
-            if note.place and (note.code == "NCF416" or "must not be split" in note.text)
-        )
+            for line in (line for first, last in axis.stretches for line in range(first, last + 1)):
+                left.setdefault(line, {})[axis.axis] = 0.0 if axis.rotary else axis.most
+        whole: dict[int, float] = {}
+        for note in report.warnings:
+            if note.place and (note.code == "NCF416" or "must not be split" in note.text):
+                figure = re.search(r"([\d.]+) um", note.text)
+                most = JUMP if figure is None else float(figure[1]) / 1e3 + FIGURE
+                whole[note.place.line] = max(whole.get(note.place.line, 0.0), most)
         cuts = passed & (moves.kind != MotionKind.RAPID)
         lawful = np.zeros(len(moves), dtype=bool) if moves.passing is None else np.isin(moves.passing, list(LAWFUL))
         return cls(
@@ -369,7 +396,7 @@ class Claims:
             frozenset(lines[passed].tolist()),
             frozenset(lines[cuts & ~lawful].tolist()),
             left,
-            frozenset(whole),
+            whole,
         )
 
     def fate(self, step: Step) -> str:

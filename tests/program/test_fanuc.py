@@ -13,11 +13,12 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow as follow_on
 from ncfix.compensate.following import kinematics_of
+from ncfix.compensate.plan.intent import Intent
 from ncfix.control.moves import Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError, UsageError
-from ncfix.machine import load, loads
+from ncfix.machine import State, load, loads
 from ncfix.text.dialects import detect
 from ncfix.text.reader import read
 from ncfix.text.tree import Opaque, Word
@@ -377,9 +378,9 @@ def test_g53_1_turns_the_tool_square_to_the_plane(root: Path, name: str, angles:
     assert math.isclose(float(np.linalg.det(plane)), 1.0)
 
 
-@pytest.mark.parametrize(("length", "rule"), [("", Rule.REFUSE), ("G43H1", Rule.CORRECT)])
-def test_cuts_in_a_tilted_plane_need_a_tool_length_in_force(root: Path, length: str, rule: Rule) -> None:
-    """Without one the control leads the gauge point along the plane; rapids are not refused, G43 may come."""
+@pytest.mark.parametrize(("length", "led"), [("", 0.0), ("G43H1", 80.0), ("G43H0", 0.0)])
+def test_a_tilted_plane_is_led_by_the_length_in_force(root: Path, length: str, led: float) -> None:
+    """Without one the control leads the gauge point along the plane; the tip, 80 mm away, is what is corrected."""
     machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
     lines = [
         "G21G54G0X0.Y0.Z90.A0.C0.",
@@ -393,8 +394,13 @@ def test_cuts_in_a_tilted_plane_need_a_tool_length_in_force(root: Path, length: 
     setup = Setup(assume_zero=True, no_point="IS-B", tools={1: Tool(80.0)})
     program = read("\n".join(lines).encode(), "part", "fanuc")
     moves = follow_on(program, machine, setup).trace.moves
-    assert moves.rule[-1] == rule
-    assert moves.rule[-2] != Rule.REFUSE
+    assert moves.rule[-1] == Rule.CORRECT
+    assert (moves.tcp[-1], moves.tool_length[-1], moves.led_length[-1]) == (True, 80.0, led)
+    at = Intent(machine, moves, State()).joints(np.array([len(moves) - 1]), moves.end[-1:])[0]
+    z = moves.frames[moves.frame[-1]].rotation[:, 2]
+    tip, gauge = machine.tip(at, 80.0), machine.tip(at, 0.0)
+    np.testing.assert_allclose(gauge - tip, 80.0 * z, atol=1e-9)
+    np.testing.assert_allclose((tip if led else gauge) @ z, np.array([1.0, 2.0, 3.0]) @ z + 9.0, atol=1e-9)
 
 
 # -- the corpus -------------------------------------------------------------------------------------------------------

@@ -207,6 +207,11 @@ def test_a_tool_that_is_set_leaves_the_axes_where_they_are(dmu50: Machine) -> No
     assert np.isclose(moves.start[1][dmu50.axis_names.index("Z")], 10.0)
 
 
+def test_a_tool_that_is_set_at_run_time_has_no_length(dmu50: Machine) -> None:
+    moves = moves_of("G90 G54 G0 X0. Y0. Z10. B0. C0.\nF100.\nM160 T#500\nG1 X6.\nM30\n", dmu50)
+    assert [Rule(rule) for rule in moves.rule] == [Rule.CORRECT, Rule.REFUSE]
+
+
 def test_motions_before_a_refusal_are_corrected(dmu50: Machine) -> None:
     moves = moves_of("G90 G54 G0 X0. Y0. Z10. B0. C0.\nG1 X5. F100.\nG131\nX6.\nM30\n", dmu50)
     assert [Rule(rule) for rule in moves.rule] == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]

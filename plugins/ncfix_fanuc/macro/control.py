@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable
 
 from ncfix.control.coordinates import INDEX
-from ncfix.control.moves import MotionKind, UnknownAxes
 from ncfix.control.posture import stands_square
 from ncfix.control.setup import POINTLESS, Run
 from ncfix.diagnostics import Message
@@ -21,7 +20,6 @@ NO_POINT = "NCF240"
 DEFAULT_SYSTEM = "IS-B"
 ANGLE = ",A"
 """The address of the angle by which a line is given."""
-WITHOUT_LENGTH = "a tilted plane (G68.2) while no tool length is in force (G49): it is not the tip that is led"
 
 
 class MacroControl(RS274Control):
@@ -68,12 +66,6 @@ class MacroControl(RS274Control):
     def stands_square(self) -> bool:
         """Whether the tool is known to lie along Z of a tilted plane that is in force."""
         return self.tilted and bool(stands_square(self, self.rotation))
-
-    def _verdict(self, kind: MotionKind, unknown: UnknownAxes, refusal: str) -> str:
-        """As of all controls; nor is a cut corrected in a tilted plane while no tool length is in force."""
-        if self.tilted and kind != MotionKind.RAPID and self.tools.offset is None and self.tool_length()[1] > 0:
-            refusal = refusal or WITHOUT_LENGTH
-        return super()._verdict(kind, unknown, refusal)
 
     def refresh(self) -> None:
         """Compose the offsets; a number without a point counts increments of the unit in force."""

@@ -85,7 +85,7 @@ def modes(control: MacroControl) -> dict[int, Getter]:
         109: lambda: 0.0 if math.isnan(control.modal.feed) else control.modal.feed / control.modal.unit,
         111: lambda: float(tools.offset or 0),
         119: lambda: control.modal.speed,
-        120: lambda: float(tools.selected),
+        120: lambda: Unknown("T", tools.selected) if tools.doubtful else float(tools.selected),
     }
     return {base + number: getter for base in (4000, 4200, 4300) for number, getter in state.items()}
 

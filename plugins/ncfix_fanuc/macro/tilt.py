@@ -135,7 +135,7 @@ def begin(control: MacroControl, rotation: Rotation, origin: Block) -> None:
     feature = shifted({index: control.modal.unit * origin.get(LETTERS[index]) for index in (X, Y, Z)})
     control.frames = replace(control.frames, plane=replace(feature, rotation=rotation), rotation=WORLD)
     control.tilted, control.frame_unknown = True, None
-    switch(control, control.tools.vector, True)
+    switch(control, control.tools.vector, True, control.tools.offset)
     control.refresh()
 
 
@@ -160,7 +160,8 @@ def end(control: MacroControl) -> None:
         return
     control.tilted, control.frame_unknown = False, None
     control.frames = replace(control.frames, plane=WORLD, rotation=WORLD)
-    switch(control, control.tools.vector, control.setup.tcp or control.tip_control)
+    on = control.setup.tcp or control.tip_control
+    switch(control, control.tools.vector, on, control.tools.offset)
     turned_back(control)
     control.refresh()
 
@@ -197,7 +198,7 @@ def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: boo
     if about_tip:
         return [angles.get(index, value) for index, value in enumerate(control.position)]
     assert control.kinematics is not None, "they have shown how the tool is pointed"
-    on, off = TcpState(True, control.tools.vector[Z]), TcpState(False, control.tools.vector[Z])
+    on, off = TcpState(True, control.led_length), TcpState(False, 0.0)
     still = control.kinematics([control.position[index] for index in control.machine], on, off)
     command = [angles.get(index, value) for index, value in zip(control.machine, still, strict=True)]
     target = control.position[:]

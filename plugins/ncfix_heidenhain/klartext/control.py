@@ -143,7 +143,7 @@ class KlartextControl(base.ProgramControl):
         if on != self.tcp:
             self.ask_for_tool()
             why = next(iter(self.unknown.values())) if self.is_led(self.unknown) else TURNED
-            switch(self, self.tools.vector, on)
+            switch(self, self.tools.vector, on, self.tools.offset)
             self.unknown = {i: why if reason is TURNED else reason for i, reason in self.unknown.items()}
         self.refresh()
 

@@ -143,7 +143,7 @@ def take_short_way(control: KlartextControl, step: Step, target: Vector, axes: i
 def turn_under_tilt(control: KlartextControl, step: Step, target: Vector, unknown: UnknownAxes, axes: int) -> None:
     """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
     linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
-    switch(control, control.tools.vector, False)
+    switch(control, control.tools.vector, False, control.tools.offset)
     control.refresh()
     for index in control.machine:
         if not control.rotary[index]:
@@ -167,7 +167,7 @@ def at_machine(control: KlartextControl, step: Step) -> None:
     """A motion in machine coordinates: M91, or M92."""
     was = control.tcp
     if was:
-        switch(control, control.tools.vector, False)
+        switch(control, control.tools.vector, False, control.tools.offset)
         control.refresh()
     target, unknown = in_machine(control, step.words)
     code = "M91" if 91 in step.codes else "M92"

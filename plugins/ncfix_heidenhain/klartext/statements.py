@@ -178,8 +178,8 @@ AT_RUN_TIME = "the length of the tool is known only at run time"
 def define_tool(control: KlartextControl, tool: str | float | None, words: MotionWords, flags: frozenset[str]) -> None:
     """TOOL DEF: the length of a tool, where the program brings it."""
     if isinstance(tool, float) and "L" in words.values:
-        radius = words.values.get("R")
-        length = words.values["L"] * control.modal.unit
+        radius = None if "R" in words.runtime else words.values.get("R")
+        length = None if "L" in words.runtime else words.values["L"] * control.modal.unit
         control.defined_tools[int(tool)] = Tool(length, None if radius is None else radius * control.modal.unit)
 
 
@@ -202,7 +202,8 @@ def call_tool(control: KlartextControl, tool: str | float | None, words: MotionW
     if isinstance(tool, str):
         control.tools.spindle = NAMED
     if isinstance(tool, float):
-        control.tools.spindle = control.tools.selected = int(tool)
+        control.tools.select(int(tool))
+        control.tools.change()
     if tool is not None:
         control.places.lose(mask_of(control.machine))
     control.tool_called = True
@@ -230,7 +231,7 @@ def set_length(control: KlartextControl, length: float) -> None:
     tool = zeros()
     tool[Z] = length
     if control.tcp:
-        switch(control, tool, True)
+        switch(control, tool, True, control.tools.offset)
     control.tools.vector = tool
     control.refresh()
 

@@ -181,7 +181,7 @@ def way_home(control: KlartextControl) -> dict[int, float] | None:
 def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
     """TURN and MOVE: the control positions the rotary axes."""
     if control.tcp:
-        switch(control, control.tools.vector, False)
+        switch(control, control.tools.vector, False, control.tools.offset)
         control.refresh()
     if way is None:
         control.pass_here(TURNED, POSITIONED, rotary_letters(control))

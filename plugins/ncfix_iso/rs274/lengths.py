@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from ncfix.control.coordinates import LETTERS, Vector, X, Y, Z, mask_of, zeros
 from ncfix.control.expressions import Fault
+from ncfix.control.state import TOOL_AT_RUN_TIME
 from ncfix.control.tcp import switch
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
@@ -25,18 +26,18 @@ DIFFERS = "what G10 L{} sets differs from control to control (--dialect says whi
 
 def select_tool(control: RS274Control, block: Block, code: int) -> None:
     """T: the tool that the next M6 puts into the spindle."""
-    control.tools.selected = whole(block.values["T"], "T")
+    control.tools.select(whole(block.values["T"], "T"), unsure="T" in block.runtime)
 
 
 def change_tool(control: RS274Control, block: Block, code: int) -> None:
     """M6, for which machines go where tools are changed, and M61 Qn, which only says what is in the spindle."""
     if code == 610:
-        control.tools.selected = whole(block.get("Q", -1.0), "Q of M61")
+        control.tools.select(whole(block.get("Q", -1.0), "Q of M61"), unsure="Q" in block.runtime)
         if control.tools.selected < 0:
             raise Fault(BAD_LENGTH, "M61 needs Q, the number of the tool")
     else:
         control.places.lose(mask_of(control.machine))
-    control.tools.spindle = control.tools.selected
+    control.tools.change()
 
 
 # -- length offsets ---------------------------------------------------------------------------------------------------
@@ -49,18 +50,20 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     was not given and is taken as zero is one.
     """
     tool, number, lacking = offset_of(control, block, code)
+    given = number is not None
+    control.tip_control = code in (434, 435)
+    on = control.setup.tcp or control.tip_control or control.tilted
+    number = number if (on and number) or any(tool) or lacking else None
     if "H" in block.runtime or (code in BY_WORDS and block.runtime):
         control.refusal = control.refusal or "a tool length offset is known only at run time"
     if code == 435:
         control.refusal = control.refusal or "the tool direction is given by I J K (G43.5)"
-    control.tip_control = code in (434, 435)
-    on = control.setup.tcp or control.tip_control or control.tilted
     across = (X, Y) if on and not (control.tcp and control.stands_square()) else ()
     if on or control.tcp:
-        switch(control, tool, on)
+        switch(control, tool, on, number)
     control.places.shift(mask_of((*across, Z)))
-    control.tools.vector, control.tools.offset = tool, number if on or any(tool) or lacking else None
-    control.modal.tool_code = 490 if number is None else 430
+    control.tools.vector, control.tools.offset = tool, number
+    control.modal.tool_code = 430 if given else 490
     control.refresh()
 
 
@@ -92,12 +95,14 @@ def offset_by_words(control: RS274Control, block: Block, *, added: bool) -> tupl
 
 def numbered_tool(control: RS274Control, block: Block) -> int:
     """The tool that H names; without H, and with H0 in LinuxCNC, the one in the spindle."""
-    if "H" not in block.values:
-        return control.tools.spindle
-    number = whole(block.values["H"], "H")
-    if number < 0:
+    number = whole(block.values["H"], "H") if "H" in block.values else None
+    if number is not None and number < 0:
         raise Fault(BAD_LENGTH, f"H{number} is negative")
-    return control.tools.spindle if number == 0 and control.rules.strict else number
+    if number is not None and (number or not control.rules.strict):
+        return number
+    if control.tools.unsure:
+        control.refusal = control.refusal or TOOL_AT_RUN_TIME
+    return control.tools.spindle
 
 
 def is_lacking(control: RS274Control, number: int) -> bool:
@@ -125,6 +130,8 @@ def set_data(control: RS274Control, block: Block, code: int) -> None:
     Where controls differ: P0 is the system in force or the external one, and in G91 words are set or added.
     """
     kind = whole(block.get("L", -1.0), "L of G10")
+    if block.runtime & {"L", "P"}:
+        control.refusal = control.refusal or "what G10 sets is known only at run time"
     alike = kind == 2 and "R" not in block.values and block.get("P") != 0.0 and not control.modal.incremental
     if not control.rules.strict and not alike:
         control.refusal = control.refusal or DIFFERS.format(kind)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import partial
 
 from ncfix.control.coordinates import LETTERS
-from ncfix.control.expressions import Value
+from ncfix.control.expressions import Unknown, Value
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.flow import OWords
 
@@ -29,11 +29,16 @@ def install(control: RS274Control, flow: OWords) -> None:
 def numbered(control: RS274Control) -> dict[int, Getter]:
     """Numbered parameters: tool number and data (5400 ..), position in program units (5420 ..)."""
     getters: dict[int, Getter] = {5420 + index: partial(control.coordinate, index) for index in range(9)}
-    getters[5400] = lambda: float(control.tools.spindle)
-    getters[5403] = lambda: number_or_zero(control.tool_length()[1])
-    getters[5410] = lambda: 2.0 * (control.knowledge.known_tool_radius(control.tools.spindle) or 0.0)
+    getters[5400] = lambda: of_tool(control, control.tools.spindle)
+    getters[5403] = lambda: of_tool(control, number_or_zero(control.tool_length()[1]))
+    getters[5410] = lambda: of_tool(control, 2.0 * (control.knowledge.known_tool_radius(control.tools.spindle) or 0.0))
     getters[5220] = lambda: float(control.modal.system)
     return getters
+
+
+def of_tool(control: RS274Control, value: float) -> Value:
+    """A value that depends on which tool is in the spindle."""
+    return Unknown("tool", value) if control.tools.unsure else float(value)
 
 
 def number_or_zero(value: float) -> float:
@@ -109,8 +114,9 @@ def machine(control: RS274Control) -> dict[str, Getter]:
         "_imperial_machine": 0.0,
     }
     getters: dict[str, Getter] = {name: partial(float, value) for name, value in constants.items()}
-    getters["_current_tool"] = lambda: float(control.tools.spindle)
-    getters["_selected_tool"] = lambda: float(control.tools.selected)
+    tools = control.tools
+    getters["_current_tool"] = lambda: of_tool(control, tools.spindle)
+    getters["_selected_tool"] = lambda: Unknown("tool", tools.selected) if tools.doubtful else float(tools.selected)
     return getters
 
 

@@ -12,7 +12,7 @@ from ncfix.control.expressions import Fault
 from ncfix.control.moves import Arc, MotionKind, Passing, UnknownAxes
 from ncfix.control.tcp import led_in_machine
 from ncfix_siemens.sinumerik.increments import unsteady
-from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
 
 RUNTIME = "where the axis {} stands is known only at run time"
@@ -283,7 +283,7 @@ def machine_destination(control: Sinumerik, words: BlockWordValues) -> End:
         for letter in LETTERS:
             if letter in words.values:
                 place_at_machine(control, words, letter, target, unknown)
-    return End(target, unknown, lost_in_frame(control, unknown))
+    return End(target, unknown, control.along_frame(unknown))
 
 
 def axes_of_machine(control: Sinumerik, words: BlockWordValues) -> tuple[dict[int, float], UnknownAxes]:
@@ -316,15 +316,6 @@ def place_at_machine(
         unknown.pop(index, None)
     if value is None:
         unknown[index] = RUNTIME
-
-
-def lost_in_frame(control: Sinumerik, unknown: UnknownAxes) -> UnknownAxes:
-    """Which coordinates of the program are not known where these axes are not: in a turned frame one hides three."""
-    if not control.is_rotated:
-        return dict(unknown)
-    lost = {index: why for index, why in unknown.items() if index not in GEOMETRY}
-    why = next((why for index, why in unknown.items() if index in GEOMETRY), None)
-    return lost if why is None else lost | {index: why for index in GEOMETRY if index in control.machine}
 
 
 def step_of(control: Sinumerik, letter: str, value: float | None) -> float:

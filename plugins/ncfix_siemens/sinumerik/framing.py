@@ -219,7 +219,7 @@ def call_tool(control: Sinumerik, words: BlockWordValues) -> bool:
     if name is None and value is None:
         control.refusal = control.refusal or "the tool (T) is known only at run time"
         return False
-    control.tools.selected = control.named.number(name) if name is not None else round(value or 0.0)
+    control.tools.select(control.named.number(name) if name is not None else round(value or 0.0))
     return True
 
 
@@ -236,7 +236,7 @@ def choose_edge(control: Sinumerik, words: BlockWordValues) -> bool:
 def into_spindle(control: Sinumerik) -> None:
     """The tool that is selected comes into the spindle, with its edge D1."""
     control.suspended.pop("tool", None)
-    control.tools.spindle = control.tools.selected
+    control.tools.change()
     control.edge = 1
     control.places.lose(mask_of(control.machine))
 

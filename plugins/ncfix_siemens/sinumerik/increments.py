@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.frames import WORLD, Affine
+from ncfix.control.state import XYZ
 
 if TYPE_CHECKING:
     from ncfix_siemens.sinumerik.state import Sinumerik
@@ -21,6 +22,9 @@ UNSTEADY = (
     "whether the increment takes along that {} has changed is for setting data: "
     'variables."{}" = 0 in the setup file says that it does not'
 )
+
+TAKEN_ALONG = ("by machine coordinates",)
+"""What an axis of a turned frame counts from that an axis of the machine has moved: neither frames nor none."""
 
 Footing = tuple[tuple[object, ...], tuple[object, ...]]
 """What the numbers of an axis count from: by its frame, and by the tool."""
@@ -56,11 +60,17 @@ def unsteady(control: Sinumerik, index: int, *, by_machine: bool = False) -> str
 
 
 def stand(control: Sinumerik, axes: int, *, by_machine: bool) -> None:
-    """These axes, a bit mask, have been brought somewhere: in the frames in force, or in machine coordinates."""
+    """These axes, a bit mask, have been brought somewhere: in the frames in force, or in machine coordinates.
+
+    An axis of the machine takes X, Y and Z of a turned frame along, and the frame was off meanwhile.
+    """
     footing = footings(control, WORLD) if by_machine else control.footing
+    moved = [index for index in XYZ if by_machine and control.is_rotated and axes >> index & 1]
     for index in range(len(LETTERS)):
         if axes >> index & 1:
             control.counted[index] = footing[index]
+        elif index in XYZ and any(control.tcp or control.rotation[other][index] for other in moved):
+            control.counted[index] = TAKEN_ALONG, footing[index][1]
 
 
 def had_from_the_start(control: Sinumerik, before: list[Footing]) -> None:

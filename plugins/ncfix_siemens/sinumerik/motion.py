@@ -171,15 +171,9 @@ def measure(control: Sinumerik, words: BlockWordValues) -> None:
     """MEAS: towards the words until the probe switches."""
     end = destination(control, words)
     gone = {i: AFTER_MEASURING for i in control.machine if end.target[i] != control.position[i] or i in end.unknown}
-    lost = end.lost | dict.fromkeys(spread(control, gone), AFTER_MEASURING)
+    lost = end.lost | control.along_frame(gone)
     ends = End(end.target, end.unknown | gone, lost)
     control.go(ProgrammedMotion(MotionKind.FEED, words, ends, control.modal.motion, passing=MEASURING))
-
-
-def spread(control: Sinumerik, gone: dict[int, str]) -> list[int]:
-    """The coordinates of the program that are not known where these axes are not."""
-    hidden = control.is_rotated and any(index in GEOMETRY for index in gone)
-    return sorted(set(gone) | ({index for index in GEOMETRY if index in control.machine} if hidden else set()))
 
 
 def soft_approach(control: Sinumerik, words: BlockWordValues) -> None:
@@ -194,7 +188,7 @@ def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     gone = tuple(index for index in dict.fromkeys(named) if index in control.machine)
     reasons = dict.fromkeys((*gone, *(GEOMETRY if gone and control.tcp else ())), AFTER_REFERENCE)
     reasons = {index: why for index, why in reasons.items() if index in control.machine}
-    lost = dict(control.lost) | dict.fromkeys(spread(control, reasons), AFTER_REFERENCE)
+    lost = control.lost | control.along_frame(reasons)
     words = BlockWordValues(words.block, {}, {}, mask_of(gone))
     end = End(control.position[:], dict(control.unknown) | reasons, lost)
     control.go(

@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 
 GEOMETRY = (X, Y, Z)
 ROUND = frozenset({20, 30, MOTIONS["cip"]})
-TURNED = "where the axis {} stands in the turned coordinates is not known"
 RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
 
 RESET_OF_DIAMETER = "$MC_GCODE_RESET_VALUES[28]"
@@ -193,13 +192,10 @@ class Sinumerik(ProgramControl):
         return self.tcp, (self.tools.offset, self.edge) if self.tcp or index == Z else None
 
     def hide_in_turned_frame(self) -> None:
-        """Coordinates of a frame that has just been turned are known if all of them are."""
+        """Coordinates of a frame that has just been turned are known if all axes are that have a part in them."""
         mine = {index: why for index, why in self.lost.items() if index not in GEOMETRY}
-        hidden = [index for index in GEOMETRY if index in self.unknown]
-        if hidden and self.is_rotated:
-            self.lost = mine | {index: TURNED for index in GEOMETRY if index in self.machine}
-        else:
-            self.lost = mine | {index: self.unknown[index] for index in hidden}
+        hidden = {index: why for index, why in self.unknown.items() if index in GEOMETRY}
+        self.lost = mine | self.along_frame(hidden)
 
     def select(self, name: str) -> None:
         """A settable frame comes into force."""
@@ -249,7 +245,7 @@ class Sinumerik(ProgramControl):
         new = self.tools.vector if tool is None else tool
         if on or self.tcp:
             known = dict(self.unknown)
-            switch(self, new, on)
+            switch(self, new, on, self.tools.offset)
             self.lost |= {index: why for index, why in self.unknown.items() if index not in known}
         self.tcp = on
         self.tools.vector = new
@@ -268,10 +264,7 @@ class Sinumerik(ProgramControl):
     def lose_axes(self, indices: tuple[int, ...], reason: str) -> None:
         """These axes stand somewhere that is not known from here on."""
         self.lose(indices, reason)
-        gone = {index for index in indices if index in self.machine}
-        if self.is_rotated and gone & set(GEOMETRY):
-            gone |= {index for index in GEOMETRY if index in self.machine}
-        self.lost |= dict.fromkeys(sorted(gone), reason)
+        self.lost |= self.along_frame({index: reason for index in indices if index in self.machine})
 
     def path_word(self, words: Collection[str]) -> str:
         """See `PATH_WORDS`; I J K are words of arcs, and lead nowhere beside a straight motion."""
@@ -397,14 +390,11 @@ class Sinumerik(ProgramControl):
             return tools.get(f"{name} D{edge}".upper())
         return tools.get(name.upper()) if name in self.named.numbers else self.setup.tools.get(number)
 
-    def tool_length(self) -> tuple[int, float]:
-        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown.
-
-        With D0 a transformation leads the point where a tool of no length has its tip.
-        """
-        if self.tools.offset is not None:
-            return self.tools.offset, self.tools.vector[2]
-        if self.tcp:
-            return self.tools.spindle, 0.0
+    def spindle_length(self) -> float:
+        """As of every control, by the names of tools."""
         known = self.given_length(self.tools.spindle)
-        return self.tools.spindle, math.nan if known is None else known
+        return math.nan if known is None else known
+
+    def led_with(self, tool: Vector, number: int | None) -> float:
+        """With D0 a transformation leads the point where a tool of no length has its tip."""
+        return tool[2]

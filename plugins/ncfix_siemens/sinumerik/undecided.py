@@ -58,7 +58,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
     why = ASYNCHRONOUS.get(step.name, "a positioning axis (POS)")
     if step.name in GO_SOMEWHERE:
         still = BlockWordValues(turn.words.block, {}, {}, mask_of(gone))
-        lost = dict(control.lost) | dict.fromkeys(gone, AFTER_POSITIONING)
+        lost = control.lost | control.along_frame(dict.fromkeys(gone, AFTER_POSITIONING))
         control.go(
             ProgrammedMotion(
                 MotionKind.RAPID, still, End(control.position[:], control.axes_of(lost), lost), 0, refusal=why

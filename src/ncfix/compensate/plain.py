@@ -452,7 +452,7 @@ def plain_ones(head: Moves, moves: Moves) -> Mask | None:
 def _may_be_planned(moves: Moves) -> bool:
     """Whether motions are to be corrected, in the axes that they name, from where they begin to where they say."""
     rule = (moves.rule != Rule.CORRECT) & (moves.kind != MotionKind.DWELL)
-    special = moves.incremental | rule | (moves.kind == MotionKind.CYCLE)
+    special = moves.incremental | rule | (moves.kind == MotionKind.CYCLE) | moves.beside_tip
     columns = moves.approach, moves.counted, moves.resting
     if special.any() or not all(each is None or not np.any(each) for each in columns):
         return False

@@ -4,6 +4,7 @@ arrays. No object is kept per motion.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -38,6 +39,7 @@ class MotionStyle(NamedTuple):
     passing: Pass = Pass.NONE
     beside: float = 0.0
     across: int = 2
+    led: float = math.nan
 
 
 DTYPES: dict[str, type[np.generic]] = {
@@ -52,6 +54,7 @@ DTYPES: dict[str, type[np.generic]] = {
     "passing": np.int8,
     "beside": np.float64,
     "across": np.int8,
+    "led": np.float64,
 }
 """The types of the columns of `Moves` that styles hold; the others are flags."""
 
@@ -235,6 +238,8 @@ class MotionBuilder:
             styles["passing"] = None
         if not styles["beside"].any():
             styles["beside"] = styles["across"] = None
+        if np.isnan(styles["led"]).all():
+            styles["led"] = None
         programmed = named.take(mask, axis=0, mode="clip")
         counted = self._mask_column(self._counted, styles["incremental"])
         angles = self._keep_whole(styles, programmed, counted, start, end, block)

@@ -30,7 +30,7 @@ from ncfix.control.moves import (
 from ncfix.control.pointing import Pointing
 from ncfix.control.posture import MachineDirections, pointing_of
 from ncfix.control.setup import Run
-from ncfix.control.state import ControlState
+from ncfix.control.state import TOOL_AT_RUN_TIME, ControlState
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
 
@@ -305,6 +305,8 @@ class ProgramControl(ControlState):
         A canned cycle begins with a rapid, so it does not matter where from.
         """
         reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
+        if not reason and self.tools.unsure and self.tools.offset is None:
+            reason = TOOL_AT_RUN_TIME
         if not reason and unknown:
             reason = first_reason(unknown)
         if not reason and kind not in (MotionKind.RAPID, MotionKind.CYCLE) and self.unknown:
@@ -361,6 +363,7 @@ class ProgramControl(ControlState):
                 passing,
                 self._beside(),
                 modal.plane.across if modal.compensated else 2,
+                math.nan if not self.tcp or self.led_length == length else self.led_length,
             )
         )
 

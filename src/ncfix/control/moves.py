@@ -180,6 +180,8 @@ class Moves:
                  None: of none
     calls        the calls that occur
     spelled      (n, n_axes) axes that get a word even if they stand where it would lead them. None: none
+    led          (n,) mm, the length by which the control leads X Y Z under TCP, where that is not the tool's: zero
+                 while none is in force, so that it leads the spindle reference, not the tip; else NaN. None: nowhere
     """
 
     axes: tuple[str, ...]
@@ -221,9 +223,20 @@ class Moves:
     call: NDArray[np.int32] | None = None
     calls: tuple[CycleCall, ...] = ()
     spelled: NDArray[np.bool_] | None = None
+    led: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.block)
+
+    @property
+    def led_length(self) -> NDArray[np.float64]:
+        """(n,) mm, the length of tool that the control has X Y Z of under TCP."""
+        return self.tool_length if self.led is None else np.where(np.isnan(self.led), self.tool_length, self.led)
+
+    @property
+    def beside_tip(self) -> NDArray[np.bool_]:
+        """(n,) X Y Z are those of another point than the tip, though TCP is on."""
+        return np.zeros(len(self), dtype=bool) if self.led is None else self.tcp & ~np.isnan(self.led)
 
     @property
     def wordless(self) -> NDArray[np.bool_]:

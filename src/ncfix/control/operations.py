@@ -122,8 +122,8 @@ class SetTool(Operation):
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         if self.address in block.values:
-            control.tools.selected = round(block.values[self.address])
-        control.tools.spindle = control.tools.selected
+            control.tools.select(round(block.values[self.address]), unsure=self.address in block.runtime)
+        control.tools.change()
         control.places.lose(mask_of(control.machine))
 
     def __str__(self) -> str:

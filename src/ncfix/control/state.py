@@ -116,10 +116,13 @@ class Tools:
     cutter    the radius by which contours are offset, mm, where the program says it; NaN where it does not
     lengths   lengths that the program has set (G10 L1), mm
     measured  tools whose length it has set from what is known only at run time
+    unsure    which tool is in the spindle is known only at run time; `doubtful`: which one is selected
     """
 
     selected: int = 0
     spindle: int = 0
+    doubtful: bool = False
+    unsure: bool = False
     offset: int | None = None
     vector: Vector = field(default_factory=zeros)
     register: int | None = None
@@ -127,8 +130,17 @@ class Tools:
     lengths: dict[int, float] = field(default_factory=dict)
     measured: set[int] = field(default_factory=set)
 
+    def select(self, number: int, *, unsure: bool = False) -> None:
+        """The tool that is changed next; `unsure`: the number is only a nominal one."""
+        self.selected, self.doubtful = number, unsure
+
+    def change(self) -> None:
+        """The tool that is selected comes into the spindle."""
+        self.spindle, self.unsure = self.selected, self.doubtful
+
 
 BLOCK_DELETE = "NCF235"
+TOOL_AT_RUN_TIME = "which tool is in the spindle is known only at run time, and no length offset says how long it is"
 XYZ = (X, Y, Z)
 SPATIAL = 1 << X | 1 << Y | 1 << Z
 
@@ -319,8 +331,11 @@ class ControlState(ABC):
         return self.along_frame(self.unknown)
 
     def along_frame(self, unknown: UnknownAxes) -> UnknownAxes:
-        """The axes of the program's frame that have a part in one of these of the machine."""
-        return mixed_into(unknown, self.inverse) if unknown and self.is_rotated else unknown
+        """Which axes of the program's frame are not known where these of the machine are not.
+
+        In a turned frame one hides all that it has a part in.
+        """
+        return mixed_into(unknown, self.inverse) if unknown and self.is_rotated else dict(unknown)
 
     def axes_of(self, lost: UnknownAxes) -> UnknownAxes:
         """Which axes of the machine are not known where this is not known along those of the program's frame."""
@@ -335,8 +350,25 @@ class ControlState(ABC):
         """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
         if self.tools.offset is not None:
             return self.tools.offset, self.tools.vector[2]
+        return self.tools.spindle, self.spindle_length()
+
+    def spindle_length(self) -> float:
+        """The length of the tool in the spindle, mm, whether it is in force or not; NaN unknown."""
         known = self.tools.lengths.get(self.tools.spindle, self.knowledge.known_tool_length(self.tools.spindle))
-        return self.tools.spindle, math.nan if known is None else known
+        return math.nan if known is None else known
+
+    @property
+    def led_length(self) -> float:
+        """The length of tool that X Y Z are of under TCP, mm."""
+        return self.led_with(self.tools.vector, self.tools.offset)
+
+    def led_with(self, tool: Vector, number: int | None) -> float:
+        """The same with an offset in force, and the number of its tool (None without one).
+
+        Without one the control leads the spindle reference; if the setup says that X Y Z are those of the tip, the tip.
+        """
+        known = self.spindle_length() if number is None and self.setup.tcp else math.nan
+        return tool[Z] if math.isnan(known) else known
 
     def tool_radius(self) -> float:
         """The radius by which the control offsets contours, mm; NaN where it is not known."""

@@ -48,7 +48,7 @@ def led_in_machine(
     Under TCP the tip moves along other axes, too: the numbers of an axis that stands still change with the rest.
     """
     target, unknown = control.position[:], dict(control.unknown)
-    tip = TcpState(True, control.tools.vector[Z])
+    tip = TcpState(True, control.led_length)
     still = [index for index in (X, Y, Z) if index in control.machine and index not in axes]
     if control.tcp and still and not converted(control, target, unknown, tip, MACHINE):
         unknown |= dict.fromkeys(still, TURNED)
@@ -77,14 +77,15 @@ def converted(
     return True
 
 
-def switch(control: ProgramControl, tool: Vector, on: bool) -> None:
+def switch(control: ProgramControl, tool: Vector, on: bool, number: int | None) -> None:
     """Another tool length, and tool-centre-point control on or off: the machine stands still, the tip may not.
 
-    Where the tool lies along Z of a tilted plane, another length moves the tip along that only.
+    Where the tool lies along Z of a tilted plane, another length moves the tip along that only. `number` is that of the
+    tool whose length it is, None if none is in force from here on.
     """
     lost = {**control.lost_in_frame(), Z: TURNED} if on and control.tcp and control.stands_square() else None
-    before = TcpState(control.tcp, control.tools.vector[Z])
-    after = TcpState(on, tool[Z])
+    before = TcpState(control.tcp, control.led_length)
+    after = TcpState(on, control.led_with(tool, number))
     if (before.shift != after.shift or control.tcp != on) and not converted(
         control, control.position, control.unknown, before, after
     ):
@@ -138,7 +139,7 @@ def passed_through(moves: Moves, row: int, position: FloatArray, kinematics: Kin
 def _state(moves: Moves, row: int) -> TcpState:
     """Whether tool-centre-point control is on in a motion, and with which length."""
     on = bool(moves.tcp[row])
-    return TcpState(on, float(moves.tool_length[row]) if on else 0.0)
+    return TcpState(on, float(moves.led_length[row]) if on else 0.0)
 
 
 def jumps(moves: Moves) -> NDArray[np.bool_]:
@@ -149,6 +150,7 @@ def jumps(moves: Moves) -> NDArray[np.bool_]:
     """
     found = np.zeros(moves.start.shape, dtype=bool)
     found[1:] = ~(moves.start[1:] == moves.end[:-1]) & ~(np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
-    longer = moves.tcp[1:] & (moves.tool_length[1:] != moves.tool_length[:-1])
+    length = moves.led_length
+    longer = moves.tcp[1:] & (length[1:] != length[:-1])
     found[1:] |= (longer | (moves.tcp[1:] != moves.tcp[:-1]))[:, None] & ~moves.rotary
     return found

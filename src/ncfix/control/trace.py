@@ -178,6 +178,7 @@ LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
     "passing": lambda moves: np.zeros(len(moves), dtype=np.int8),
     "beside": lambda moves: np.zeros(len(moves)),
     "across": lambda moves: np.full(len(moves), 2, dtype=np.int8),
+    "led": lambda moves: np.full(len(moves), np.nan),
     "fixed_centre": lambda moves: np.zeros(len(moves), dtype=np.bool_),
     "call": lambda moves: np.full(len(moves), -1, dtype=np.int32),
     "counted": lambda moves: np.repeat(moves.incremental[:, None], len(moves.axes), axis=1),

@@ -147,6 +147,7 @@ def _opening(intent: Intent, rows: Index, start: Array) -> Mask:
     row, before = rows[next_one], rows[next_one - 1]
     same = every(picked(moves.start, row) == picked(moves.end, before)) & (moves.tcp[row] == moves.tcp[before])
     same &= (moves.tool_length[row] == moves.tool_length[before]) & (moves.kind[row] != MotionKind.CYCLE)
+    same &= moves.beside_tip[row] == moves.beside_tip[before]
     opens[next_one[same]] = False
     return opens
 

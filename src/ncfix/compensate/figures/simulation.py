@@ -263,7 +263,7 @@ def seems_corrected(machine: Machine, moves: Moves) -> bool:
         corrected = get_strategy(FixOptions().strategy).correct(
             machine, intent.joints_at(some, ends), intent.states(some, ends)
         )
-        commands = commands_from_joints(machine, corrected, moves.tcp[some], moves.tool_length[some])
+        commands = commands_from_joints(machine, corrected, moves.tcp[some], moves.led_length[some])
         shift[some] = commands - moves.end[some]
     step = machine.least_increment[0]
     return looks_corrected(numbers_of(moves, shift, ~kept, step), step)

@@ -90,7 +90,7 @@ def bounds(intent: Intent, real: Segments, rows: Index, uneasy: Mask) -> Array:
     """
     most, moves = np.full(len(rows), np.inf), intent.moves
     plain = ~((moves.kind == MotionKind.ARC)[rows] | uneasy[rows])
-    plain[lacking(intent, rows)] = False
+    plain[lacking(intent, rows)] = plain[moves.beside_tip[rows]] = False
     if intent.machine.bow is None or intent.state.inputs or not plain.any():
         return most
     led = moves.tcp[rows]

@@ -150,7 +150,7 @@ def _restarts(moves: Moves, back: Mask) -> Mask:
 
 def _runs(moves: Moves) -> list[slice]:
     """Stretches over which commands mean the same: no change of tool-centre-point control or of its tool length."""
-    length = np.where(moves.tcp, moves.tool_length, 0.0)
+    length = np.where(moves.tcp, moves.led_length, 0.0)
     changes = np.flatnonzero((np.diff(moves.tcp.astype(np.int8)) != 0) | (np.diff(length) != 0)) + 1
     ends = [*changes.tolist(), len(moves)]
     return [slice(start, stop) for start, stop in zip([0, *changes.tolist()], ends, strict=True) if stop > start]
@@ -163,10 +163,10 @@ def _translated(machine: Machine, moves: Moves, row: int, shift: Array) -> Array
         return shift
     ends = np.concatenate([moves.end[there], moves.end[there] + shift])
     pair = np.repeat(there, 2), np.repeat(here, 2)
-    q, reached = reached_joints(machine, ends, moves.tcp[pair[0]], moves.tool_length[pair[0]])
+    q, reached = reached_joints(machine, ends, moves.tcp[pair[0]], moves.led_length[pair[0]])
     if not reached.all():
         return np.zeros_like(shift)
-    commands = commands_from_joints(machine, q, moves.tcp[pair[1]], moves.tool_length[pair[1]])
+    commands = commands_from_joints(machine, q, moves.tcp[pair[1]], moves.led_length[pair[1]])
     result: Array = commands[1] - commands[0]
     return result
 
@@ -200,7 +200,7 @@ def _steered(intent: Intent, rows: Index, nominal: Array, wanted: Array) -> tupl
     arrived, commands = fit.copy(), nominal.copy()
     target = machine.tip(meant[fit], intent.lengths(good))
     solved, arrived[fit] = steer(machine, q[fit], target, intent.states(good, np.ones(len(good))))
-    commands[fit] = commands_from_joints(machine, solved, moves.tcp[good], moves.tool_length[good])
+    commands[fit] = commands_from_joints(machine, solved, moves.tcp[good], moves.led_length[good])
     return commands, arrived
 
 
@@ -365,7 +365,7 @@ def as_commands(intent: Intent, rows: Index, programmed: Array, nominal: Array, 
     programmed  (k, n_axes) commands of the program
     nominal     (k, n_axes) axis positions of the program
     """
-    tcp, lengths = intent.moves.tcp[rows], intent.moves.tool_length[rows]
+    tcp, lengths = intent.moves.tcp[rows], intent.moves.led_length[rows]
     if not tcp.any():
         return corrected
     return led_as_commands(intent.machine, programmed, (nominal, corrected), tcp, lengths)

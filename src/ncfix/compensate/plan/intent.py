@@ -109,7 +109,7 @@ class Intent:
     def joints(self, rows: Index, commands: Array) -> Array:
         """Axis positions of commands (k, n_axes) of motions `rows` (k,); NaN where they cannot be reached."""
         moves = self.moves
-        q, reached = reached_joints(self.machine, commands, moves.tcp[rows], moves.tool_length[rows])
+        q, reached = reached_joints(self.machine, commands, moves.tcp[rows], moves.led_length[rows])
         return q if reached.all() else np.where(reached[:, None], q, np.nan)
 
     def joints_at(self, rows: Index, fraction: Array) -> Array:
@@ -122,12 +122,15 @@ class Intent:
 
     def meant(self, rows: Index, commands: Array) -> Array:
         """Where commands (k, n_axes) of motions `rows` (k,) take the tip of a perfect machine, (k, 3) mm."""
-        tcp = self.moves.tcp[rows]
-        if tcp.all():
+        tcp, beside = self.moves.tcp[rows], np.flatnonzero(self.moves.beside_tip[rows])
+        if tcp.all() and not beside.size:
             return programmed_tip(self.machine, commands)
         tip: Array = self.machine.tip(commands, self.lengths(rows))
         if tcp.any():
             tip[tcp] = programmed_tip(self.machine, commands[tcp])
+        if beside.size:
+            on = rows[beside]
+            tip[beside] = self.machine.tip(self.joints(on, commands[beside]), self.lengths(on))
         return tip
 
     def lengths(self, rows: Index) -> Array:
@@ -216,7 +219,7 @@ class Intent:
         moves = self.moves
         begin, target = self.joints(rows, commands), self.tip(rows, fraction)
         q, arrived = steer(self.machine, begin, target, self.states(rows, fraction))
-        return commands_from_joints(self.machine, q, moves.tcp[rows], moves.tool_length[rows]), arrived
+        return commands_from_joints(self.machine, q, moves.tcp[rows], moves.led_length[rows]), arrived
 
     def guessed(self, real: Segments, rows: Index, fraction: Array) -> Array:
         """Nearly the corrected commands at fractions of motions, (k, n_axes), see `improved`."""

@@ -293,7 +293,7 @@ def _rounding_of_turns(intent: Intent, pieces: Pieces, rows: Index) -> float:
     """
     moves, rotary = intent.moves, intent.machine.rotary
     anew = some((picked(pieces.end, rows) != picked(moves.end, pieces.move[rows]))[:, rotary])
-    on = rows[anew & ~moves.tcp[pieces.move[rows]]]
+    on = rows[anew & (~moves.tcp | moves.beside_tip)[pieces.move[rows]]]
     if not on.size:
         return 0.0
     most = 0.0
