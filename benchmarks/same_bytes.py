@@ -27,7 +27,7 @@ import programs
 
 from ncfix import fast
 from ncfix.cli import console
-from ncfix.cli.batch import FixJob
+from ncfix.cli.shop.batch import FixJob
 from ncfix.cli.targets import OutputTarget
 from ncfix.compensate import FixOptions
 from ncfix.control.setup import Setup

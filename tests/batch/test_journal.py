@@ -36,6 +36,7 @@ def test_what_was_noted_is_read_again(tmp_path: Path, record: JournalRecord) -> 
     again = Journal(str(tmp_path))
     assert again.records == journal.records == {"part.nc": record}
     assert set(again.written["part.nc"]) == {"0", record.digest}
+    assert again.made("part.nc", "") == set()
 
 
 @pytest.mark.parametrize("cut", [1, 20, 60])
@@ -58,8 +59,11 @@ def test_what_is_no_line_of_a_journal_does_not_count(tmp_path: Path, record: Jou
 
 
 def test_what_is_announced_counts_as_written(tmp_path: Path) -> None:
-    announce(Journal(str(tmp_path)).path, "part.nc", "12")
-    assert Journal(str(tmp_path)).written == {"part.nc": {"12": None}}
+    one, other = tmp_path / "one" / "part.nc", tmp_path / "other" / "part.nc"
+    announce(Journal(str(tmp_path)).path, "part.nc", "12", str(one))
+    assert Journal(str(tmp_path)).made("part.nc", str(one)) == {"12"}
+    assert Journal(str(tmp_path)).made("part.nc", str(other)) == set()
+    assert Journal(str(tmp_path)).made("else.nc", str(one)) == set()
 
 
 def test_a_journal_does_not_grow_for_ever(
@@ -67,14 +71,14 @@ def test_a_journal_does_not_grow_for_ever(
 ) -> None:
     monkeypatch.setattr(journals, "ROOM_BYTES", 100)
     with Journal.opened(str(tmp_path)) as journal:
-        announce(journal.path, "new.nc", "34")
+        announce(journal.path, "new.nc", "34", "new")
     for _ in range(5):
         with Journal.opened(str(tmp_path)) as journal:
             journal.add(record)
     assert len(Path(journal.path).read_bytes().split(b"\n")) <= 5
     again = Journal(str(tmp_path))
     assert again.records == {"part.nc": record}
-    assert again.written == {"part.nc": {record.digest: None}, "new.nc": {"34": None}}
+    assert again.written == {"part.nc": {record.digest: ""}, "new.nc": {"34": "new"}}
 
 
 def test_one_batch_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

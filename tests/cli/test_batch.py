@@ -162,6 +162,17 @@ def test_an_output_that_somebody_changed_is_never_trusted_nor_replaced(night: An
     assert resumed(night()[0]) == set("012345")
 
 
+def test_a_program_of_the_same_name_does_not_take_the_place_of_another(night: Any, ncfix: Any, shop: Any) -> None:
+    night()
+    other = shop.folder / "elsewhere" / "part0.ngc"
+    other.parent.mkdir()
+    other.write_bytes(shop.program.read_bytes())
+    before = contents(shop.folder / "out")
+    result = ncfix("fix", other, "-m", shop.machine, "-o", shop.folder / "out", "--assume-zero", "--resume")
+    assert "NCF004" in result.err
+    assert contents(shop.folder / "out") == before
+
+
 def test_a_failure_is_remembered_until_something_changes(night: Any, parts: Path) -> None:
     bad = parts / "bad.ngc"
     bad.write_bytes(b"G1 X1 Y..2\nM2\n")
@@ -252,7 +263,7 @@ def test_json_lines(ncfix: Any, shop: Any, parts: Path) -> None:
 def test_a_program_that_takes_too_long(
     ncfix: Any, shop: Any, parts: Path, jobs: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from ncfix.cli.batch import FixJob
+    from ncfix.cli.shop.batch import FixJob
 
     fixed = FixJob.fixed
 

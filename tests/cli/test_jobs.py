@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from ncfix.cli import fix
-from ncfix.cli.batch import Batch
 from ncfix.cli.fix import AUTO, ON_ONE, PAYS_BYTES, PAYS_PROGRAMS, processes_for
+from ncfix.cli.shop.batch import Batch
 from ncfix.cli.targets import STREAM, OutputTarget
 from ncfix.diagnostics import ExitCode
 

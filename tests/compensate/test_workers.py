@@ -17,7 +17,7 @@ import pytest
 from compensate.streaming import run
 from compensate.test_stream import OPTIONS, SETUP, program, streamed
 from ncfix.cli import console
-from ncfix.cli.batch import FixJob
+from ncfix.cli.shop.batch import FixJob
 from ncfix.cli.streams import Outlet, Source
 from ncfix.cli.targets import OutputTarget
 from ncfix.compensate import driver, workers

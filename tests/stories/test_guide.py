@@ -10,7 +10,7 @@ import pytest
 
 from stories.story import GUIDE, alike, run, steps
 
-PAGES = ("batch", "calibrate", "correct", "diagnose", "export", "machine")
+PAGES = ("batch", "calibrate", "correct", "diagnose", "export", "machine", "post")
 EXCERPT = re.compile(r"^```(?:nc|toml|csv)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 

@@ -2,8 +2,9 @@
 
 The journal stays when the batch is over. The next run of the same batch, with `--resume`, finds there what need not be
 done again: programs of which nothing has changed, also those that failed. What changed is done again, and its output
-takes the place of the old one, as long as that is what ncfix has written there: the journal knows the digests of all
-outputs. An output that somebody has changed since is never replaced, and never taken for done.
+takes the place of the old one, as long as that is what ncfix has written there for this program: the journal knows the
+digests of all outputs. An output that somebody has changed since, or that was made of another program of the same name,
+is never replaced, and never taken for done.
 
 A process can be killed at any moment. So an output is announced in the journal before it gets its name, and noted after
 it; a line that was cut off does not count, and spoils no other. While a batch runs its journal is locked.
@@ -74,6 +75,7 @@ class JournalRecord:
     """A program that is done, or that failed.
 
     name    the output, as a way down from the folder
+    source  the program's real path
     key     what the result depends on, as a digest: the program, the machine, the set-up, the options
     digest  of the output; empty if none was written
     called  subprograms that were looked for: name -> digest of their text, empty if there was none
@@ -89,6 +91,7 @@ class JournalRecord:
     entry: Mapping[str, Any] = field(default_factory=dict)
     code: int = 0
     limits: str = ""
+    source: str = ""
 
     def holds(self, key: str, output: str, find: Find, limits: str = "") -> bool:
         """Whether the same would come of it again, and the output is as it was written."""
@@ -101,9 +104,12 @@ class JournalRecord:
         return all(text_digest(find(name)) == digest for name, digest in self.called.items())
 
 
-def announce(path: str, name: str, digest: str) -> None:
-    """Say in a journal that an output is about to get this content. Raises `UsageError` NCF005, NCF007."""
-    _append(path, {"name": name, "writes": digest})
+def announce(path: str, name: str, digest: str, source: str) -> None:
+    """Say in a journal that an output is about to get this content, made of the program with this real path.
+
+    Raises `UsageError` NCF005, NCF007.
+    """
+    _append(path, {"name": name, "writes": digest, "source": source})
 
 
 def _append(path: str, content: Mapping[str, Any]) -> None:
@@ -115,14 +121,14 @@ class Journal:
     """The journal of a folder.
 
     records  what is known of each output, by its name: the last word counts
-    written  the digests of all that ncfix has written, or was about to, under a name
+    written  what ncfix has written, or was about to, under a name: digests, and the real paths of the programs
     """
 
     def __init__(self, folder: str) -> None:
         self.folder = folder
         self.path = os.path.join(folder, JOURNAL)
         self.records: dict[str, JournalRecord] = {}
-        self.written: dict[str, dict[str, None]] = {}
+        self.written: dict[str, dict[str, str]] = {}
         self._read()
 
     @classmethod
@@ -137,6 +143,11 @@ class Journal:
             journal = cls(folder)
             yield journal
             journal.tidy()
+
+    def made(self, name: str, program: str) -> frozenset[str]:
+        """The digests of what ncfix has written under a name for this program; not for another of the same name."""
+        source = os.path.realpath(program)
+        return frozenset(digest for digest, of in self.written.get(name, {}).items() if of == source)
 
     def add(self, record: JournalRecord) -> None:
         """Note what came of a program. Raises `UsageError` NCF005, NCF007."""
@@ -154,15 +165,15 @@ class Journal:
     def _lines(self) -> Iterator[dict[str, Any]]:
         """All that counts."""
         for name, digests in self.written.items():
-            for digest in digests:
+            for digest, source in digests.items():
                 if name not in self.records or digest != self.records[name].digest:
-                    yield {"schema": SCHEMA, "name": name, "writes": digest}
+                    yield {"schema": SCHEMA, "name": name, "writes": digest, "source": source}
         yield from ({"schema": SCHEMA, **asdict(record)} for record in self.records.values())
 
     def _take(self, record: JournalRecord) -> None:
         self.records[record.name] = record
         if record.digest:
-            self.written.setdefault(record.name, {})[record.digest] = None
+            self.written.setdefault(record.name, {})[record.digest] = record.source
 
     def _read(self) -> None:
         try:
@@ -179,7 +190,7 @@ class Journal:
         if found.pop("schema") != SCHEMA:
             return
         if "writes" in found:
-            self.written.setdefault(str(found["name"]), {})[str(found["writes"])] = None
+            self.written.setdefault(str(found["name"]), {})[str(found["writes"])] = str(found["source"])
         else:
             self._take(JournalRecord(**found))
 

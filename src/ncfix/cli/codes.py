@@ -111,4 +111,11 @@ CODES = {
         "output.",
         "Do not use this output: remove it, or put right what the program fails of.",
     ),
+    "NCF028": Code(
+        "a fault in a project file",
+        "`ncfix.toml` says what holds for the programs of a folder: `machine`, `setup`, `output`, `dialect`, "
+        "`tool_table`, a table `[options]` of options of `ncfix fix`, and `[[programs]]` with a `match`. "
+        "Something else stands there, or another kind of value.",
+        "docs/formats.md has the keys; `--no-project` goes without the file.",
+    ),
 }

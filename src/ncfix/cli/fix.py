@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -22,14 +24,18 @@ from ncfix.cli.options import (
     tolerance_option,
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.shop.projects import ProjectCommand, base_of, group_of, is_from_file, next_group, project_options
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, targets
 from ncfix.diagnostics import UsageError
 from ncfix.host import processors
 from ncfix.plugins import registry
 
 if TYPE_CHECKING:
-    from ncfix.cli.batch import Batch, FixOutcome
+    from ncfix.batch.work import ExecutorMaker
+    from ncfix.cli.shop.batch import Batch
 
+BATCHES = "ncfix.batches"
+"""Where a context keeps the batches of the groups of programs before this one."""
 AUTO = 0
 """`--jobs auto` as a number: as many as pay."""
 PAYS_BYTES = 8 << 20
@@ -82,11 +88,16 @@ def _executors() -> Iterable[str]:
     return registry("executors", BUILT_IN)
 
 
-@click.command()
+@click.command(cls=ProjectCommand)
 @click.argument("programs", type=PATH, nargs=-1, required=True, metavar="PROGRAM...")
 @machine_option
 @click.option(
-    "-o", "--output", type=PATH, metavar="FILE|DIR", help="Where to write; a folder for many programs; - for stdout."
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="FILE|DIR",
+    envvar="NCFIX_OUTPUT",
+    help="Where to write; a folder for many programs; - for stdout.",
 )
 @click.option("--in-place", is_flag=True, help="Put the result in PROGRAM's place and keep that as PROGRAM.orig.")
 @click.option(
@@ -138,6 +149,7 @@ def _executors() -> Iterable[str]:
 @click.option("--memory-limit-mb", type=click.IntRange(1), metavar="MB", help="Memory that one program may take.")
 @click.option("-q", "--quiet", is_flag=True, help="Say only of which programs nothing was written, and why.")
 @click.option("-v", "--verbose", is_flag=True, help="Of many programs, say all of each.")
+@project_options
 @json_option
 @click.option("--json-lines", is_flag=True, help="Print one JSON object for each program as soon as it is done.")
 def fix(
@@ -166,13 +178,19 @@ def fix(
     was written.
     """
     from ncfix.batch.work import executor_of
-    from ncfix.cli.batch import Batch, FixJob, ProgramLimits
-    from ncfix.cli.summary import Loudness
+    from ncfix.cli.shop.batch import Batch, FixJob, ProgramLimits
+    from ncfix.cli.shop.summary import Loudness
 
     if as_json and json_lines:
         raise UsageError.of("NCF001", "--json and --json-lines are two forms of one output", hint="leave one out")
-    outputs = Outputs(output, in_place, force, resume)
-    wanted = targets(programs, outputs, (machine_path, *given.files), folders=True)
+    context = click.get_current_context()
+    base = base_of(context, "output")
+    if base and (in_place or programs == (STREAM,)):
+        output = None
+    if resume and is_from_file(context, "resume") and Outputs(output, in_place).folder(programs) is None:
+        resume = False
+    outputs = Outputs(output, in_place, force, resume, base)
+    wanted = targets(programs, outputs, (machine_path, *given.files), folders=True, only=group_of(context).programs)
     for target in wanted:
         check_streams(JSON if as_json or json_lines else None, program=target)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
@@ -185,22 +203,29 @@ def fix(
     job = FixJob(machine, given.load(), dialect, options, ProgramLimits(time_limit_s, memory_limit_mb))
     loudness = Loudness.ALL if verbose else Loudness.QUIET if quiet else Loudness.USUAL
     batch = Batch(job, wanted, outputs.folder(programs), resume, retry, loudness)
-    return _reported(batch.run(processes_for(jobs, wanted), executor_of(executor)), batch, as_json, json_lines)
+    batches = [*context.meta.get(BATCHES, ()), (batch, processes_for(jobs, wanted), executor_of(executor))]
+    context.meta[BATCHES] = batches
+    if (following := next_group(context)) is not None:
+        with following:
+            return int(following.command.invoke(following))
+    return _reported(batches, as_json, json_lines)
 
 
-def _reported(outcomes: Iterator[FixOutcome], batch: Batch, as_json: bool, json_lines: bool) -> int:
-    """Print what comes of programs, in the form asked for; the worst exit code."""
-    from ncfix.cli.summary import Became, Loudness, Summary
+def _reported(batches: Sequence[tuple[Batch, int, ExecutorMaker]], as_json: bool, json_lines: bool) -> int:
+    """Do batches, one after the other, and print what comes of them, in the form asked for; the worst exit code."""
+    from ncfix.cli.shop.summary import Became, Loudness, Summary
 
     summary, entries, worst = Summary(), list[Mapping[str, Any]](), 0
-    for outcome in outcomes:
+    many = sum(len(batch.targets) for batch, _, _ in batches) > 1
+    runs = (replace(batch, many=many).run(jobs, make) for batch, jobs, make in batches if batch.targets)
+    for outcome in chain.from_iterable(runs):
         summary.add(outcome.entry)
         worst = max(worst, outcome.code)
         if json_lines:
             console.put(console.json_text(None, outcome=Became.of(outcome.entry), **outcome.entry))
         if as_json:
             entries.append(outcome.entry)
-    if batch.many and batch.loudness != Loudness.QUIET:
+    if many and batches[0][0].loudness != Loudness.QUIET:
         from ncfix.cli.listings import all_codes
 
         for line in summary.lines(all_codes()):

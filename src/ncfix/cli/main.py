@@ -37,6 +37,7 @@ VERBS = {
     "effects": "List the errors that a machine file may have.",
     "dialects": "List the control languages that can be read.",
     "plugins": "List the plugins and what each adds.",
+    "init": "Write a project file, so that programs need no options.",
     "explain": "Explain a message code.",
     "completion": "Print the completion script of a shell.",
 }
@@ -47,6 +48,7 @@ MODULES = {
     **dict.fromkeys(("plan", "calibrate", "diagnose"), "measurements"),
     **dict.fromkeys(("export", "emulate", "lint"), "tables"),
     **dict.fromkeys(("derive", "effects"), "machine"),
+    "init": "shop.projects",
     **dict.fromkeys(("dialects", "plugins", "explain", "completion"), "listings"),
 }
 """In which module of `ncfix.cli` the command of a verb is, if not in one of its own name."""

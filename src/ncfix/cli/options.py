@@ -85,17 +85,34 @@ CONTROL = of_kind("controls")
 
 
 machine_option = click.option(
-    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", required=True, help="The machine file (TOML)."
+    "-m",
+    "--machine",
+    "machine_path",
+    type=PATH,
+    metavar="FILE",
+    required=True,
+    envvar="NCFIX_MACHINE",
+    help="The machine file (TOML).",
 )
 
 
 optional_machine_option = click.option(
-    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="The machine file (TOML)."
+    "-m",
+    "--machine",
+    "machine_path",
+    type=PATH,
+    metavar="FILE",
+    envvar="NCFIX_MACHINE",
+    help="The machine file (TOML).",
 )
 
 
 dialect_option = click.option(
-    "--dialect", type=DIALECT, metavar="NAME", help="The control's language; found out if not given."
+    "--dialect",
+    type=DIALECT,
+    metavar="NAME",
+    envvar="NCFIX_DIALECT",
+    help="The control's language; found out if not given.",
 )
 
 

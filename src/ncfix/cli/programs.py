@@ -14,6 +14,7 @@ from ncfix.cli import console
 from ncfix.cli.following import Following, dialect_in, parts_of, task_of, through
 from ncfix.cli.options import PATH, dialect_option, force_option, json_option, optional_machine_option, table_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.shop.projects import ProjectCommand, group_of, next_group, project_options
 from ncfix.cli.streams import Keep, Source, source_of
 from ncfix.cli.targets import Outputs, shown, targets
 from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from ncfix.text.tree import Program
 
 
+OUTCOMES = "ncfix.outcomes"
+"""Where a context keeps what was found in the groups of programs before this one."""
 Found = tuple["Checked", str]
 """What is found in a program, and the name of the dialect in which it was read."""
 
@@ -45,11 +48,12 @@ def _whole(following: Following, source: Source) -> Found:
     return following.checked(program, source.path), program.dialect.name
 
 
-@click.command()
+@click.command(cls=ProjectCommand)
 @click.argument("programs", type=PATH, nargs=-1, required=True, metavar="PROGRAM...")
 @optional_machine_option
 @dialect_option
 @setup_options
+@project_options
 @json_option
 def check(
     programs: tuple[str, ...], machine_path: str | None, dialect: str | None, given: SetupOptions, as_json: bool
@@ -60,10 +64,16 @@ def check(
     findings.
     """
     following = Following.of(machine_path, dialect, given)
-    outcomes = [_outcome(following, program.path) for program in program_files(programs)]
+    context = click.get_current_context()
+    only, outcomes = group_of(context).programs, context.meta.setdefault(OUTCOMES, [])
+    paths = (program.path for program in program_files(programs))
+    outcomes += [_outcome(following, path) for path in paths if only is None or path in only]
+    if (following_group := next_group(context)) is not None:
+        with following_group:
+            return int(following_group.command.invoke(following_group))
     if as_json:
         console.put_json(files=[entry for _, entry in outcomes])
-    return max(code for code, _ in outcomes)
+    return max(int(code) for code, _ in outcomes)
 
 
 def _outcome(following: Following, path: str) -> tuple[int, dict[str, Any]]:

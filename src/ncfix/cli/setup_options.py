@@ -118,7 +118,12 @@ class Switches(click.ParamType):  # type: ignore[type-arg]
 
 OPTIONS = (
     click.option(
-        "--setup", "setup_file", type=PATH, metavar="FILE", help="Work offsets, tools and start position (TOML)."
+        "--setup",
+        "setup_file",
+        type=PATH,
+        metavar="FILE",
+        envvar="NCFIX_SETUP",
+        help="Work offsets, tools and start position (TOML).",
     ),
     click.option(
         "--offset",

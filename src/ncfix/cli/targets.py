@@ -122,12 +122,14 @@ class Outputs:
     in_place  outputs take the places of their inputs
     force     existing outputs may be replaced
     resume    outputs that are there from an earlier run are not done again
+    base      programs below this folder keep their way down from it in the folder of the outputs; None: their names
     """
 
     output: str | None = None
     in_place: bool = False
     force: bool = False
     resume: bool = False
+    base: str | None = None
 
     def folder(self, given: Sequence[str]) -> str | None:
         """The folder that the outputs go to; None if they do not go to one."""
@@ -139,11 +141,16 @@ class Outputs:
 
 
 def targets(
-    given: Sequence[str], outputs: Outputs, others: Sequence[str | None] = (), folders: bool = False
+    given: Sequence[str],
+    outputs: Outputs,
+    others: Sequence[str | None] = (),
+    folders: bool = False,
+    only: Collection[str] | None = None,
 ) -> list[OutputTarget]:
     """Where each output goes, which is none of the programs nor of the `others` that are read.
 
     folders  a folder among the inputs stands for all programs below it
+    only     the paths of those programs that are meant; None: all
 
     Raises `UsageError` NCF003 ... NCF016 before anything is computed or written.
     """
@@ -152,6 +159,12 @@ def targets(
     programs = (
         program_files(given, folder) if folders else [ProgramFile(path, os.path.basename(path)) for path in given]
     )
+    if only is not None:
+        programs = [program for program in programs if program.path in only]
+    if outputs.base is not None:
+        from ncfix.project import way_below
+
+        programs = [ProgramFile(each.path, way_below(outputs.base, each.path) or each.name) for each in programs]
     if outputs.in_place:
         found = [OutputTarget(program.path, program.path, in_place=True) for program in programs]
     else:

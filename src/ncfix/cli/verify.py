@@ -16,6 +16,7 @@ from ncfix.cli import console
 from ncfix.cli.following import Following, dialect_in, task_of, tell_of_stamp, through
 from ncfix.cli.options import PATH, dialect_option, json_option, machine_option, read_program, tolerance_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.shop.projects import ProjectCommand, project_options
 from ncfix.cli.streams import Source, source_of
 from ncfix.cli.targets import STREAM, shown
 from ncfix.diagnostics import ExitCode, Message
@@ -94,13 +95,14 @@ def compared(following: Following, original: str, fixed: str, tolerance_um: floa
     return Compared.together([Compared.of(each) for each in found])
 
 
-@click.command()
+@click.command(cls=ProjectCommand)
 @click.argument("original", type=PATH)
 @click.argument("fixed", type=PATH)
 @machine_option
 @tolerance_option
 @dialect_option
 @setup_options
+@project_options
 @json_option
 def verify(
     original: str,

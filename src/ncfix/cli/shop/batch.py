@@ -21,8 +21,8 @@ from ncfix.batch.work import ExecutorMaker, results_in_order
 from ncfix.cli import console
 from ncfix.cli.console import owned
 from ncfix.cli.options import dialect_of
+from ncfix.cli.shop.summary import Loudness, brief, progress, told
 from ncfix.cli.streams import FixedText, Outlet, Source, outlet_for, part_bytes, source_of
-from ncfix.cli.summary import Loudness, brief, progress, told
 from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
 from ncfix.host import limited
@@ -198,7 +198,7 @@ class FixJob:
         if not refused:
             if self.journal:
                 digest = text_digest(fixed.text)
-                announce(self.journal, target.name, digest)
+                announce(self.journal, target.name, digest, os.path.realpath(target.source))
             if fixed.changed or not target.in_place:
                 target.write(fixed.text, files.mode_of(target.source))
             entry["output"] = target.path
@@ -272,6 +272,7 @@ class Batch:
     resume    what an earlier run has done stays, and what failed then is not tried again
     retry     what failed is tried again
     loudness  how much is said
+    many      they are, perhaps together with others, many programs; None: if they are several
     """
 
     job: FixJob
@@ -280,10 +281,12 @@ class Batch:
     resume: bool
     retry: bool = False
     loudness: Loudness = Loudness.USUAL
+    many: bool | None = None
 
     def run(self, jobs: int, make: ExecutorMaker) -> Iterator[FixOutcome]:
         """What becomes of them, in their order; each is noted as soon as it is done."""
-        if self.folder is None or not (self.resume or self.many or os.path.exists(os.path.join(self.folder, JOURNAL))):
+        several = len(self.targets) > 1
+        if self.folder is None or not (self.resume or several or os.path.exists(os.path.join(self.folder, JOURNAL))):
             yield from self._told(self.targets, {}, self._fresh(self.job, self.targets, jobs, make, _forget))
             return
         with Journal.opened(self.folder) as journal:
@@ -295,9 +298,8 @@ class Batch:
             yield from self._told(targets, kept, fresh)
 
     @property
-    def many(self) -> bool:
-        """Whether there are several programs."""
-        return len(self.targets) > 1
+    def _many(self) -> bool:
+        return len(self.targets) > 1 if self.many is None else self.many
 
     def _told(
         self, targets: Sequence[OutputTarget], kept: Mapping[OutputTarget, JournalRecord], fresh: Iterator[Finished]
@@ -309,12 +311,12 @@ class Batch:
                     outcome, said = _done_before(target, kept[target])
                 else:
                     outcome, said = next(fresh)
-                told(outcome.entry, said, self.loudness, self.many)
+                told(outcome.entry, said, self.loudness, self._many)
                 step()
                 yield outcome
 
     def _known(self, target: OutputTarget, journal: Journal) -> OutputTarget:
-        return replace(target, made=frozenset(journal.written.get(target.name, ()))) if self.resume else target
+        return replace(target, made=journal.made(target.name, target.source)) if self.resume else target
 
     def _kept(self, job: FixJob, target: OutputTarget, journal: Journal) -> JournalRecord | None:
         """The record of a program that need not be fixed again; None if it is to be fixed."""
@@ -332,7 +334,7 @@ class Batch:
             yield from results_in_order(job.outcome_and_messages, rest, make, jobs, _lost, note)
             return
         for target in rest:
-            if self.many or self.loudness == Loudness.QUIET:
+            if self._many or self.loudness == Loudness.QUIET:
                 finished = job.outcome_and_messages(target, jobs)
             else:
                 finished = job.outcome(target, jobs), []
@@ -355,8 +357,9 @@ def _note(journal: Journal, limits: str, target: OutputTarget, finished: Finishe
     codes = [error["code"] for error in outcome.entry.get("errors", ())]
     faulty = outcome.code == ExitCode.FAULT
     if outcome.key and all(code in LASTING or (int(code[3:]) >= OF_PROGRAMS and not faulty) for code in codes):
-        entry, called = outcome.entry, outcome.called
-        journal.add(JournalRecord(target.name, outcome.key, outcome.digest, called, entry, outcome.code, limits))
+        source = os.path.realpath(target.source)
+        found = (outcome.key, outcome.digest, outcome.called, outcome.entry, outcome.code)
+        journal.add(JournalRecord(target.name, *found, limits, source))
 
 
 def _done_before(target: OutputTarget, record: JournalRecord) -> Finished:

@@ -1,0 +1,240 @@
+"""The project file on the command line: what `ncfix.toml` says are defaults of options; `ncfix init` writes one.
+
+An option on the command line wins over the environment (`NCFIX_MACHINE`, `NCFIX_SETUP`, `NCFIX_OUTPUT`,
+`NCFIX_DIALECT`), and that over the file. Programs for which the file says different things are done in groups.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ncfix.batch.programs import program_files
+from ncfix.cli import console
+from ncfix.cli.options import FOLDER, PATH, PathName, force_option
+from ncfix.diagnostics import ConfigError, UsageError, visible
+
+if TYPE_CHECKING:
+    from ncfix.project import Project
+
+STATE = "ncfix.groups"
+"""Where a context keeps the groups of programs."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramGroup:
+    """Programs for which the same holds.
+
+    settings  defaults of parameters, by their names
+    programs  their paths; None: all that are given
+    folder    of the project file; None: there is none
+    """
+
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    programs: frozenset[str] | None = None
+    folder: str | None = None
+
+
+@dataclass(slots=True)
+class _Groups:
+    arguments: list[str]
+    found: list[ProgramGroup]
+    at: int = 0
+
+
+class ProjectCommand(click.Command):
+    """A verb on programs; what the project file says of its options are defaults."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Find the project of the programs first."""
+        if not ctx.resilient_parsing:
+            if STATE not in ctx.meta:
+                ctx.meta[STATE] = _Groups(list(args), self._groups(ctx, args))
+            ctx.default_map = dict(group_of(ctx).settings)
+        return super().parse_args(ctx, args)
+
+    def _groups(self, ctx: click.Context, args: list[str]) -> list[ProgramGroup]:
+        said, _, _ = self.make_parser(ctx).parse_args(args=list(args))
+        first = next(param.name for param in self.params if isinstance(param, click.Argument))
+        given = said.get(first or "")
+        given = [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else []
+        if said.get("help") is True or said.get("no_project") is True or not given:
+            return [ProgramGroup()]
+        named = said.get("project") or os.environ.get("NCFIX_PROJECT")
+        return self._by_settings(given, named if isinstance(named, str) else os.environ.get("NCFIX_PROJECT"))
+
+    def _by_settings(self, given: Iterable[str], named: str | None) -> list[ProgramGroup]:
+        """Programs, those below folders each for itself, together if their settings are the same."""
+        from ncfix.project import Project
+
+        known: dict[str, Project | None] = {}
+
+        def project_of(path: str) -> Project | None:
+            folder = path if os.path.isdir(path) or path == "-" else os.path.dirname(path)
+            if folder not in known:
+                known[folder] = Project.load(named) if named else Project.of(folder or os.curdir)
+            return known[folder]
+
+        found: dict[str, tuple[Project | None, dict[str, Any], list[str]]] = {}
+        for path in given:
+            for program in program_files([path]) if os.path.isdir(path) else ():
+                self._put(found, program.path, project_of(program.path))
+            if not os.path.isdir(path):
+                self._put(found, path, project_of(path))
+        several = len(found) > 1
+        for project in {id(project): project for project, _, _ in found.values() if project}.values():
+            console.say(f"{visible(project.path)} says what is not said here")
+        return [
+            ProgramGroup(
+                settings, frozenset(paths) if several else None, None if project is None else project.folder or "."
+            )
+            for project, settings, paths in found.values()
+        ]
+
+    def _put(self, found: dict[str, Any], program: str, project: Project | None) -> None:
+        settings = {} if project is None else self._parameters(project, project.settings(program))
+        key = repr((project and project.path, sorted(settings.items())))
+        found.setdefault(key, (project, settings, []))[2].append(program)
+
+    def _parameters(self, project: Project, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Settings by the names of parameters; those of other verbs are left out."""
+        own, others = _options(self.params), _all_options()
+        found = {}
+        for key, value in settings.items():
+            if key not in others:
+                from difflib import get_close_matches
+
+                close = get_close_matches(key, others, 1)
+                hint = f"did you mean {close[0]}?" if close else "ncfix fix --help shows the options"
+                raise ConfigError((project.fault(f"{key}: there is no such option", "options", key, hint=hint),))
+            if (option := own.get(key)) and option.name and (taken := _taken(option, value, project)) is not None:
+                found[option.name] = taken
+        return found
+
+
+def _options(params: Iterable[click.Parameter]) -> dict[str, click.Option]:
+    """Options by their names as a project file has them."""
+    options = (param for param in params if isinstance(param, click.Option))
+    return {name[2:].replace("-", "_"): option for option in options for name in option.opts if name.startswith("--")}
+
+
+def _all_options() -> frozenset[str]:
+    from ncfix.cli.fix import fix
+
+    return frozenset(_options(fix.params)) - {"project", "no_project"}
+
+
+def _taken(option: click.Option, value: Any, project: Project) -> Any:
+    """The value of an option in a project file as the command line would give it; None for a flag that is off."""
+    if option.is_flag:
+        if not isinstance(value, bool):
+            text = f"{value!r} is neither true nor false"
+            raise ConfigError((project.fault(text, "options", (option.name or "")),))
+        return option.flag_value is not False if value else None
+    several = value if isinstance(value, list) else [value]
+    if isinstance(option.type, (PathName, click.Path)):
+        several = [project.from_here(str(each)) for each in several]
+        if option.name == "output" and several[0] and several[0][-1] != os.sep:
+            several[0] += os.sep
+    if option.multiple:
+        return several
+    return several[0] if len(several) == 1 else value
+
+
+def group_of(context: click.Context) -> ProgramGroup:
+    """The programs that this run of a verb is for."""
+    groups: _Groups | None = context.meta.get(STATE)
+    return groups.found[groups.at] if groups else ProgramGroup()
+
+
+def next_group(context: click.Context) -> click.Context | None:
+    """A context in which the verb runs for the next group; None after the last one."""
+    groups: _Groups | None = context.meta.get(STATE)
+    if groups is None or groups.at + 1 >= len(groups.found):
+        return None
+    groups.at += 1
+    return context.command.make_context(context.info_name, list(groups.arguments), context.parent)
+
+
+def base_of(context: click.Context, option: str) -> str | None:
+    """The folder of the project file, if it is that file which gives the value of an option."""
+    return group_of(context).folder if is_from_file(context, option) else None
+
+
+def is_from_file(context: click.Context, option: str) -> bool:
+    """Whether it is the project file which gives the value of an option."""
+    return context.get_parameter_source(option) == click.core.ParameterSource.DEFAULT_MAP
+
+
+def project_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a verb the options that say which project file is used."""
+    named = click.option(
+        "--project",
+        type=PATH,
+        metavar="FILE",
+        expose_value=False,
+        help="The project file, instead of the ncfix.toml in the folder of the program or above.",
+    )
+    none = click.option("--no-project", is_flag=True, expose_value=False, help="Use no project file.")
+    return named(none(command))
+
+
+@click.command()
+@click.argument("folder", type=FOLDER, default=".", metavar="[FOLDER]")
+@click.option("-m", "--machine", type=PATH, metavar="FILE", help="The machine file.")
+@click.option("--setup", type=PATH, metavar="FILE", help="The setup file; empty for none.")
+@click.option("-o", "--output", type=PATH, metavar="DIR", help="Where corrected programs go.")
+@force_option
+def init(folder: str, machine: str | None, setup: str | None, output: str | None, force: bool) -> None:
+    """Write a project file ncfix.toml into FOLDER, so that `ncfix fix PROGRAM` needs no options there.
+
+    What is not said is asked for. Paths are counted from FOLDER.
+    """
+    from ncfix import files
+    from ncfix.machine import load
+    from ncfix.project import NAME, written
+
+    path = os.path.join(folder, NAME)
+    if os.path.lexists(path) and not force:
+        raise files.exists_already(path)
+    values = {
+        "machine": _asked("machine", machine, "machine file", _only(folder, ("topology",)) or None),
+        "setup": _asked("setup", setup, "setup file, empty for none", _only(folder, ("[work_offsets]", "[tools]"))),
+        "output": _asked("output", output, "folder of corrected programs", "corrected"),
+    }
+    load(os.path.join(folder, values["machine"]))
+    if values["setup"]:
+        from ncfix.control.setup_file import load as load_setup
+
+        load_setup(os.path.join(folder, values["setup"]))
+    text = written({key: value for key, value in values.items() if value}, resume=True)
+    files.write_whole(path, text.encode(), force)
+    console.say(f"{visible(path)}: ncfix fix PROGRAM corrects a program in this folder or below")
+
+
+def _asked(option: str, given: str | None, what: str, default: str | None) -> str:
+    """What was given, else what somebody answers at a terminal; raises `UsageError` NCF001 if nobody is there."""
+    if given is not None:
+        return given
+    if sys.stdin is None or not sys.stdin.isatty():
+        if default is not None:
+            return default
+        raise UsageError.of("NCF001", f"the {what} is not said, and nobody can be asked", hint=f"--{option}")
+    return str(click.prompt(what, default=default, err=True))
+
+
+def _only(folder: str, marks: tuple[str, ...]) -> str:
+    """The only TOML file in a folder in which one of these stands; empty if there is none, or if there are several."""
+    found = []
+    for name in sorted(os.listdir(folder) if os.path.isdir(folder) else ()):
+        if name.endswith(".toml") and os.path.isfile(os.path.join(folder, name)):
+            with open(os.path.join(folder, name), encoding="utf-8", errors="replace") as handle:
+                text = handle.read(1 << 16)
+            if any(line.startswith(marks) for line in text.splitlines()):
+                found.append(name)
+    return found[0] if len(found) == 1 else ""

@@ -1,0 +1,164 @@
+"""The project file, `ncfix.toml`: what holds for the programs of a folder, so that a post only calls `ncfix fix FILE`.
+
+It is looked for from the folder of the program upwards. Paths in it are counted from its own folder.
+
+    machine = "mill.toml"
+    setup = "vise.toml"
+    output = "corrected"
+
+    [options]
+    resume = true
+
+    [[programs]]
+    match = "five-axis/*.nc"
+    setup = "plate.toml"
+
+The first of `[[programs]]` that matches the program's way down from the folder wins over what holds for all.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from typing import Any
+
+from ncfix.diagnostics import ConfigError, Message
+from ncfix.files import read_bytes
+from ncfix.inputs import MOST_SAID
+from ncfix.toml_text import decoded, key_lines, line_of, parsed, place_of
+from ncfix.toml_text import written as table_written
+
+NAME = "ncfix.toml"
+CODE = "NCF028"
+TEXTS = ("machine", "setup", "output", "dialect", "tool_table")
+"""Keys that are options of their own, each a text."""
+
+
+@dataclass(frozen=True, slots=True)
+class Project:
+    """A project file.
+
+    path     as messages name it
+    folder   of the file
+    content  what it says, checked but for the names and values of options
+    text     of the file
+    """
+
+    path: str
+    folder: str
+    content: Mapping[str, Any] = field(repr=False)
+    text: str = field(repr=False)
+
+    @classmethod
+    def of(cls, program: str) -> Project | None:
+        """The project that a program, or a folder of programs, belongs to; `-` to that of the working folder."""
+        if program == "-":
+            start = os.getcwd()
+        else:
+            start = os.path.abspath(program)
+            start = start if os.path.isdir(start) else os.path.dirname(start)
+        for folder in _upwards(start):
+            path = os.path.join(folder, NAME)
+            if os.path.isfile(path):
+                return cls.load(_near(path))
+        return None
+
+    @classmethod
+    def load(cls, path: str) -> Project:
+        """Read a project file; raises SourceError NCF002, ConfigError NCF028 with all that is wrong in it."""
+        text = decoded(read_bytes(path, MOST_SAID), path, CODE)
+        content = parsed(text, path, CODE, "docs/formats.md shows a project file")
+        project = cls(path, os.path.dirname(path), content, text)
+        if faults := list(project._faults()):
+            raise ConfigError.collected(faults)
+        return project
+
+    def settings(self, program: str) -> dict[str, Any]:
+        """What holds for a program: values of options by their names as in the file; for paths see `from_here`."""
+        found: dict[str, Any] = {}
+        for table in (self.content, *self._matching(program)):
+            found |= {key: table[key] for key in TEXTS if key in table}
+            found |= table.get("options", {})
+        return found
+
+    def fault(self, text: str, *keys: str | int, hint: str = "") -> Message:
+        """What is wrong with a key, with its place."""
+        line = line_of(keys, key_lines(self.text))
+        return Message(CODE, text, place_of(line, self.text, self.path), hint)
+
+    def from_here(self, path: str) -> str:
+        """A path that the file gives, as it is called from the working folder."""
+        return os.path.join(self.folder, path)
+
+    def _matching(self, program: str) -> Iterator[Mapping[str, Any]]:
+        way = way_below(self.folder or os.curdir, program)
+        for entry in self.content.get("programs", ()) if way else ():
+            given = entry["match"]
+            patterns = [given] if isinstance(given, str) else given
+            if any(fnmatchcase(way.replace(os.sep, "/").lower(), each.lower()) for each in patterns):
+                yield entry
+                return
+
+    def _faults(self) -> Iterator[Message]:
+        yield from self._faults_of(self.content, {"ncfix", "programs"})
+        programs = self.content.get("programs", [])
+        if not isinstance(programs, list):
+            yield self.fault("programs: is a list of tables, [[programs]]", "programs")
+            return
+        for number, entry in enumerate(programs):
+            where = ("programs", number)
+            if not isinstance(entry, dict):
+                yield self.fault(f"programs[{number}]: is a table", *where)
+                continue
+            match = entry.get("match")
+            if not isinstance(match, str) and not (isinstance(match, list) and all(isinstance(x, str) for x in match)):
+                yield self.fault(f'programs[{number}]: needs match = "PATTERN", or a list of patterns', *where, "match")
+            yield from self._faults_of(entry, {"match"}, *where)
+
+    def _faults_of(self, table: Mapping[str, Any], others: set[str], *where: str | int) -> Iterator[Message]:
+        for key, value in table.items():
+            if key in TEXTS and not isinstance(value, str):
+                yield self.fault(f"{key}: {value!r} is not a text", *where, key)
+            elif key == "options" and not isinstance(value, dict):
+                yield self.fault("options: is a table, [options]", *where, key)
+            elif key not in {*TEXTS, "options", *others}:
+                close = get_close_matches(key, [*TEXTS, "options", *others], 1)
+                hint = f"did you mean {close[0]}?" if close else "options of verbs stand in the table [options]"
+                yield self.fault(f"{key}: there is no such key", *where, key, hint=hint)
+
+
+def way_below(folder: str, path: str) -> str:
+    """The way down from a folder to a file; empty if it is not below it."""
+    try:
+        way = os.path.relpath(os.path.abspath(path), os.path.abspath(folder))
+    except ValueError:  # another disk, on Windows
+        return ""
+    return "" if path == "-" or way.split(os.sep, 1)[0] == os.pardir else way
+
+
+def _upwards(folder: str) -> Iterator[str]:
+    yield folder
+    while (above := os.path.dirname(folder)) != folder:
+        yield above
+        folder = above
+
+
+def _near(path: str) -> str:
+    """A path as it is called from the working folder, if that is shorter."""
+    try:
+        return min(os.path.relpath(path), path, key=len)
+    except ValueError:  # another disk, on Windows
+        return path
+
+
+def written(settings: Mapping[str, str], resume: bool) -> str:
+    """A project file with these settings, to be read and changed by people."""
+    head = "# What holds for the programs in this folder and below; docs/formats.md says what may stand here.\n"
+    found = table_written(head, {key: settings.get(key) for key in TEXTS})
+    options = table_written("[options]              # of ncfix fix, with _ for -", {"resume": resume})
+    others = ("# tolerance_um = 1.0", "# flatten = true", "", "# [[programs]]         # the first that matches wins")
+    more = ('# match = "plate/*"', '# setup = "plate.toml"', "")
+    return "\n".join((found, "", options, *others, *more))
