@@ -18,6 +18,7 @@ from ncfix.batch.programs import program_files
 from ncfix.cli import console
 from ncfix.cli.options import FOLDER, PATH, PathName, force_option
 from ncfix.diagnostics import ConfigError, UsageError, visible
+from ncfix.outputs import exists_already
 
 if TYPE_CHECKING:
     from ncfix.project import Project
@@ -201,7 +202,7 @@ def init(folder: str, machine: str | None, setup: str | None, output: str | None
 
     path = os.path.join(folder, NAME)
     if os.path.lexists(path) and not force:
-        raise files.exists_already(path)
+        raise exists_already(path)
     values = {
         "machine": _asked("machine", machine, "machine file", _only(folder, ("topology",)) or None),
         "setup": _asked("setup", setup, "setup file, empty for none", _only(folder, ("[work_offsets]", "[tools]"))),
