@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable
 
 from ncfix.control.coordinates import INDEX
-from ncfix.control.posture import stands_square
 from ncfix.control.setup import POINTLESS, Run
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
@@ -65,7 +64,7 @@ class MacroControl(RS274Control):
 
     def stands_square(self) -> bool:
         """Whether the tool is known to lie along Z of a tilted plane that is in force."""
-        return self.tilted and bool(stands_square(self, self.rotation))
+        return self.tilted and bool(self.square_to(self.rotation))
 
     def refresh(self) -> None:
         """Compose the offsets; a number without a point counts increments of the unit in force."""

@@ -22,7 +22,7 @@ from ncfix.control.expressions import Fault
 from ncfix.control.frames import WORLD, euler, from_points, from_vectors, shifted, spatial
 from ncfix.control.moves import Motion, MotionKind, Pass, Passing, TcpState
 from ncfix.control.pointing import Triple
-from ncfix.control.posture import machine_directions, normal_of, postures
+from ncfix.control.posture import normal_of
 from ncfix.control.tcp import switch
 from ncfix_iso.rs274.control import Block
 from ncfix_iso.rs274.expressions import whole
@@ -175,7 +175,7 @@ def align(control: MacroControl, block: Block, code: int) -> None:
     In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece.
     """
     control.use_start_positions(control.turning)
-    found = postures(control, normal_of(control.rotation))
+    found = control.postures(normal_of(control.rotation))
     target, lost = control.position[:], set[int]()
     if found is not None and found.ways:
         target = turned(control, found.chosen, about_tip=code == ABOUT_TIP)
@@ -231,7 +231,7 @@ def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
     if not (control.mirrored or control.is_rotated):
         control.use_start_positions(control.turning)
         known = not control.unknown.keys() & {*control.turning}
-        machine = machine_directions(control, control.position) if known else None
+        machine = control.posture.directions(control.position) if known else None
     if machine is None:
         control.suspended[DYNAMIC] = OFFSET_NOT_SOLVED
         return

@@ -14,7 +14,7 @@ import numpy as np
 
 from ncfix.control.coordinates import DEGREE, LETTERS, dot
 from ncfix.control.expressions import Fault
-from ncfix.control.posture import Postures, WayRules, postures
+from ncfix.control.posture import Postures, WayRules
 
 if TYPE_CHECKING:
     from ncfix_fanuc.macro.control import MacroControl
@@ -46,12 +46,12 @@ def directed(control: MacroControl, block: Block, motion: int) -> str:
         return ""
     if block.runtime & set(COMPONENTS):
         return AT_RUNTIME
-    if control.pointing is None:
+    if control.posture.pointing is None:
         return NO_KINEMATICS
     control.use_start_positions(axes)
     if control.unknown.keys() & set(axes):
         return FROM_UNKNOWN
-    found = postures(control, wanted(control, block), WayRules(in_travel=True))
+    found = control.postures(wanted(control, block), WayRules(in_travel=True))
     if found is None or not found.ways:
         raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction (I J K)")
     note_choice(control, found)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.control.arcs import CLOCKWISE, COUNTER, plane_of, resting_of_many
+from ncfix.control.arcs import CLOCKWISE, COUNTER
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.lanes.block_rows import LONGEST, filled, followed, followed_compiled
 from ncfix.control.lanes.lane import SHORTEST, before_placing
@@ -148,8 +148,8 @@ def take(control: KlartextControl, stage: KlartextBlockRows, unit: KlartextUnit,
         control.places.begun = True
         sided = stage.side[moving] != 0
         if sided.any():
-            control.builder.many_rest(np.where(sided, resting_of_many(control, mask, starts, ends), 0))
-        plane = plane_of(control)
+            control.builder.many_rest(np.where(sided, control.resting_of_many(mask, starts, ends), 0))
+        plane = control.plane_axes
         unplaced = control.places.unplaced | np.where(sided & (mask & plane == 0), plane, 0)
         control.builder.circles(circles._replace(row=np.searchsorted(moving, circles.row)))
         control.builder.extend(MotionColumns(blocks, mask, styles, stage.feed[moving], starts, ends, unplaced))

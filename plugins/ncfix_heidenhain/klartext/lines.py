@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from ncfix.control.coordinates import LETTERS, Vector, dot, mask_of
 from ncfix.control.frames import unit
 from ncfix.control.moves import Motion, MotionKind, Pass, Passing, UnknownAxes
-from ncfix.control.posture import WayRules, postures
+from ncfix.control.posture import WayRules
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.arcs import Step, refuse, with_increments
 from ncfix_heidenhain.klartext.control import DEPARTED, KlartextControl
@@ -68,7 +68,7 @@ def pointed(control: KlartextControl, words: MotionWords) -> dict[int, float] | 
     vector = unit((words.values.get("TX", 0.0), words.values.get("TY", 0.0), words.values.get("TZ", 0.0)))
     if vector is None or not control.m128:
         return None
-    found = postures(control, [dot(row, vector) for row in control.rotation], IN_TRAVEL)
+    found = control.postures([dot(row, vector) for row in control.rotation], IN_TRAVEL)
     return found.chosen if found is not None and found.ways else None
 
 

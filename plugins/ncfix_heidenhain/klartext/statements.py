@@ -128,7 +128,7 @@ def end_of_short_ways(control: KlartextControl, on: bool) -> None:
 
     M126 means nothing to an axis that cannot go round, as the one that tilts the tool: it may stand below zero.
     """
-    pointing = control.pointing if on and control.shortest else None
+    pointing = control.posture.pointing if on and control.shortest else None
     tilts = None if pointing is None else control.machine[pointing.columns[1]]
     for index in control.turning if on and control.shortest else ():
         below = control.position[index] < 0 and index != tilts

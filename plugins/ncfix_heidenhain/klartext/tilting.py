@@ -13,7 +13,7 @@ from ncfix.control.coordinates import DEGREE, IDENTITY, INDEX, LETTERS, Rotation
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import euler, from_points, from_vectors, projected, spatial
 from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Passing
-from ncfix.control.posture import AT_ZERO, WayRules, machine_directions, normal_of, postures, stands_square
+from ncfix.control.posture import AT_ZERO, WayRules, normal_of
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import MOVED_ALONG, TILTED, KlartextControl
 from ncfix_heidenhain.klartext.targets import MotionWords
@@ -116,7 +116,7 @@ def by_axes(control: KlartextControl, values: Values, flags: frozenset[str]) -> 
     for letter in "ABC":
         if letter in values:
             turned[INDEX[letter]] = values[letter] * DEGREE
-    found = machine_directions(control, turned)
+    found = control.posture.directions(turned)
     if found is None or math.dist(found.tool, normal_of(found.axes)) > 1e-6:
         tilt_to(control, control.frames.plane.rotation, flags, NO_KINEMATICS)
         return
@@ -157,7 +157,7 @@ def chosen_way(control: KlartextControl, tilt: Rotation | None, flags: frozenset
     """
     signs = (-1 if flag.endswith("-") else 1 for flag in flags if flag[:3] in ("seq", "sym"))
     normal = normal_of(IDENTITY if tilt is None else tilt)
-    found = postures(control, normal, WayRules(in_travel=True, sign=next(signs, 0)))
+    found = control.postures(normal, WayRules(in_travel=True, sign=next(signs, 0)))
     if found is None or not found.ways:
         return None
     if found.at_pole:
@@ -219,7 +219,7 @@ def cycle_19(control: KlartextControl, words: MotionWords) -> None:
         and abs(control.position[INDEX[letter]] - value * DEGREE) < 1e-6
         for letter, value in values.items()
     )
-    if stands_square(control, meant) is False and standing:
+    if control.square_to(meant) is False and standing:
         by_axes(control, values, frozenset())
         return
     tilt_to(control, meant, frozenset())
@@ -229,4 +229,4 @@ def check_normal(control: KlartextControl) -> str:
     """Why a motion in the tilted plane is refused: the tool does not stand normal to it."""
     if not control.plane_tilted or control.m128 or TILTED in control.suspended:
         return ""
-    return NOT_NORMAL if stands_square(control, control.frames.plane.rotation) is False else ""
+    return NOT_NORMAL if control.square_to(control.frames.plane.rotation) is False else ""

@@ -10,7 +10,6 @@ from ncfix.control.coordinates import INCH, LETTERS
 from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
 from ncfix.control.setup import Run
 from ncfix.control.state import Saved
-from ncfix.control.turns import watch
 from ncfix.text.dialect import Dialect
 from ncfix_iso.rs274.groups import RULES, Rules
 from ncfix_iso.rs274.own_codes import with_own_codes
@@ -86,7 +85,7 @@ class RS274Control(shared.ProgramControl):
         self.left_out = False
         self.unwritten = ""
         if not self.rules.strict:
-            watch(self)
+            self.watch_rolling()
         self.refresh()
 
     def lasting(self) -> str | None:

@@ -26,7 +26,7 @@ from ncfix.control.lanes.block_rows import BlockRows, IntArray, stage_of
 from ncfix.control.lanes.lane import SHORTEST, before_placing, is_open, take
 from ncfix.control.moves import FeedMode
 from ncfix.control.pointing import Pointing, Triple, Ways, dot, nearest
-from ncfix.control.posture import FAR, postures
+from ncfix.control.posture import FAR
 from ncfix_siemens.sinumerik.destination import BlockWordValues
 from ncfix_siemens.sinumerik.directions import NO_LENGTH
 from ncfix_siemens.sinumerik.state import Sinumerik
@@ -88,15 +88,15 @@ def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
         return IN_MACHINE
     if control.modes.orientation.startswith(ON_CURVES):
         return BY_CURVE.format(control.modes.orientation.upper())
-    if control.pointing is None:
+    if control.posture.pointing is None:
         return NO_KINEMATICS
     wanted = by_angles(control, words) if any(address in words.values for address in ANGLES) else by_vector(words)
     if wanted is None:
         return WHICH_ANGLES
     control.use_all_start_positions()
     if control.unknown.keys() & {*control.turning}:
-        return FROM_UNKNOWN.format(LETTERS[control.machine[control.pointing.columns[0]]])
-    found = postures(control, direction_of(control, wanted))
+        return FROM_UNKNOWN.format(LETTERS[control.machine[control.posture.pointing.columns[0]]])
+    found = control.postures(direction_of(control, wanted))
     if found is None or not found.ways:
         raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction")
     if found.leaves_pole:
@@ -154,7 +154,7 @@ def run_vectors(control: Sinumerik, unit: SinumerikUnit, block: int, main: bool)
     stop = min(unit.vector_end(block), block + LONGEST)
     if stop - block < SHORTEST or not is_ready(control) or not is_open(control, unit, block):
         return 0
-    pointing = control.pointing
+    pointing = control.posture.pointing
     assert pointing is not None
     letters = [control.machine[column] for column in pointing.columns]
     turning = 1 << letters[0] | 1 << letters[1]
@@ -181,7 +181,7 @@ def is_ready(control: Sinumerik) -> bool:
     modes, modal = control.modes, control.modal
     plain = not modal.incremental and modal.feed_mode != FeedMode.INVERSE_TIME and control.tools.offset is not None
     followed = modes.transformed and not modes.orientation.startswith(ON_CURVES)
-    return plain and followed and control.pointing is not None
+    return plain and followed and control.posture.pointing is not None
 
 
 def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Sequence[Ways], stage: BlockRows) -> int:

@@ -32,7 +32,7 @@ from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Rule, Unknow
 from ncfix.control.setup import Run, Tool
 from ncfix.control.state import Modal
 from ncfix.control.tcp import switch
-from ncfix.control.turns import Winding, watch
+from ncfix.control.turns import Winding
 from ncfix.text.dialect import Dialect
 from ncfix_siemens.sinumerik import heading
 from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
@@ -154,7 +154,7 @@ class Sinumerik(ProgramControl):
         self.refresh()
         self.lost = dict(self.unknown)
         self.counted: list[Footing] = list(self.footing)
-        watch(self)
+        self.watch_rolling()
         self.builder.winding = Winding(np.zeros(len(run.axes), dtype=np.bool_))
         at_start = DIAMETERS.get(self.variables.value(key_of(RESET_OF_DIAMETER)))
         if at_start:

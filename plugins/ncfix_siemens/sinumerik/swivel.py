@@ -16,7 +16,7 @@ from ncfix.control.coordinates import X, Y, Z, mask_of
 from ncfix.control.expressions import number
 from ncfix.control.frames import WORLD, Affine, projected, shifted, turned
 from ncfix.control.moves import MotionKind, Pass, Passing
-from ncfix.control.posture import WayRules, normal_of, postures
+from ncfix.control.posture import WayRules, normal_of
 from ncfix.control.tcp import rotary_at_zero
 from ncfix.text.tree import StringLiteral
 from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion
@@ -172,11 +172,11 @@ def turn_square(control: Sinumerik, plane: SwivelPlane) -> dict[int, float]:
 
     An axis of which it is not known where it stands counts as standing at zero.
     """
-    if control.pointing is None:
+    if control.posture.pointing is None:
         return {}
-    outer, inner = (control.machine[column] for column in control.pointing.columns)
+    outer, inner = (control.machine[column] for column in control.posture.pointing.columns)
     here = [0.0 if index in control.unknown else control.position[index] for index in (outer, inner)]
-    found = postures(control, normal_of(control.rotation), WayRules(sense=plane.direction), (here[0], here[1]))
+    found = control.postures(normal_of(control.rotation), WayRules(sense=plane.direction), (here[0], here[1]))
     if found is None or not found.ways:
         return {}
     control.warn(WAY, f"CYCLE800 is taken to turn to {found}", "check it on the control: its swivel data decide")

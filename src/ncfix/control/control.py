@@ -1,4 +1,12 @@
-"""The control while it follows a program: its motions, and what may be done to each of them."""
+"""The control while it follows a program: its motions, and what may be done to each of them.
+
+Contours: while the control offsets them (cutter radius compensation), it would offset the least way in the plane by the
+radius, in whatever direction it leads. So a motion that makes no way in the plane must make none when it is corrected:
+axes of the plane that it does not name get no word, and those that it names, as `X40` where X stands at 40, stay where
+they stand. At a corner that the control rounds or breaks it puts in nothing where a motion leaves the plane; so a
+motion that does not leave it must not do so when it is corrected.
+Source: Siemens, "SINUMERIK 840D sl, NC programming, fundamentals": chamfer, rounding (CHF, CHR, RND, RNDM).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +14,13 @@ import math
 from abc import abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import Any
 
-from ncfix.control.arcs import plane_of, resting
+import numpy as np
+from numpy.typing import NDArray
+
 from ncfix.control.builder import MotionBuilder, MotionStyle
-from ncfix.control.coordinates import LETTERS, Vector, mask_of
+from ncfix.control.coordinates import LETTERS, Vector, mask_of, rotated
 from ncfix.control.flow import Budget
 from ncfix.control.moves import (
     AT_START,
@@ -27,12 +36,12 @@ from ncfix.control.moves import (
     leaves_unknown,
     may_pass,
 )
-from ncfix.control.pointing import Pointing
-from ncfix.control.posture import MachineDirections, pointing_of
 from ncfix.control.setup import Run
 from ncfix.control.state import TOOL_AT_RUN_TIME, ControlState
+from ncfix.control.turns import ROLLED, ROLLS, may_roll
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
+from ncfix.text.tree import Program
 
 UNKNOWN_AXIS = "NCF206"
 NEITHER = 'all motions after it are refused; if it does neither, say passed_codes = ["{}"] in the setup file'
@@ -47,6 +56,8 @@ RIGHT = 42
 """The control offsets the contour to the right of the way."""
 NOT_ACCOUNTED = "nothing is known that the control would make of the word {} in this block"
 AFTER_THAT = "where the axis {{}} stands is not known after this: {}"
+NO_WAY = 1e-9
+"""mm"""
 SQUARE = 1 - 1e-12
 """A component of a turned axis that is no less lies along the axis itself."""
 
@@ -65,9 +76,8 @@ class ProgramControl(ControlState):
     ends       where the motions of a block end, if somebody wants to know
     points     a block gave the direction of the tool as a vector
     whole      the motions of the block must not be split, as under cutter compensation
-    at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `arcs`
+    at_corner  the motion begins or ends at a corner that the control rounds or breaks
     handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
-    directions where the axes point in the workpiece, and for which positions that has been asked of the kinematics
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
     block_words  the addresses of the block that is executed, as long as it has made no motion and no setting took them
     """
@@ -88,7 +98,6 @@ class ProgramControl(ControlState):
         self.points = False
         self.whole = self.at_corner = False
         self.beside = 0
-        self.directions: tuple[Vector, MachineDirections] | None = None
         self.block_words: Collection[str] = ()
         self.handedness = 1.0
 
@@ -113,15 +122,10 @@ class ProgramControl(ControlState):
         """Whether an arc may have a centre word across its plane, a zero (I, J and K in all of them)."""
         return True
 
-    @cached_property
-    def pointing(self) -> Pointing | None:
-        """How the machine's two rotary axes point the tool; None if that cannot be known."""
-        return pointing_of(self)
-
     def moves(self) -> Moves:
         """The motions so far."""
         moves = self.builder.moves()
-        return replace(moves, pointing=self.pointing) if self.points else moves
+        return replace(moves, pointing=self.posture.pointing) if self.points else moves
 
     def refuse_after(self, code: int, *, moving: bool) -> None:
         """A G code (tenths) is not known: it may move or change coordinates. The setup may say that it does not.
@@ -134,6 +138,22 @@ class ProgramControl(ControlState):
         name = f"G{code / 10:g}"
         self.refusal = f"{name} is not known, and may move axes or change coordinates"
         self.warn("NCF228", self.refusal, TAKEN if passed else NEITHER.format(name))
+
+    @property
+    def remarks(self) -> tuple[Message, ...]:
+        """All that there is to say of the program, in the same order whether it was followed in parts or as a whole."""
+        rolled = (self.rolled[text] for text in ROLLED if text in self.rolled)
+        return (*self.knowledge.assumed.values(), *self.messages.values(), *rolled)
+
+    def watch_rolling(self) -> None:
+        """Have motions watched in which an axis might roll over: one that goes a full turn or more, as far as known."""
+        self.builder.rolls = may_roll(None if self.kinematics is None else self.kinematics.travel, self.builder.rotary)
+
+    def note_rolling(self, program: Program) -> None:
+        """Say where the first motions are in which an axis might roll over, of each kind."""
+        for text, block in zip(ROLLED, (self.builder.overturned, self.builder.brought_back), strict=True):
+            if block is not None and text not in self.rolled:
+                self.rolled[text] = Message(ROLLS, text, program.place(block), ROLLED[text])
 
     # -- blocks -------------------------------------------------------------------------------------------------------
 
@@ -190,7 +210,7 @@ class ProgramControl(ControlState):
         if fate.arc is not None:
             self.builder.arc(fate.arc)
         if not fate.passing and fate.kind != MotionKind.DWELL:
-            self.builder.rests(resting(self, fate))
+            self.builder.rests(self._resting(fate))
         if fate.kind != MotionKind.DWELL:
             self.block_words = ()
         start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
@@ -268,14 +288,38 @@ class ProgramControl(ControlState):
         return unplaced
 
     def still_beside(self, axes: int) -> int:
-        """Axes of the plane that get no word in a motion across it, see `arcs`."""
-        plane = plane_of(self) if self.modal.compensated else 0
+        """Axes of the plane that get no word in a motion across it."""
+        plane = self.plane_axes if self.modal.compensated else 0
         return 0 if axes & plane else plane
+
+    def _resting(self, motion: Motion) -> int:
+        """Axes that must stay where they stand in a motion.
+
+        Those of the plane, if it names some of them without any way in it; at a corner all others that make no way.
+        """
+        plane = self.plane_axes
+        beside = motion.arc is None and bool(self.modal.compensated and motion.axes & plane)
+        if not (beside or self.at_corner):
+            return 0
+        way = [there - here for there, here in zip(motion.target, self.position, strict=True)]
+        way = rotated(self.inverse, way) if self.is_rotated else way
+        lacking = {*motion.unknown, *self.unknown}
+        still = mask_of(index for index in self.machine if abs(way[index]) <= NO_WAY and index not in lacking)
+        across = still & ~plane if self.at_corner else 0
+        return across | (plane if beside and plane & ~still == 0 else 0)
+
+    def resting_of_many(
+        self, words: NDArray[np.int64], starts: NDArray[np.float64], ends: NDArray[np.float64]
+    ) -> NDArray[np.int64]:
+        """The same of motions with `words` (n,) from `starts` to `ends` (n, 9), in coordinates that are not turned."""
+        columns = [self.modal.plane.first, self.modal.plane.second]
+        still = (np.abs(ends[:, columns] - starts[:, columns]) <= NO_WAY).all(axis=1)
+        return np.where(still & (words & self.plane_axes != 0), self.plane_axes, 0)
 
     def end_compensation(self) -> None:
         """Where the axes of the plane stand after the contour the control knows, until they are named."""
         if self.modal.compensated:
-            self.beside = mask_of((self.modal.plane.first, self.modal.plane.second)) & mask_of(self.machine)
+            self.beside = self.plane_axes
             self.places.lose(self.beside)
         self.modal.compensated = 0
 

@@ -15,8 +15,6 @@ import math
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from ncfix.control.setup import Setup
-
 LETTERS = "XYZABCUVW"
 """The axis letters of RS274NGC in the order of its parameters; every position here is a list in this order."""
 
@@ -121,12 +119,6 @@ class Places:
     anchors: Sequence[Hashable] = field(default_factory=list)
     rotation: Sequence[Hashable] = ()
     begun: bool = False
-
-    @classmethod
-    def at_start(cls, setup: Setup, axes: Iterable[str], letters: str) -> Places:
-        """At the start only those axes stand somewhere known that the setup gives, if it assumes nothing."""
-        given = () if setup.assume_zero else setup.initial
-        return cls(sum(1 << letters.index(axis) for axis in axes if axis not in given))
 
     def watch(self, anchors: Sequence[Hashable], rotation: Sequence[Hashable]) -> None:
         """What numbers count from now; an axis for which that has changed since the first motion is unplaced.

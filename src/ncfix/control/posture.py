@@ -13,16 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from ncfix.control.coordinates import Rotation, Vector, X, Y, Z, angles_in_words, as_rotation
-from ncfix.control.moves import TcpState
+from ncfix.control.moves import Kinematics, TcpState
 from ncfix.control.pointing import FloatArray, Pair, Pointing, Triple
-
-if TYPE_CHECKING:
-    from ncfix.control.control import ProgramControl
 
 PROBE = 128.0
 """mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""
@@ -96,34 +94,90 @@ class Postures:
         return angles_in_words(self.letters, self.ways[0])
 
 
-def postures(
-    control: ProgramControl, direction: Sequence[float], rules: WayRules = NEAREST, here: Pair | None = None
-) -> Postures | None:
-    """The ways to point the tool along a unit vector in the workpiece.
+@dataclass(frozen=True, slots=True)
+class MachineDirections:
+    """Directions in the workpiece, with the rotary axes at some positions.
 
-    None where the kinematics are not known, or those of two rotary axes, or where these stand. `here` says so where the
-    control does not ask.
+    tool  unit vector from the tip to the spindle
+    axes  of the machine's X, Y and Z, as columns of a rotation
     """
-    pointing = control.pointing
-    if pointing is None:
-        return None
-    outer, inner = pointing.columns
-    letters = control.machine[outer], control.machine[inner]
-    if here is None:
-        control.use_start_positions(letters)
-        if control.unknown.keys() & {*letters}:
+
+    tool: Triple
+    axes: Rotation
+
+
+class MachinePosture:
+    """Where a machine points its tool and its axes, as its kinematics tell.
+
+    kinematics  None: nobody knows them
+    machine     letter indices of the machine's axes, in the order of its columns; `rotary`: whether each letter turns
+    """
+
+    def __init__(self, kinematics: Kinematics | None, machine: tuple[int, ...], rotary: Sequence[bool]) -> None:
+        self.kinematics, self.machine, self.rotary = kinematics, machine, rotary
+        self._directions: tuple[Vector, MachineDirections] | None = None
+
+    @cached_property
+    def pointing(self) -> Pointing | None:
+        """How the two rotary axes point the tool: the tips of two tool lengths say which way it points.
+
+        None if the machine has others, if it lacks X, Y or Z, or if nobody knows its kinematics.
+        """
+        turning = [index for index in self.machine if self.rotary[index]]
+        if self.kinematics is None or len(turning) != 2 or not {X, Y, Z} <= {*self.machine}:
             return None
-        here = control.position[letters[0]], control.position[letters[1]]
-    wanted = np.array(direction)
-    ways, at_pole = pointing.angles(wanted, here), pointing.at_pole(wanted)
-    if rules.in_travel:
-        assert control.kinematics is not None, "they have shown how the tool is pointed"
-        ways = within(ways, [control.kinematics.travel[column] for column in pointing.columns], here)
-    if rules.sign:
-        ways = [way for way in ways if abs(way[1]) < AT_ZERO or (way[1] > 0) == (rules.sign > 0)]
-    if rules.sense and not at_pole:
-        ways.sort(key=lambda way: -rules.sense * way[1])
-    return Postures(pointing, letters, here, ways, at_pole)
+
+        def directions(first: float, second: float) -> FloatArray:
+            position = [0.0] * len(self.rotary)
+            position[turning[0]], position[turning[1]] = first, second
+            found: FloatArray = (self._tip(position, 0.0) - self._tip(position, PROBE)) / PROBE
+            return found
+
+        return Pointing.of((self.machine.index(turning[0]), self.machine.index(turning[1])), directions)
+
+    def postures(self, direction: Sequence[float], rules: WayRules, here: Pair) -> Postures | None:
+        """The ways to point the tool along a unit vector in the workpiece, from where the two rotary axes stand.
+
+        None where the kinematics are not known, or those of two rotary axes.
+        """
+        pointing = self.pointing
+        if pointing is None:
+            return None
+        wanted = np.array(direction)
+        ways, at_pole = pointing.angles(wanted, here), pointing.at_pole(wanted)
+        if rules.in_travel:
+            assert self.kinematics is not None, "they have shown how the tool is pointed"
+            ways = within(ways, [self.kinematics.travel[column] for column in pointing.columns], here)
+        if rules.sign:
+            ways = [way for way in ways if abs(way[1]) < AT_ZERO or (way[1] > 0) == (rules.sign > 0)]
+        if rules.sense and not at_pole:
+            ways.sort(key=lambda way: -rules.sense * way[1])
+        outer, inner = pointing.columns
+        return Postures(pointing, (self.machine[outer], self.machine[inner]), here, ways, at_pole)
+
+    def directions(self, position: Vector) -> MachineDirections | None:
+        """How the machine stands with its rotary axes at these positions; None if nobody knows its kinematics."""
+        if self.kinematics is None or not {X, Y, Z} <= {*self.machine}:
+            return None
+        still = [value if self.rotary[index] else 0.0 for index, value in enumerate(position)]
+        if self._directions is None or self._directions[0] != still:
+            origin = self._tip(still, 0.0)
+            columns = []
+            for index in (X, Y, Z):
+                moved = still[:]
+                moved[index] = PROBE
+                columns.append(_unit(self._tip(moved, 0.0) - origin))
+            tool = _unit(origin - self._tip(still, PROBE))
+            found = MachineDirections((tool[0], tool[1], tool[2]), as_rotation(list(zip(*columns, strict=True))))
+            self._directions = still, found
+        return self._directions[1]
+
+    def _tip(self, position: Vector, length: float) -> FloatArray:
+        """The tip (3,) of a tool of some length in the workpiece, mm."""
+        assert self.kinematics is not None
+        command = [position[index] for index in self.machine]
+        found = self.kinematics(command, TcpState(False, length), TcpState(True, length))
+        return np.array([found[self.machine.index(index)] for index in (X, Y, Z)])
 
 
 def within(ways: Iterable[Pair], travel: Sequence[Pair], near: Pair) -> list[Pair]:
@@ -143,77 +197,9 @@ def _in_travel(angle: float, low: float, high: float, near: float) -> float | No
     return min(possible, key=lambda each: abs(each - near), default=None)
 
 
-# -- what the kinematics say ------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class MachineDirections:
-    """Directions in the workpiece, with the rotary axes at some positions.
-
-    tool  unit vector from the tip to the spindle
-    axes  of the machine's X, Y and Z, as columns of a rotation
-    """
-
-    tool: Triple
-    axes: Rotation
-
-
-def machine_directions(control: ProgramControl, position: Vector) -> MachineDirections | None:
-    """How the machine stands with its rotary axes at these positions; None if nobody knows its kinematics."""
-    if control.kinematics is None or not {X, Y, Z} <= {*control.machine}:
-        return None
-    still = [value if control.rotary[index] else 0.0 for index, value in enumerate(position)]
-    if control.directions is None or control.directions[0] != still:
-        origin = _tip(control, still, 0.0)
-        columns = []
-        for index in (X, Y, Z):
-            moved = still[:]
-            moved[index] = PROBE
-            columns.append(_unit(_tip(control, moved, 0.0) - origin))
-        tool = _unit(origin - _tip(control, still, PROBE))
-        found = MachineDirections((tool[0], tool[1], tool[2]), as_rotation(list(zip(*columns, strict=True))))
-        control.directions = still, found
-    return control.directions[1]
-
-
-def stands_square(control: ProgramControl, frame: Rotation) -> bool | None:
-    """Whether the tool lies along Z of a frame in the workpiece; None if that is not known."""
-    if control.unknown.keys() & {*control.turning}:
-        return None
-    found = machine_directions(control, control.position)
-    return None if found is None else math.dist(found.tool, normal_of(frame)) < SQUARE
-
-
 def normal_of(frame: Rotation) -> Triple:
     """The Z axis of a frame."""
     return frame[0][2], frame[1][2], frame[2][2]
-
-
-def pointing_of(control: ProgramControl) -> Pointing | None:
-    """How the machine's two rotary axes point the tool: the tips of two tool lengths say which way it points.
-
-    None if it has others, if it lacks X, Y or Z, or if nobody knows its kinematics.
-    """
-    turning = control.turning
-    if control.kinematics is None or len(turning) != 2 or not {X, Y, Z} <= {*control.machine}:
-        return None
-
-    def directions(first: float, second: float) -> FloatArray:
-        position = [0.0] * len(control.position)
-        position[turning[0]], position[turning[1]] = first, second
-        found: FloatArray = (_tip(control, position, 0.0) - _tip(control, position, PROBE)) / PROBE
-        return found
-
-    columns = [control.machine.index(index) for index in turning]
-    return Pointing.of((columns[0], columns[1]), directions)
-
-
-def _tip(control: ProgramControl, position: Vector, length: float) -> FloatArray:
-    """The tip (3,) of a tool of some length in the workpiece, mm."""
-    assert control.kinematics is not None
-    command = [position[index] for index in control.machine]
-    found = control.kinematics(command, TcpState(False, length), TcpState(True, length))
-    return np.array([found[control.machine.index(index)] for index in (X, Y, Z)])
 
 
 def _unit(vector: FloatArray) -> list[float]:

@@ -31,6 +31,8 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.frames import WORLD, FrameStack, mixed_into
 from ncfix.control.moves import AT_START, UnknownAxes
+from ncfix.control.pointing import Pair
+from ncfix.control.posture import NEAREST, SQUARE, MachinePosture, Postures, WayRules, normal_of
 from ncfix.control.setup import Knowledge, Run
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect
@@ -155,6 +157,7 @@ class ControlState(ABC):
 
     machine    letter indices of the machine's axes, in the order of its columns
     rotary     for each letter whether it turns; `turning`: the letter indices of the machine's rotary axes
+    posture    where the machine points its tool and its axes
     modal      what is in force of modal codes; `tools` likewise
     frames     the frames in force, in `frame_order`; `composed`: all of them as one
     offset     what is added to the numbers of the program, turned and scaled: that of `composed`, and the tool length
@@ -186,6 +189,7 @@ class ControlState(ABC):
             (letter in run.rotary) if letter in run.axes else letter in ROTARY_LETTERS for letter in LETTERS
         )
         self.turning = tuple(index for index in self.machine if self.rotary[index])
+        self.posture = MachinePosture(run.kinematics, self.machine, self.rotary)
         self.modal = Modal()
         self.frames = FrameStack(self.frame_order)
         self.composed = WORLD
@@ -202,7 +206,8 @@ class ControlState(ABC):
         self.locate: Callable[[], Place] = lambda: Place("")
         self.offset_checked = False
         self._frame = -1
-        self.places = Places.at_start(run.setup, run.axes, LETTERS)
+        given = () if run.setup.assume_zero else run.setup.initial
+        self.places = Places(mask_of(INDEX[axis] for axis in run.axes if axis not in given))
         self.rotation: Rotation = IDENTITY
         self.position = zeros()
         self.unknown: UnknownAxes = {}
@@ -345,6 +350,33 @@ class ControlState(ABC):
     def stands_square(self) -> bool:
         """Whether the tool is known to lie along Z of a tilted plane that is in force."""
         return False
+
+    def postures(
+        self, direction: Sequence[float], rules: WayRules = NEAREST, here: Pair | None = None
+    ) -> Postures | None:
+        """The ways to point the tool along a unit vector in the workpiece.
+
+        None where the kinematics are not known, or those of two rotary axes, or where these stand. `here` says so where
+        the control does not ask.
+        """
+        if here is None and self.posture.pointing is not None:
+            outer, inner = (self.machine[column] for column in self.posture.pointing.columns)
+            self.use_start_positions((outer, inner))
+            if not self.unknown.keys() & {outer, inner}:
+                here = self.position[outer], self.position[inner]
+        return None if here is None else self.posture.postures(direction, rules, here)
+
+    def square_to(self, frame: Rotation) -> bool | None:
+        """Whether the tool lies along Z of a frame in the workpiece; None if that is not known."""
+        if self.unknown.keys() & {*self.turning}:
+            return None
+        found = self.posture.directions(self.position)
+        return None if found is None else math.dist(found.tool, normal_of(frame)) < SQUARE
+
+    @property
+    def plane_axes(self) -> int:
+        """The axes of the plane that the machine has, as bits."""
+        return mask_of((self.modal.plane.first, self.modal.plane.second)) & mask_of(self.machine)
 
     def tool_length(self) -> tuple[int, float]:
         """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""

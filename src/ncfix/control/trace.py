@@ -20,7 +20,6 @@ from ncfix.control.interpreter import Interpreter
 from ncfix.control.language import FollowedLanguage
 from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Run, Setup
-from ncfix.control.turns import remarks, say
 from ncfix.diagnostics import Message, SourceError, UsageError
 from ncfix.text import stamp
 from ncfix.text.dialect import Dialect
@@ -270,7 +269,7 @@ class Follower:
             raise NotInPartsError("blocks with / may be skipped, and all positions of block delete are looked at")
         moves = control.moves()
         check_reach(program, moves)
-        say(control, program)
+        control.note_rolling(program)
         interpreter.check_motions(program, moves)
         self.unchanged = begun is not None and begun == control.lasting()
         return moves
@@ -312,7 +311,7 @@ class Follower:
     @property
     def messages(self) -> tuple[Message, ...]:
         """What there is to say so far."""
-        return remarks(self.control)
+        return self.control.remarks
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -354,14 +353,14 @@ def _are_far(places: NDArray[np.float64]) -> NDArray[np.bool_]:
 def finished(control: ProgramControl, program: Program, moves: Moves) -> Trace:
     """The trace of a program; raises UsageError with all that was not given."""
     check_reach(program, moves)
-    say(control, program)
+    control.note_rolling(program)
     lacking = (*control.foreign.values(), *control.knowledge.missing.values())
     if lacking:
         raise UsageError.collected(lacking)
     marked = stamp.find(program)
     return Trace(
         moves=moves,
-        messages=remarks(control),
+        messages=control.remarks,
         assumed=tuple(control.knowledge.assumed),
         stamp="" if marked is None else program.text_of(marked),
         switches=frozenset(control.switches),

@@ -15,12 +15,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.turns import is_dragged, number, way
 from ncfix.text.layout import ABSOLUTE, CENTRE_LETTERS, INCREMENT, Layout
 from ncfix.text.spelling import Spelling, value_of
 from ncfix.text.tree import Literal, Program, Word
 from ncfix.writer.block_text import BlockText
-from ncfix.writer.target import LINE, TANGENTIAL, Rendered, Target
+from ncfix.writer.target import LINE, TANGENTIAL, Rendered, Target, feed_number, feed_way
 
 FloatArray = NDArray[np.float64]
 
@@ -56,7 +55,7 @@ class BlockWriter(BlockText):
         super().__init__(program, block, layout, target, spelling)
         self.incremental = target.incremental and spelling.modal
         self.code = TANGENTIAL.get(target.code, target.code)
-        self.dragged = math.isfinite(target.turn_minutes) and is_dragged(target)
+        self.dragged = math.isfinite(target.turn_minutes) and target.is_dragged
         self.turning = target.pointing.columns if target.pointing is not None and self._says_direction() else ()
 
     def write(self) -> Rendered:
@@ -478,8 +477,8 @@ class BlockWriter(BlockText):
     def _turn_feed(self, piece: int, begin: FloatArray, end: FloatArray) -> str:
         """The number after F with which a piece of a turn takes its share of the time."""
         minutes = self.target.turn_minutes * float(self.target.shares[piece])
-        reach = way(self.target.letters, begin, end, self.target.diameter) if self.target.turn_by_feed else 1.0
-        return number(reach / minutes) if reach > 0 else self._feed_in_force()
+        reach = feed_way(self.target.letters, begin, end, self.target.diameter) if self.target.turn_by_feed else 1.0
+        return feed_number(reach / minutes) if reach > 0 else self._feed_in_force()
 
     def _feed_in_force(self) -> str:
         feed = self.layout.feed

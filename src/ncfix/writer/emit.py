@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ncfix.control.moves import FeedMode, Kinematics, MotionKind, Moves, Rule
 from ncfix.control.tcp import jumps, passed_through, renamed
-from ncfix.control.turns import UNTIMED, at_their_pace, is_dragged, minutes, turn_alone, turns_alone
+from ncfix.control.turns import UNTIMED, minutes, turn_alone, turns_alone
 from ncfix.text.language import BlockLayout, language_of
 from ncfix.text.tree import Program, view
 from ncfix.text.writer import Edit, Splices, overlong
@@ -292,8 +292,8 @@ class _Emitter:
         rows = slice(self.first_piece[row], self.first_piece[row + 1])
         target = self._target(row, rows)
         if target.turn_by_feed and target.inverse_time and turn_alone(self.moves, row) > 0:
-            target = at_their_pace(target)
-        if math.isinf(target.turn_minutes) and is_dragged(target):
+            target = target.at_their_pace()
+        if math.isinf(target.turn_minutes) and target.is_dragged:
             self.conflicts.setdefault(block, UNTIMED)
         rendered = self.language.writer(self.program, block, layout, target, self.spelling).write()
         if rendered.conflict:

@@ -1,8 +1,13 @@
-"""What one corrected motion shall become in a block, and what became of it: what `BlockWriter` takes and gives back."""
+"""What one corrected motion shall become in a block, and what became of it: what `BlockWriter` takes and gives back.
+
+In inverse time LinuxCNC moves linear axes no slower than `LEAST_PACE`. A turn that this would hurry gets the F of its
+little linear motion too, in feed per minute (G94), and G93 again behind it.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +23,14 @@ LINE = 10
 TANGENTIAL = {1010: 30, 1011: 20}
 """Codes of arcs that go on in the direction of the motion before them, to the left and to the right: once that motion
 is corrected they are not the same arcs any more, and are written as those that they were."""
+
+
+LEAST_PACE = 0.1
+"""Units per minute; what LinuxCNC makes of slower motions in inverse time (`inverse_time_rate_straight`)."""
+FEED_GROUPS = ("XYZ", "UVW", "ABC")
+"""The axes whose way F is the speed of: the first group that moves (LinuxCNC, "Machining Center Overview", feed)."""
+DIGITS = 6
+"""Significant digits of an F word of ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +147,29 @@ class Target:
             return TANGENTIAL.get(self.code, self.code)
         return self.arc_code if self.arcs[-1] else LINE
 
+    def at_their_pace(self) -> Target:
+        """The same; a turn in inverse time that LinuxCNC would hurry as one whose time is kept by a feed per minute."""
+        path = np.vstack((self.start, np.round(self.ends * 10.0**self.decimals) / 10.0**self.decimals))
+        linear = [letter not in FEED_GROUPS[-1] for letter in self.letters]
+        steps = np.linalg.norm(np.diff(path, axis=0)[:, linear], axis=1)
+        ways = np.array([feed_way(self.letters, *pair, self.diameter) for pair in pairwise(path)])
+        if np.all((steps == 0) | (ways * self.feed / self.shares >= LEAST_PACE)):
+            return self
+        known = self.feed > 0
+        return replace(
+            self, inverse_time=False, turn_minutes=1.0 / self.feed if known else float("inf"), back_to_inverse_time=True
+        )
+
+    @property
+    def is_dragged(self) -> bool:
+        """Whether a turn of rotary axes alone gets a linear motion, which would take its feed over."""
+        if np.isnan(self.turn_minutes):
+            return False
+        linear = np.array([letter not in FEED_GROUPS[-1] for letter in self.letters])
+        steps = np.diff(np.vstack((self.start, self.ends)), axis=0)
+        half = 0.5 * 10.0 ** -self.decimals.astype(float)
+        return bool(np.any(np.abs(steps[:, linear]) >= half[linear]))
+
 
 @dataclass(slots=True)
 class Rendered:
@@ -177,3 +213,20 @@ def plane_across(normal: FloatArray) -> tuple[int, int, int]:
     """The two columns of an arc's plane and the one across it, from the plane's normal in program axes."""
     across = int(np.argmax(np.abs(normal)))
     return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
+
+
+def feed_way(letters: tuple[str, ...], begin: FloatArray, end: FloatArray, diameter: bool) -> float:
+    """The way that F is the speed of, in program units: of linear axes, of rotary axes where none of those moves.
+
+    begin, end  (n_axes,) program numbers; `diameter`: those of X are twice the way
+    """
+    step = end - begin
+    if diameter and "X" in letters:
+        step[letters.index("X")] /= 2
+    lengths = (np.linalg.norm(step[[letter in group for letter in letters]]) for group in FEED_GROUPS)
+    return float(next((length for length in lengths if length > 0), 0.0))
+
+
+def feed_number(value: float) -> str:
+    """The number after F."""
+    return f"{value:.{max(3, DIGITS - 1 - int(np.floor(np.log10(value))))}f}"

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ncfix.control.arcs import CLOCKWISE, COUNTER, resting_of_many
+from ncfix.control.arcs import CLOCKWISE, COUNTER
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.control import ProgramControl
 from ncfix.control.lanes.block_rows import BlockRows, IntArray, Lookahead, Mask, ProgramText, rows_before
@@ -134,7 +134,7 @@ def take(control: ProgramControl, stage: BlockRows, block: int, main: bool, circ
     path = stage.path
     stretch = MotionColumns(blocks, stage.mask, styles(control, stage), stage.feed, path[:-1], path[1:], unplaced, path)
     if plane:
-        resting = resting_of_many(control, stretch.programmed, stretch.start, stretch.end)
+        resting = control.resting_of_many(stretch.programmed, stretch.start, stretch.end)
         resting[rows] = 0
         control.builder.many_rest(resting)
     if circles is not None:
