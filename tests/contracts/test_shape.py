@@ -14,7 +14,6 @@ SHORT = frozenset(
     {
         "plugins/ncfix_fanuc/macro/corners.py",
         "plugins/ncfix_fanuc/macro/cycles.py",
-        "plugins/ncfix_siemens/sinumerik/heading.py",
     }
 )
 """Modules that are still under `LEAST` lines. None may be added."""
@@ -22,7 +21,7 @@ LEAST = 60
 LARGEST = 20
 FOLDERS = {
     "plugins/ncfix_heidenhain/klartext": 26,
-    "plugins/ncfix_siemens/sinumerik": 26,
+    "plugins/ncfix_siemens/sinumerik": 25,
     "src/ncfix/control": 21,
 }
 """Folders that still have more than `LARGEST` modules. None may grow."""

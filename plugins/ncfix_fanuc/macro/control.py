@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
 
-from ncfix.control.coordinates import INDEX
+from ncfix.control.coordinates import INDEX, Vector
 from ncfix.control.setup import POINTLESS, Run
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
 from ncfix.text.tree import Template
-from ncfix_fanuc.macro.rules import RULES
-from ncfix_fanuc.macro.scaling import Scaling
 from ncfix_fanuc.macro.variables import MacroVariables
-from ncfix_fanuc.macro.vectors import COMPONENTS
 from ncfix_iso.rs274.control import Block, RS274Control
+from ncfix_iso.rs274.groups import Rules
 
 NO_POINT = "NCF240"
 DEFAULT_SYSTEM = "IS-B"
 ANGLE = ",A"
 """The address of the angle by which a line is given."""
+
+
+COMPONENTS = "IJK"
+"""The words of the direction of the tool (G43.5)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scaling:
+    """A scaling in force: its centre, mm in the program's frame, all letters, and its factor."""
+
+    centre: Vector
+    factor: float
 
 
 class MacroControl(RS274Control):
@@ -35,8 +46,8 @@ class MacroControl(RS274Control):
     vectors        the direction of the tool is given by I J K (G43.5)
     """
 
-    def __init__(self, run: Run, dialect: Dialect) -> None:
-        super().__init__(run, dialect, RULES[dialect.semantics])
+    def __init__(self, run: Run, dialect: Dialect, rules: Rules) -> None:
+        super().__init__(run, dialect, rules)
         self.parameters: MacroVariables = MacroVariables()
         self.polar: tuple[float, float] | None = None
         self.scaling: Scaling | None = None

@@ -14,7 +14,7 @@ from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import polar, scaling, system, tilt, vectors
 from ncfix_fanuc.macro.blocks import G15, G16, is_angle, is_scaled
-from ncfix_fanuc.macro.control import ANGLE, MacroControl
+from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl
 from ncfix_fanuc.macro.corners import CORNER
 from ncfix_fanuc.macro.expressions import is_vacant, variable_number
 from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
@@ -217,7 +217,7 @@ class MacroInterpreter(RS274Interpreter):
         before = self.control.tools.vector[Z]
         super().settings(codes, block)
         lone_number(self.control, block, codes)
-        if self.control.vectors and codes.takes and block.values.keys() & {*vectors.COMPONENTS}:
+        if self.control.vectors and codes.takes and block.values.keys() & {*COMPONENTS}:
             self.control.lose(self.control.turning, vectors.AFTER_VECTOR)
         changed = self.control.tools.vector[Z] != before and not codes.takes
         if changed and self.control.modal.incremental and "Z" in block.values:
@@ -240,7 +240,7 @@ class MacroInterpreter(RS274Interpreter):
     def motion_of(self, plan: RS274Plan, codes: Codes) -> int | None:
         """The motion code that a block executes; a direction of the tool (G43.5) is a motion, too."""
         found = super().motion_of(plan, codes)
-        vector = self.control.vectors and not plan.letters.isdisjoint(vectors.COMPONENTS)
+        vector = self.control.vectors and not plan.letters.isdisjoint(COMPONENTS)
         if found is None and vector and codes.motion is None and not codes.takes:
             return self.control.modal.motion if self.control.modal.motion in vectors.STRAIGHT else None
         return found

@@ -72,7 +72,7 @@ FANUC: WrittenLanguage = replace(
     RS274,
     scan=scanned,
     parse=parse_block,
-    control=MacroControl,
+    control=lambda run, dialect: MacroControl(run, dialect, RULES[dialect.semantics]),
     interpreter=MacroInterpreter,
     layout=layout,
     same_per_shape=False,

@@ -9,16 +9,16 @@ programming manual, where it acts on the axes that the block names only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, Z, zeros
+from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, X, Y, Z, zeros
 from ncfix.control.frames import WORLD, handed, mirrored, turned_about
+from ncfix_fanuc.macro.control import MacroControl, Scaling
 from ncfix_iso.rs274.groups import CONTROL, CUTTER, DISTANCE, FEED_MODE, MOTION, PLANE, RETRACT, SPINDLE_MODE
 from ncfix_iso.rs274.systems import is_turned, turned_back, unfollowed, words_of
 
 if TYPE_CHECKING:
-    from ncfix_fanuc.macro.control import MacroControl
     from ncfix_iso.rs274.control import Block
     from ncfix_iso.rs274.plans import Codes
 
@@ -31,14 +31,6 @@ AT_PEACE = frozenset((MOTION, PLANE, DISTANCE, FEED_MODE, CUTTER, CONTROL, RETRA
 """Groups of codes that scaling has nothing to do with."""
 MIRROR_OFF = 501
 SPATIAL = (X, Y, Z)
-
-
-@dataclass(frozen=True, slots=True)
-class Scaling:
-    """A scaling in force: its centre, mm in the program's frame, all letters, and its factor."""
-
-    centre: Vector
-    factor: float
 
 
 def switch(control: MacroControl, block: Block, code: int) -> None:

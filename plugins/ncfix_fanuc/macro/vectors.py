@@ -15,12 +15,11 @@ import numpy as np
 from ncfix.control.coordinates import DEGREE, LETTERS, dot
 from ncfix.control.expressions import Fault
 from ncfix.control.posture import Postures, WayRules
+from ncfix_fanuc.macro.control import COMPONENTS, MacroControl
 
 if TYPE_CHECKING:
-    from ncfix_fanuc.macro.control import MacroControl
     from ncfix_iso.rs274.control import Block
 
-COMPONENTS = "IJK"
 STRAIGHT, ARCS = (0, 10), (20, 30)
 BAD_VECTOR = "NCF219"
 TURNED_TO = "NCF243"

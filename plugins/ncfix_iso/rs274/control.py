@@ -20,7 +20,7 @@ RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
 
 PASSING = frozenset(
     {
-        *("setup", "kinematics", "dialect", "rules", "builder", "locate"),
+        *("setup", "kinematics", "posture", "dialect", "rules", "builder", "locate"),
         *("knowledge", "modal", "parameters", "position"),
         *("budget", "row_block", "numbers", "first"),
     }

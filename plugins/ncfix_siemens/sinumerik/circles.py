@@ -14,13 +14,11 @@ from ncfix.control.frames import handed
 from ncfix.control.moves import Arc, MotionKind
 from ncfix_siemens.sinumerik.destination import (
     NO_POLE,
-    BlockWordValues,
-    End,
-    ProgrammedMotion,
     destination,
     doubtful_polar,
 )
 from ncfix_siemens.sinumerik.state import Sinumerik
+from ncfix_siemens.sinumerik.values import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT
 
 NO_HEADING = "in which direction the motion before this arc (CT) ends is not known"

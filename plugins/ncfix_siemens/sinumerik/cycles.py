@@ -13,23 +13,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS, mask_of, rotated
 from ncfix.control.expressions import Unknown, number
 from ncfix.control.moves import CycleCall, MotionKind
-from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
-from ncfix_siemens.sinumerik.increments import stand
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix_siemens.sinumerik.values import DP, FIRST_DEPTH, BlockWordValues, Drilling, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.vocabulary import DRILLING
-
-if TYPE_CHECKING:
-    from ncfix_siemens.sinumerik.plans import Calling
-    from ncfix_siemens.sinumerik.state import Sinumerik
-
 
 Points = tuple[tuple[float, float], ...]
 """Places in the plane, in program units."""
@@ -116,82 +108,51 @@ MEASURING = re.compile(r"cycle9[789]\d")
 
 AFTER_CYCLE = "where the axis {} stands after a cycle is not followed"
 
-DEEP, FIRST_DEPTH = "cycle83", (5, 6)
-"""The cycle that drills in steps, and where the depth of the first one stands: a height (FDEP), a way down (FDPR)."""
-
 CENTRING, GEOMETRY_MODE = "cycle81", 6
 """The cycle that can go down to a diameter, and which argument says so."""
 
-DP, DPR = 3, 4
 ALIKE = 1e-6
 """Program units; two depths that differ by less are one."""
 
 
-@dataclass(frozen=True, slots=True)
-class Drilling:
-    """A drilling cycle as it was called.
+def drilling_of(control: Sinumerik, step: Calling) -> Drilling:
+    """A drilling cycle as it is called, from the arguments RTP, RFP, SDIS, DP, DPR."""
+    values = tuple(value(control) for value in step.arguments)
+    given = [(part is not None, number(value)) for part, value in zip(step.written, values, strict=True)]
+    (_, clear), (_, reference), _, (is_deep, deep), (is_way, way) = (given + [(False, None)] * 5)[:5]
+    name, depth, fault = step.name.upper(), deep if is_deep else None, ""
+    if is_way and way and clear is not None and reference is not None:
+        down = reference - way if clear >= reference else reference + way
+        fault = TWO_DEPTHS.format(name) if is_deep and (deep is None or abs(deep - down) > ALIKE) else ""
+        depth = down
+    elif is_way and way is None:
+        depth = None
+    if clear is None or depth is None:
+        fault = fault or HEIGHTS.format(name)
+    mode = given[GEOMETRY_MODE][1] if len(given) > GEOMETRY_MODE else None
+    if step.name == CENTRING and mode:
+        fault = BY_DIAMETER.format(name)
+    sure = all(
+        not isinstance(value, Unknown) for part, value in zip(step.written, values, strict=True) if part is not None
+    )
+    said = tuple(
+        None if part is None or isinstance(value, Unknown) else value
+        for part, value in zip(step.written, values, strict=True)
+    )
+    return Drilling(step.name, clear, depth, fault, said, sure, control.external)
 
-    name    lower case
-    clear   height at which it ends, in program units (RTP); None if known only at run time
-    depth   of the hole, in program units
-    fault   why its holes are refused; empty if they are not
-    values  of its arguments
-    sure    all arguments that are written are known
-    external  the file in which it is called; empty: the program itself
-    """
 
-    name: str
-    clear: float | None
-    depth: float | None
-    fault: str
-    values: tuple[float | str | None, ...]
-    sure: bool
-    external: str
-
-    @classmethod
-    def of(cls, control: Sinumerik, step: Calling) -> Drilling:
-        """From the arguments RTP, RFP, SDIS, DP, DPR."""
-        values = tuple(value(control) for value in step.arguments)
-        given = [(part is not None, number(value)) for part, value in zip(step.written, values, strict=True)]
-        (_, clear), (_, reference), _, (is_deep, deep), (is_way, way) = (given + [(False, None)] * 5)[:5]
-        name, depth, fault = step.name.upper(), deep if is_deep else None, ""
-        if is_way and way and clear is not None and reference is not None:
-            down = reference - way if clear >= reference else reference + way
-            fault = TWO_DEPTHS.format(name) if is_deep and (deep is None or abs(deep - down) > ALIKE) else ""
-            depth = down
-        elif is_way and way is None:
-            depth = None
-        if clear is None or depth is None:
-            fault = fault or HEIGHTS.format(name)
-        mode = given[GEOMETRY_MODE][1] if len(given) > GEOMETRY_MODE else None
-        if step.name == CENTRING and mode:
-            fault = BY_DIAMETER.format(name)
-        sure = all(
-            not isinstance(value, Unknown) for part, value in zip(step.written, values, strict=True) if part is not None
-        )
-        said = tuple(
-            None if part is None or isinstance(value, Unknown) else value
-            for part, value in zip(step.written, values, strict=True)
-        )
-        return cls(step.name, clear, depth, fault, said, sure, control.external)
-
-    def call(self, control: Sinumerik, block: int, *, modal: bool) -> CycleCall:
-        """The call for a hole in a block of the program that is executed."""
-        depths = [(place, 1 if place in (DP, FIRST_DEPTH[0]) else -1) for place in self._depths()]
-        fixed = ALONE if block in control.solitary else ""
-        if modal and self.external != control.external:
-            fixed = fixed or ELSEWHERE
-        if not modal:
-            fixed = fixed or (UNDER_ANOTHER if control.modes.modal_cycle is not None else "")
-            fixed = fixed or ("" if control.stated else UNSTATED)
-        across = LETTERS[control.modal.plane.across]
-        return CycleCall(self.name.upper(), self.values, tuple(depths), across, modal, fixed, not self.sure)
-
-    def _depths(self) -> list[int]:
-        """The places of the arguments that say how deep the hole, or the first step to it, is."""
-        places = [DP, DPR, *(FIRST_DEPTH if self.name == DEEP else ())]
-        given = [place for place in places if place < len(self.values) and self.values[place] is not None]
-        return [place for place in given if place not in (DPR, FIRST_DEPTH[1]) or self.values[place] != 0.0]
+def call_of(control: Sinumerik, drilling: Drilling, block: int, *, modal: bool) -> CycleCall:
+    """The call for a hole in a block of the program that is executed."""
+    depths = [(place, 1 if place in (DP, FIRST_DEPTH[0]) else -1) for place in drilling.depths]
+    fixed = ALONE if block in control.solitary else ""
+    if modal and drilling.external != control.external:
+        fixed = fixed or ELSEWHERE
+    if not modal:
+        fixed = fixed or (UNDER_ANOTHER if control.modes.modal_cycle is not None else "")
+        fixed = fixed or ("" if control.stated else UNSTATED)
+    across = LETTERS[control.modal.plane.across]
+    return CycleCall(drilling.name.upper(), drilling.values, tuple(depths), across, modal, fixed, not drilling.sure)
 
 
 def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: bool) -> None:
@@ -209,7 +170,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
         if MEASURING.fullmatch(step.name):
             control.refusal = control.refusal or f"{name} measures, and may set offsets at run time"
         return
-    drilling = Drilling.of(control, step)
+    drilling = drilling_of(control, step)
     if modal:
         control.modes.modal_cycle = drilling
         return
@@ -254,7 +215,7 @@ def drill(
     bottom = over if depth is None else at_height(control, over, depth)
     counted = mask_of(control.counted_words(words))
     placed = (stated & ~counted) | (1 << across if depth is not None else 0)
-    control.builder.called(drilling.call(control, words.block, modal=modal))
+    control.builder.called(call_of(control, drilling, words.block, modal=modal))
     code = control.modal.motion
     control.go(
         ProgrammedMotion(MotionKind.CYCLE, words, bottom, code if code >= 0 else 10, refusal=refusal, placed=placed)
@@ -265,7 +226,7 @@ def drill(
         up = End(up.target, control.axes_of(up.lost), up.lost)
     else:
         up = at_height(control, End(control.position, dict(control.unknown), dict(control.lost)), clear)
-        stand(control, 1 << across, by_machine=False)
+        control.count_from_here(1 << across)
     control.position, control.unknown, control.lost = up.target, up.unknown, up.lost
 
 

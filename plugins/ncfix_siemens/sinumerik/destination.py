@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of
 from ncfix.control.expressions import Fault
-from ncfix.control.moves import Arc, MotionKind, Passing, UnknownAxes
+from ncfix.control.moves import UnknownAxes
 from ncfix.control.tcp import led_in_machine
-from ncfix_siemens.sinumerik.increments import unsteady
 from ncfix_siemens.sinumerik.state import Sinumerik
+from ncfix_siemens.sinumerik.values import BlockWordValues, End
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
 
 RUNTIME = "where the axis {} stands is known only at run time"
@@ -32,73 +29,6 @@ STILL = 1e-9
 INCREMENT_IN_PLANE = (
     "where the axis {} stands after increments in machine coordinates in a swivelled plane is not followed"
 )
-
-
-@dataclass(slots=True)
-class BlockWordValues:
-    """The words of a block while it is executed.
-
-    block    the block in its program
-    values   address -> number, in program units; None where it is known only at run time
-    forms    address -> how the word is meant (`ac`, `ic`, `dc`, ...), where it says so
-    axes     bit mask of the axis words
-    texts    address -> text, as in T="DRILL"
-    refusal  why a motion of the block is refused, if it is
-    whole    the motion must not be split
-    """
-
-    block: int
-    values: dict[str, float | None]
-    forms: dict[str, str]
-    axes: int
-    texts: dict[str, str] = field(default_factory=dict)
-    refusal: str = ""
-    whole: bool = False
-
-    def refuse(self, reason: str, rotary: Sequence[int]) -> None:
-        """Refuse the motion of the block; where these rotary axes go is not known."""
-        self.refusal = reason
-        for index in rotary:
-            self.values[LETTERS[index]] = None
-            self.forms[LETTERS[index]] = ABSOLUTE
-
-    def get(self, address: str, default: float = 0.0) -> float:
-        """The number of a word; the default where it is not there, or not known."""
-        value = self.values.get(address)
-        return default if value is None else value
-
-    def runtime(self, *addresses: str) -> bool:
-        """Whether one of these words is there and known only at run time."""
-        return any(address in self.values and self.values[address] is None for address in addresses)
-
-
-@dataclass(slots=True)
-class End:
-    """Where a motion ends: the command, which axes are not known there, and which coordinates."""
-
-    target: Vector
-    unknown: UnknownAxes
-    lost: UnknownAxes
-
-
-class ProgrammedMotion(NamedTuple):
-    """One motion of a block, as its words say it: what `Sinumerik.go` makes a `Motion` of.
-
-    code        the motion code, in tenths
-    refusal, passing, arc  as in `Motion`
-    placed     as there; None: the axes of its words, but for increments, and none where the motion is passed
-    by_machine  the words are machine coordinates
-    """
-
-    kind: MotionKind
-    words: BlockWordValues
-    end: End
-    code: int
-    refusal: str = ""
-    passing: Passing | None = None
-    arc: Arc | None = None
-    placed: int | None = None
-    by_machine: bool = False
 
 
 def destination(control: Sinumerik, words: BlockWordValues) -> End:
@@ -122,7 +52,7 @@ def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vect
     index, value = INDEX[letter], words.values[letter]
     form = words.forms.get(letter, "")
     incremental = counts_on(control, form)
-    if incremental and (why := unsteady(control, index)):
+    if incremental and (why := control.unsteady(index)):
         lost[index] = why
         return
     if not incremental:
@@ -266,7 +196,7 @@ def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
     axes = plane.first, plane.second
     if control.lost.keys() & {*axes} or control.places.unplaced & mask_of(axes):
         return None
-    return None if any(unsteady(control, index) for index in axes) else (here[plane.first], here[plane.second])
+    return None if any(control.unsteady(index) for index in axes) else (here[plane.first], here[plane.second])
 
 
 def machine_destination(control: Sinumerik, words: BlockWordValues) -> End:
@@ -309,7 +239,7 @@ def place_at_machine(
         target[index] += step_of(control, letter, value)
         if index == 0 and control.modes.diameter == "DIAM90":
             unknown[index] = RADIUS
-        if why := unsteady(control, index, by_machine=True):
+        if why := control.unsteady(index, by_machine=True):
             unknown[index] = why
     else:
         target[index] = control.tool_shift[index] + step_of(control, letter, value)

@@ -11,9 +11,8 @@ from dataclasses import replace
 from ncfix.control.coordinates import INCH, INDEX, LETTERS, PLANES, Vector, mask_of, zeros
 from ncfix.control.expressions import Unknown
 from ncfix.control.frames import WORLD, ZEROS, Affine, mirrored, shifted, turned, turned_in
-from ncfix_siemens.sinumerik.destination import BlockWordValues
-from ncfix_siemens.sinumerik.increments import had_from_the_start
 from ncfix_siemens.sinumerik.state import RESET_OF_DIAMETER, Sinumerik
+from ncfix_siemens.sinumerik.values import BlockWordValues
 
 FRAME_AT_RUNTIME = "a frame ({}) is known only at run time"
 UNEQUAL = "a scale that differs from axis to axis ({})"
@@ -251,7 +250,8 @@ def take_up(control: Sinumerik) -> None:
     control.tools.offset = 0
     before = control.footing
     control.switch_tcp(vector)
-    had_from_the_start(control, before)
+    now = zip(control.counted, before, control.footing, strict=True)
+    control.counted = [new if counted == old else counted for counted, old, new in now]
 
 
 def set_length(control: Sinumerik) -> None:

@@ -19,11 +19,8 @@ from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.tree import Program
-from ncfix_siemens.sinumerik.destination import BlockWordValues
 from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
-from ncfix_siemens.sinumerik.heading import note_stretch
-from ncfix_siemens.sinumerik.increments import stand
 from ncfix_siemens.sinumerik.motion import is_harmless
 from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
 from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, SinumerikPlan, is_statement
@@ -40,6 +37,7 @@ from ncfix_siemens.sinumerik.undecided import (
     sweep,
 )
 from ncfix_siemens.sinumerik.unit import HEAD, PROCEDURE, SinumerikUnit, units_of
+from ncfix_siemens.sinumerik.values import BlockWordValues
 
 NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
@@ -174,8 +172,8 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             named = reduce(or_, (plan.axes for plan in plans))
             if any(plan.vector is not None for plan in plans):
                 named |= mask_of(control.turning)
-            stand(control, named, by_machine=False)
-        note_stretch(control)
+            control.count_from_here(named)
+        control.head_as_latest()
 
     # -- one block ----------------------------------------------------------------------------------------------------
 

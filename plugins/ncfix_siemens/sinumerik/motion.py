@@ -12,9 +12,6 @@ from ncfix.control.moves import MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, tangential, through_point
 from ncfix_siemens.sinumerik.cycles import TO_A_HOLE, drill, hole_after
 from ncfix_siemens.sinumerik.destination import (
-    BlockWordValues,
-    End,
-    ProgrammedMotion,
     destination,
     doubtful_polar,
     machine_destination,
@@ -22,6 +19,7 @@ from ncfix_siemens.sinumerik.destination import (
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.orientation import oriented
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix_siemens.sinumerik.values import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS
 
 _ACTION = r"""

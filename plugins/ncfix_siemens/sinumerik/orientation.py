@@ -27,10 +27,10 @@ from ncfix.control.lanes.lane import SHORTEST, before_placing, is_open, take
 from ncfix.control.moves import FeedMode
 from ncfix.control.pointing import Pointing, Triple, Ways, dot, nearest
 from ncfix.control.posture import FAR
-from ncfix_siemens.sinumerik.destination import BlockWordValues
 from ncfix_siemens.sinumerik.directions import NO_LENGTH
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
+from ncfix_siemens.sinumerik.values import BlockWordValues
 from ncfix_siemens.sinumerik.vocabulary import ANGLES, NORMALS, OTHERS, VECTOR
 
 BAD_VECTOR = "NCF254"

@@ -3,14 +3,19 @@
 Positions, motions, what is known and what is asked of the setup are those of all controls. SINUMERIK has of its own a
 chain of frames, and a book of what is not known that is kept in the coordinates of the program, since in a turned frame
 one unknown coordinate would hide three axes.
+
+Increments (G91, IC), after a frame or a tool length has changed: an axis stands, and its frame or the length of its
+tool changes. Whether the next increment takes that change along is for setting data, one for frames and one for tools;
+as a control is delivered it does. So such an increment is refused, until the axis is brought somewhere absolutely,
+unless the setup says that increments leave it out.
+Source: Siemens, "SINUMERIK 840D sl, axes, coordinate systems, frames (K2)": frames with G91, SD42440, SD42442.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,21 +32,16 @@ from ncfix.control.coordinates import (
     mask_of,
 )
 from ncfix.control.expressions import Unknown, Value
-from ncfix.control.frames import ZEROS, FrameStack, shifted
-from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Rule, UnknownAxes
+from ncfix.control.frames import WORLD, Affine, FrameStack, shifted
+from ncfix.control.moves import AT_START, Arc, Motion, MotionKind, Pass, Rule, UnknownAxes
 from ncfix.control.setup import Run, Tool
 from ncfix.control.state import Modal
 from ncfix.control.tcp import switch
 from ncfix.control.turns import Winding
 from ncfix.text.dialect import Dialect
-from ncfix_siemens.sinumerik import heading
 from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
-from ncfix_siemens.sinumerik.increments import Footing, footings, stand
+from ncfix_siemens.sinumerik.values import BlockWordValues, Modes, Named, ProgrammedMotion
 from ncfix_siemens.sinumerik.vocabulary import MOTIONS, PATH_WORDS, TURNING
-
-if TYPE_CHECKING:
-    from ncfix_siemens.sinumerik.cycles import Drilling
-    from ncfix_siemens.sinumerik.destination import BlockWordValues, ProgrammedMotion
 
 GEOMETRY = (X, Y, Z)
 ROUND = frozenset({20, 30, MOTIONS["cip"]})
@@ -53,62 +53,20 @@ RESET_OF_DIAMETER = "$MC_GCODE_RESET_VALUES[28]"
 DIAMETERS: Mapping[Value, str] = {1.0: "diamof", 2.0: "diamon", 3.0: "diam90"}
 
 
+FRAME_COUNTS, TOOL_COUNTS = "$sc_frame_offset_incr_prog", "$sc_tool_offset_incr_prog"
+UNSTEADY = (
+    "whether the increment takes along that {} has changed is for setting data: "
+    'variables."{}" = 0 in the setup file says that it does not'
+)
+
+TAKEN_ALONG = ("by machine coordinates",)
+"""What an axis of a turned frame counts from that an axis of the machine has moved: neither frames nor none."""
+
+Footing = tuple[tuple[object, ...], tuple[object, ...]]
+"""What the numbers of an axis count from: by its frame, and by the tool."""
+
 NO_SYSTEM = "G500"
 """The name under which the setup may give what is in force while no settable frame is."""
-
-
-@dataclass(slots=True)
-class Modes:
-    """What is in force besides the modal state that all controls have.
-
-    added        what of the shift of the programmable frame is the additive part (ATRANS, G59), mm and rad; None where
-                 nobody can say
-    fine         G59 has set that part
-    diameter     "", "DIAMON" or "DIAM90"
-    said         the program or the setup has said whether X is a diameter
-    pole         of polar coordinates in the frame of the program, mm; None until one is programmed
-    carried      TRAORI or TRAFOOF, if one came after the settable frame and no motion has come since
-    in_plane     the plane has not changed since the start: a pole that nobody has set is the zero point
-    polar        the last AP and RP
-    transformed  TRAORI is on
-    swivelled    CYCLE800 has tilted the plane
-    modal_cycle  what MCALL calls after each block with a motion
-    orientation  ORIAXES, ORIVECT or another way in which the tool turns, lower case
-    orientation_in_machine  ORIMKS
-    rounds       RNDM rounds all corners
-    angles       ORIEULER, ORIRPY or ORIRPY2, lower case: what A2 B2 C2 are
-    """
-
-    added: Sequence[float] | None = ZEROS
-    fine: bool = False
-    diameter: str = ""
-    said: bool = False
-    pole: tuple[float, float] | None = None
-    carried: str = ""
-    in_plane: bool = True
-    polar: tuple[float | None, float | None] = (None, None)
-    transformed: bool = False
-    swivelled: bool = False
-    modal_cycle: Drilling | None = None
-    orientation: str = ""
-    orientation_in_machine: bool = False
-    rounds: bool = False
-    angles: str = ""
-
-
-@dataclass(slots=True)
-class Named:
-    """Tools that are called by name: numbers that stand for them here, beyond those that a magazine has."""
-
-    numbers: dict[str, int] = field(default_factory=dict)
-
-    def number(self, name: str) -> int:
-        """The number of a name."""
-        return self.numbers.setdefault(name, 1_000_000 + len(self.numbers))
-
-    def name(self, number: int) -> str:
-        """How people call a tool."""
-        return next((name for name, known in self.numbers.items() if known == number), str(number))
 
 
 class Sinumerik(ProgramControl):
@@ -173,7 +131,7 @@ class Sinumerik(ProgramControl):
         """As of every control; coordinates that are not known are kept along the axes of the program's frame."""
         before = self.rotation
         super().refresh()
-        self.footing = footings(self, self.composed)
+        self.footing = self._footings(self.composed)
         if self.rotation != before:
             self.hide_in_turned_frame()
 
@@ -287,26 +245,90 @@ class Sinumerik(ProgramControl):
         """Coordinates whose start position has been asked for are known."""
         self.lost = {index: why for index, why in self.lost.items() if why is not AT_START or index in self.unknown}
 
+    # -- increments ---------------------------------------------------------------------------------------------------
+
+    def _footings(self, whole: Affine) -> list[Footing]:
+        """The footing of every letter while these frames are in force."""
+        tool = self.tools.vector
+        return [
+            (frame_of(whole, index), (self.tcp, tuple(tool[:3])) if self.tcp and index < 3 else (tool[index],))
+            for index in range(len(LETTERS))
+        ]
+
+    def unsteady(self, index: int, *, by_machine: bool = False) -> str:
+        """Why nobody can say where an increment of an axis leads; empty if all is well."""
+        before, now = self.counted[index], (self._footings(WORLD) if by_machine else self.footing)[index]
+        if before == now:
+            return ""
+        if before[0] != now[0] and self.variables.value(FRAME_COUNTS) != 0.0:
+            return UNSTEADY.format("the frame", FRAME_COUNTS.upper())
+        if before[1] != now[1] and self.variables.value(TOOL_COUNTS) != 0.0:
+            return UNSTEADY.format("the tool length", TOOL_COUNTS.upper())
+        return ""
+
+    def count_from_here(self, axes: int, *, by_machine: bool = False) -> None:
+        """These axes, a bit mask, have been brought somewhere: in the frames in force, or in machine coordinates.
+
+        An axis of the machine takes X, Y and Z of a turned frame along, and the frame was off meanwhile.
+        """
+        footing = self._footings(WORLD) if by_machine else self.footing
+        moved = [index for index in GEOMETRY if by_machine and self.is_rotated and axes >> index & 1]
+        for index in range(len(LETTERS)):
+            if axes >> index & 1:
+                self.counted[index] = footing[index]
+            elif index in GEOMETRY and any(self.tcp or self.rotation[other][index] for other in moved):
+                self.counted[index] = TAKEN_ALONG, footing[index][1]
+
     # -- motions ------------------------------------------------------------------------------------------------------
 
-    def go(self, leg: ProgrammedMotion) -> None:
+    def go(self, motion: ProgrammedMotion) -> None:
         """Make a motion of a block, and keep where it leads in coordinates of the program."""
-        words, end = leg.words, leg.end
-        axes, placed = self._axes_of(words), leg.placed
+        words, end = motion.words, motion.end
+        axes, placed = self._axes_of(words), motion.placed
         if placed is None:
-            placed = 0 if leg.passing else axes & ~mask_of(self.counted_words(words))
+            placed = 0 if motion.passing else axes & ~mask_of(self.counted_words(words))
         self.lost, self.fresh_tool = end.lost, False
-        refusal, self.whole = leg.refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
+        refusal, self.whole = motion.refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
         sure = (letter for letter, form in words.forms.items() if form in TURNING and letter in INDEX)
         self.builder.says_the_way(mask_of(INDEX[letter] for letter in sure))
-        follows = not leg.passing and not refusal
+        follows = not motion.passing and not refusal
         if follows:
             self.ask_for_length()
-        heading.note(self, leg, follows=follows)
-        self.make(Motion(leg.kind, axes, end.target, end.unknown, leg.code, refusal, leg.passing, leg.arc, placed))
+        self._head(motion, follows=follows)
+        self.make(
+            Motion(motion.kind, axes, end.target, end.unknown, motion.code, refusal, motion.passing, motion.arc, placed)
+        )
         self.whole = False
-        stand(self, axes, by_machine=leg.by_machine)
+        self.count_from_here(axes, by_machine=motion.by_machine)
         self.forget_unknown()
+
+    def _head(self, motion: ProgrammedMotion, *, follows: bool) -> None:
+        """Keep the direction in which a motion is about to end; None where it is not known, or not followed."""
+        end, arc = motion.end, motion.arc
+        if motion.kind == MotionKind.DWELL:
+            return
+        step = [b - a for a, b in zip(self.position, end.target, strict=True)]
+        if not follows or any(index in self.unknown or index in end.unknown for index in (X, Y, Z)):
+            self.heading = None
+        elif arc is not None:
+            self.heading = self.in_frame(departing(arc, end.target, step))[:3]
+        elif any(step[:3]):
+            self.heading = self.in_frame(step)[:3]
+        elif any(step):
+            self.heading = None
+
+    def head_as_latest(self) -> None:
+        """Keep the direction in which the last of many motions of the fast lane ended, as that of single ones."""
+        stretch = self.builder.latest
+        if stretch is None:
+            return
+        steps, (turned, arc) = stretch.end - stretch.start, self.builder.latest_arc() or (-1, None)
+        rows = range(len(steps) - 1, -1, -1)
+        last = next((row for row in rows if row == turned or steps[row].any()), -1)
+        if arc is not None and last == turned:
+            self.heading = departing(arc, stretch.end[last].tolist(), steps[last].tolist())[:3]
+        elif last >= 0:
+            self.heading = steps[last, :3].tolist() if steps[last, :3].any() else None
 
     def _axes_of(self, words: BlockWordValues) -> int:
         """The axes that a block names, as bits: polar coordinates name both axes of the plane."""
@@ -398,3 +420,20 @@ class Sinumerik(ProgramControl):
     def led_with(self, tool: Vector, number: int | None) -> float:
         """With D0 a transformation leads the point where a tool of no length has its tip."""
         return tool[2]
+
+
+def frame_of(whole: Affine, index: int) -> tuple[object, ...]:
+    """What an axis counts from by frames; in a turned frame each of X Y Z counts from all three."""
+    if index >= 3:
+        return (whole.shift[index],)
+    turned = whole.rotation != WORLD.rotation
+    return (tuple(whole.shift[:3]) if turned else whole.shift[index], whole.rotation, whole.scale)
+
+
+def departing(arc: Arc, end: Vector, step: Vector) -> Vector:
+    """The direction in which an arc or helix that makes `step` ends, in commands; of any length."""
+    nx, ny, nz = arc.normal
+    x, y, z = (end[i] - arc.centre[i] for i in range(3))
+    rise = nx * step[0] + ny * step[1] + nz * step[2]
+    round_ = ny * z - nz * y, nz * x - nx * z, nx * y - ny * x
+    return [arc.sweep * part + rise * across for part, across in zip(round_, arc.normal, strict=True)]

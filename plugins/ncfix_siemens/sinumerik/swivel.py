@@ -19,10 +19,10 @@ from ncfix.control.moves import MotionKind, Pass, Passing
 from ncfix.control.posture import WayRules, normal_of
 from ncfix.control.tcp import rotary_at_zero
 from ncfix.text.tree import StringLiteral
-from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.orientation import WAY
 from ncfix_siemens.sinumerik.plans import Calling, plain_text
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix_siemens.sinumerik.values import BlockWordValues, End, ProgrammedMotion
 
 ORDER = {1: "X", 2: "Y", 3: "Z"}
 """The axes in the bits of the mode."""

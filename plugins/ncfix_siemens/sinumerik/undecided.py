@@ -15,12 +15,13 @@ import numpy as np
 from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.expressions import number
 from ncfix.control.moves import MotionKind, Moves, Pass, Passing, Rule
-from ncfix_siemens.sinumerik.destination import BlockWordValues, End, ProgrammedMotion, destination
+from ncfix_siemens.sinumerik.destination import destination
 from ncfix_siemens.sinumerik.flow import SinumerikFlow
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
 from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, SinumerikPlan
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
+from ncfix_siemens.sinumerik.values import BlockWordValues, End, ProgrammedMotion
 from ncfix_siemens.sinumerik.vocabulary import (
     ASYNCHRONOUS,
     HARMLESS,
