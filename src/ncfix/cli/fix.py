@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.arguments import BLOCK_NUMBERS
+from ncfix.batch.programs import program_files
 from ncfix.cli import console
 from ncfix.cli.options import (
     PATH,
@@ -32,7 +33,7 @@ from ncfix.plugins import registry
 
 if TYPE_CHECKING:
     from ncfix.batch.work import ExecutorMaker
-    from ncfix.cli.shop.batch import Batch
+    from ncfix.cli.shop.batch import Batch, FixJob
 
 BATCHES = "ncfix.batches"
 """Where a context keeps the batches of the groups of programs before this one."""
@@ -127,6 +128,8 @@ def _executors() -> Iterable[str]:
     help="Of blocks that are put in (Klartext), or all blocks anew (SINUMERIK, too).",
 )
 @click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
+@click.option("--diff", is_flag=True, help="Print how the text would change (unified diff); write nothing.")
+@click.option("--diff-motions", is_flag=True, help="Print which commands would change, and why; write nothing.")
 @click.option("--no-figures", "verify", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
 @click.option(
     "-j",
@@ -160,6 +163,8 @@ def fix(
     force: bool,
     resume: bool,
     retry: bool,
+    diff: bool,
+    diff_motions: bool,
     time_limit_s: float | None,
     memory_limit_mb: int | None,
     quiet: bool,
@@ -184,16 +189,10 @@ def fix(
     if as_json and json_lines:
         raise UsageError.of("NCF001", "--json and --json-lines are two forms of one output", hint="leave one out")
     context = click.get_current_context()
-    base = base_of(context, "output")
-    if base and (in_place or programs == (STREAM,)):
-        output = None
-    if resume and is_from_file(context, "resume") and Outputs(output, in_place).folder(programs) is None:
-        resume = False
-    outputs = Outputs(output, in_place, force, resume, base)
-    wanted = targets(programs, outputs, (machine_path, *given.files), folders=True, only=group_of(context).programs)
-    for target in wanted:
-        check_streams(JSON if as_json or json_lines else None, program=target)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
+    looks = diff or diff_motions
+    outputs = _outputs(context, programs, Outputs(output, in_place, force, resume))
+    wanted = [] if looks else _targets(context, programs, outputs, (machine_path, *given.files), as_json or json_lines)
     from ncfix.compensate import FixOptions
 
     if choices.pop("thesis"):
@@ -201,6 +200,8 @@ def fix(
     machine = sound(load_machine(machine_path), machine_path, force)
     options = FixOptions(**choices, force=force)
     job = FixJob(machine, given.load(), dialect, options, ProgramLimits(time_limit_s, memory_limit_mb))
+    if looks:
+        return _changes(context, job, programs, outputs.folder(programs), diff_motions, as_json)
     loudness = Loudness.ALL if verbose else Loudness.QUIET if quiet else Loudness.USUAL
     batch = Batch(job, wanted, outputs.folder(programs), resume, retry, loudness)
     batches = [*context.meta.get(BATCHES, ()), (batch, processes_for(jobs, wanted), executor_of(executor))]
@@ -209,6 +210,42 @@ def fix(
         with following:
             return int(following.command.invoke(following))
     return _reported(batches, as_json, json_lines)
+
+
+def _outputs(context: click.Context, programs: Sequence[str], said: Outputs) -> Outputs:
+    """Where outputs are to go; what the project file says does not hold where it cannot."""
+    base = base_of(context, "output")
+    output = None if base and (said.in_place or programs == (STREAM,)) else said.output
+    outputs = replace(said, output=output, base=base)
+    if said.resume and is_from_file(context, "resume") and outputs.folder(programs) is None:
+        return replace(outputs, resume=False)
+    return outputs
+
+
+def _targets(
+    context: click.Context, programs: Sequence[str], outputs: Outputs, files: Sequence[str | None], prints: bool
+) -> list[OutputTarget]:
+    wanted = targets(programs, outputs, files, folders=True, only=group_of(context).programs)
+    for target in wanted:
+        check_streams(JSON if prints else None, program=target)
+    return wanted
+
+
+def _changes(
+    context: click.Context, job: FixJob, programs: Sequence[str], apart: str | None, motions: bool, as_json: bool
+) -> int:
+    """Show what would change in programs, and in those of the groups behind; the worst exit code."""
+    from ncfix.cli.changes import show_changes
+
+    only, before = group_of(context).programs, context.meta.setdefault(BATCHES, [])
+    paths = [each.path for each in program_files(programs, apart) if only is None or each.path in only]
+    before += show_changes(job, paths, motions, as_json)
+    if (following := next_group(context)) is not None:
+        with following:
+            return int(following.command.invoke(following))
+    if as_json:
+        console.put_json(files=[entry for _, entry in before])
+    return max(int(code) for code, _ in before)
 
 
 def _reported(batches: Sequence[tuple[Batch, int, ExecutorMaker]], as_json: bool, json_lines: bool) -> int:

@@ -123,6 +123,7 @@ class Corrector:
     head     the first part
     at       where the stamp stands in what is written
     stamped  the stamp, as far as it was known then; empty if there is none
+    together what was planned and written last
     """
 
     task: Task
@@ -132,6 +133,7 @@ class Corrector:
     head: Program | None = None
     at: int = 0
     stamped: bytes = b""
+    together: Together | None = None
 
     def stamp(self) -> bytes:
         """The stamp as it has to be by what is known now."""
@@ -164,6 +166,7 @@ class Corrector:
             if not part.last:
                 leave(PrecedingMotion.of(solution.rounds, np.zeros(len(solution.moves.axes), dtype=np.int8)), len(text))
             readings = self.proof.taught(unit, together, text)
+        self.together = together
         own, tally = None, Tally(self.machine.least_increment[0])
         if unit.head is not None:
             own = np.ones(len(solution.moves), dtype=bool)
@@ -232,10 +235,12 @@ def fix_program(
     setup: Setup,
     options: FixOptions = FixOptions(),  # noqa: B008
     resolve: Resolve | None = None,
+    seen: Callable[[Program, Corrector], object] = lambda program, corrector: None,
 ) -> Fixed:
     """Correct a program for a machine. A program that needs no change comes back as it is, without a stamp.
 
     resolve  gives the text of a subprogram file by its name
+    seen     is given the program as it was read, and what corrected it
 
     Raises SourceError for what cannot be followed or is not known, RefusedError NCF430 for a program that carries a
     stamp, NCF438 for one that seems to have been corrected without one. Motions that had to be left uncorrected are in
@@ -255,6 +260,7 @@ def fix_program(
     proof = WholeProof(program, [partial(follow, own=each.setup) for each in positions])
     corrector = Corrector(task, placed(machine, setup), proof, lambda: words)
     done = corrector.correct(ProgramPart.whole(program, moves[0], corrector.machine), moves)
+    seen(program, corrector)
     tally, text = done.tally, done.text
     assert isinstance(text, bytes)
     suspicion = suspected(tally.numbers, tally.step, program.path, options.force)
@@ -268,7 +274,12 @@ def fix_program(
 
 
 def fix_flat(
-    program: Program, machine: Machine, setup: Setup, options: FixOptions, resolve: Resolve | None = None
+    program: Program,
+    machine: Machine,
+    setup: Setup,
+    options: FixOptions,
+    resolve: Resolve | None = None,
+    seen: Callable[[Program, Corrector], object] = lambda program, corrector: None,
 ) -> Fixed:
     """As `fix_program`; where that refuses motions, the program is written out flat and corrected so.
 
@@ -276,7 +287,7 @@ def fix_flat(
     The report speaks of the lines of the original. A flat program has the numbers of one position of block delete, so a
     program that is to be right in several stays as it is. Raises what `fix_program` and `flatten` raise.
     """
-    fixed = fix_program(program, machine, setup, options, resolve)
+    fixed = fix_program(program, machine, setup, options, resolve, seen)
     if not fixed.report.refused:
         return fixed
     if len(fixed.report.block_delete) > 1:
@@ -287,7 +298,7 @@ def fix_flat(
     names = machine.axis_names
     by_name = dict(zip(names, steps, strict=True))
     flat = flatten(program, setup, names, rotary_names(machine), by_name, resolve, kinematics_of(machine))
-    again = fix_program(flat.program, machine, setup, options, resolve)
+    again = fix_program(flat.program, machine, setup, options, resolve, seen)
     if {each.line for each in fixed.report.refused} <= {flat.lines[each.line - 1] for each in again.report.refused}:
         return fixed
     return replace(again, changed=True, report=in_lines(again.report, flat, program))

@@ -1,0 +1,70 @@
+"""`ncfix fix --diff`: what a correction would change, as text or as motions; nothing is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from ncfix.batch.programs import subprograms
+from ncfix.cli import console
+from ncfix.cli.console import owned
+from ncfix.cli.options import dialect_of
+from ncfix.cli.targets import read, shown
+from ncfix.diagnostics import ExitCode, Message, Place, visible
+
+if TYPE_CHECKING:
+    from ncfix.cli.shop.batch import FixJob
+    from ncfix.compensate.changes import Changes, MotionChange
+
+COLUMNS = ("line", "axis", "from", "to", "change", "why")
+Outcome = tuple[int, dict[str, Any]]
+
+
+def show_changes(job: FixJob, paths: Iterable[str], motions: bool, as_json: bool) -> list[Outcome]:
+    """Print what would change in programs; of each the exit code, and its entry in the JSON object."""
+    return [_shown(job, path, motions, as_json) for path in paths]
+
+
+def _shown(job: FixJob, path: str, motions: bool, as_json: bool) -> Outcome:
+    from ncfix.compensate.changes import Changes, as_plain
+    from ncfix.text.reader import read as read_source
+
+    name = shown(path)
+    entry: dict[str, Any] = {"path": name}
+    try:
+        with console.busy(f"fixing {name}"):
+            text = read(path)
+            program = read_source(text, name, dialect_of(text, name, job.dialect, job.machine))
+            find = subprograms(job.setup, path)
+            changes = Changes.of(program, job.machine, job.setup, job.options, find)
+            found = list(changes.motions())
+    except Exception as error:
+        own = owned(error)
+        console.tell(*own.messages)
+        return own.exit_code, {**entry, "errors": [message.as_dict() for message in own.messages]}
+    report = changes.fixed.report
+    refused = [Message(each.code, each.reason, Place(name, each.line)) for each in report.refused]
+    console.tell_some([*report.warnings, *refused])
+    if refused and not job.options.allow_refused:
+        console.say(f"{visible(name)}: {console.counted(len(refused), 'motion')} refused, so nothing would be written")
+        refusals = [message.as_dict() for message in refused]
+        return ExitCode.REFUSED, {**entry, "changed": False, "motions": [], "refused": refusals}
+    if not as_json:
+        _put(changes, found, motions, text, name)
+    entry |= {"changed": changes.fixed.changed, "motions": as_plain(found), "refused": []}
+    return ExitCode.FINDINGS if changes.fixed.changed else ExitCode.DONE, entry
+
+
+def _put(changes: Changes, found: list[MotionChange], motions: bool, text: bytes, name: str) -> None:
+    if not motions:
+        console.put(b"".join(changes.unified(text, name, f"{name} (corrected)")))
+        return
+    if found:
+        console.put(f"{visible(name)}\n")
+        console.table(COLUMNS, [_row(each) for each in found])
+
+
+def _row(each: MotionChange) -> tuple[str, ...]:
+    digits, unit = (5, "mdeg") if each.rotary else (4, "um")
+    places = (f"{value:.{digits}f}" for value in (each.before, each.after))
+    return (str(each.line), each.axis, *places, f"{each.change:+.1f} {unit}", each.reason)

@@ -1,0 +1,223 @@
+"""What a correction would change, before anything is written: as lines of text, and as motions with their reasons.
+
+The text is a unified diff, in which the old and the new form of a line stand together. The motions are commands of the
+machine's axes at the ends of motions, before and after, and which errors of the machine move the tool tip most there.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ncfix.compensate.driver import Corrector, Fixed, fix_flat, fix_program
+from ncfix.compensate.following import placed
+from ncfix.compensate.plan.arrays import Array, Index, picked
+from ncfix.compensate.plan.kinematics import reached_joints, signs
+from ncfix.machine import Machine, State
+from ncfix.text.writer import Edit, Splices, spliced
+
+if TYPE_CHECKING:
+    from ncfix.compensate import FixOptions
+    from ncfix.compensate.following import Resolve
+    from ncfix.compensate.solve import WrittenPlan
+    from ncfix.control.setup import Setup
+    from ncfix.text.tree import Program
+
+FLAT = "NCF445"
+"""The remark that a program is written out flat."""
+CONTEXT = 3
+"""Lines round a change that a diff shows."""
+MOST_NAMED = 3
+"""So many errors are named as the reason of a correction."""
+LEAST_SHARE = 0.05
+"""None is named that moves the tip by less than this part of what the largest does."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionChange:
+    """The command of an axis at the end of a motion, before and after.
+
+    line           of the program
+    before, after  mm, or degrees of a rotary axis, in machine coordinates; under tool-centre-point control X Y Z of
+                   the tip
+    change         um, or thousandths of a degree
+    pieces         into how many blocks the motion is split
+    why            the errors that move the tip most there, um
+    """
+
+    line: int
+    axis: str
+    rotary: bool
+    before: float
+    after: float
+    change: float
+    pieces: int
+    why: Mapping[str, float]
+
+    @property
+    def reason(self) -> str:
+        """Why, in words."""
+        named = ", ".join(f"{name} {size:.1f} um" for name, size in self.why.items())
+        return f"{named}; in {self.pieces} pieces" if self.pieces > 1 else named
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """What a correction changes.
+
+    program  as it is corrected: where blocks are written out flat, another than was given
+    fixed    the result
+    edits    what is replaced in its text, the stamp, too; None where the text was numbered anew
+    plan     the motions, None of a machine without errors
+    machine  with the workpiece in its place
+    """
+
+    program: Program
+    fixed: Fixed
+    edits: Splices | None
+    plan: WrittenPlan | None
+    machine: Machine
+
+    @classmethod
+    def of(
+        cls, program: Program, machine: Machine, setup: Setup, options: FixOptions, resolve: Resolve | None
+    ) -> Changes:
+        """Correct a program, and keep how; raises what `fix_program` does."""
+        seen: list[tuple[Program, Corrector]] = []
+        fix = fix_flat if options.flatten else fix_program
+        fixed = fix(program, machine, setup, options, resolve, lambda *each: seen.append(each))
+        if not seen:
+            return cls(program, fixed, Splices.of([]), None, machine)
+        flat = any(message.code == FLAT for message in fixed.report.warnings)
+        source, corrector = seen[-1 if flat else 0]
+        assert corrector.together is not None
+        stamp = [Edit(corrector.at, corrector.at, corrector.stamped)] if corrector.stamped else []
+        edits = Splices.joined([corrector.together.splices, Splices.of(stamp)])
+        anew = spliced(source.source, edits) != fixed.text
+        return cls(source, fixed, None if anew else edits, corrector.together.plans[0], placed(machine, setup))
+
+    def unified(self, original: bytes, before: str, after: str) -> Iterator[bytes]:
+        """The lines of a unified diff of the text that was given; nothing if nothing changes."""
+        text = self.fixed.text
+        if text == original:
+            return
+        heads = (f"--- {before}\n".encode(), f"+++ {after}\n".encode())
+        if self.edits is None or original != self.program.source:
+            old, new = original.splitlines(keepends=True), text.splitlines(keepends=True)
+            found = difflib.diff_bytes(difflib.unified_diff, old, new, n=CONTEXT, lineterm=b"\n")
+            yield from (*heads, *(_ended(line) for number, line in enumerate(found) if number > 1))
+            return
+        yield from heads
+        yield from _hunks(original.splitlines(keepends=True), list(_replaced(original, self.edits)))
+
+    def motions(self) -> Iterator[MotionChange]:
+        """The commands that change, motion after motion, axis after axis."""
+        if self.plan is None:
+            return
+        plan, moves = self.plan, self.plan.moves
+        steps = np.where(moves.rotary, self.machine.least_increment[1], self.machine.least_increment[0])
+        changed = (np.abs(plan.shift) > steps / 2) & ~plan.kept[:, None]
+        rows = np.flatnonzero(changed.any(axis=1))
+        pieces = np.bincount(plan.plan.pieces.move, minlength=len(moves))
+        lines, shift = self.program.lines(moves.block), plan.shift
+        why = self._reasons(rows)
+        scale = np.where(moves.rotary, np.degrees(1.0), 1.0)
+        for at, row in enumerate(rows.tolist()):
+            for axis in np.flatnonzero(changed[row]).tolist():
+                before = float(moves.end[row, axis] * scale[axis])
+                way = float(shift[row, axis] * scale[axis])
+                found = (moves.axes[axis], bool(moves.rotary[axis]), before, before + way, 1e3 * way)
+                yield MotionChange(int(lines[row]), *found, int(pieces[row]), why[at])
+
+    def _reasons(self, rows: Index) -> Sequence[Mapping[str, float]]:
+        """The largest errors of the tip at the ends of motions, um, by the names of effects."""
+        assert self.plan is not None
+        moves = self.plan.moves
+        length = np.nan_to_num(picked(moves.tool_length, rows))
+        q, _ = reached_joints(self.machine, picked(moves.end, rows), moves.tcp[rows], length)
+        state = State(length, signs(picked(moves.end - moves.start, rows)))
+        names = dict.fromkeys(effect.name for effect in self.machine.effects if effect.active)
+        tip = self.machine.tip(q, length)
+        sizes = np.zeros((len(rows), len(names)))
+        for column, name in enumerate(names):
+            own = tuple(effect for effect in self.machine.effects if effect.active and effect.name == name)
+            gap: Array = self.machine.replace(effects=own).actual_tip(q, state) - tip
+            sizes[:, column] = 1e3 * np.linalg.norm(np.nan_to_num(gap), axis=1)
+        order = np.argsort(-sizes, axis=1, kind="stable")[:, :MOST_NAMED]
+        known = list(names)
+        return [
+            {known[k]: float(each[k]) for k in best if each[k] > max(LEAST_SHARE * each[best[0]], 1e-3)}
+            for each, best in zip(sizes, order.tolist(), strict=True)
+        ]
+
+
+def as_plain(changes: Sequence[MotionChange]) -> list[dict[str, Any]]:
+    """Changes as plain data, for JSON: mm and um, degrees and thousandths of them."""
+    return [
+        {
+            "line": each.line,
+            "axis": each.axis,
+            "from": round(each.before, 6),
+            "to": round(each.after, 6),
+            "mdeg" if each.rotary else "um": round(each.change, 3),
+            "pieces": each.pieces,
+            "why": {name: round(size, 3) for name, size in each.why.items()},
+        }
+        for each in changes
+    ]
+
+
+def _replaced(source: bytes, edits: Splices) -> Iterator[tuple[int, int, list[bytes]]]:
+    """Stretches of lines (from, up to), counted from 0, and the lines that stand there instead."""
+    lines = source.splitlines(keepends=True)
+    begins = np.append(0, np.cumsum([len(line) for line in lines]))
+    found: list[tuple[int, int, list[Edit]]] = []
+    for edit in edits.edits():
+        first = min(int(np.searchsorted(begins, edit.start, side="right")) - 1, len(lines) - 1)
+        last = max(int(np.searchsorted(begins, edit.stop, side="left")), first + 1)
+        if found and first < found[-1][1]:
+            found[-1] = (found[-1][0], max(last, found[-1][1]), [*found[-1][2], edit])
+        else:
+            found.append((first, last, [edit]))
+    for first, last, own in found:
+        at, stop = int(begins[first]), int(begins[last])
+        moved = Splices.of([replace(edit, start=edit.start - at, stop=edit.stop - at) for edit in own])
+        new = spliced(source[at:stop], moved).splitlines(keepends=True)
+        while first < last and new and lines[first] == new[0]:
+            first, new = first + 1, new[1:]
+        while first < last and new and lines[last - 1] == new[-1]:
+            last, new = last - 1, new[:-1]
+        if first < last or new:
+            yield first, last, new
+
+
+def _hunks(lines: Sequence[bytes], changes: Sequence[tuple[int, int, list[bytes]]]) -> Iterator[bytes]:
+    together: list[list[tuple[int, int, list[bytes]]]] = []
+    for change in changes:
+        if together and change[0] - together[-1][-1][1] <= 2 * CONTEXT:
+            together[-1].append(change)
+        else:
+            together.append([change])
+    moved = 0
+    for hunk in together:
+        begin, end = max(hunk[0][0] - CONTEXT, 0), min(hunk[-1][1] + CONTEXT, len(lines))
+        grown = sum(len(new) - (last - first) for first, last, new in hunk)
+        sizes = (end - begin, end - begin + grown)
+        old, new = (at + (size > 0) for at, size in zip((begin, begin + moved), sizes, strict=True))
+        yield f"@@ -{old},{sizes[0]} +{new},{sizes[1]} @@\n".encode()
+        at = begin
+        for first, last, instead in hunk:
+            yield from (_ended(b" " + line) for line in lines[at:first])
+            yield from (_ended(b"-" + line) for line in lines[first:last])
+            yield from (_ended(b"+" + line) for line in instead)
+            at = last
+        yield from (_ended(b" " + line) for line in lines[at:end])
+        moved += grown
+
+
+def _ended(line: bytes) -> bytes:
+    return line if line.endswith(b"\n") else line + b"\n\\ No newline at end of file\n"
