@@ -21,6 +21,7 @@ from ncfix.version import __version__
 
 VERBS = {
     "fix": "Rewrite programs so that this machine cuts what was meant.",
+    "watch": "Correct programs that come into a folder, each when it is complete.",
     "check": "Say what is the matter with programs; write nothing.",
     "trace": "Print the motions of a program as a table.",
     "verify": "Check a corrected program against its original, by simulation.",
@@ -49,6 +50,7 @@ MODULES = {
     **dict.fromkeys(("export", "emulate", "lint"), "tables"),
     **dict.fromkeys(("derive", "effects"), "machine"),
     "init": "shop.projects",
+    "watch": "shop.watch",
     **dict.fromkeys(("dialects", "plugins", "explain", "completion"), "listings"),
 }
 """In which module of `ncfix.cli` the command of a verb is, if not in one of its own name."""

@@ -1,0 +1,230 @@
+"""`ncfix watch IN OUT`: programs that come into a folder are corrected when they are complete."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ncfix import files
+from ncfix.batch.watching import WatchedFolder, moments, state_of
+from ncfix.cli import console
+from ncfix.cli.fix import fix, processes_for
+from ncfix.cli.options import FOLDER, PATH, Positive, load_machine, sound
+from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.shop.projects import ProgramGroup, ProjectCommand
+from ncfix.cli.shop.summary import Became, Loudness, reasons
+from ncfix.cli.targets import Outputs, targets
+from ncfix.diagnostics import NcfixError, Place, UsageError, visible
+
+if TYPE_CHECKING:
+    from ncfix.cli.shop.batch import FixJob
+
+LAST = 200
+"""So many programs are on the status page."""
+STYLE = """:root { color-scheme: light dark; font: 15px/1.4 system-ui, sans-serif }
+body { max-width: 70em; margin: 1.5em auto; padding: 0 1em }
+table { border-collapse: collapse; width: 100% } th, td { text-align: left; padding: .3em .8em .3em 0 }
+td { border-top: 1px solid #8886; overflow-wrap: anywhere } .failed, .refused { color: #c33; font-weight: 600 }"""
+TAKEN = frozenset(
+    {
+        *("machine_path", "dialect", "strategy", "thesis", "tolerance_um", "split_rapids", "flatten", "block_numbers"),
+        *("allow_refused", "verify", "jobs", "executor", "time_limit_s", "memory_limit_mb"),
+    }
+)
+"""Parameters of `fix` that `watch` has, too, besides those of the setup."""
+
+
+class FolderCommand(ProjectCommand):
+    """A verb on a folder, for which the project file of the folder holds as a whole."""
+
+    def _by_settings(self, given: Iterable[str], named: str | None) -> list[ProgramGroup]:
+        from ncfix.project import Project
+
+        (folder, *_) = given
+        project = Project.load(named) if named else Project.of(folder)
+        if project is None:
+            return [ProgramGroup()]
+        console.say(f"{visible(project.path)} says what is not said here")
+        return [ProgramGroup(self._parameters(project, project.settings(folder)), None, project.folder or os.curdir)]
+
+
+@dataclass(slots=True)
+class StatusPage:
+    """What has become of the programs since the start, as a page that a browser reads again and again.
+
+    path  of the page; None: there is none
+    """
+
+    path: str | None
+    began: float = field(default_factory=time.time)
+    counts: Counter[str] = field(default_factory=Counter)
+    last: list[tuple[float, Mapping[str, Any]]] = field(default_factory=list)
+    trouble: str = ""
+
+    def add(self, entry: Mapping[str, Any]) -> None:
+        """Take in what became of a program."""
+        self.counts[Became.of(entry)] += 1
+        self.last = [(time.time(), entry), *self.last[: LAST - 1]]
+
+    def write(self) -> None:
+        """Write the page anew."""
+        if self.path is not None:
+            files.write_whole(self.path, self.text().encode(), replace=True)
+
+    def text(self) -> str:
+        """The page."""
+        rows = "\n".join(self._row(at, entry) for at, entry in self.last)
+        counts = ", ".join(f"{count} {became}" for became, count in sorted(self.counts.items())) or "no program yet"
+        trouble = f'<p class="failed">{escape(visible(self.trouble, lines=True))}</p>' if self.trouble else ""
+        return f"""<!doctype html>
+<html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="5">
+<meta name="viewport" content="width=device-width"><title>ncfix watch</title><style>{STYLE}</style>
+<h1>ncfix watch</h1>
+<p>Since {_clock(self.began)}: {counts}. Written {_clock(time.time())}.</p>{trouble}
+<table><tr><th>when<th>program<th>what became of it<th>why</tr>
+{rows}
+</table></html>
+"""
+
+    def _row(self, at: float, entry: Mapping[str, Any]) -> str:
+        became, why = Became.of(entry), reasons(entry)
+        said = f"{why[0][0]}: {why[0][1]}" if why else _correction(entry)
+        cells = (_clock(at), visible(entry["path"]), f'<span class="{became}">{became}</span>', visible(said))
+        return "<tr>" + "".join(f"<td>{cell if '<span' in cell else escape(cell)}" for cell in cells) + "</tr>"
+
+
+def _correction(entry: Mapping[str, Any]) -> str:
+    most = entry.get("max_correction_um")
+    return "" if most is None else f"largest correction {most:.1f} um"
+
+
+def _clock(at: float) -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(at))
+
+
+def _like_fix(command: click.Command) -> click.Command:
+    """Give the verb those options of `fix` that it takes."""
+    own = {param.name for param in command.params}
+    command.params += [param for param in fix.params if param.name in TAKEN and param.name not in own]
+    return command
+
+
+@_like_fix
+@click.command(cls=FolderCommand)
+@click.argument("folder", type=FOLDER, metavar="IN")
+@click.argument("output", type=FOLDER, metavar="OUT")
+@setup_options
+@click.option(
+    "--settle-s",
+    type=Positive(),
+    default=2.0,
+    show_default=True,
+    help="A program that has not changed for so long is complete.",
+)
+@click.option(
+    "--poll-s", type=Positive(), metavar="S", help="Look at IN every S seconds: for shares, where nothing is told."
+)
+@click.option("--status", type=PATH, metavar="FILE.html", help="A page that says what became of the programs.")
+@click.option("--once", is_flag=True, help="End when all that is in IN now is done.")
+@click.option("--project", type=PATH, metavar="FILE", expose_value=False, help="The project file.")
+@click.option("--no-project", is_flag=True, expose_value=False, help="Use no project file.")
+@click.option("-q", "--quiet", is_flag=True, help="Say only of which programs nothing was written, and why.")
+@click.option("-v", "--verbose", is_flag=True, help="Say all of each program.")
+def watch(
+    folder: str,
+    output: str,
+    given: SetupOptions,
+    settle_s: float,
+    poll_s: float | None,
+    status: str | None,
+    once: bool,
+    quiet: bool,
+    verbose: bool,
+    machine_path: str,
+    **options: Any,
+) -> int:
+    """Correct programs that come into the folder IN, each when it is complete, into the folder OUT, until Ctrl-C.
+
+    What has been done before and has not changed is not done again, as with `ncfix fix --resume`.
+    """
+    if not os.path.isdir(folder):
+        raise UsageError.of("NCF014", "is not a folder", Place(folder), "make it, or name another one")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    inputs = [path for path in (machine_path, *given.files) if path]
+    loudness = Loudness.ALL if verbose else Loudness.QUIET if quiet else Loudness.USUAL
+    page = StatusPage(status)
+    watched, watching = WatchedFolder(folder, output, settle_s), _Watching(folder, output, given, options, loudness)
+    known, worst = None, 0
+    page.write()
+    try:
+        for _ in moments(folder, inputs, settle_s, poll_s):
+            now = tuple(map(state_of, inputs))
+            if now != known:
+                known = now
+                watched.again()
+            try:
+                ready = watched.complete()
+                if ready:
+                    worst = max(worst, watching.corrected(machine_path, inputs, ready, page))
+                page.trouble = ""
+            except NcfixError as error:
+                if str(error) != page.trouble:
+                    console.tell(*error.messages)
+                    page.trouble = str(error)
+                    page.write()
+                watched.again()
+                worst = max(worst, error.exit_code)
+                if once:
+                    return worst
+            if once and not watched.waiting:
+                return worst
+    except KeyboardInterrupt:
+        console.say("stopped")
+    return worst
+
+
+@dataclass(frozen=True, slots=True)
+class _Watching:
+    folder: str
+    output: str
+    given: SetupOptions
+    options: Mapping[str, Any]
+    loudness: Loudness
+
+    def corrected(self, machine_path: str, inputs: Iterable[str], ready: list[str], page: StatusPage) -> int:
+        """Correct programs, and say what became of them; the worst exit code."""
+        from ncfix.batch.work import executor_of
+        from ncfix.cli.shop.batch import Batch
+
+        outputs = Outputs(os.path.join(self.output, ""), resume=True)
+        wanted = targets([self.folder], outputs, [*inputs], folders=True, only=frozenset(ready))
+        if not wanted:
+            return 0
+        batch = Batch(self._job(machine_path), wanted, self.output, True, False, self.loudness, many=True)
+        worst = 0
+        for outcome in batch.run(processes_for(self.options["jobs"], wanted), executor_of(self.options["executor"])):
+            entry = outcome.entry
+            if entry["output"] is not None and not entry.get("resumed") and self.loudness == Loudness.USUAL:
+                console.say(f"{visible(entry['path'])} -> {visible(entry['output'])}")
+            page.add(entry)
+            worst = max(worst, outcome.code)
+            page.write()
+        return worst
+
+    def _job(self, machine_path: str) -> FixJob:
+        from ncfix.cli.shop.batch import FixJob, ProgramLimits
+        from ncfix.compensate import FixOptions
+
+        names = ("tolerance_um", "split_rapids", "flatten", "block_numbers", "allow_refused", "verify")
+        chosen = {name: self.options[name] for name in names}
+        strategy = "thesis" if self.options["thesis"] else self.options["strategy"]
+        machine = sound(load_machine(machine_path), machine_path, force=False)
+        limits = ProgramLimits(self.options["time_limit_s"], self.options["memory_limit_mb"])
+        return FixJob(machine, self.given.load(), self.options["dialect"], FixOptions(strategy, **chosen), limits)

@@ -1,0 +1,120 @@
+"""`ncfix watch`: programs that come into a folder are corrected when they are complete."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from typing import Any
+
+import pytest
+
+from cli.conftest import PROGRAM
+from ncfix.diagnostics import ExitCode
+
+PATIENCE_S = 60.0
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.fixture(params=["polling", "told"])
+def watching(request: Any, shop: Any) -> Iterator[subprocess.Popen[str]]:
+    if request.param == "told" and not find_spec("watchfiles"):
+        pytest.skip("watchfiles is not installed")
+    (shop.folder / "in").mkdir()
+    command = ["watch", "in", "out", "-m", "machine.toml", "--assume-zero", "--settle-s", "0.4", "--status", "s.html"]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "ncfix", *command, *(["--poll-s", "0.1"] if request.param == "polling" else [])],
+        cwd=shop.folder,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    yield running
+    if running.poll() is None:
+        running.kill()
+    running.communicate()
+
+
+def test_programs_are_corrected_as_they_come(watching: subprocess.Popen[str], shop: Any) -> None:
+    source, output, page = (shop.folder / name for name in ("in/a/part.ngc", "out/a/part.ngc", "s.html"))
+    until(page.exists)
+    assert "no program yet" in page.read_text()
+    source.parent.mkdir()
+    with source.open("wb") as handle:
+        for piece in (PROGRAM[:30], PROGRAM[30:]):
+            handle.write(piece)
+            handle.flush()
+            time.sleep(0.2)
+            assert not output.exists()
+    until(output.exists)
+    assert b"X109.989" in output.read_bytes()
+    source.write_bytes(PROGRAM.replace(b"X110.000", b"X120.000"))
+    until(lambda: b"X119.988" in output.read_bytes())
+    (shop.folder / "in/bad.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
+    until(lambda: "bad.ngc" in page.read_text())
+    text = page.read_text()
+    assert "1 failed, 2 written" in text
+    assert "NCF1" in text
+    shop.machine.write_text(shop.machine.read_text().replace("1e-4", "2e-4"))
+    until(lambda: b"X119.976" in output.read_bytes())
+    os.kill(watching.pid, signal.SIGINT)
+    _, said = watching.communicate(timeout=PATIENCE_S)
+    assert watching.returncode == ExitCode.UNREADABLE
+    assert said.count("in/a/part.ngc -> out/a/part.ngc\n") == 3
+    assert said.endswith("stopped\n")
+
+
+def test_once(ncfix: Any, shop: Any) -> None:
+    (shop.folder / "in").mkdir()
+    (shop.folder / "in/part.ngc").write_bytes(PROGRAM)
+    command = ("watch", shop.folder / "in", shop.folder / "out", "-m", shop.machine, "--settle-s", "0.1", "--once")
+    assert ncfix(*command).code == ExitCode.USAGE
+    assert ncfix(*command, "--assume-zero", "--poll-s", "0.05").code == ExitCode.DONE
+    assert b"X109.989" in (shop.folder / "out/part.ngc").read_bytes()
+    assert "->" not in ncfix(*command, "--assume-zero").err
+
+
+def test_with_a_project(ncfix: Any, shop: Any) -> None:
+    (shop.folder / "in").mkdir()
+    (shop.folder / "in/part.ngc").write_bytes(PROGRAM)
+    (shop.folder / "ncfix.toml").write_text('machine = "machine.toml"\n[options]\nassume_zero = true\n')
+    result = ncfix("watch", shop.folder / "in", shop.folder / "out", "--settle-s", "0.1", "--once")
+    assert result.code == ExitCode.DONE, result.err
+    assert (shop.folder / "out/part.ngc").exists()
+
+
+def test_a_machine_that_is_wrong_for_a_while(ncfix: Any, shop: Any) -> None:
+    (shop.folder / "in").mkdir()
+    (shop.folder / "in/part.ngc").write_bytes(PROGRAM)
+    shop.machine.write_text("nonsense")
+    page = shop.folder / "s.html"
+    command = ("watch", shop.folder / "in", shop.folder / "out", "-m", shop.machine, "--settle-s", "0.1", "--once")
+    result = ncfix(*command, "--status", page)
+    assert result.code == ExitCode.UNREADABLE
+    assert "NCF30" in page.read_text()
+
+
+def test_what_is_no_folder(ncfix: Any, shop: Any) -> None:
+    result = ncfix("watch", shop.folder / "none", shop.folder / "out", "-m", shop.machine)
+    assert result.code == ExitCode.USAGE
+    assert "NCF014" in result.err
+
+
+def test_nothing_of_a_name_steers_the_page(shop: Any) -> None:
+    from ncfix.cli.shop.watch import StatusPage
+
+    page = StatusPage(None)
+    error = {"code": "NCF100", "text": "<script>", "line": 1}
+    page.add({"path": "<b>\x1b.ngc", "output": None, "errors": [error]})
+    text = page.text()
+    assert "<script>" not in text
+    assert "&lt;b&gt;\\x1b.ngc" in text
