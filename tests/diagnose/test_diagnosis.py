@@ -62,7 +62,8 @@ def test_a_backlash_is_named_and_added(backlash: Diagnosis) -> None:
 def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
     found = as_dict(backlash)
     assert {"verdict", "effects", "unknown", "gap_um", "where", "next_measurements", "machine"} <= set(found)
-    assert set(found["gap_um"]) == {"before", "after", "floor", "holdout_before", "holdout_after"}
+    gaps = {"given", "holdout_given", "before", "after", "floor", "holdout_before", "holdout_after"}
+    assert set(found["gap_um"]) == gaps
     wanted = {"name", "title", "axis", "why", "coefficients", "sigma", "p_value", "aliases"}
     assert wanted <= set(found["effects"][0])
     assert found["findable_um"]["backlash X"] <= 3.0  # 150 poses, 2 um of noise
@@ -94,18 +95,42 @@ def test_constants_that_the_data_put_elsewhere_are_said_and_changed(known: Machi
     assert abs(found.machine.effects[index].coefficients[0] - true) < 20e-6
 
 
-def test_nothing_missing_does_not_hide_constants_that_are_wrong(known: Machine) -> None:
-    """No machine file comes of it, so it is said who puts them right."""
-    index = next(k for k, effect in enumerate(known.effects) if effect.name == "EC0Y")
-    off = replace(known.effects[index], coefficients=(known.effects[index].coefficients[0] + 60e-6,))
-    found = diagnose(
-        [measured(known)], known.replace(effects=(*known.effects[:index], off, *known.effects[index + 1 :]))
-    )
-    assert found.verdict == NOTHING
-    assert found.machine is None
-    assert "but constants of the machine file are not what the data say" in text(found).splitlines()[0]
-    assert "ncfix calibrate" in text(found)
-    assert "ncfix calibrate" in markdown(document(found)).decode()
+def off_by(known: Machine, name: str, by: float) -> tuple[Machine, int]:
+    """The machine file with one constant wrong, and which effect that is."""
+    index = next(k for k, effect in enumerate(known.effects) if effect.name == name)
+    wrong = replace(known.effects[index], coefficients=(known.effects[index].coefficients[0] + by,))
+    return known.replace(effects=(*known.effects[:index], wrong, *known.effects[index + 1 :])), index
+
+
+def test_a_constant_that_is_wrong_is_a_finding_with_a_machine_file(known: Machine) -> None:
+    file, index = off_by(known, "EC0Y", 60e-6)
+    found = diagnose([measured(known)], file)
+    assert found.verdict == FOUND
+    assert [each.candidate.name for each in found.findings] == ["constant EC0Y"]
+    assert found.machine is not None
+    right = known.effects[index].coefficients[0]
+    assert abs(found.machine.effects[index].coefficients[0] - right) < 4 * found.moved[0].sigma
+    kept = [k for k in range(len(known.effects)) if k != index]
+    assert [found.machine.effects[k].coefficients for k in kept] == [file.effects[k].coefficients for k in kept]
+    assert found.gap.given > 2 * found.gap.before
+    assert found.gap.holdout_given > 2 * found.gap.holdout_after
+    assert "file as given" in text(found)
+    rungs = as_dict(found)["ladder"]
+    assert [each["rung"] for each in rungs][:3] == ["file as given", "mistakes", "constants of the file"]
+    assert rungs[2]["share"] > 0.7
+    assert rungs[2]["found"] == ["constant EC0Y"]
+    assert as_dict(found)["constants_together"]["p_value"] < 1e-9
+    assert "constant EC0Y" in markdown(document(found)).decode()
+
+
+def test_a_constant_that_the_set_up_hides_is_held_as_calibrate_holds_it(known: Machine) -> None:
+    """Only the difference of EX0C and EX0B is seen: either is the name, the other its alias, and one is held."""
+    file, _ = off_by(known, "EX0C", 0.3)
+    found = diagnose([measured(known)], file)
+    (first,) = found.findings
+    assert {first.candidate.name, *first.aliases} == {"constant EX0C", "constant EX0B"}
+    assert found.verdict == AMBIGUOUS
+    assert "only their difference" in text(found)
 
 
 def test_a_laser_says_the_direction_of_its_runs_by_a_column_of_its_own() -> None:

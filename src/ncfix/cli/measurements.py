@@ -413,8 +413,7 @@ def diagnose(
     else:
         console.put(text(diagnosis))
         if output and written is None:
-            wrong = "; constants that are wrong are for `ncfix calibrate`" if diagnosis.moved else ""
-            console.say(f"no machine file was written: there is nothing to add to the model{wrong}")
+            console.say("no machine file was written: there is nothing to add to the model")
     return ExitCode.FINDINGS if check and diagnosis.verdict != NOTHING else ExitCode.DONE
 
 

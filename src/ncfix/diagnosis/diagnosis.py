@@ -18,19 +18,19 @@ from numpy.typing import NDArray
 from ncfix.diagnosis import checks
 from ncfix.diagnosis.assessment import Plausibility, plausibility
 from ncfix.diagnosis.catalogue import Candidate, catalogue, without
+from ncfix.diagnosis.constants import ConstantsVerdict, FileLikelihood, MovedConstant, judged_constants, names_of
 from ncfix.diagnosis.evidence import Comparison, Evidence, Member
 from ncfix.diagnosis.forms import VisibleForms, scaled_axes, unnamed_alternatives, visible_forms
 from ncfix.diagnosis.joint_fit import (
+    RATHER,
     JointFit,
-    MovedConstant,
     fitted,
     held_out,
+    held_out_as_given,
     machine_with,
-    moved_constants,
     passing,
     unnamed_um,
     visible_um,
-    with_firm_constants,
 )
 from ncfix.diagnosis.mistakes import Mistake, find
 from ncfix.diagnosis.next_poses import Proposal, proposed
@@ -55,6 +55,9 @@ from ncfix.diagnosis.selection import (
     with_constants_free,
 )
 from ncfix.machine import Effect, Machine
+from ncfix.machine.axes import component_title
+from ncfix.measure.least_squares import orthonormal
+from ncfix.measure.least_squares import without as without_base
 from ncfix.measure.measurement import Array, Measurement
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
@@ -64,6 +67,8 @@ MUCH = 1 / 3
 """Nor below this share of what all names together show."""
 LACKING = 1e-3
 """Probability of what is left by chance, below which something is missing that follows no pattern either."""
+CONSTANT_FAMILY = "constant of the file"
+ANEW = "use the new machine file, or calibrate the machine anew"
 NO_PATTERN = "something that follows no pattern that was looked for"
 
 
@@ -92,13 +97,18 @@ class EffectFinding:
 
 @dataclass(frozen=True)
 class Gap:
-    """Root mean square of residual lengths, um: before, after, the noise floor, and the first two on held-out poses."""
+    """Root mean square of residual lengths, um: before, after, the noise floor, and the first two on held-out poses.
+
+    given, holdout_given  with the machine file as it stands: only the set-up is fitted
+    """
 
     before: float
     after: float
     floor: float
     holdout_before: float
     holdout_after: float
+    given: float = float("nan")
+    holdout_given: float = float("nan")
 
 
 @dataclass(frozen=True, repr=False)
@@ -133,8 +143,9 @@ class Diagnosis:
     rest           what has no name
     machine        with the findings added, or None if there is nothing to add
     before, after  (m,) residuals with the constants alone and with the findings, um; p_lack, p_left by chance
+    named_odds, unnamed_odds  log odds of all names together, and of what has none beside them
     clustering     how much neighbouring residuals are alike, before and after
-    moved          constants of the machine file that the data put elsewhere; the gap before is after that
+    constants      what the data say of the constants of the machine file; the gap before is after that
     findable       name -> um rms from which on an effect would be found in these data; inf: never
     """
 
@@ -151,15 +162,22 @@ class Diagnosis:
     p_lack: float | None
     patterns: tuple[ResidualPattern, ...]
     clustering: tuple[float, float]
-    moved: tuple[MovedConstant, ...]
+    constants: ConstantsVerdict
     findable: Mapping[str, float]
     proposal: Proposal | None = None
     mistake: Mistake | None = None
+    named_odds: float = 0.0
+    unnamed_odds: float = 0.0
 
     @property
     def data(self) -> ResidualData:
         """The data."""
         return self.case.data
+
+    @property
+    def moved(self) -> tuple[MovedConstant, ...]:
+        """Constants of the machine file that the data put elsewhere."""
+        return self.constants.moved
 
     @property
     def unknown_um(self) -> float:
@@ -226,10 +244,15 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
     checks.agreeing(data, joint.before, sigma)
     floor = noise_floor(data, evidence.background, sigma, keep)
     noise_um = data.rms(np.where(data.row >= 0, floor.sigma_um * data.relative, 0.0), keep)
-    machine, added = machine_with(evidence, told, with_firm_constants(evidence, told, share, joint))
-    findings = _findings(case, selected, joint, added)
+    constants = judged_constants(evidence, told, share)
+    machine, added = machine_with(evidence, told, fitted(evidence, told, share, constants.stay))
+    named = _findings(case, selected, joint, added)
+    off = _off(case, constants, machine, max((each.size_um for each in named), default=0.0))
+    findings = (*off, *named) if named and off and off[0].size_um > named[0].size_um else (*named, *off)
     rest = _rest(case, selected, joint, floor, noise_um)
     places = scaled_axes(data)
+    sets: list[dict[str, Member]] = [{}, {name: selected.members[name] for name in selected.named}, selected.members]
+    weights = [scale.weight(each) for each in sets]
     return Diagnosis(
         case=case,
         verdict=verdict_of(findings, rest, visible_um(data, joint.together), floor, noise_um),
@@ -237,7 +260,7 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
         rest=rest,
         gap=_gap(case, told, joint, share, noise_um),
         floor=floor,
-        machine=machine if any(added) else None,
+        machine=machine if any(added) or off else None,
         selected=selected,
         before=joint.before,
         after=joint.after,
@@ -247,9 +270,11 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
             clustering(evidence.background, joint.before, places),
             clustering(evidence.background, joint.after, places),
         ),
-        moved=moved_constants(evidence, joint),
+        constants=constants,
         findable=findable_sizes(scale),
         proposal=proposed(scale, selected, sigma) if told else None,
+        named_odds=weights[1] - weights[0],
+        unnamed_odds=weights[2] - weights[1],
     )
 
 
@@ -266,6 +291,39 @@ def _findings(
             EffectFinding(owner, selected.odds[name], selected.p_value(name), alike, size, effects, shown, judgement)
         )
     return tuple(found)
+
+
+def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: float) -> tuple[EffectFinding, ...]:
+    """Constants of the file that are off by more than a day and a set-up make of them: findings like names.
+
+    Beside a name they have to matter at least half as much: the mean of a curve is a constant, too.
+    """
+    if constants.odds <= 0 or constants.size_um < max(EXCESS_UM, RATHER * named_um):
+        return ()
+    p_value = min(constants.p_value, float(np.exp(-constants.odds)))
+    if constants.whole:
+        count = len(constants.moved)
+        title = f"constants of the machine file: all {count} that can be told are off together"
+        owner = Candidate("constants of the file", title, "", CONSTANT_FAMILY, (), (), remedy=ANEW)
+        return (EffectFinding(owner, constants.odds, p_value, (), constants.size_um, (), constants.shown),)
+    effects = dict(zip(names_of(case.data.problem.selection), _owners(case.data, machine), strict=True))
+    found = []
+    for each in constants.moved:
+        effect = effects[each.name]
+        title = f"constant of the machine file: {component_title(effect.name, case.data.machine.axis(effect.joint))}"
+        title += ", with the other sign" if each.turned else ""
+        owner = Candidate(f"constant {each.name}", title, effect.joint, CONSTANT_FAMILY, (), (), remedy=ANEW)
+        shown = np.zeros(len(case.data.y))
+        odds = max(each.odds, 0.0) if len(constants.moved) > 1 else constants.odds
+        alike = tuple(f"constant {name}" for name in each.aliases)
+        found.append(EffectFinding(owner, odds, p_value, alike, each.size_um, (effect,), shown))
+    return tuple(found)
+
+
+def _owners(data: ResidualData, machine: Machine) -> list[Effect]:
+    """The effect of each free constant, as the new machine has it."""
+    free = [effect for effect, loose in zip(machine.effects, data.problem.selection.free, strict=False) if loose]
+    return [replace(effect, covariance=None) for effect in free for _ in range(effect.basis.size)]
 
 
 def _rest(case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, noise_um: float) -> Unexplained:
@@ -285,9 +343,14 @@ def _rest(case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, no
 def _gap(case: Case, told: Sequence[Member], joint: JointFit, share: float, noise_um: float) -> Gap:
     data, keep = case.data, case.kept
     held = held_out(case.evidence, told, share)
-    known = np.isfinite(held.without) & np.isfinite(held.with_all) & keep
+    asked = FileLikelihood(case.evidence, told, share)
+    predicted = held_out_as_given(case.evidence, asked.from_file, asked.setup, share)
+    known = np.isfinite(held.without) & np.isfinite(held.with_all) & np.isfinite(predicted) & keep
+    basis = orthonormal(asked.setup / data.relative[:, None])
+    given = without_base(basis, (asked.from_file / data.relative)[:, None])[:, 0] * data.relative
     before, after = data.rms(joint.before, keep), data.rms(joint.after, keep)
-    return Gap(before, after, noise_um, data.rms(held.without, known), data.rms(held.with_all, known))
+    holdout = [data.rms(values, known) for values in (held.without, held.with_all, predicted)]
+    return Gap(before, after, noise_um, holdout[0], holdout[1], data.rms(given, keep), holdout[2])
 
 
 def _constants(case: Case) -> float:

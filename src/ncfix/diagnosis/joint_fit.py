@@ -21,7 +21,6 @@ from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.diagnosis.selection import Selected, with_alternatives
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis, Fourier, Polynomial
-from ncfix.machine.effects import Unit, units
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index
 
@@ -29,8 +28,6 @@ Mask = NDArray[np.bool_]
 WIDE = 1e3
 """um: how far a constant of the machine file may be off; wide enough to be no prior, and what cannot be seen stays."""
 TRACE = 1e-12
-FIRM = 3.0
-"""Standard deviations by which the data must ask for another constant; else the machine file keeps its own."""
 REGIONS = 16
 FOLDS = 4
 BLIND = 1e2
@@ -94,56 +91,6 @@ def fitted(evidence: Evidence, members: Sequence[Member], share: float, stay: Ma
     sigmas[loose] = (np.sqrt(np.diag(spread)[:n]) / lengths)[n - loose.sum() :]
     covariances = tuple(spread[part, part] for part in parts)
     return JointFit(constants, sigmas, numbers, covariances, shown, y - base @ alone, y - columns @ z)
-
-
-def constant_changes(evidence: Evidence, joint: JointFit) -> Array:
-    """(k,) how far the data move the free constants from what the machine file says, in mm and rad."""
-    data = evidence.background.data
-    change: Array = data.coefficients + joint.constants - data.problem.selection.start
-    return change
-
-
-@dataclass(frozen=True, slots=True)
-class MovedConstant:
-    """A constant of the machine file that the data put elsewhere, surely: mm or rad, with its standard deviation.
-
-    unit  what these are multiplied with to be in the unit that people use, and its name
-    """
-
-    name: str
-    file: float
-    data: float
-    sigma: float
-    unit: Unit
-
-
-def moved_constants(evidence: Evidence, joint: JointFit) -> tuple[MovedConstant, ...]:
-    """The constants that the data move by more than three standard deviations."""
-    data = evidence.background.data
-    selection, change = data.problem.selection, constant_changes(evidence, joint)
-    said = [unit for effect in selection.estimated for unit in units(data.machine, effect)]
-    start = selection.start
-    return tuple(
-        MovedConstant(
-            selection.labels[k], float(start[k]), float(start[k] + change[k]), float(joint.sigmas[k]), said[k]
-        )
-        for k in np.flatnonzero(np.abs(change) > FIRM * joint.sigmas).tolist()
-    )
-
-
-def with_firm_constants(evidence: Evidence, members: Sequence[Member], share: float, joint: JointFit) -> JointFit:
-    """The fit in which constants stay that the data do not ask to change; the one given if it needs them changed.
-
-    A constant that the data hardly see takes any value that helps a little, and would do harm at other poses.
-    """
-    stay = np.abs(constant_changes(evidence, joint)) <= FIRM * joint.sigmas
-    held, precision = fitted(evidence, members, share, stay), evidence.background.precision(share)
-    worse, count = _misfit(held.after, precision) - _misfit(joint.after, precision), int(stay.sum())
-    return joint if worse > count + FIRM * np.sqrt(2 * count) else held
-
-
-def _misfit(residual: Array, precision: Array) -> float:
-    return float(residual @ precision @ residual)
 
 
 def _lengths(columns: Array) -> Array:
@@ -222,26 +169,44 @@ class HeldOut:
     cell: Index
 
 
+def held_out_as_given(evidence: Evidence, from_file: Array, setup: Array, share: float) -> Array:
+    """Prediction errors (m,) um of the machine file as it stands, its set-up fitted to the other regions.
+
+    from_file  (m,) values minus what the file says; setup (m, j) what the unknown set-up shows
+    """
+    background = evidence.background
+    columns = WIDE * setup / _lengths(setup)
+    return _predicted(background, from_file, columns, share, _folds(background.data)[1])
+
+
+def _folds(data: ResidualData) -> tuple[Index, list[NDArray[np.bool_]]]:
+    """The region of each value, (m,), and which values are held out in turn."""
+    cell = pose_regions(scaled_axes(data))[np.maximum(data.row, 0)]
+    return cell, [(cell % FOLDS == fold) & (data.row >= 0) for fold in range(FOLDS)]
+
+
 def held_out(evidence: Evidence, members: Sequence[Member], share: float) -> HeldOut:
     """Predict each region from the others: without members, with all, and with all but each one."""
     background = evidence.background
     data = background.data
-    cell = pose_regions(scaled_axes(data))[np.maximum(data.row, 0)]
-    base = WIDE * data.base / np.where((s := np.sqrt((data.base**2).mean(axis=0))) > 0, s, 1.0)
+    cell, tests = _folds(data)
+    base = WIDE * data.base / _lengths(data.base)
     shown = [evidence.groups[m.group].columns * m.size for m in members]
     models = [[], shown, *([*shown[:out], *shown[out + 1 :]] for out in range(len(shown)))]
-    tests = [(cell % FOLDS == fold) & (data.row >= 0) for fold in range(FOLDS)]
-    errors = [_predicted(background, np.concatenate([base, *model], axis=1), share, tests) for model in models]
+    errors = [_predicted(background, data.y, np.concatenate([base, *model], axis=1), share, tests) for model in models]
     return HeldOut(errors[0], errors[1], tuple(errors[2:]), cell)
 
 
-def _predicted(background: Background, signal: Array, share: float, tests: Sequence[NDArray[np.bool_]]) -> Array:
-    """Errors of the predictions of each fold from the others, for a signal whose columns are there at unit size.
+def _predicted(
+    background: Background, y: Array, signal: Array, share: float, tests: Sequence[NDArray[np.bool_]]
+) -> Array:
+    """Errors of the predictions of each fold of values y from the others, for a signal whose columns are there at
+    unit size.
 
     With Q the inverse of the covariance of all values, the block of Q of a fold says what the others tell of it: with
     the fold's values so replaced, Q y are the weights of the others, and the signal alone is carried over to the fold.
     """
-    precision, y = background.precision(share), background.data.y
+    precision = background.precision(share)
     weighed = precision @ signal
     inner = np.eye(signal.shape[1]) + signal.T @ weighed
     inverse = precision - weighed @ np.linalg.solve(inner, weighed.T)

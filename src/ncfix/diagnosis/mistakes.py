@@ -69,6 +69,8 @@ class Mistake:
     after_um: float = 0.0
     likely: bool = False
     aliases: tuple[str, ...] = ()
+    given_um: float = 0.0
+    odds: float = 0.0
 
 
 def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = ()) -> Mistake | None:

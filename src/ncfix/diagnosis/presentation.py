@@ -11,12 +11,16 @@ from typing import Any
 import numpy as np
 
 from ncfix.diagnosis.assessment import carriers, conditions
+from ncfix.diagnosis.constants import MovedConstant, names_of
 from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, EffectFinding
-from ncfix.diagnosis.joint_fit import MovedConstant
+from ncfix.diagnosis.ladder import in_words, ladder
 from ncfix.diagnosis.next_poses import Proposal, as_objects
 from ncfix.diagnosis.selection import findable_in_words, shows_hardly_anything
 from ncfix.machine import Machine
+from ncfix.measure.calibrate import untold
 
+HEAD = ("rung", "left, um", "held out", "share", "log odds", "found")
+"""Of the table of the ladder."""
 SHOWN = 0.05
 """um and urad: what is smaller is not there."""
 NEARLY = 0.925
@@ -43,6 +47,7 @@ def text(diagnosis: Diagnosis) -> str:
         f"gap: {gap.before:.2f} um before, {gap.after:.2f} um after, noise {gap.floor:.2f} um "
         f"({NOISE[diagnosis.floor.source]}); held out: {gap.holdout_before:.2f} -> {gap.holdout_after:.2f} um",
     ]
+    lines += ["", *_table(diagnosis)]
     for finding in diagnosis.findings:
         lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(diagnosis, finding)}"]
         if finding.aliases:
@@ -59,7 +64,7 @@ def text(diagnosis: Diagnosis) -> str:
     if diagnosis.moved:
         lines += ["", "constants of the machine file that the data put elsewhere (the gap before is after that):"]
         lines += [f"  {constant(each)}" for each in diagnosis.moved]
-        lines += [f"  {each}" for each in anew(diagnosis)]
+        lines += [f"  {each}" for each in held(diagnosis)]
     if diagnosis.verdict == NOTHING:
         lines += ["", *silence(diagnosis)]
     lines += _next(diagnosis)
@@ -68,16 +73,26 @@ def text(diagnosis: Diagnosis) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _table(diagnosis: Diagnosis) -> list[str]:
+    """The ladder as a table."""
+    rows = [HEAD, *in_words(ladder(diagnosis))]
+    width = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]
+    cells = [
+        [cell.ljust(w) if k in (0, 5) else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, width, strict=True))]
+        for row in rows
+    ]
+    return ["  ".join(row).rstrip() for row in cells]
+
+
 def verdict(diagnosis: Diagnosis) -> str:
-    """What the verdict means; that nothing is missing does not mean that the machine file is right."""
-    said = SAID[diagnosis.verdict]
-    return f"{said}, but constants of the machine file are not what the data say" if anew(diagnosis) else said
+    """What the verdict means."""
+    return SAID[diagnosis.verdict]
 
 
-def anew(diagnosis: Diagnosis) -> list[str]:
-    """What to do about constants that are wrong where no machine file comes out of the diagnosis."""
-    wrong = diagnosis.moved and diagnosis.verdict == NOTHING
-    return ["no machine file is written for these: `ncfix calibrate` estimates them anew"] if wrong else []
+def held(diagnosis: Diagnosis) -> list[str]:
+    """What the data cannot tell of the constants, as `calibrate` says it."""
+    labels = names_of(diagnosis.data.problem.selection)
+    return [message.text for message in untold(diagnosis.constants.solution, labels)]
 
 
 def silence(diagnosis: Diagnosis) -> list[str]:
@@ -196,6 +211,17 @@ def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:
     """The fields of docs/formats.md, section 4, and some more."""
     return {
         "verdict": diagnosis.verdict,
+        "ladder": [
+            {
+                "rung": rung.name,
+                "left_um": rung.left_um,
+                "holdout_um": None if np.isnan(rung.holdout_um) else rung.holdout_um,
+                "share": rung.share,
+                "log_odds": None if np.isnan(rung.log_odds) else rung.log_odds,
+                "found": list(rung.found),
+            }
+            for rung in ladder(diagnosis)
+        ],
         "effects": [_effect(diagnosis, each) for each in diagnosis.findings],
         "unknown": {"share_um": diagnosis.unknown_um, "where": diagnosis.rest.kind},
         "gap_um": {name: getattr(diagnosis.gap, name) for name in diagnosis.gap.__dataclass_fields__},
@@ -215,7 +241,25 @@ def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:
         "findable_um": {name: size if np.isfinite(size) else None for name, size in diagnosis.findable.items()},
         "considered": len(diagnosis.case.considered),
         "outliers": _outliers(diagnosis),
-        "constants": [{"name": m.name, "file": m.file, "data": m.data, "sigma": m.sigma} for m in diagnosis.moved],
+        "constants": [
+            {
+                "name": m.name,
+                "file": m.file,
+                "data": m.data,
+                "sigma": m.sigma,
+                "log_odds": m.odds,
+                "size_um": m.size_um,
+                "aliases": list(m.aliases),
+            }
+            for m in diagnosis.moved
+        ],
+        "constants_together": {
+            "chi_square": diagnosis.constants.distance,
+            "freedom": diagnosis.constants.freedom,
+            "p_value": diagnosis.constants.p_value,
+            "log_odds": diagnosis.constants.odds,
+            "size_um": diagnosis.constants.size_um,
+        },
     }
 
 

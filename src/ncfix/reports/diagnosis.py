@@ -7,12 +7,14 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ncfix.diagnosis.diagnosis import NOTHING, Diagnosis, EffectFinding
+from ncfix.diagnosis.ladder import in_words, ladder
 from ncfix.diagnosis.presentation import (
+    HEAD,
     NOISE,
-    anew,
     carried,
     constant,
     constants,
+    held,
     hope,
     hopeless,
     odd,
@@ -25,7 +27,7 @@ from ncfix.diagnosis.presentation import (
 from ncfix.machine import Effect
 from ncfix.machine.effects import with_unit
 from ncfix.measure.measurement import Array
-from ncfix.reports.document import Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
+from ncfix.reports.document import Bars, Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
 
 HOUR = 3600.0
 CURVES = 4
@@ -61,6 +63,7 @@ def _verdict(diagnosis: Diagnosis) -> ReportSection:
     noise = f"noise {diagnosis.floor.sigma_um:.2f} um a value, {NOISE[diagnosis.floor.source]}"
     parts: list[Part] = [
         Paragraph(f"{diagnosis.verdict}: {verdict(diagnosis)}."),
+        *_waterfall(diagnosis),
         Paragraph(f"{diagnosis.data.count} rows of {files}; {noise}."),
         Table(("gap, um rms", "before", "after", "noise"), rows),
     ]
@@ -71,6 +74,14 @@ def _verdict(diagnosis: Diagnosis) -> ReportSection:
         for each in (silence(diagnosis) if diagnosis.verdict == NOTHING else [])
     ]
     return ReportSection("Verdict", [*parts, *_chances(diagnosis), *_moved(diagnosis)])
+
+
+def _waterfall(diagnosis: Diagnosis) -> Iterator[Part]:
+    """What each rung of the ladder leaves, as bars and as a table."""
+    rungs = ladder(diagnosis)
+    caption = "What is left below each rung, um rms, with the set-up fitted."
+    yield Bars(caption, [rung.name for rung in rungs], [rung.left_um for rung in rungs])
+    yield Table(HEAD, in_words(rungs))
 
 
 def _chances(diagnosis: Diagnosis) -> Iterator[Part]:
@@ -97,7 +108,7 @@ def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
     if diagnosis.moved:
         yield Paragraph("Constants of the machine file that the data put elsewhere (the gap before is after that):")
         yield Table((), [(constant(each),) for each in diagnosis.moved])
-        yield from (Paragraph(f"{each[0].upper()}{each[1:]}.") for each in anew(diagnosis))
+        yield from (Paragraph(f"{each[0].upper()}{each[1:]}.") for each in held(diagnosis))
 
 
 def _finding(diagnosis: Diagnosis, finding: EffectFinding) -> ReportSection:

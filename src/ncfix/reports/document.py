@@ -55,7 +55,16 @@ class Plot:
     drawn: Sequence[Line | Dots]
 
 
-Part = Paragraph | Table | Plot
+@dataclass(frozen=True, slots=True)
+class Bars:
+    """Values that are compared, a horizontal bar each: their names, and the caption with their unit."""
+
+    caption: str
+    names: Sequence[str]
+    values: Sequence[float]
+
+
+Part = Paragraph | Table | Plot | Bars
 
 
 @dataclass(frozen=True, slots=True)

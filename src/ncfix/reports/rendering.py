@@ -17,11 +17,13 @@ import numpy as np
 from ncfix.diagnostics import Place, UsageError
 from ncfix.machine.se3 import Array
 from ncfix.plugins import called, registry
-from ncfix.reports.document import Document, Dots, Line, Paragraph, Part, Plot, Table
+from ncfix.reports.document import Bars, Document, Dots, Line, Paragraph, Part, Plot, Table
 
 WIDTH, HEIGHT = 520, 190
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 10, 24
 """Pixels round the axes, for the numbers."""
+NAMES, VALUES, BAR = 150, 60, 24
+"""Pixels for the names and the values of bars, and from one bar to the next."""
 ACROSS, UP = 7, 5
 """Ticks that there are about."""
 ROUND = (1.0, 2.0, 5.0, 10.0)
@@ -69,6 +71,8 @@ def _html_part(part: Part) -> str:
             return _html_table(part)
         case Plot():
             return _html_plot(part)
+        case Bars():
+            return _html_bars(part)
 
 
 def _html_table(table: Table) -> str:
@@ -87,6 +91,23 @@ def _html_plot(plot: Plot) -> str:
     inside = "".join(_drawn(frame, each, colour) for each, colour in zip(plot.drawn, cycle(COLOURS), strict=False))
     caption = f"<figcaption>{escape(plot.caption)}{_legend(plot.drawn)}</figcaption>"
     return f"<figure>{frame.around_it(inside)}{caption}</figure>"
+
+
+def _html_bars(bars: Bars) -> str:
+    """One bar below the other, with its name before it and its value behind it."""
+    longest = max([0.0, *bars.values]) or 1.0
+    room = WIDTH - NAMES - VALUES
+    drawn = []
+    for k, (name, value) in enumerate(zip(bars.names, bars.values, strict=True)):
+        top, wide = BAR * k, max(room * value / longest, 1.0)
+        drawn.append(
+            f'<text x="{NAMES - 6}" y="{top + BAR - 7}" text-anchor="end">{escape(name)}</text>'
+            f'<rect x="{NAMES}" y="{top + 3}" width="{wide:.1f}" height="{BAR - 6}" fill="{COLOURS[0]}"/>'
+            f'<text x="{NAMES + wide + 5:.1f}" y="{top + BAR - 7}">{value:.2f}</text>'
+        )
+    height = BAR * len(bars.names)
+    picture = f'<svg width="{WIDTH}" height="{height}" font-size="12" role="img">{"".join(drawn)}</svg>'
+    return f"<figure>{picture}<figcaption>{escape(bars.caption)}</figcaption></figure>"
 
 
 def _drawn(frame: PlotAxes, what: Line | Dots, colour: str) -> str:
@@ -127,6 +148,9 @@ def _markdown_part(part: Part) -> str:
             return "\n".join(f"| {' | '.join(map(_escaped, row))} |" for row in cells)
         case Plot(caption, drawn):
             return f"{_escaped(caption)}: {'; '.join(map(_extremes, drawn))}"
+        case Bars(caption, names, values):
+            listed = "; ".join(f"{_escaped(name)} {value:.2f}" for name, value in zip(names, values, strict=True))
+            return f"{_escaped(caption)}: {listed}"
 
 
 def _extremes(what: Line | Dots) -> str:

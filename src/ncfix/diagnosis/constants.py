@@ -1,0 +1,365 @@
+"""Constants of the machine file that the data put elsewhere: judged together, named as far as they can be told.
+
+The data see combinations of constants, so each by itself may look known badly although the file is wrong by far. The
+fit holds what cannot be told exactly as `calibrate` does (`ncfix.measure.least_squares.solve`); of the others the
+smallest set is sought whose change explains the misfit. A set has log odds like a name has: its constants are taken
+as independent, of a size at the tool tip, and each pays for what it was chosen from. The distance of the file from all
+that can be told together is Mahalanobis' (chi-square).
+
+All likelihoods of the ladder are of the same values, with only the set-up free: so odds of constants, names and
+mistakes are on one scale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import chdtrc, logsumexp
+
+from ncfix.diagnosis.evidence import FURTHER, SURE, Evidence, Member, marginal
+from ncfix.diagnosis.residual_data import ResidualData
+from ncfix.machine.effects import Unit, units
+from ncfix.measure.least_squares import Combination, Solution, orthonormal, solve, without
+from ncfix.measure.measurement import Array, Index
+from ncfix.measure.observation import Mask
+from ncfix.measure.selection import Selection
+
+FIRST_UM, TIMES, STEPS = 1.5, 3.0, 10
+"""Sizes of a change at the tool tip that are considered, um: from the first on, each so many times the one before."""
+MOST = 6
+"""Constants that are named one by one; where more are off the file as a whole is."""
+DOUBT = 3.0
+"""Standard deviations of a chi-square beyond which the constants that stay do not explain the data."""
+ALIKE = 3.0
+"""Log odds (20 to 1) within which another constant explains the data as well."""
+HELPS = 0.1
+"""Log odds by which a change of the set must help."""
+
+
+@dataclass(frozen=True, slots=True)
+class MovedConstant:
+    """A constant of the machine file that the data put elsewhere, surely: mm or rad, with its standard deviation.
+
+    unit     what these are multiplied with to be in the unit that people use, and its name
+    index    its place among the free constants
+    odds     log odds that it is off, the others given; aliases: constants that explain its part as well
+    size_um  how far its change moves what was measured, rms beside the set-up
+    """
+
+    name: str
+    file: float
+    data: float
+    sigma: float
+    unit: Unit
+    index: int = -1
+    odds: float = 0.0
+    aliases: tuple[str, ...] = ()
+    size_um: float = 0.0
+
+    @property
+    def turned(self) -> bool:
+        """Whether it is the file's value with the other sign."""
+        return abs(self.file) > DOUBT * self.sigma and abs(self.file + self.data) < DOUBT * self.sigma
+
+
+@dataclass(frozen=True, repr=False)
+class ConstantsVerdict:
+    """What the data say of all constants of the file together.
+
+    change    (k,) what is to be added to the file's values, mm or rad; zero for those that stay
+    moved     the constants that change, those that matter most first
+    odds      log odds that any is off; what they were chosen from is counted
+    distance, freedom  chi-square of the file's constants against the data over all that can be told, and of how many
+    size_um   how far the changes move what was measured, rms beside the set-up
+    shown     (m,) what they show, um
+    solution  of the fit: what could not be told, and of which only combinations are seen
+    whole     the file as a whole is off: more constants than can be named one by one
+    """
+
+    change: Array
+    moved: tuple[MovedConstant, ...]
+    odds: float
+    distance: float
+    freedom: int
+    size_um: float
+    shown: Array
+    solution: Solution
+    whole: bool
+
+    @property
+    def p_value(self) -> float:
+        """How likely constants so far from the file's are by chance."""
+        return float(chdtrc(max(self.freedom, 1), self.distance))
+
+    @property
+    def stay(self) -> Mask:
+        """(k,) whether a constant keeps the file's value."""
+        kept: Mask = self.change == 0
+        return kept
+
+
+@dataclass(frozen=True, repr=False)
+class FileLikelihood:
+    """Likelihoods of the values about the machine file as it stands, with some constants or names there.
+
+    evidence  of the data; `members` are there, at this share of a little of everything
+    """
+
+    evidence: Evidence
+    members: Sequence[Member]
+    share: float
+
+    @property
+    def data(self) -> ResidualData:
+        """The data."""
+        return self.evidence.background.data
+
+    @cached_property
+    def from_file(self) -> Array:
+        """(m,) values minus what the file's own constants and the fitted set-up say, um."""
+        data = self.data
+        back = data.problem.selection.start - data.coefficients
+        found: Array = data.y - self.constants @ back
+        return found
+
+    @property
+    def constants(self) -> Array:
+        """(m, k) what the free constants show, um per mm or rad."""
+        count = len(self.data.coefficients)
+        return self.data.base[:, self.data.base.shape[1] - count :]
+
+    @property
+    def setup(self) -> Array:
+        """(m, j) what the unknown set-up shows."""
+        return self.data.base[:, : self.data.base.shape[1] - len(self.data.coefficients)]
+
+    @cached_property
+    def root(self) -> Array:
+        """The root of the inverse covariance of the values, (m, m): it makes noise and background white."""
+        found: Array = cholesky(self.evidence.background.precision(self.share), check_finite=False)
+        return found
+
+    @cached_property
+    def free(self) -> tuple[Array, float]:
+        """An orthonormal basis of the white set-up, and the log of its determinant."""
+        white = self.root @ self.setup
+        size = np.linalg.norm(white, axis=0)
+        scaled = white[:, size > 0] / size[size > 0]
+        left, values, _ = np.linalg.svd(scaled, full_matrices=False)
+        kept = values > 1e-9 * values.max(initial=1e-300)
+        return left[:, kept], 2 * float(np.log(values[kept]).sum() + np.log(size[size > 0]).sum())
+
+    @cached_property
+    def sizes(self) -> Array:
+        """(k,) rms of what a constant shows per mm or rad, um; zero where nothing."""
+        found: Array = np.sqrt((self.constants**2).sum(axis=0) / max(self.data.count, 1))
+        return found
+
+    @cached_property
+    def _columns(self) -> tuple[Array, Array, int]:
+        """White members at their sizes and constants of 1 um, beside the set-up; the data; how many are members'."""
+        groups = self.evidence.groups
+        named = [m.size * groups[m.group].columns for m in self.members]
+        unit = self.constants / np.where(self.sizes > 0, self.sizes, 1.0)
+        columns = np.concatenate([np.zeros((len(unit), 0)), *named, unit], axis=1)
+        basis, _ = self.free
+        white = without(basis, self.root @ np.column_stack([columns, self.from_file]))
+        return white[:, :-1], white[:, -1], columns.shape[1] - unit.shape[1]
+
+    @cached_property
+    def _products(self) -> tuple[Array, Array, float]:
+        columns, y, _ = self._columns
+        return columns.T @ columns, columns.T @ y, float(y @ y)
+
+    def likelihood(self, moved: Sequence[int] = ()) -> float:
+        """Log likelihood of the values with the members and these constants (their numbers) off, of whatever size."""
+        if not len(moved):
+            return self._at((), 1.0)
+        return float(logsumexp([self._at(moved, size) for size in self._steps]) - np.log(len(self._steps)))
+
+    @property
+    def _steps(self) -> Array:
+        sizes: Array = FIRST_UM * np.power(TIMES, np.arange(STEPS, dtype=np.float64))
+        return sizes
+
+    def _at(self, moved: Sequence[int], size: float) -> float:
+        inner, seen, total = self._products
+        named = self._columns[2]
+        places = [*range(named), *(named + k for k in moved)]
+        scale = np.concatenate([np.ones(named), np.full(len(moved), size)])
+        gram = np.eye(len(places)) + scale[:, None] * inner[np.ix_(places, places)] * scale
+        factor = cholesky(gram, lower=True, check_finite=False)
+        own = solve_triangular(factor, scale * seen[places], lower=True, check_finite=False)
+        freedom, basis = self.evidence.background.freedom, self.free
+        count = len(self.from_file) - basis[0].shape[1]
+        squares = max(total - float(own @ own), 0.0)
+        determinant = 2 * float(np.log(np.diag(factor)).sum() - np.log(np.diag(self.root)).sum()) + basis[1]
+        return marginal(squares, determinant, count, freedom)
+
+    def solution(self, first: Sequence[int] = ()) -> Solution:
+        """Least squares of all constants from the file on, beside set-up and members; what cannot be told is held.
+
+        Of constants of which only a combination is seen those in `first` are kept, and the others held.
+        """
+        groups = self.evidence.groups
+        named = [m.size * groups[m.group].columns for m in self.members]
+        beside = np.concatenate([self.setup, *named], axis=1)
+        extra = beside.shape[1] - self.setup.shape[1]
+        prior = np.concatenate([np.zeros((extra, self.setup.shape[1])), np.eye(extra)], axis=1)
+        scale = np.linalg.norm(self.setup, axis=0)
+        beside[:, : len(scale)] /= np.where(scale > 0, scale, 1.0)
+        still = np.zeros((extra, len(self.data.coefficients)))
+        order = np.array([*first, *(k for k in range(still.shape[1]) if k not in set(first))], dtype=np.int64)
+        found = solve(
+            np.concatenate([self.root @ self.constants, still])[:, order],
+            np.concatenate([self.root @ beside, prior]),
+            np.concatenate([self.root @ self.from_file, np.zeros(extra)]),
+            self.data.problem.limits[order],
+        )
+        return _renumbered(found, order)
+
+
+def judged_constants(evidence: Evidence, members: Sequence[Member], share: float) -> ConstantsVerdict:
+    """Which constants the data put elsewhere, with these names there."""
+    asked = FileLikelihood(evidence, members, share)
+    data, k = asked.data, len(asked.data.coefficients)
+    plainly = asked.solution()
+    offered = [each for each in range(k) if each not in {*plainly.unseen, *plainly.set_up}]
+    chosen = _chosen(asked, offered)
+    solution = asked.solution(chosen)
+    kept = solution.kept
+    chosen = [each for each in chosen if each in kept]
+    scale = _noise(evidence, members, share)
+    inner = _inverse(solution.covariance)
+    full = solution.change[kept]
+    seen = inner @ full
+    distance = float(full @ seen) / scale
+    places = np.array([kept.tolist().index(each) for each in chosen], dtype=np.int64)
+    explained = _gained(inner, seen, places) / scale
+    left, spare = distance - explained, len(kept) - len(chosen)
+    whole = spare > 0 and left > spare + DOUBT * np.sqrt(2 * spare) and left > 2 * DOUBT**2
+    if whole:
+        chosen, places = [int(each) for each in kept], np.arange(len(kept), dtype=np.int64)
+    spread: Array = _inverse(inner[np.ix_(places, places)])
+    change = np.zeros(k)
+    change[chosen] = spread @ seen[places]
+    plain = asked.likelihood()
+    odds = asked.likelihood(chosen) - plain - _price(len(chosen), len(offered)) if chosen else 0.0
+    basis = orthonormal(asked.setup / data.relative[:, None])
+
+    def beside(shown: Array) -> Array:
+        found: Array = without(basis, (shown / data.relative)[:, None])[:, 0] * data.relative
+        return found
+
+    sigma: Array = np.sqrt(np.diag(spread) * scale)
+    start, labels = data.problem.selection.start, names_of(data.problem.selection)
+    said = [unit for effect in data.problem.selection.estimated for unit in units(data.machine, effect)]
+    moved = []
+    for place, index in enumerate(chosen):
+        size = data.rms(beside(asked.constants[:, index] * change[index]))
+        own, alike = (0.0, ()) if whole else _own(asked, chosen, index, offered)
+        value = float(start[index])
+        data_value = value + float(change[index])
+        moved.append(
+            MovedConstant(
+                labels[index],
+                value,
+                data_value,
+                float(sigma[place]),
+                said[index],
+                index,
+                own,
+                tuple(labels[each] for each in alike),
+                size,
+            )
+        )
+    shown = beside(asked.constants @ change)
+    moved.sort(key=lambda each: -each.size_um)
+    return ConstantsVerdict(
+        change, tuple(moved), odds, distance, len(kept), data.rms(shown), shown, solution, bool(whole)
+    )
+
+
+def _inverse(matrix: Array) -> Array:
+    """Of a matrix that may be empty."""
+    return np.asarray(np.linalg.inv(matrix) if len(matrix) else matrix, dtype=np.float64)
+
+
+def names_of(selection: Selection) -> list[str]:
+    """A name for each free constant: of its effect where that has no other, else with the power."""
+    names = [effect.name for effect in selection.estimated for _ in range(effect.basis.size)]
+    return [name if names.count(name) == 1 else label for name, label in zip(names, selection.labels, strict=True)]
+
+
+def _noise(evidence: Evidence, members: Sequence[Member], share: float) -> float:
+    """The variance of the noise with all constants free against what was taken for it before the data were seen."""
+    count, freedom = len(evidence.y), evidence.background.freedom
+    return float((evidence.squares(members, share) + freedom) / (count + freedom))
+
+
+def _gained(inner: Array, seen: Array, places: Index) -> float:
+    """Squares that these constants explain."""
+    own = seen[places]
+    return float(own @ np.linalg.solve(inner[np.ix_(places, places)], own)) if len(places) else 0.0
+
+
+def _price(count: int, among: int) -> float:
+    """What so many constants pay: for what they were chosen from, and for being there."""
+    return count * float(np.log(max(among, 1))) + SURE + (count - 1) * FURTHER if count else 0.0
+
+
+def _chosen(asked: FileLikelihood, offered: Sequence[int]) -> list[int]:
+    """The constants whose change weighs most, found by adding, exchanging and dropping one at a time."""
+
+    def weight(chosen: Sequence[int]) -> float:
+        return asked.likelihood(chosen) - _price(len(chosen), len(offered))
+
+    chosen: list[int] = []
+    best = weight(chosen)
+    while True:
+        tried = [[*chosen, each] for each in offered if each not in chosen and len(chosen) < MOST]
+        for out in chosen:
+            less = [each for each in chosen if each != out]
+            tried += [less, *([*less, each] for each in offered if each not in chosen)]
+        found = max(tried, key=weight, default=chosen)
+        if weight(found) <= best + HELPS:
+            return sorted(chosen)
+        chosen, best = found, weight(found)
+
+
+def _own(
+    asked: FileLikelihood, chosen: Sequence[int], index: int, offered: Sequence[int]
+) -> tuple[float, tuple[int, ...]]:
+    """Log odds that one is off, the others given, and the constants that explain its part as well."""
+    others = [each for each in chosen if each != index]
+    with_all, less = asked.likelihood(chosen), asked.likelihood(others)
+    alike = [each for each in offered if each not in chosen and asked.likelihood([*others, each]) > with_all - ALIKE]
+    return with_all - less - float(np.log(max(len(offered), 1))), tuple(alike)
+
+
+def _renumbered(found: Solution, order: Index) -> Solution:
+    """A solution whose columns were in another order; `order` says which is which."""
+    change = np.zeros(len(order))
+    change[order] = found.change
+    back = np.argsort(order[found.kept])
+
+    def those(numbers: Sequence[int]) -> tuple[int, ...]:
+        return tuple(int(order[each]) for each in numbers)
+
+    return replace(
+        found,
+        change=change,
+        kept=order[found.kept][back],
+        covariance=found.covariance[np.ix_(back, back)],
+        orthogonal=found.orthogonal,
+        unseen=those(found.unseen),
+        set_up=those(found.set_up),
+        weak=those(found.weak),
+        combinations=tuple(
+            Combination(int(order[each.held]), those(each.others), each.factors) for each in found.combinations
+        ),
+    )

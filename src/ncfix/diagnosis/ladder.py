@@ -1,0 +1,78 @@
+"""The ladder of a diagnosis: from the machine file as it was given, rung by rung, down to the noise.
+
+Each rung explains a share of the squares of the misfit as it was given. Its evidence is the natural logarithm of how
+much likelier the data are with it, less what it pays; all rungs are on that scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.diagnosis.diagnosis import CONSTANT_FAMILY, Diagnosis
+
+GIVEN, MISTAKES, CONSTANTS, NAMED, UNNAMED, NOISE = (
+    "file as given",
+    "mistakes",
+    "constants of the file",
+    "named effects",
+    "without a name",
+    "noise",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Rung:
+    """One step down.
+
+    name        which; `found` are the findings on it
+    left_um     what is left below it, rms um; holdout_um the same on poses left out of the fit, NaN where not known
+    share       of the squares of the misfit as given that it explains; of the noise: what is left of them
+    log_odds    its evidence; NaN for the first and the last
+    """
+
+    name: str
+    left_um: float
+    holdout_um: float
+    share: float
+    log_odds: float
+    found: tuple[str, ...] = ()
+
+
+def ladder(diagnosis: Diagnosis) -> tuple[Rung, ...]:
+    """All rungs; that of mistakes is always there, and empty where none was made."""
+    gap, wrong, none = diagnosis.gap, diagnosis.mistake, float("nan")
+    first = gap.given if wrong is None else wrong.given_um
+    names = {each.candidate.name: each.candidate.family for each in diagnosis.findings}
+    mistakes = (wrong.name,) if wrong else ()
+    constants = tuple(name for name, family in names.items() if family == CONSTANT_FAMILY)
+    named = tuple(name for name in names if name not in (*mistakes, *constants))
+    below = float(np.sqrt(max(gap.after**2 - diagnosis.rest.pattern_um**2, 0.0)))
+    steps = [
+        (MISTAKES, gap.given, gap.holdout_given, wrong.odds if wrong else 0.0, mistakes),
+        (CONSTANTS, gap.before, gap.holdout_before, max(diagnosis.constants.odds, 0.0), constants),
+        (NAMED, gap.after, gap.holdout_after, diagnosis.named_odds, named),
+        (UNNAMED, below, none, diagnosis.unnamed_odds, diagnosis.rest.titles),
+    ]
+    found, above = [Rung(GIVEN, first, gap.holdout_given if wrong is None else none, 0.0, none)], first
+    for name, left, held, odds, those in steps:
+        found.append(Rung(name, left, held, _share(above**2 - left**2, first), odds, those))
+        above = min(left, above)
+    found.append(Rung(NOISE, gap.floor, none, _share(above**2, first), none))
+    return tuple(found)
+
+
+def _share(squares: float, given: float) -> float:
+    return max(squares, 0.0) / given**2 if given else 0.0
+
+
+def in_words(rungs: tuple[Rung, ...]) -> list[tuple[str, str, str, str, str, str]]:
+    """The rows of a table: rung, what is left, held out, share, evidence, what was found."""
+    rows = []
+    for rung in rungs:
+        held = "" if np.isnan(rung.holdout_um) else f"{rung.holdout_um:.2f}"
+        share = "" if rung.name == GIVEN else f"{100 * rung.share:.0f} %"
+        odds = "" if np.isnan(rung.log_odds) else f"{rung.log_odds:.0f}"
+        rows.append((rung.name, f"{rung.left_um:.2f}", held, share, odds, ", ".join(rung.found)))
+    return rows
