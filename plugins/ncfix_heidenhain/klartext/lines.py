@@ -10,7 +10,7 @@ from ncfix.control.coordinates import LETTERS, Vector, dot, mask_of
 from ncfix.control.frames import unit
 from ncfix.control.moves import Motion, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.posture import WayRules
-from ncfix.control.tcp import switch
+from ncfix.control.tcp import led_in_machine, switch
 from ncfix_heidenhain.klartext.arcs import Step, refuse, with_increments
 from ncfix_heidenhain.klartext.control import DEPARTED, KlartextControl
 from ncfix_heidenhain.klartext.targets import (
@@ -165,20 +165,15 @@ def own(unknown: UnknownAxes, index: int) -> UnknownAxes:
 
 def at_machine(control: KlartextControl, step: Step) -> None:
     """A motion in machine coordinates: M91, or M92."""
-    was = control.tcp
-    if was:
-        switch(control, control.tools.vector, False, control.tools.offset)
-        control.refresh()
-    target, unknown = in_machine(control, step.words)
-    code = "M91" if 91 in step.codes else "M92"
+    code, (axes, unsure) = "M91" if 91 in step.codes else "M92", in_machine(control, step.words)
     if code == "M92":
-        unknown |= {i: NOT_GIVEN for i in control.machine if step.words.axes >> i & 1}
+        unsure |= dict.fromkeys(axes, NOT_GIVEN)
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
-        unknown |= {i: NOT_STRAIGHT for i in control.machine if not control.rotary[i]}
+        elsewhere = dict.fromkeys((i for i in control.machine if not control.rotary[i]), NOT_STRAIGHT)
+        axes, unsure = dict.fromkeys(elsewhere, 0.0) | axes, unsure | elsewhere
+    target, unknown = led_in_machine(control, axes, unsure)
     passing = Passing(Pass.MACHINE_COORDINATES, MACHINE_COORDINATES.format(code))
     control.make(Motion(step.kind, step.words.axes, target, unknown, 0, passing=passing))
-    if was:
-        control.switch_tip()
     control.path.tangent = None
 
 

@@ -148,19 +148,21 @@ def command_of(control: KlartextControl, where: Where, axes: int) -> tuple[Vecto
     return control.command(where.inner, axes), found
 
 
-def in_machine(control: KlartextControl, words: MotionWords) -> tuple[Vector, UnknownAxes]:
-    """The command of words in machine coordinates (M91); increments count from the last such position, if any."""
-    target, unknown = control.position[:], dict(control.unknown)
+def in_machine(control: KlartextControl, words: MotionWords) -> tuple[dict[int, float], UnknownAxes]:
+    """Where words in machine coordinates (M91) lead axes, and why that is not known, see `led_in_machine`.
+
+    Increments count from the last such position, if any.
+    """
+    axes, unsure = dict[int, float](), dict[int, str]()
     for address, value in words.values.items():
         index = INDEX.get(address.removeprefix("I"))
-        if index is not None and address[0] == "I":
-            unknown[index] = COUNTED_FROM
-        elif index is not None:
-            target[index] = value * (DEGREE if control.rotary[index] else control.modal.unit)
-            unknown.pop(index, None)
-            if address in words.runtime:
-                unknown[index] = RUNTIME
-    return target, unknown
+        if index is not None:
+            axes[index] = value * (DEGREE if control.rotary[index] else control.modal.unit)
+            if address[0] == "I":
+                unsure[index] = COUNTED_FROM
+            elif address in words.runtime:
+                unsure[index] = RUNTIME
+    return axes, unsure
 
 
 # -- poles ------------------------------------------------------------------------------------------------------------
