@@ -60,7 +60,8 @@ def test_axes_that_machine_coordinates_do_not_name_stand_still_under_tcp(
     moves = follow(read(text.encode(), "a.nc", dialect), machine, SETUP).trace.moves
     kinematics, on, off = kinematics_of(machine), TcpState(True, 100.0), TcpState(False, 0.0)
     assert kinematics is not None
-    start, end = (np.array(kinematics(each.tolist(), on, off)) for each in (moves.end[0], moves.end[-1]))
+    start, end = np.array(kinematics(moves.end[0].tolist(), on, off)), moves.end[-1]
+    assert moves.tcp[[0, -1]].tolist() == [True, False]  # said in axes of the machine
     named = [letter in block for letter in moves.axes]
     # affine maps of 256 mm probes in double precision
     np.testing.assert_allclose(end[~np.array(named)], start[~np.array(named)], atol=1e-9)
@@ -78,7 +79,8 @@ def test_axes_that_machine_coordinates_do_not_name_stand_still_in_a_swivelled_pl
     kinematics, on, off = kinematics_of(machine), TcpState(True, 100.0), TcpState(False, 0.0)
     assert kinematics is not None
     assert moves.rule[-1] == Rule.PASS
-    start, end = (np.array(kinematics(each.tolist(), on, off)) for each in moves.end[-2:])
+    start, end = np.array(kinematics(moves.end[-2].tolist(), on, off)), moves.end[-1]
+    assert not moves.tcp[-1]  # said in axes of the machine
     words = {word[0]: float(word[1:]) for word in block.split()[2:] if word[0] in "XYZ"}
     tool = {"Z": 100.0}
     wanted = [

@@ -46,6 +46,7 @@ class Control(Standing):
     def run(self, text: str) -> list[Path]:
         """Follow a program to its end."""
         self.codes = {"g": 0, "system": 54, "retract": 98, "vectors": False, "polar": None, "place": None}
+        self.codes["tool"] = 1
         self.settable = self.system(54)
         lines = text.splitlines()
         heads = {int(found[1]): n for n, line in enumerate(lines) if (found := re.match(r"O(\d+)", line))}
@@ -100,7 +101,9 @@ class Control(Standing):
         for letter, text in WORD.findall(body):
             if letter == "G":
                 codes.append(float(text))
-            elif letter not in "MSFTN":
+            elif letter == "T":
+                self.codes["tool"] = int(text)
+            elif letter not in "MSFN":
                 words[letter] = self.value(text)
         taken = self.settings(codes, words)
         if self.codes["vectors"] and {"I", "J", "K"} & words.keys():
@@ -159,7 +162,7 @@ class Control(Standing):
         def change() -> None:
             self.length = length
 
-        self.gauge = self.tools[1]
+        self.gauge = self.tools[int(words["H"]) if "H" in words else self.codes["tool"]]
         self.stand(change, tcp=code in (43.4, 43.5) or self.modes.get("tilted", False))
         self.codes["tip"], self.codes["vectors"] = code in (43.4, 43.5), code == 43.5
 

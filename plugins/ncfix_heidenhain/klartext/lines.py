@@ -171,9 +171,10 @@ def at_machine(control: KlartextControl, step: Step) -> None:
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
         elsewhere = dict.fromkeys((i for i in control.machine if not control.rotary[i]), NOT_STRAIGHT)
         axes, unsure = dict.fromkeys(elsewhere, 0.0) | axes, unsure | elsewhere
-    target, unknown = led_in_machine(control, axes, unsure)
+    end = led_in_machine(control, axes, unsure)
     passing = Passing(Pass.MACHINE_COORDINATES, MACHINE_COORDINATES.format(code))
-    control.make(Motion(step.kind, step.words.axes, target, unknown, 0, passing=passing))
+    motion = Motion(step.kind, step.words.axes, end.target, end.unknown, 0, passing=passing)
+    control.make(motion._replace(in_machine=end.in_machine))
     control.path.tangent = None
 
 

@@ -10,7 +10,7 @@ import math
 from ncfix.control.coordinates import INDEX, N_LETTERS, Vector, mask_of, rotated
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import FeedMode, Motion, MotionKind, Pass, Passing, UnknownAxes
-from ncfix.control.tcp import led_in_machine
+from ncfix.control.tcp import LedInMachine, led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import REFERENCES, is_given, store, stored
 from ncfix_iso.rs274.targets import destination, machine_destination
@@ -122,9 +122,9 @@ def in_machine_coordinates(control: RS274Control, block: Block, code: int) -> No
         check_feed(control, block)
     control.modal.motion = modal
     if block.axes:
-        target, unknown = machine_destination(control, block)
-        kind = MotionKind.FEED if code else MotionKind.RAPID
-        control.make(Motion(kind, block.axes, target, unknown, code, passing=MACHINE_COORDINATES))
+        end, kind = machine_destination(control, block), MotionKind.FEED if code else MotionKind.RAPID
+        motion = Motion(kind, block.axes, end.target, end.unknown, code, passing=MACHINE_COORDINATES)
+        control.make(motion._replace(in_machine=end.in_machine))
         if control.modal.incremental:
             control.lose_in_machine([index for index in range(N_LETTERS) if block.axes >> index & 1], AFTER_G53)
 
@@ -149,11 +149,12 @@ def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
     if way != control.position or (block.axes and not control.modal.incremental):
         control.make(Motion(MotionKind.RAPID, block.axes, way, unknown, modal, passing=passing))
     axes = block.axes or mask_of(control.machine)
-    target, unknown = reference_target(control, name, axes)
-    control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, modal, passing=passing))
+    end = reference_target(control, name, axes)
+    motion = Motion(MotionKind.RAPID, block.axes, end.target, end.unknown, modal, passing=passing)
+    control.make(motion._replace(in_machine=end.in_machine))
 
 
-def reference_target(control: RS274Control, name: str, axes: int) -> tuple[Vector, UnknownAxes]:
+def reference_target(control: RS274Control, name: str, axes: int) -> LedInMachine:
     """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
     first = REFERENCES[name]
     place, unsure = along(control, stored(control, first), axes), dict(control.unknown)

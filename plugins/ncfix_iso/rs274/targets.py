@@ -11,7 +11,7 @@ import math
 from ncfix.control.coordinates import INDEX, LETTERS, Vector, X, Y
 from ncfix.control.expressions import Fault, nominal
 from ncfix.control.moves import UnknownAxes
-from ncfix.control.tcp import led_in_machine
+from ncfix.control.tcp import LedInMachine, led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import check_system
 
@@ -127,7 +127,7 @@ def by_radius_and_angle(control: RS274Control, block: Block, x: float, y: float)
     return radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle))
 
 
-def machine_destination(control: RS274Control, block: Block) -> tuple[Vector, UnknownAxes]:
+def machine_destination(control: RS274Control, block: Block) -> LedInMachine:
     """The command at which a motion in machine coordinates (G53) ends."""
     named = [letter for letter in block.values if letter in INDEX]
     axes = {INDEX[letter]: control.scale[INDEX[letter]] * block.values[letter] for letter in named}

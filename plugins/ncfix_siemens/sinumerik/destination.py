@@ -207,12 +207,12 @@ def machine_destination(control: Sinumerik, words: BlockWordValues) -> End:
     if POLAR_WORDS & words.values.keys():
         raise Fault(POLAR, "polar coordinates do not go with machine coordinates")
     if control.tcp and not (control.modes.transformed or control.setup.tcp):
-        target, unknown = led_in_machine(control, *axes_of_machine(control, words))
-    else:
-        target, unknown = control.position[:], dict(control.unknown)
-        for letter in LETTERS:
-            if letter in words.values:
-                place_at_machine(control, words, letter, target, unknown)
+        end = led_in_machine(control, *axes_of_machine(control, words))
+        return End(end.target, end.unknown, control.along_frame(end.unknown), end.in_machine)
+    target, unknown = control.position[:], dict(control.unknown)
+    for letter in LETTERS:
+        if letter in words.values:
+            place_at_machine(control, words, letter, target, unknown)
     return End(target, unknown, control.along_frame(unknown))
 
 

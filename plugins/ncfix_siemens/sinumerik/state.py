@@ -295,9 +295,8 @@ class Sinumerik(ProgramControl):
         if follows:
             self.ask_for_length()
         self._head(motion, follows=follows)
-        self.make(
-            Motion(motion.kind, axes, end.target, end.unknown, motion.code, refusal, motion.passing, motion.arc, placed)
-        )
+        told = refusal, motion.passing, motion.arc, placed, end.in_machine
+        self.make(Motion(motion.kind, axes, end.target, end.unknown, motion.code, *told))
         self.whole = False
         self.count_from_here(axes, by_machine=motion.by_machine)
         self.forget_unknown()

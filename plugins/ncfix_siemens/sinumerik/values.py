@@ -57,11 +57,15 @@ class BlockWordValues:
 
 @dataclass(slots=True)
 class End:
-    """Where a motion ends: the command, which axes are not known there, and which coordinates."""
+    """Where a motion ends: the command, which axes are not known there, and which coordinates.
+
+    in_machine  as in `Motion`
+    """
 
     target: Vector
     unknown: UnknownAxes
     lost: UnknownAxes
+    in_machine: Vector | None = None
 
 
 class ProgrammedMotion(NamedTuple):

@@ -38,6 +38,7 @@ from ncfix.control.moves import (
 )
 from ncfix.control.setup import Run
 from ncfix.control.state import TOOL_AT_RUN_TIME, ControlState
+from ncfix.control.tcp import in_machine
 from ncfix.control.turns import ROLLED, ROLLS, may_roll
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
@@ -214,6 +215,8 @@ class ProgramControl(ControlState):
         if fate.kind != MotionKind.DWELL:
             self.block_words = ()
         start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
+        if fate.in_machine is not None:
+            start, end, style = in_machine(self), fate.in_machine, self._without_tcp(style)
         self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, unplaced)
         if self.ends is not None:
             self.ends.append(fate.target[:])
@@ -410,6 +413,10 @@ class ProgramControl(ControlState):
                 math.nan if not self.tcp or self.led_length == length else self.led_length,
             )
         )
+
+    def _without_tcp(self, style: int) -> int:
+        """A style for a motion whose ends are said in axes of the machine."""
+        return self.builder.style(self.builder.styles[style]._replace(tcp=False, led=math.nan))
 
     def _beside(self) -> float:
         """By how much the control offsets the contour to the left of the way, mm; NaN where it is not known."""

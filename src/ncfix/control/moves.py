@@ -424,6 +424,7 @@ class Motion(NamedTuple):
     refusal  why it is refused; empty if it is not
     passing  why it is passed as it is; None if it is not
     placed  the axes whose words say where they stand afterwards; None: those of absolute words
+    in_machine  where it ends in axes of the machine, if TCP is on and its words mean these, see `LedInMachine`
     """
 
     kind: MotionKind
@@ -435,6 +436,7 @@ class Motion(NamedTuple):
     passing: Passing | None = None
     arc: Arc | None = None
     placed: int | None = None
+    in_machine: Vector | None = None
 
 
 def blanked(position: Vector, unknown: UnknownAxes) -> Vector:

@@ -12,7 +12,7 @@ axes that a correction has put beside their places.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,26 +21,39 @@ from ncfix.control.coordinates import Vector, X, Y, Z
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState
 
 if TYPE_CHECKING:
-    from ncfix.control.control import ProgramControl
     from ncfix.control.moves import UnknownAxes
+    from ncfix.control.state import ControlState
 
 
 FloatArray = NDArray[np.float64]
 
 MACHINE = TcpState(False, 0.0)
 
+ALIKE = 1e-7
+"""mm and rad; positions that are the same but for rounding."""
+
 TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
 
 
-def rotary_at_zero(control: ProgramControl, position: Vector, unknown: UnknownAxes) -> bool:
+def rotary_at_zero(control: ControlState, position: Vector, unknown: UnknownAxes) -> bool:
     """Whether all rotary axes of the machine stand at zero."""
     return all(index not in unknown and abs(position[index]) < 1e-12 for index in control.turning)
 
 
-def led_in_machine(
-    control: ProgramControl, axes: Mapping[int, float], unsure: UnknownAxes
-) -> tuple[Vector, UnknownAxes]:
-    """The command at which a motion ends that leads axes to places of the machine, while the others stand still.
+class LedInMachine(NamedTuple):
+    """Where a motion ends that leads axes to places of the machine.
+
+    target, unknown  the command, and what is not known of it
+    in_machine       under TCP the same in axes of the machine, where all of it is known
+    """
+
+    target: Vector
+    unknown: UnknownAxes
+    in_machine: Vector | None = None
+
+
+def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: UnknownAxes) -> LedInMachine:
+    """Where a motion ends that leads axes to places of the machine, while the others stand still.
 
     axes    letter index -> where that axis of the machine goes, mm or rad
     unsure  why that is not known, of those of which it is not
@@ -57,14 +70,25 @@ def led_in_machine(
         unknown.pop(index, None)
         if index in unsure:
             unknown[index] = unsure[index]
-    if control.tcp and not converted(control, target, unknown, MACHINE, tip):
-        unknown |= {index: TURNED for index in (X, Y, Z) if index in control.machine}
-    return target, unknown
+    if not control.tcp:
+        return LedInMachine(target, unknown)
+    end = target[:]
+    if not converted(control, target, unknown, MACHINE, tip):
+        return LedInMachine(target, unknown | {index: TURNED for index in (X, Y, Z) if index in control.machine})
+    for index in still:
+        if abs(target[index] - control.position[index]) < ALIKE:
+            target[index] = control.position[index]
+    return LedInMachine(target, unknown, None if control.unknown or unknown else end)
 
 
-def converted(
-    control: ProgramControl, position: Vector, unknown: UnknownAxes, before: TcpState, after: TcpState
-) -> bool:
+def in_machine(control: ControlState) -> Vector:
+    """Where the axes of the machine stand under TCP, if that is known."""
+    position = control.position[:]
+    converted(control, position, {}, TcpState(True, control.led_length), MACHINE)
+    return position
+
+
+def converted(control: ControlState, position: Vector, unknown: UnknownAxes, before: TcpState, after: TcpState) -> bool:
     """Say the same position as another command, in place; False where that is not known."""
     if rotary_at_zero(control, position, unknown):
         position[Z] += before.shift - after.shift
@@ -77,7 +101,7 @@ def converted(
     return True
 
 
-def switch(control: ProgramControl, tool: Vector, on: bool, number: int | None) -> None:
+def switch(control: ControlState, tool: Vector, on: bool, number: int | None) -> None:
     """Another tool length, and tool-centre-point control on or off: the machine stands still, the tip may not.
 
     Where the tool lies along Z of a tilted plane, another length moves the tip along that only. `number` is that of the
@@ -92,10 +116,6 @@ def switch(control: ProgramControl, tool: Vector, on: bool, number: int | None) 
         control.lose((X, Y, Z), TURNED)
         control.frame_unknown = lost
     control.tcp = on
-
-
-ALIKE = 1e-7
-"""mm and rad; positions that are the same but for rounding."""
 
 
 def renamed(moves: Moves, row: int, position: FloatArray, kinematics: Kinematics | None) -> FloatArray | None:
