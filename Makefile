@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint format accuracy bench same-bytes tables study hidden metamorphic refusals inserted-blocks \
+.PHONY: demo test lint share format accuracy bench same-bytes tables study hidden metamorphic refusals inserted-blocks \
 	goldens goldens-update ci clean
 
 demo:            ## fix the shipped five-axis example
@@ -15,6 +15,9 @@ lint:            ## style, types, floors (needs: pip install -e '.[dev]')
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m mypy
 	$(dir $(PYTHON))lint-imports
+
+share:           ## write the manual page and the completion scripts into share/
+	$(PYTHON) -c "from pathlib import Path; from ncfix.cli.manual import shared_files as s; [((p := Path('share', f)).parent.mkdir(parents=True, exist_ok=True), p.write_text(t)) for f, t in s()]"
 
 format:
 	$(PYTHON) -m ruff format .

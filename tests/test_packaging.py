@@ -75,7 +75,9 @@ def test_the_wheel_holds_the_packages_and_the_grammars_and_nothing_else(root: Pa
     assert wheel.name == f"ncfix-{__version__}-py3-none-any.whl"
     names = zipfile.ZipFile(wheel).namelist()
     tops = {name.split("/")[0] for name in names}
-    assert tops == packages() | {f"ncfix-{__version__}.dist-info"}
+    assert tops == packages() | {f"ncfix-{__version__}.{kind}" for kind in ("dist-info", "data")}
+    shared = {str(path.relative_to(root)) for path in (root / "share").rglob("*") if path.is_file()}
+    assert {name.split("/data/", 1)[1] for name in names if "/data/" in name} == shared
     grammars = {f"ncfix/grammars/{path.name}" for path in (root / "grammars").glob("*.lark")}
     assert grammars
     assert {name for name in names if "/grammars/" in name} == grammars

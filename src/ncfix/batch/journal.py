@@ -18,7 +18,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from time import monotonic, sleep
 from typing import Any
 
@@ -103,6 +103,10 @@ class JournalRecord:
             return False
         return all(text_digest(find(name)) == digest for name, digest in self.called.items())
 
+    def as_dict(self) -> dict[str, Any]:
+        """The record as plain data."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
 
 def announce(path: str, name: str, digest: str, source: str) -> None:
     """Say in a journal that an output is about to get this content, made of the program with this real path.
@@ -112,9 +116,11 @@ def announce(path: str, name: str, digest: str, source: str) -> None:
     _append(path, {"name": name, "writes": digest, "source": source})
 
 
-def _append(path: str, content: Mapping[str, Any]) -> None:
+def _append(path: str, content: Mapping[str, Any]) -> int:
+    """Write a line, and say how long it is."""
     line = "\n" + json.dumps({"schema": SCHEMA, **content})  # a line that was cut off earlier does not spoil this one
     files.append(path, line.encode())
+    return len(line)
 
 
 class Journal:
@@ -129,6 +135,7 @@ class Journal:
         self.path = os.path.join(folder, JOURNAL)
         self.records: dict[str, JournalRecord] = {}
         self.written: dict[str, dict[str, str]] = {}
+        self._counting: dict[str, int] = {}
         self._read()
 
     @classmethod
@@ -151,15 +158,14 @@ class Journal:
 
     def add(self, record: JournalRecord) -> None:
         """Note what came of a program. Raises `UsageError` NCF005, NCF007."""
-        self._take(record)
-        _append(self.path, asdict(record))
+        self._take(record, _append(self.path, record.as_dict()))
 
     def tidy(self) -> None:
         """Write the journal anew without what does not count any more, if that is much."""
         with suppress(FileNotFoundError):
-            size = os.path.getsize(self.path)
-            lines = b"".join(f"\n{json.dumps(line)}".encode() for line in self._lines())
-            if size > ROOM_BYTES and size > 2 * len(lines):
+            size, counting = os.path.getsize(self.path), sum(self._counting.values())
+            if size > ROOM_BYTES and size > 2 * counting:
+                lines = (f"\n{json.dumps(line)}".encode() for line in self._lines())
                 files.write_whole(self.path, lines, replace=True)
 
     def _lines(self) -> Iterator[dict[str, Any]]:
@@ -168,10 +174,11 @@ class Journal:
             for digest, source in digests.items():
                 if name not in self.records or digest != self.records[name].digest:
                     yield {"schema": SCHEMA, "name": name, "writes": digest, "source": source}
-        yield from ({"schema": SCHEMA, **asdict(record)} for record in self.records.values())
+        yield from ({"schema": SCHEMA, **record.as_dict()} for record in self.records.values())
 
-    def _take(self, record: JournalRecord) -> None:
+    def _take(self, record: JournalRecord, size: int = 0) -> None:
         self.records[record.name] = record
+        self._counting[record.name] = size
         if record.digest:
             self.written.setdefault(record.name, {})[record.digest] = record.source
 
@@ -180,19 +187,19 @@ class Journal:
             with open(self.path, "rb") as handle:
                 for line in handle:
                     with suppress(ValueError, TypeError, KeyError, AttributeError):
-                        self._understand(json.loads(line))
+                        self._understand(json.loads(line), len(line))
         except FileNotFoundError:
             return
         except OSError as error:
             raise files.unreadable(self.path, error) from error
 
-    def _understand(self, found: dict[str, Any]) -> None:
+    def _understand(self, found: dict[str, Any], size: int) -> None:
         if found.pop("schema") != SCHEMA:
             return
         if "writes" in found:
             self.written.setdefault(str(found["name"]), {})[str(found["writes"])] = str(found["source"])
         else:
-            self._take(JournalRecord(**found))
+            self._take(JournalRecord(**found), size)
 
 
 @contextmanager

@@ -53,7 +53,9 @@ def suffixes() -> frozenset[str]:
 
 def _below(folder: str, apart: str | None) -> list[ProgramFile]:
     known = suffixes()
-    found = [ProgramFile(path, os.path.relpath(path, folder)) for path in _files(folder, apart) if _is(path, known)]
+    found = [
+        ProgramFile(path, path[len(folder) :].lstrip(os.sep)) for path in _files(folder, apart) if _is(path, known)
+    ]
     if not found:
         hint = f"programs in folders have one of these suffixes: {' '.join(sorted(known))}; or name the files"
         raise UsageError.of("NCF014", "there is no program in this folder", Place(folder), hint)

@@ -235,7 +235,7 @@ def _changes(
     context: click.Context, job: FixJob, programs: Sequence[str], apart: str | None, motions: bool, as_json: bool
 ) -> int:
     """Show what would change in programs, and in those of the groups behind; the worst exit code."""
-    from ncfix.cli.changes import show_changes
+    from ncfix.cli.shop.changes import show_changes
 
     only, before = group_of(context).programs, context.meta.setdefault(BATCHES, [])
     paths = [each.path for each in program_files(programs, apart) if only is None or each.path in only]

@@ -40,6 +40,8 @@ VERBS = {
     "plugins": "List the plugins and what each adds.",
     "init": "Write a project file, so that programs need no options.",
     "explain": "Explain a message code.",
+    "doctor": "Look at this computer as ncfix does, and say what is wrong.",
+    "manual": "Print the manual page.",
     "completion": "Print the completion script of a shell.",
 }
 """The built-in verbs in the order of `--help`."""

@@ -1,0 +1,202 @@
+"""`ncfix doctor`: what ncfix finds on this computer, and what of it is not as it should be."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, metadata, version
+from pathlib import Path
+
+import click
+
+from ncfix import fast, host
+from ncfix.cli import console
+from ncfix.cli.options import json_option
+from ncfix.diagnostics import ExitCode, visible
+from ncfix.plugins import load_plugins
+from ncfix.version import __version__
+
+EXTRAS = {
+    "numba": ("fast", "long programs take two or three times as long"),
+    "sympy": ("symbolic", "`ncfix derive` does not work"),
+    "watchfiles": ("watch", "`ncfix watch` looks every second"),
+}
+"""What is not needed: package -> its extra, and what it is like without."""
+NEEDS = re.compile(r"^([A-Za-z0-9_.-]+)\s*(?:>=([0-9.]+))?\s*(?:;.*extra\s*==\s*['\"](\w+)['\"])?")
+OLDEST_PYTHON = (3, 11)
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """Something that was looked at.
+
+    what   is looked at
+    found  what it is like
+    wrong  what to do about it; empty if it is as it should be
+    """
+
+    what: str
+    found: str
+    wrong: str = ""
+
+
+def findings() -> Iterator[Looked]:
+    """All that is looked at, in order."""
+    yield Looked("ncfix", f"{__version__}, {Path(__file__).parents[1]}")
+    python = f"{platform.python_version()}, {sys.executable}"
+    yield Looked("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "3.11 or later is needed")
+    yield Looked("computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} to be used")
+    yield from _packages()
+    yield _loops()
+    yield from _plugins()
+    yield from _caches()
+    yield _temporary()
+    yield _outputs()
+    settings = sorted(name for name in os.environ if name.startswith("NCFIX_"))
+    yield Looked("environment", ", ".join(f"{name}={os.environ[name]}" for name in settings) or "nothing of ncfix")
+
+
+def _packages() -> Iterator[Looked]:
+    """What ncfix needs, and what of its extras is there."""
+    least: dict[str, str] = {}
+    for line in _requirements():
+        found = NEEDS.match(line)
+        if found and not found[3]:
+            least[found[1]] = found[2] or ""
+    for name, wanted in least.items():
+        there = _version(name)
+        if there is None:
+            yield Looked(name, "not installed", f"pip install '{name}>={wanted}'")
+        elif _numbers(there) < _numbers(wanted):
+            yield Looked(name, there, f"{wanted} or later is needed")
+        else:
+            yield Looked(name, there)
+    for name, (extra, without) in EXTRAS.items():
+        there = _version(name)
+        yield Looked(name, there or f"not installed (extra {extra}): {without}")
+
+
+def _requirements() -> list[str]:
+    try:
+        return metadata("ncfix").get_all("Requires-Dist") or []
+    except PackageNotFoundError:
+        return []
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in re.findall(r"\d+", text)[:3])
+
+
+def _loops() -> Looked:
+    """Whether long programs are corrected by compiled loops."""
+    if not fast.wanted():
+        return Looked("compiled loops", "not used: NCFIX_NO_FAST is set")
+    if _version("numba") is None:
+        return Looked("compiled loops", "not used: numba is not installed")
+    said: list[str] = []
+    if fast.engage(said.append):
+        return Looked("compiled loops", "used for long programs" + ("; they have just been compiled" if said else ""))
+    return Looked(
+        "compiled loops", "cannot be compiled", "another release of numba (0.61 or later), or NCFIX_NO_FAST=1"
+    )
+
+
+def _plugins() -> Iterator[Looked]:
+    found = load_plugins()
+    for plugin in found.loaded:
+        adds = "; ".join(f"{kind}: {', '.join(things)}" for kind, things in plugin.things.items() if things)
+        yield Looked(f"plugin {plugin.name}", f"{plugin.distribution} {plugin.version}: {adds}".strip())
+    for problem in found.problems:
+        yield Looked("plugin", problem.text, f"{problem.code}: {problem.advice}")
+
+
+def _caches() -> Iterator[Looked]:
+    """Where compiled loops and grammars are kept: in the first of these folders that can be written to."""
+    writable = False
+    for folder in host.cache_folders(str(Path(fast.__file__))):
+        can = _writable(folder)
+        writable = writable or can
+        size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else 0
+        state = "can be written to" if can else "cannot be written to"
+        yield Looked("cache", f"{folder}, {size / 1e6:.1f} MB, {state}")
+    if not writable:
+        yield Looked("caches", "none can be written to", "make one of them; until then each start takes longer")
+
+
+def _writable(folder: Path) -> bool:
+    """Whether a folder can be written to, or made."""
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    return folder.is_dir() and os.access(folder, os.W_OK)
+
+
+def _temporary() -> Looked:
+    folder = tempfile.gettempdir()
+    room = _room(folder)
+    wrong = (
+        "" if room is None or room > 1 << 30 else "make room, or set TMPDIR: long programs from pipes are kept there"
+    )
+    return Looked("temporary files", folder + ("" if room is None else f", {room / 1e9:.1f} GB free"), wrong)
+
+
+def _room(folder: str) -> int | None:
+    try:
+        found = os.statvfs(folder)
+    except (OSError, AttributeError):
+        return None
+    return found.f_bavail * found.f_frsize
+
+
+def _outputs() -> Looked:
+    """How files are written where this process works."""
+    try:
+        with tempfile.TemporaryDirectory(prefix=".ncfix-doctor-", dir=os.curdir) as folder:
+            path = os.path.join(folder, "whole")
+            from ncfix.files import append, write_whole
+
+            write_whole(path, b"whole\n")
+            append(path, b"and more\n")
+            unnamed = hasattr(os, "O_TMPFILE") and _has_unnamed(folder)
+    except OSError as error:
+        return Looked("working folder", f"cannot be written to: {error.strerror}")
+    how = "without a name at first" if unnamed else "under another name at first"
+    return Looked("working folder", f"{visible(os.getcwd())}: outputs are written {how}")
+
+
+def _has_unnamed(folder: str) -> bool:
+    try:
+        os.close(os.open(folder, os.O_RDWR | os.O_TMPFILE, 0o600))
+    except OSError:
+        return False
+    return True
+
+
+@click.command()
+@json_option
+def doctor(as_json: bool) -> int:
+    """Look at this computer as ncfix does: packages, plugins, compiled loops, caches.
+
+    Exit code 1 if something is wrong.
+    """
+    found = list(findings())
+    if as_json:
+        console.put_json(findings=[{"what": each.what, "found": each.found, "wrong": each.wrong} for each in found])
+    else:
+        wide = max(len(each.what) for each in found)
+        for each in found:
+            console.put(f"{each.what:<{wide}}  {each.found}\n")
+            if each.wrong:
+                console.put(f"{'':<{wide}}  WRONG: {each.wrong}\n")
+    return ExitCode.FINDINGS if any(each.wrong for each in found) else ExitCode.DONE

@@ -1,0 +1,71 @@
+"""`ncfix doctor`, and the manual page and completion scripts that the package brings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ncfix.cli import doctor
+from ncfix.cli.main import VERBS
+from ncfix.cli.manual import ENVIRONMENT, page, shared_files
+from ncfix.diagnostics import ExitCode
+
+
+@pytest.fixture(autouse=True)
+def without_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NCFIX_NO_FAST", "1")
+
+
+def test_what_is_as_it_should_be(ncfix: Any) -> None:
+    result = ncfix("doctor", "--json")
+    found = {each["what"]: each for each in result.json()["findings"]}
+    assert {"ncfix", "Python", "computer", "numpy", "rich", "numba", "plugin iso", "cache", "compiled loops"} <= set(
+        found
+    )
+    assert found["environment"]["found"] == "NCFIX_NO_FAST=1"
+    assert [each for each in found.values() if each["wrong"]] == []
+    assert result.code == ExitCode.DONE
+    assert "NCFIX_NO_FAST is set" in ncfix("doctor").out.decode()
+
+
+def test_what_is_wrong(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    there = {"numpy": "1.2", "lark": None}
+    version = doctor._version
+    monkeypatch.setattr(doctor, "_version", lambda name: there.get(name, version(name)))
+    result = ncfix("doctor")
+    assert result.code == ExitCode.FINDINGS
+    assert "WRONG: pip install 'lark>=" in result.out.decode()
+    assert "1.2\n" in result.out.decode()
+    assert result.out.decode().count("WRONG") == 2
+
+
+def test_a_folder_that_cannot_be_written_to(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def locked(*_: Any, **more: Any) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(doctor.tempfile, "TemporaryDirectory", locked)
+    assert "cannot be written to: Permission denied" in ncfix("doctor").out.decode()
+
+
+def test_the_package_brings_the_manual_page_and_the_scripts_of_now(root: Path) -> None:
+    """Else: `make share`."""
+    share = root / "share"
+    kept = {str(path.relative_to(share)): path.read_text() for path in share.rglob("*") if path.is_file()}
+    assert kept == dict(shared_files())
+
+
+def test_the_manual_page_has_all_verbs_and_no_line_that_is_lost(ncfix: Any) -> None:
+    text = page()
+    assert ncfix("manual").out.decode() == text
+    for verb in VERBS:
+        assert f".SS ncfix {verb}" in text
+    commands = {line.split()[0] for line in text.splitlines() if line.startswith((".", "'"))}
+    assert commands == {".TH", ".SH", ".SS", ".PP", ".TP", ".B"}
+
+
+def test_the_environment_of_the_manual_page_is_documented(root: Path) -> None:
+    said = (root / "docs/formats.md").read_text() + (root / "docs/performance.md").read_text()
+    for names, _ in ENVIRONMENT:
+        assert all(name in said for name in names.split(", "))
