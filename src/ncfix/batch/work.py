@@ -22,6 +22,8 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 ExecutorMaker: TypeAlias = "Callable[[int], Executor]"
 """Makes an executor with so many workers."""
+SCHEME = "dask://"
+"""How the name of a cluster begins."""
 
 
 def processes(workers: int) -> Executor:
@@ -35,7 +37,11 @@ BUILT_IN: Mapping[str, ExecutorMaker] = {"processes": processes}
 
 
 def executor_of(name: str) -> ExecutorMaker:
-    """The executors of that name; raises `UsageError` NCF015."""
+    """The executors of that name, or on a cluster, `dask://HOST:PORT`; raises `UsageError` NCF015, NCF029."""
+    if name.startswith(SCHEME):
+        from ncfix.batch.cluster import cluster
+
+        return cluster(name)
     known: dict[str, ExecutorMaker] = registry("executors", BUILT_IN)
     if name not in known:
         raise UsageError.of("NCF015", f"there is no executor {name!r}", hint=nearest(name, known))

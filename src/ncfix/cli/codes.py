@@ -118,4 +118,10 @@ CODES = {
         "Something else stands there, or another kind of value.",
         "docs/formats.md has the keys; `--no-project` goes without the file.",
     ),
+    "NCF029": Code(
+        "a cluster that cannot be used",
+        "`--executor dask://HOST:PORT` gives the programs of a batch to a Dask cluster. Its scheduler does not answer "
+        "or is gone, or it has no workers, or these have another version of ncfix. What is done is in the journal.",
+        "Start scheduler and workers, with the same ncfix and the same folders; then the same command with `--resume`.",
+    ),
 }

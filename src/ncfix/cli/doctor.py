@@ -25,6 +25,7 @@ EXTRAS = {
     "numba": ("fast", "long programs take two or three times as long"),
     "sympy": ("symbolic", "`ncfix derive` does not work"),
     "watchfiles": ("watch", "`ncfix watch` looks every second"),
+    "distributed": ("cluster", "`--executor dask://HOST:PORT` does not work"),
 }
 """What is not needed: package -> its extra, and what it is like without."""
 NEEDS = re.compile(r"^([A-Za-z0-9_.-]+)\s*(?:>=([0-9.]+))?\s*(?:;.*extra\s*==\s*['\"](\w+)['\"])?")

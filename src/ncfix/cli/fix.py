@@ -146,7 +146,7 @@ def _executors() -> Iterable[str]:
     default="processes",
     show_default=True,
     metavar="NAME",
-    help="What runs the programs of a batch.",
+    help="What runs the programs of a batch: processes, a plugin's, or dask://HOST:PORT.",
 )
 @click.option("--time-limit-s", type=Positive(), metavar="S", help="Seconds that one program may take.")
 @click.option("--memory-limit-mb", type=click.IntRange(1), metavar="MB", help="Memory that one program may take.")
@@ -182,7 +182,7 @@ def fix(
     Programs are never changed where they are unless --in-place says so. Exit code 4: motions were refused and nothing
     was written.
     """
-    from ncfix.batch.work import executor_of
+    from ncfix.batch.work import SCHEME, executor_of
     from ncfix.cli.shop.batch import Batch, FixJob, ProgramLimits
     from ncfix.cli.shop.summary import Loudness
 
@@ -204,7 +204,8 @@ def fix(
         return _changes(context, job, programs, outputs.folder(programs), diff_motions, as_json)
     loudness = Loudness.ALL if verbose else Loudness.QUIET if quiet else Loudness.USUAL
     batch = Batch(job, wanted, outputs.folder(programs), resume, retry, loudness)
-    batches = [*context.meta.get(BATCHES, ()), (batch, processes_for(jobs, wanted), executor_of(executor))]
+    workers = max(processes_for(jobs, wanted), 2 if executor.startswith(SCHEME) else 1)
+    batches = [*context.meta.get(BATCHES, ()), (batch, workers, executor_of(executor))]
     context.meta[BATCHES] = batches
     if (following := next_group(context)) is not None:
         with following:

@@ -316,7 +316,9 @@ class Batch:
                 yield outcome
 
     def _known(self, target: OutputTarget, journal: Journal) -> OutputTarget:
-        return replace(target, made=journal.made(target.name, target.source)) if self.resume else target
+        """A target that knows what ncfix has written there, and which another worker may take over at any moment."""
+        made = journal.made(target.name, target.source) if self.resume else frozenset[str]()
+        return replace(target, made=made, resume=True)
 
     def _kept(self, job: FixJob, target: OutputTarget, journal: Journal) -> JournalRecord | None:
         """The record of a program that need not be fixed again; None if it is to be fixed."""

@@ -200,7 +200,7 @@ class _Watching:
 
     def corrected(self, machine_path: str, inputs: Iterable[str], ready: list[str], page: StatusPage) -> int:
         """Correct programs, and say what became of them; the worst exit code."""
-        from ncfix.batch.work import executor_of
+        from ncfix.batch.work import SCHEME, executor_of
         from ncfix.cli.shop.batch import Batch
 
         outputs = Outputs(os.path.join(self.output, ""), resume=True)
@@ -209,7 +209,9 @@ class _Watching:
             return 0
         batch = Batch(self._job(machine_path), wanted, self.output, True, False, self.loudness, many=True)
         worst = 0
-        for outcome in batch.run(processes_for(self.options["jobs"], wanted), executor_of(self.options["executor"])):
+        executor = self.options["executor"]
+        workers = max(processes_for(self.options["jobs"], wanted), 2 if executor.startswith(SCHEME) else 1)
+        for outcome in batch.run(workers, executor_of(executor)):
             entry = outcome.entry
             if entry["output"] is not None and not entry.get("resumed") and self.loudness == Loudness.USUAL:
                 console.say(f"{visible(entry['path'])} -> {visible(entry['output'])}")

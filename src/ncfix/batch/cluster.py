@@ -1,0 +1,140 @@
+"""A Dask cluster as what runs the programs of a batch: `--executor dask://HOST:PORT` (the extra `cluster`).
+
+The workers read programs and write outputs themselves. So they have ncfix in the same version, see the same folders
+under the same paths, and work where the batch was started. A worker that dies gives its program to another one; what it
+may have written by then is what the other one writes. When the scheduler is gone the batch ends, and `--resume` goes on
+with it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import suppress
+from functools import partial
+from importlib.util import find_spec
+from threading import Event, Lock, Thread
+from typing import Any, TypeVar
+
+from ncfix.batch.work import SCHEME
+from ncfix.diagnostics import UsageError
+from ncfix.version import __version__
+
+CONNECT_S = 10
+"""How long the scheduler may take to answer, at first and when it is gone for a while."""
+LOOK_S = 0.5
+"""How often is looked whether the scheduler is still there."""
+Result = TypeVar("Result")
+
+
+def cluster(address: str) -> Callable[[int], Executor]:
+    """What makes executors on a cluster; raises `UsageError` NCF029 if that cannot be.
+
+    address  dask://HOST:PORT of its scheduler
+    """
+    if find_spec("distributed") is None:
+        raise UsageError.of("NCF029", "dask.distributed is not installed", hint="pip install 'ncfix[cluster]'")
+    return partial(ClusterExecutor, address)
+
+
+class ClusterExecutor(Executor):
+    """Gives tasks to the workers of a cluster, all of them, however many are asked for."""
+
+    def __init__(self, address: str, workers: int) -> None:
+        self.address = address
+        self.client = self._connected(address.removeprefix(SCHEME))
+        self._check_workers()
+        self._folder = os.getcwd()
+        self._lock = Lock()
+        self._waiting: dict[Future[Any], Any] = {}
+        self._over = Event()
+        Thread(target=self._watch, daemon=True).start()
+
+    def _connected(self, place: str) -> Any:
+        from distributed import Client
+
+        connect: Callable[..., Any] = Client
+        try:
+            return connect(f"tcp://{place}", timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            hint = "start it, or name another one; --resume goes on with a batch that has begun"
+            raise UsageError.of("NCF029", f"there is no scheduler at {self.address}", hint=hint) from error
+
+    def _check_workers(self) -> None:
+        versions = self.client.run(_version)
+        if not versions:
+            self.client.close()
+            raise UsageError.of("NCF029", f"{self.address} has no workers", hint="dask worker HOST:PORT --nthreads 1")
+        others = {found for found in versions.values() if found != __version__}
+        if others:
+            self.client.close()
+            text = f"workers of {self.address} have ncfix {', '.join(sorted(others))}, and this is {__version__}"
+            raise UsageError.of("NCF029", text, hint="install the same on all of them")
+
+    def submit(self, work: Callable[..., Result], /, *given: Any, **named: Any) -> Future[Result]:
+        """Give a task to a worker; it is broken (`BrokenExecutor`) if several died over it, or the cluster is gone."""
+        outer: Future[Result] = Future()
+        try:
+            inner = self.client.submit(_there, self._folder, work, *given, pure=False, **named)
+        except Exception as error:
+            raise BrokenExecutor(str(error)) from error
+        with self._lock:
+            self._waiting[outer] = inner
+        inner.add_done_callback(partial(self._came, outer))
+        return outer
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Leave the cluster; what has not begun is not done."""
+        self._over.set()
+        with self._lock:
+            rest = list(self._waiting.items())
+        for outer, inner in rest:
+            outer.cancel()
+            with suppress(Exception):
+                inner.cancel()
+        with suppress(Exception):
+            self.client.close(timeout=CONNECT_S)
+
+    def _came(self, outer: Future[Any], inner: Any) -> None:
+        from distributed.scheduler import KilledWorker
+
+        if self._taken(outer) is None:
+            return
+        if inner.status == "finished":
+            try:
+                outer.set_result(inner.result(timeout=CONNECT_S))
+            except Exception as error:
+                outer.set_exception(BrokenExecutor(str(error)))
+            return
+        failed = inner.exception(timeout=CONNECT_S) if inner.status == "error" else None
+        if failed is None or isinstance(failed, KilledWorker):
+            failed = BrokenExecutor(f"{self.address}: {failed or inner.status}")
+        outer.set_exception(failed)
+
+    def _taken(self, outer: Future[Any]) -> Any:
+        """What a task waits for, once; None if its result is not waited for any more."""
+        with self._lock:
+            inner = self._waiting.pop(outer, None)
+        return inner if inner is not None and outer.set_running_or_notify_cancel() else None
+
+    def _watch(self) -> None:
+        """Break what is waited for when the cluster is gone."""
+        while not self._over.wait(LOOK_S):
+            if self.client.status in ("closed", "closing"):
+                with self._lock:
+                    rest = list(self._waiting)
+                for outer in rest:
+                    if self._taken(outer) is not None:
+                        outer.set_exception(BrokenExecutor(f"{self.address} is gone"))
+
+
+def _version() -> str:
+    return __version__
+
+
+def _there(folder: str, work: Callable[..., Result], *given: Any, **named: Any) -> Result:
+    """Do a task where the batch was started: its paths are counted from there."""
+    if os.getcwd() != folder:
+        os.chdir(folder)
+    return work(*given, **named)
