@@ -13,10 +13,9 @@ from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Passing, Unk
 from ncfix.control.setup import WORK_OFFSET, Run, Setup, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
-from ncfix_heidenhain.klartext.calculate import FormulaScope, QParameters
 from ncfix_heidenhain.klartext.free import ContourElement
 from ncfix_heidenhain.klartext.patterns import HolePosition
-from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING
+from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING, FormulaScope, QParameters
 
 START = "PRESET"
 """The name in the setup of the preset that is active when the program starts; G54 is taken for it."""

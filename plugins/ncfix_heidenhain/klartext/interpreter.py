@@ -21,6 +21,7 @@ from ncfix.diagnostics import Place, SourceError
 from ncfix.text.reach import UNREAD
 from ncfix.text.tree import Command, Opaque, Program, Template
 from ncfix_heidenhain.klartext import cycles, lines, tilting, transformations
+from ncfix_heidenhain.klartext.arc_text import relies_at_once
 from ncfix_heidenhain.klartext.arcs import Step, circular, circular_by_radius, circular_polar, refuse, tangential
 from ncfix_heidenhain.klartext.blocks import unread_line
 from ncfix_heidenhain.klartext.control import KlartextControl
@@ -28,7 +29,6 @@ from ncfix_heidenhain.klartext.lane import run_lane
 from ncfix_heidenhain.klartext.layout import CORNERS, FULL, axis_numbers, poles_move
 from ncfix_heidenhain.klartext.lines import straight, straight_polar
 from ncfix_heidenhain.klartext.plans import CARTESIAN, MOVING, POLAR, VECTOR, KlartextPlan
-from ncfix_heidenhain.klartext.poles import relies_at_once
 from ncfix_heidenhain.klartext.statements import (
     PROGRAM,
     KlartextFlow,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ncfix.control.language import FlatLine
+from ncfix.control.interpreter import FlatLine
 from ncfix.text.reach import whole_text
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Opaque

@@ -23,8 +23,8 @@ from ncfix.text.tree import (
     Template,
     Word,
 )
+from ncfix_heidenhain.klartext.arc_text import in_lines
 from ncfix_heidenhain.klartext.plans import opens_block, own_words
-from ncfix_heidenhain.klartext.poles import in_lines
 
 CORNERS = frozenset({"rnd", "chf"})
 """Corners that the control makes of the end of one motion and the beginning of the next."""

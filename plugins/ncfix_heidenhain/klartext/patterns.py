@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from ncfix.control.expressions import Value, nominal, numbers, signed
 from ncfix.text.spelling import value_of
-from ncfix_heidenhain.klartext.calculate import QParameters
+from ncfix_heidenhain.klartext.plans import QParameters
 
 ON_CIRCLE, ON_LINES = 220, 221
 MOST_HOLES = 100_000

@@ -20,10 +20,9 @@ from ncfix.text.spelling import Spelling, value_of
 from ncfix.text.tree import Literal, Program, Word
 from ncfix.writer.block import EXACT, BlockWriter
 from ncfix.writer.target import Target
-from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text
+from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text, is_relied_on, pole_in_force
 from ncfix_heidenhain.klartext.control import BY_DEPTH, FROM_START
 from ncfix_heidenhain.klartext.layout import FULL, VECTOR, KlartextLayout, poles_move, tilts, uses_comma
-from ncfix_heidenhain.klartext.poles import is_relied_on, pole_in_force
 
 FloatArray = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from ncfix_iso.rs274.groups import RULES
 from ncfix_iso.rs274.interpreter import RS274Interpreter
 
 if TYPE_CHECKING:
-    from ncfix.control.language import FlatLine
+    from ncfix.control.interpreter import FlatLine
 
 
 def writable(program: Program, block: int) -> Layout | None:

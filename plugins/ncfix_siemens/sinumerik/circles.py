@@ -18,8 +18,7 @@ from ncfix_siemens.sinumerik.destination import (
     doubtful_polar,
 )
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.values import BlockWordValues, End, ProgrammedMotion
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT, BlockWordValues, End, ProgrammedMotion
 
 NO_HEADING = "in which direction the motion before this arc (CT) ends is not known"
 TURNS_AT_RUNTIME = "the turns of the arc (CT) are known only at run time"

@@ -20,8 +20,15 @@ from ncfix.control.moves import CycleCall, MotionKind
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
-from ncfix_siemens.sinumerik.values import DP, FIRST_DEPTH, BlockWordValues, Drilling, End, ProgrammedMotion
-from ncfix_siemens.sinumerik.vocabulary import DRILLING
+from ncfix_siemens.sinumerik.vocabulary import (
+    DP,
+    DRILLING,
+    FIRST_DEPTH,
+    BlockWordValues,
+    Drilling,
+    End,
+    ProgrammedMotion,
+)
 
 Points = tuple[tuple[float, float], ...]
 """Places in the plane, in program units."""

@@ -9,8 +9,7 @@ from ncfix.control.expressions import Fault
 from ncfix.control.moves import UnknownAxes
 from ncfix.control.tcp import led_in_machine
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.values import BlockWordValues, End
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING, BlockWordValues, End
 
 RUNTIME = "where the axis {} stands is known only at run time"
 RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM90)"

@@ -12,7 +12,7 @@ from ncfix.control.coordinates import INCH, INDEX, LETTERS, PLANES, Vector, mask
 from ncfix.control.expressions import Unknown
 from ncfix.control.frames import WORLD, ZEROS, Affine, mirrored, shifted, turned, turned_in
 from ncfix_siemens.sinumerik.state import RESET_OF_DIAMETER, Sinumerik
-from ncfix_siemens.sinumerik.values import BlockWordValues
+from ncfix_siemens.sinumerik.vocabulary import BlockWordValues
 
 FRAME_AT_RUNTIME = "a frame ({}) is known only at run time"
 UNEQUAL = "a scale that differs from axis to axis ({})"

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.language import FlatLine
+from ncfix.control.interpreter import FlatLine
 from ncfix.control.moves import Moves
 from ncfix.text import reach
 from ncfix.text.language import ArcLayout, BulkLayout
@@ -21,12 +21,11 @@ from ncfix.writer.pieces import Pieces
 from ncfix_siemens.sinumerik.blocks import parse_block
 from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 from ncfix_siemens.sinumerik.interpreter import SinumerikInterpreter
-from ncfix_siemens.sinumerik.layout import SinumerikLayout, layout_of
 from ncfix_siemens.sinumerik.plans import fixed_centre
 from ncfix_siemens.sinumerik.scanning import polar_words, renumbered, scan
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import VECTOR
-from ncfix_siemens.sinumerik.writing import SPELLING, SinumerikWriter
+from ncfix_siemens.sinumerik.writing import SPELLING, SinumerikLayout, SinumerikWriter, layout_of
 
 SPATIAL = frozenset("XYZ")
 

@@ -19,8 +19,7 @@ from ncfix_siemens.sinumerik.destination import (
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.orientation import oriented
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
-from ncfix_siemens.sinumerik.values import BlockWordValues, End, ProgrammedMotion
-from ncfix_siemens.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS
+from ncfix_siemens.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS, BlockWordValues, End, ProgrammedMotion
 
 _ACTION = r"""
     \$A_\w+(?:\[[^\]]*\])?=\S+

@@ -40,8 +40,15 @@ from ncfix.control.tcp import switch
 from ncfix.control.turns import Winding
 from ncfix.text.dialect import Dialect
 from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
-from ncfix_siemens.sinumerik.values import BlockWordValues, Modes, Named, ProgrammedMotion
-from ncfix_siemens.sinumerik.vocabulary import MOTIONS, PATH_WORDS, TURNING
+from ncfix_siemens.sinumerik.vocabulary import (
+    MOTIONS,
+    PATH_WORDS,
+    TURNING,
+    BlockWordValues,
+    Modes,
+    Named,
+    ProgrammedMotion,
+)
 
 GEOMETRY = (X, Y, Z)
 ROUND = frozenset({20, 30, MOTIONS["cip"]})

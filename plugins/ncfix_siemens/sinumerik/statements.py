@@ -18,11 +18,10 @@ from ncfix_siemens.sinumerik import framing, motion
 from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import set_pole
 from ncfix_siemens.sinumerik.framing import into_spindle, set_length
+from ncfix_siemens.sinumerik.orientation import swivel
 from ncfix_siemens.sinumerik.plans import LISTS, Calling, SinumerikPlan, evaluates, plain_text
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
-from ncfix_siemens.sinumerik.swivel import swivel
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
-from ncfix_siemens.sinumerik.values import BlockWordValues
 from ncfix_siemens.sinumerik.vocabulary import (
     DRILLING,
     ENDED_BY,
@@ -34,6 +33,7 @@ from ncfix_siemens.sinumerik.vocabulary import (
     TURNS_OF_THE_TOOL,
     UNFOLLOWED,
     UNFOLLOWED_MOTIONS,
+    BlockWordValues,
 )
 
 Find = Callable[[str], SinumerikUnit | None]

@@ -24,7 +24,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.plan.arrays import Array, Mask
 from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.control.language import FollowedLanguage
+from ncfix.control.interpreter import FollowedLanguage
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState, Trace
 from ncfix.control.setup import PROBED, Run, Setup
 from ncfix.control.trace import Follower, NotInPartsError, trace

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ncfix.control.expressions import Fault
-from ncfix.control.language import FlatLine, FollowedLanguage
+from ncfix.control.interpreter import FlatLine, FollowedLanguage
 from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule
 from ncfix.control.setup import Resolve, Run
 from ncfix.control.trace import interpreter_of, trace

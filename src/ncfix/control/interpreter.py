@@ -5,16 +5,19 @@ end of a text means. Here is what surrounds that: where execution stands, the fa
 executed, programs that go round for ever, where in the program a fault is, and programs that come in parts.
 
 What it walks through is a `TextUnit`: a program, one of several that stand in a file, or the file of a subprogram.
+
+`FollowedLanguage` names what a family of controls has of its own for that.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
+from dataclasses import dataclass
 from functools import partial
-from typing import Any, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +32,13 @@ from ncfix.control.lanes.lane_tables import LaneTables
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Run
 from ncfix.diagnostics import Place, SourceError
+from ncfix.text.language import Language
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Span, Template, view
+
+if TYPE_CHECKING:
+    from ncfix.text.dialect import Dialect
+
 
 P = TypeVar("P")
 """What a language works out of a shape: its plan, with `skip` (which switches of block delete) and `lane`."""
@@ -307,3 +315,28 @@ class Interpreter(ABC, Generic[U]):
         if self._recurrence.seen(jump, self.changes):
             flow.block = block + 1
             raise Fault(ENDLESS, self.why_endless)
+
+
+# -- how a family of controls is followed -------------------------------------------------------------------------------
+
+
+class FlatLine(NamedTuple):
+    """A line of a flat program, and the line of the original that it comes from."""
+
+    text: str
+    line: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FollowedLanguage(Language):
+    """How the programs of one family of controls are followed.
+
+    control   what the control keeps while it follows a program of a dialect
+    interpreter  (control, program, run) -> the walk through a program; `in_parts`: this is the first of its parts
+    unroll    (interpreter, least increments, limit) -> the blocks of a program as they are executed, see `flatten`;
+              None if the language cannot write them
+    """
+
+    control: Callable[[Run, Dialect], ProgramControl]
+    interpreter: Callable[..., Interpreter[Any]]
+    unroll: Callable[[Any, Mapping[str, float], int], Sequence[FlatLine]] | None = None

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.control import ProgramControl
-from ncfix.control.interpreter import Interpreter
-from ncfix.control.language import FollowedLanguage
+from ncfix.control.interpreter import FollowedLanguage, Interpreter
 from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Run, Setup
 from ncfix.diagnostics import Message, SourceError, UsageError

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ncfix.control.language import FollowedLanguage
+from ncfix.control.interpreter import FollowedLanguage
 
 if TYPE_CHECKING:
     import numpy as np

@@ -10,7 +10,7 @@ import pytest
 from ncfix.control.moves import Rule
 from ncfix.control.setup import Tool
 from ncfix.diagnostics import SourceError
-from ncfix_heidenhain.klartext.poles import is_relied_on
+from ncfix_heidenhain.klartext.arc_text import is_relied_on
 from program.klartext.test_following import reasons
 from program.klartext.test_writing import lines
 from program.klartext.tnc import KNOWN, ends, fixed, follow

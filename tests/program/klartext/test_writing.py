@@ -14,8 +14,7 @@ from ncfix.machine import loads
 from ncfix.text.reader import read
 from ncfix.text.spelling import Spelling
 from ncfix.text.writer import apply
-from ncfix_heidenhain.klartext.arc_text import PieceOfArc, arc_text
-from ncfix_heidenhain.klartext.poles import pole_in_force
+from ncfix_heidenhain.klartext.arc_text import PieceOfArc, arc_text, pole_in_force
 from ncfix_heidenhain.klartext.writing import NOT_CLOSED
 from program.klartext.tnc import KNOWN, THREE, fixed, follow, program
 

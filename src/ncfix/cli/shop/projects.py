@@ -125,8 +125,10 @@ def _options(params: Iterable[click.Parameter]) -> dict[str, click.Option]:
 
 
 def _all_options() -> frozenset[str]:
-    from ncfix.cli.fix import fix
-
+    """The options that a project file may give: those of `ncfix fix`."""
+    root = click.get_current_context().find_root()
+    fix = root.command.get_command(root, "fix") if isinstance(root.command, click.Group) else None
+    assert fix is not None, "ncfix has that verb"
     return frozenset(_options(fix.params)) - {"project", "no_project"}
 
 
