@@ -317,7 +317,7 @@ class Interpreter(ABC, Generic[U]):
             raise Fault(ENDLESS, self.why_endless)
 
 
-# -- how a family of controls is followed -------------------------------------------------------------------------------
+# -- how a family of controls is followed ------------------------------------------------------------------------------
 
 
 class FlatLine(NamedTuple):
