@@ -49,7 +49,7 @@ def is_scaled(control: MacroControl, plan: RS274Plan, letter: str) -> bool:
     """Whether the number of a word counts least increments when it has no point."""
     codes = plan.codes
     motion = control.modal.motion if codes is None else motion_in_force(control, codes)
-    if motion in control.rules.tables and letter == control.rules.level_of(motion):
+    if motion in control.rules.tables and letter == control.dialect.cycle_of(motion).level:
         return True
     if letter not in SCALED or (letter == "R" and is_level(control, plan)):
         return False

@@ -24,12 +24,12 @@ def cycle(control: RS274Control, block: Block, code: int) -> None:
     control.use_start_positions(tuple(control.unknown))
     program = control.program_position()
     initial = program[across] if modal.cycle.initial is None else modal.cycle.initial
-    take_levels(control, block, initial, control.rules.level_of(code))
+    take_levels(control, block, initial, control.dialect.cycle_of(code).level)
     modal.cycle.initial, modal.cycle.level, modal.motion = initial, modal.cycle.r, code
     if modal.cycle.r < modal.cycle.depth and code != BACK_BORING:
         levels = f"{modal.cycle.r:g} and {modal.cycle.depth:g} mm"
         raise Fault(BAD_CYCLE, f"R is below the bottom of the hole ({levels})")
-    at_level = control.rules.ends_at_level(code, modal.retract_to_r)
+    at_level = control.dialect.cycle_of(code).ends_at_level(modal.retract_to_r)
     clear = modal.cycle.r if at_level else max(initial, modal.cycle.r)
     for _ in range(repeats(control, block, code)):
         place_hole(control, block, program)

@@ -79,7 +79,7 @@ def scaled(control: MacroControl, block: Block, codes: Codes) -> Block:
         control.unwritten = control.unwritten or TOGETHER.format(f"G{foreign[0] / 10:g}")
         return block
     motion = control.modal.motion if codes.motion is None else codes.motion
-    drills, level = motion in control.rules.cycles, control.rules.level_of(motion)
+    drills, level = motion in control.rules.cycles, control.dialect.cycle_of(motion).level
     across = control.modal.plane.across
     for letter, value in block.values.items():
         if letter in "XYZ" or (drills and letter == level):

@@ -56,11 +56,6 @@ class Step:
         return MotionKind.RAPID if "fmax" in self.flags else MotionKind.FEED
 
 
-def with_increments(control: KlartextControl, on: bool) -> None:
-    """Whether the words of the next motion count from where it begins."""
-    control.modal.incremental = on
-
-
 def somewhere(control: KlartextControl, axes: int, target: Vector, unknown: UnknownAxes, reason: str) -> None:
     """A refused curve that ends nobody knows where: the motion before it must still end where it did."""
     normal = control.rotation[0][2], control.rotation[1][2], control.rotation[2][2]
@@ -72,11 +67,6 @@ def somewhere(control: KlartextControl, axes: int, target: Vector, unknown: Unkn
     )
     control.modal.arc_absolute = False
     control.path.tangent = None
-
-
-def refuse(control: KlartextControl, reason: str) -> None:
-    """A motion that is not followed."""
-    control.refuse_here(reason)
 
 
 BAD_ARC = "NCF220"
@@ -201,11 +191,11 @@ def swing(control: KlartextControl, step: Step, where: Where, circle: PlaneArc) 
     normal = tuple(dot(row, IDENTITY[plane.across]) for row in control.rotation)
     sweep = hand * circle.sweep
     relative = step.name in ("ct", "ctp", "cp") or step.words.incremental
-    with_increments(control, relative)
+    control.modal.incremental = relative
     arc = Arc(centre, normal, sweep, fixed=step.name == "c")  # type: ignore[arg-type]
     code, why = CLOCKWISE if circle.sweep < 0 else COUNTER, derived(control, step.words, axes)
     control.make(Motion(MotionKind.ARC, axes, target, unknown, code, refusal=why, arc=arc))
-    with_increments(control, False)
+    control.modal.incremental = False
     control.path.tangent = direction_at_end(control.position, arc)
 
 

@@ -13,7 +13,7 @@ from ncfix.control.coordinates import X, Y, Z, mask_of
 from ncfix.control.expressions import Fault, numbers
 from ncfix.control.moves import Motion, MotionKind
 from ncfix_heidenhain.klartext import transformations
-from ncfix_heidenhain.klartext.arcs import Step, refuse
+from ncfix_heidenhain.klartext.arcs import Step
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, KlartextControl
 from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, HolePosition, pattern_of_cycle
 from ncfix_heidenhain.klartext.targets import MotionWords, Where, command_of, led, polar, polar_axes
@@ -199,7 +199,7 @@ def said(steps: Mapping[str, float], names: frozenset[str]) -> float | None:
 def own_path(control: KlartextControl, step: Step) -> None:
     """A cycle that is not followed: after it X, Y and Z stand nowhere known, and of most cycles the other axes do."""
     position, unknown = control.position[:], dict(control.unknown)
-    refuse(control, OWN_PATH.format(control.cycle.number))
+    control.refuse_here(OWN_PATH.format(control.cycle.number))
     if control.cycle.number in IN_SPACE and not step.words.axes >> (Z + 1):
         control.stand(position, unknown)
     control.lose(range(3), AFTER_CYCLE)

@@ -22,7 +22,7 @@ from ncfix.text.reach import UNREAD
 from ncfix.text.tree import Command, Opaque, Program, Template
 from ncfix_heidenhain.klartext import cycles, lines, tilting, transformations
 from ncfix_heidenhain.klartext.arc_text import relies_at_once
-from ncfix_heidenhain.klartext.arcs import Step, circular, circular_by_radius, circular_polar, refuse, tangential
+from ncfix_heidenhain.klartext.arcs import Step, circular, circular_by_radius, circular_polar, tangential
 from ncfix_heidenhain.klartext.blocks import unread_line
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.lane import run_lane
@@ -351,7 +351,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         if calls and step.name.endswith("pat"):
             cycles.pattern(control, control.cycle.places, "CYCL CALL PAT")
         elif why := astray(control, step, called=called):
-            refuse(control, why)
+            control.refuse_here(why)
         elif plan.moves and step.codes & {91, 92}:
             lines.at_machine(control, step)
         elif calls or called:

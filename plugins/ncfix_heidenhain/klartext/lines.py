@@ -11,7 +11,7 @@ from ncfix.control.frames import unit
 from ncfix.control.moves import Motion, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.posture import WayRules
 from ncfix.control.tcp import led_in_machine, switch
-from ncfix_heidenhain.klartext.arcs import Step, refuse, with_increments
+from ncfix_heidenhain.klartext.arcs import Step
 from ncfix_heidenhain.klartext.control import DEPARTED, KlartextControl
 from ncfix_heidenhain.klartext.targets import (
     MotionWords,
@@ -54,7 +54,7 @@ def straight(control: KlartextControl, step: Step) -> None:
         return
     way = None if step.words.runtime else pointed(control, step.words)
     if way is None:
-        refuse(control, ORIENTED)
+        control.refuse_here(ORIENTED)
         return
     control.points = True
     for index, angle in way.items():
@@ -100,11 +100,11 @@ def run(
     way = take_short_way(control, step, target, axes) if control.shortest else ""
     before = control.position, control.unknown
     off = step.kind == MotionKind.RAPID and control.is_led(unknown)
-    with_increments(control, follows or step.words.incremental)
+    control.modal.incremental = follows or step.words.incremental
     code = 0 if step.kind == MotionKind.RAPID else 10
     refusal = way or check_normal(control) or derived(control, step.words, axes)
     control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else None))
-    with_increments(control, False)
+    control.modal.incremental = False
     keep_tangent(control, *before)
 
 
@@ -188,9 +188,9 @@ def approach(control: KlartextControl, step: Step) -> None:
     axes = polar_axes(control, step.words) if " p" in step.name else step.words.axes
     target, unknown = command_of(control, where, axes)
     control.path.corner = True
-    with_increments(control, step.words.incremental or " p" in step.name)
+    control.modal.incremental = step.words.incremental or " p" in step.name
     control.make(Motion(MotionKind.FEED, axes, target, unknown, 10, refusal=derived(control, step.words, axes)))
-    with_increments(control, False)
+    control.modal.incremental = False
     if " p" in step.name:
         name_polar(control, step)
     control.path.tangent = None

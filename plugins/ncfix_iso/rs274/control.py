@@ -111,7 +111,7 @@ class RS274Control(shared.ProgramControl):
         if self.modal.motion in ARCS:
             leading |= {*"IJKR"}
         elif self.modal.motion in self.rules.cycles:
-            leading.add(self.rules.level_of(self.modal.motion))
+            leading.add(self.dialect.cycle_of(self.modal.motion).level)
         return min(leading.intersection(words), default="")
 
     @property

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot, mask_of
+from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import FeedMode, Motion, MotionKind, UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
@@ -34,7 +34,7 @@ def cycle(control: RS274Control, block: Block, code: int) -> None:
     initial = program[plane.across] if modal.cycle.initial is None else modal.cycle.initial
     r, depth = levels(control, initial)
     modal.cycle.initial, modal.cycle.level, modal.motion = initial, r, code
-    clear = r if control.rules.ends_at_level(code, modal.retract_to_r) else max(initial, r)
+    clear = r if control.dialect.cycle_of(code).ends_at_level(modal.retract_to_r) else max(initial, r)
     for _ in range(repeats(control, block, code)):
         place_hole(control, block, program)
         drill(control, block, code, program, depth, r, clear)
@@ -64,7 +64,7 @@ def take_words(control: RS274Control, block: Block, code: int, plane: Plane) -> 
     sticky = control.modal.cycle
     in_force = control.modal.motion == code or (not control.rules.strict and sticky.initial is not None)
     depth_letter = LETTERS[plane.across]
-    level_letter = control.rules.level_of(code)
+    level_letter = control.dialect.cycle_of(code).level
     for letter in (level_letter, depth_letter):
         if letter not in block.values and not in_force:
             raise Fault(BAD_CYCLE, f"{letter} is missing: a canned cycle cannot begin without it")
@@ -89,9 +89,14 @@ def levels(control: RS274Control, initial: float) -> tuple[float, float]:
     return r, depth
 
 
+def repeat_letters(control: RS274Control, code: int) -> str:
+    """The addresses that say how often a canned cycle drills."""
+    return control.dialect.cycle_of(code).repeats or control.rules.repeats
+
+
 def repeats(control: RS274Control, block: Block, code: int) -> int:
     """How many times the block drills: L, or K of most ISO controls."""
-    letter = next((each for each in control.rules.repeats_of(code) if each in block.values), "L")
+    letter = next((each for each in repeat_letters(control, code) if each in block.values), "L")
     count = whole(block.get(letter, 1.0), letter)
     control.budget.spend(max(count, 0))
     if count < 1 and control.rules.strict:
@@ -126,23 +131,24 @@ def drill(
 ) -> None:
     """One hole: a motion by way of R to its bottom, after which the control stands at `clear` above it."""
     across = control.modal.plane.across
+    moved = block.axes | 1 << across
     unknown = hole_unknown(control, block)
     refusal = "a word of the cycle is known only at run time" if control.modal.cycle.runtime else ""
     height = control.lost_in_frame().get(across)
     if not control.modal.incremental and not unknown and not control.modal.diameter:
         program[across] = r
-        control.builder.approach(command(control, block, program))
+        control.builder.approach(control.command(program, moved))
     program[across] = depth
-    bottom, unplaced = command(control, block, program), control.places.unplaced
-    placed = 0 if control.modal.incremental else block.axes | 1 << across
+    bottom, unplaced = control.command(program, moved), control.places.unplaced
+    placed = 0 if control.modal.incremental else moved
     if control.rules.strict:
         control.builder.rests(mask_of(control.turning))
     control.make(Motion(MotionKind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, placed=placed))
-    at_level = control.rules.ends_at_level(code, control.modal.retract_to_r)
+    at_level = control.dialect.cycle_of(code).ends_at_level(control.modal.retract_to_r)
     if not at_level:
         control.places.lose(unplaced & 1 << across)
     program[across] = clear
-    above = command(control, block, program)
+    above = control.command(program, moved)
     if height is not None and not at_level:
         control.stand(above, control.axes_of({**unknown, across: height}))
     else:
@@ -163,16 +169,3 @@ def hole_unknown(control: RS274Control, block: Block) -> UnknownAxes:
         reason = unknown[min(unknown)]
         unknown |= {index: reason for index in (0, 1, 2) if index in control.machine}
     return unknown
-
-
-def command(control: RS274Control, block: Block, program: Vector) -> Vector:
-    """The command of a point in the program's frame; axes that the cycle does not move stay exactly where they are."""
-    plane = control.modal.plane
-    inner = [dot(row, program) for row in control.rotation] + program[3:] if control.is_rotated else program
-    moved = {plane.across, *(index for index in range(len(LETTERS)) if block.axes >> index & 1)}
-    if control.is_rotated:
-        moved |= {0, 1, 2}
-    return [
-        control.offset[index] + inner[index] if index in moved else value
-        for index, value in enumerate(control.position)
-    ]

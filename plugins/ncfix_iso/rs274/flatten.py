@@ -17,7 +17,7 @@ from ncfix.control.interpreter import TextUnit
 from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Literal, NumberedParameter, Opaque, Word
 from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
-from ncfix_iso.rs274.groups import Rules
+from ncfix_iso.rs274.cycles import repeat_letters
 from ncfix_iso.rs274.plans import Codes, RS274Plan
 
 DROPPED_CODES = {"G": frozenset({150, 160, 670}), "M": frozenset({970, 980, 990, 1980})}
@@ -208,14 +208,19 @@ class RS274Flattener(Flattener):
 
     def cycle(self, changes: list[Change], holes: list[Vector]) -> None:
         """The holes of a block, one block each, in absolute coordinates."""
-        rules, code = self.control.rules, self.control.modal.motion if self.codes.motion is None else self.codes.motion
-        drop = [word for word in self.template_words() if is_place(word, rules, code)]
+        code = self.control.modal.motion if self.codes.motion is None else self.codes.motion
+        drop = [word for word in self.template_words() if is_place(word, self.control, code)]
         stop = self.end_of_words()
         incremental = self.control.modal.incremental
         level = self.control.modal.cycle.level / self.control.modal.unit
         over, depth = self.letters_of_holes(self.values)
         mode = " G90" if incremental or any(is_distance(word) for word in drop) else ""
-        first = mode + self.place(holes[0], over + depth) + f" {rules.level_of(code)}" + self.number_at("R", level)
+        first = (
+            mode
+            + self.place(holes[0], over + depth)
+            + f" {self.control.dialect.cycle_of(code).level}"
+            + self.number_at("R", level)
+        )
         self.put([*self.without(drop, changes), Change(stop, stop, first)])
         for hole in holes[1:]:
             self.write(self.place(hole, over).strip())
@@ -283,12 +288,12 @@ def is_distance(word: Word) -> bool:
     return word.address == "G" and isinstance(word.value, Constant) and word.value.value in (90.0, 91.0)
 
 
-def is_place(word: Word, rules: Rules, code: int) -> bool:
+def is_place(word: Word, control: RS274Control, code: int) -> bool:
     """Whether a word of a cycle says where its holes are, how many, or in which mode: that is written anew."""
     if word.address in "GM":
         return is_distance(word)
-    placed = word.address in INDEX or word.address in POLAR or word.address == rules.level_of(code)
-    return placed or word.address in rules.repeats_of(code)
+    placed = word.address in INDEX or word.address in POLAR or word.address == control.dialect.cycle_of(code).level
+    return placed or word.address in repeat_letters(control, code)
 
 
 def inside(change: Change, spans: set[tuple[int, int]]) -> bool:

@@ -147,18 +147,6 @@ class Rules:
     operations: Mapping[tuple[str, int], tuple[CodeOperation, ...]] = field(default_factory=dict)
     tables: Mapping[int, CycleTable] = field(default_factory=dict)
 
-    def level_of(self, code: int) -> str:
-        """The address of the level of a canned cycle."""
-        return self.tables[code].level if code in self.tables else "R"
-
-    def ends_at_level(self, code: int, mode: bool) -> bool:
-        """Whether a canned cycle ends at its level; `mode`: G99 is in force."""
-        return self.tables[code].ends_at_level(mode) if code in self.tables else mode
-
-    def repeats_of(self, code: int) -> str:
-        """The addresses that say how often a canned cycle drills."""
-        return (self.tables[code].repeats if code in self.tables else "") or self.repeats
-
 
 LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")
 ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40}))

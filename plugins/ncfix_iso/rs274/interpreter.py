@@ -46,7 +46,7 @@ def motion_of(control: RS274Control, plan: RS274Plan, codes: Codes) -> int | Non
         return without_code(control)
     if has_axes:
         return modal
-    level = control.rules.level_of(modal)
+    level = control.dialect.cycle_of(modal).level
     if not control.rules.strict and level in plan.letters and control.modal.cycle.initial is not None:
         return modal if modal in control.rules.cycles else None
     return modal if plan.letters & {"I", "J", "K"} and modal in ARCS else None

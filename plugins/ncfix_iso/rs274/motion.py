@@ -101,10 +101,9 @@ def measured(control: RS274Control, block: Block, computed: frozenset[str], kind
     """
     axes = mask_of(INDEX[letter] for letter in computed)
     target, unknown = destination(control, Block(block.index, block.values, block.runtime - computed, block.axes))
-    whole, control.whole = control.whole, True
-    control.builder.measures(axes)
-    control.make(Motion(kind, block.axes, target, unknown, code))
-    control.whole = whole
+    with control.in_one_piece():
+        control.builder.measures(axes)
+        control.make(Motion(kind, block.axes, target, unknown, code))
     control.places.lose(axes)
 
 
@@ -215,11 +214,7 @@ def probe(control: RS274Control, block: Block, code: int) -> None:
     led = 7 if control.is_rotated and block.axes & 7 else 0
     named = [index for index in moved if (block.axes | led) >> index & 1]
     ends = unknown | {index: AFTER_PROBING for index in named if index in control.machine}
-    control.make(Motion(MotionKind.FEED, block.axes, target, ends, code, passing=PROBING))
-    program = control.program_position()
-    for index in range(N_LETTERS):
-        control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
-    control.parameters.assign(5070, 1.0, runtime=True)
+    probed(control, Motion(MotionKind.FEED, block.axes, target, ends, code, passing=PROBING), touches=False)
 
 
 def probe_nominally(control: RS274Control, block: Block, target: Vector, unknown: UnknownAxes, code: int) -> None:
@@ -231,11 +226,16 @@ def probe_nominally(control: RS274Control, block: Block, target: Vector, unknown
         incremental, control.modal.incremental = control.modal.incremental, False
         target, unknown = destination(control, Block(block.index, values, frozenset(), block.axes))
         control.modal.incremental = incremental
-    control.make(Motion(MotionKind.FEED, block.axes, target, unknown, code, passing=PROBING))
+    probed(control, Motion(MotionKind.FEED, block.axes, target, unknown, code, passing=PROBING), touches=True)
+
+
+def probed(control: RS274Control, motion: Motion, *, touches: bool) -> None:
+    """The motion of a probe, and the parameters in which the control leaves what it found; `touches`: for certain."""
+    control.make(motion)
     program = control.program_position()
     for index in range(N_LETTERS):
         control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
-    control.parameters.assign(5070, 1.0, runtime=False)
+    control.parameters.assign(5070, 1.0, runtime=not touches)
 
 
 # -- followed only as far as their end --------------------------------------------------------------------------------
@@ -279,9 +279,8 @@ def at_power_on(control: RS274Control, block: Block, code: int) -> None:
     """Axis words before the first motion code: a setting of ISO controls says whether G0 or G1 is in force then
     (Fanuc: parameter 3402). Both end at the same place; a block put in would have to name one, so none may be."""
     target, unknown = destination(control, block)
-    whole, control.whole = control.whole, True
-    control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
-    control.whole = whole
+    with control.in_one_piece():
+        control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
 
 
 def dwell(control: RS274Control, block: Block, code: int) -> None:

@@ -9,7 +9,7 @@ from ncfix.control.expressions import Fault
 from ncfix.control.moves import UnknownAxes
 from ncfix.control.tcp import led_in_machine
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING, BlockWordValues, End
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, TURNING, BlockWordValues, End
 
 RUNTIME = "where the axis {} stands is known only at run time"
 RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM90)"
@@ -50,7 +50,7 @@ def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vect
     """Take one axis word."""
     index, value = INDEX[letter], words.values[letter]
     form = words.forms.get(letter, "")
-    incremental = counts_on(control, form)
+    incremental = control.counts_on(form)
     if incremental and (why := control.unsteady(index)):
         lost[index] = why
         return
@@ -75,11 +75,6 @@ def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vect
     else:
         assert form in ("", ABSOLUTE)
         program[index] = step
-
-
-def counts_on(control: Sinumerik, form: str) -> bool:
-    """Whether a word in this form is an increment."""
-    return form == INCREMENTAL or (not form and control.modal.incremental)
 
 
 def turned(form: str, here: float, angle: float, *, known: bool) -> float:
@@ -124,7 +119,7 @@ def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector
         return TWICE.format(doubled[0])
     if radius is not None and abs(radius) < NEAR_POLE:
         return NO_RADIUS
-    forms = {address: counts_on(control, words.forms.get(address, "")) for address in POLAR_WORDS & words.values.keys()}
+    forms = {address: control.counts_on(words.forms.get(address, "")) for address in POLAR_WORDS & words.values.keys()}
     angle, distance = control.modes.polar
     first = angle if forms.get("AP", True) else None
     second = distance if forms.get("RP", False) else None
@@ -159,7 +154,7 @@ def polar_word(control: Sinumerik, words: BlockWordValues, address: str) -> floa
         return None
     value *= math.pi / 180 if address == "AP" else control.stretch
     form = words.forms.get(address, "")
-    if counts_on(control, form):
+    if control.counts_on(form):
         return None if before is None else before + value
     return value
 
@@ -224,7 +219,7 @@ def axes_of_machine(control: Sinumerik, words: BlockWordValues) -> tuple[dict[in
             axes[index] = control.tools.vector[index] + step_of(control, letter, value)
             if value is None:
                 unsure[index] = RUNTIME
-            elif counts_on(control, words.forms.get(letter, "")):
+            elif control.counts_on(words.forms.get(letter, "")):
                 unsure[index] = INCREMENT_IN_PLANE
     return axes, unsure
 
@@ -234,7 +229,7 @@ def place_at_machine(
 ) -> None:
     """Take one axis word in machine coordinates."""
     index, value = INDEX[letter], words.values[letter]
-    if counts_on(control, words.forms.get(letter, "")):
+    if control.counts_on(words.forms.get(letter, "")):
         target[index] += step_of(control, letter, value)
         if index == 0 and control.modes.diameter == "DIAM90":
             unknown[index] = RADIUS

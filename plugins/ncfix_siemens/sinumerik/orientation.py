@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
@@ -276,6 +276,7 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
         level(control, plane)
 
 
+@dataclass(frozen=True, slots=True)
 class SwivelPlane:
     """The arguments of CYCLE800.
 
@@ -286,12 +287,11 @@ class SwivelPlane:
     fault      why it is not followed, empty if it is
     """
 
-    def __init__(self, frame: Affine, adds: bool, direction: int, retracts: bool, fault: str) -> None:
-        self.frame = frame
-        self.adds = adds
-        self.direction = direction
-        self.retracts = retracts
-        self.fault = fault
+    frame: Affine
+    adds: bool
+    direction: int
+    retracts: bool
+    fault: str
 
     @classmethod
     def of(cls, values: list[float]) -> SwivelPlane:
@@ -307,6 +307,10 @@ class SwivelPlane:
             fault = fault or STILL
         frame = shifted(dict(enumerate(before))).then(turn or WORLD).then(shifted(dict(enumerate(after))))
         return cls(frame, table % 10 == 1, direction, round(values[PLACES["fr"]]) != 0, fault)
+
+    def within(self, before: Affine) -> Affine:
+        """The frame of the plane where another one was in force."""
+        return before.then(self.frame) if self.adds else self.frame
 
 
 def turn_of(mode: int, angles: Sequence[float]) -> Affine | None:
@@ -333,10 +337,7 @@ def untilted(control: Sinumerik) -> None:
 
 def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
     """Into a tilted plane: the frame, then the turn of the rotary axes."""
-    whole = control.frames.plane.then(plane.frame) if plane.adds else plane.frame
-    control.frames = replace(control.frames, plane=whole, programmable=WORLD)
-    control.modes.swivelled = True
-    control.switch_tcp()
+    take_plane(control, plane.within(control.frames.plane))
     axes = turn_square(control, plane)
     target, unknown = control.position[:], dict(control.unknown)
     for index, angle in axes.items():
@@ -357,16 +358,21 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
 def level(control: Sinumerik, plane: SwivelPlane) -> None:
     """A plane that is not turned, while the rotary axes stand still: as they stand, the tool has to be square to it."""
     control.use_start_positions(control.turning)
-    whole = control.frames.plane.then(plane.frame) if plane.adds else plane.frame
+    whole = plane.within(control.frames.plane)
     if whole.rotation != WORLD.rotation or not rotary_at_zero(control, control.position, control.unknown):
         control.suspended["tilt"] = UNFOLLOWED.format(STILL)
         control.lose_all(AFTER_SWIVEL)
         return
-    control.frames = replace(control.frames, plane=whole, programmable=WORLD)
-    control.modes.swivelled = True
-    control.switch_tcp()
+    take_plane(control, whole)
     if plane.retracts:
         control.lose_axes(GEOMETRY, AFTER_SWIVEL)
+
+
+def take_plane(control: Sinumerik, frame: Affine) -> None:
+    """Make a frame that of the plane."""
+    control.frames = replace(control.frames, plane=frame, programmable=WORLD)
+    control.modes.swivelled = True
+    control.switch_tcp()
 
 
 def turn_square(control: Sinumerik, plane: SwivelPlane) -> dict[int, float]:

@@ -41,6 +41,7 @@ from ncfix.control.turns import Winding
 from ncfix.text.dialect import Dialect
 from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.vocabulary import (
+    INCREMENTAL,
     MOTIONS,
     PATH_WORDS,
     TURNING,
@@ -351,8 +352,12 @@ class Sinumerik(ProgramControl):
 
     def counted_words(self, words: BlockWordValues) -> list[int]:
         """The axes whose words count from where they stand."""
-        forms = {index: words.forms.get(letter, "") for letter, index in INDEX.items() if letter in words.values}
-        return [index for index, form in forms.items() if form == "ic" or (not form and self.modal.incremental)]
+        named = ((index, words.forms.get(letter, "")) for letter, index in INDEX.items() if letter in words.values)
+        return [index for index, form in named if self.counts_on(form)]
+
+    def counts_on(self, form: str) -> bool:
+        """Whether a word in this form is an increment."""
+        return form == INCREMENTAL or (not form and self.modal.incremental)
 
     def ends_in_hole(self, motion: Motion) -> bool:
         """As of every control; a modal cycle (MCALL) drills where motions end."""

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -59,7 +60,7 @@ NOT_ACCOUNTED = "nothing is known that the control would make of the word {} in 
 AFTER_THAT = "where the axis {{}} stands is not known after this: {}"
 NO_WAY = 1e-9
 """mm"""
-SQUARE = 1 - 1e-12
+ALONG = 1 - 1e-12
 """A component of a turned axis that is no less lies along the axis itself."""
 
 
@@ -328,7 +329,7 @@ class ProgramControl(ControlState):
 
     def _turned(self) -> int:
         """Axes that are moved by words of others, since the frame is turned."""
-        return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < SQUARE)
+        return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < ALONG)
 
     def _dragged(self, motion: Motion, unplaced: int) -> Motion:
         """The motion; if it moves an axis that has no word and must get none, a rapid passes, others are refused."""
@@ -361,6 +362,13 @@ class ProgramControl(ControlState):
         if not reason and self.external:
             reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
         return reason
+
+    @contextmanager
+    def in_one_piece(self) -> Iterator[None]:
+        """The motions that are made meanwhile must not be split."""
+        whole, self.whole = self.whole, True
+        yield
+        self.whole = whole
 
     def _style_of(self, motion: Motion) -> int:
         """The style of a motion; behind a contour the one that leads off stays whole."""

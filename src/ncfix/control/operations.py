@@ -167,9 +167,8 @@ class Rapid(Operation):
         """See `Operation`."""
         if block.axes:
             target, unknown = destination()
-            whole, control.whole = control.whole, True
-            control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
-            control.whole = whole
+            with control.in_one_piece():
+                control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
 
     def __str__(self) -> str:
         return "the axes go to the words of the block in rapid"

@@ -170,9 +170,9 @@ class Dialect:
     cycles: tuple[tuple[str, CycleTable], ...] = ()
     language: str = field(kw_only=True)
 
-    def level_of(self, code: int) -> str:
-        """The address of the level of a drilling cycle; `code` in tenths."""
-        return next((table.level for name, table in self.cycles if tenths(name) == code), "R")
+    def cycle_of(self, code: int) -> CycleTable:
+        """The drilling cycle that a code is, in tenths; those of the family are as a table without entries says."""
+        return next((table for name, table in self.cycles if tenths(name) == code), CycleTable())
 
     def derive(
         self,

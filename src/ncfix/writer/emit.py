@@ -366,7 +366,7 @@ class _Emitter:
             measured=() if moves.measured is None else tuple(moves.measured[row].tolist()),
             spelled=() if moves.spelled is None else tuple(moves.spelled[row].tolist()),
             level=self.levels.wanted(
-                row, rows.start, at, frame, as_programmed, self.position, self.program.dialect.level_of(modal)
+                row, rows.start, at, frame, as_programmed, self.position, self.program.dialect.cycle_of(modal).level
             ),
         )
 
