@@ -1,4 +1,4 @@
-"""What one X word costs in understanding: modules in which a function runs, functions that run, and modules loaded.
+"""What one X word costs in understanding: functions that run and their modules, classes that are made, modules loaded.
 
 The program of seven lines of docs/architecture.md is corrected for a three-axis machine, in a process of its own:
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections import Counter
+from inspect import CO_OPTIMIZED
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -22,11 +23,13 @@ PROGRAM = "%\nG21 G90 G94\nG54\nT1 M6\nG0 X0 Y0 Z5\nN20 G1 X10 Y2.5 F500\nM30\n%
 def main() -> None:
     """Print the counts, and with `--list` every module with the number of its functions that ran."""
     ran: set[tuple[str, str, int]] = set()
+    made: set[tuple[str, str, int]] = set()
 
     def watch(frame: FrameType, event: str, argument: Any) -> None:
         code = frame.f_code
         if event == "call" and code.co_filename.startswith(OURS) and not code.co_name.startswith("<"):
-            ran.add((code.co_filename, code.co_name, code.co_firstlineno))
+            place = code.co_filename, code.co_name, code.co_firstlineno
+            (ran if code.co_flags & CO_OPTIMIZED else made).add(place)
 
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "program.nc")
@@ -41,7 +44,8 @@ def main() -> None:
             sys.setprofile(None)
     loaded = [name for name, each in sys.modules.items() if str(getattr(each, "__file__", "")).startswith(OURS)]
     modules = Counter(str(Path(path).relative_to(ROOT)) for path, _, _ in ran)
-    print(f"exit code {code}: {len(ran)} functions ran in {len(modules)} modules; {len(loaded)} modules loaded")
+    print(f"exit code {code}: {len(ran)} functions ran in {len(modules)} modules")
+    print(f"{len(made)} classes were made; {len(loaded)} modules loaded")
     if "--list" in sys.argv:
         print("\n".join(f"{count:5}  {name}" for name, count in sorted(modules.items())))
 
