@@ -258,3 +258,26 @@ def test_what_is_seen_stays() -> None:
     assert visible("a\tb\r\nc\n", lines=True) == "a\tb\nc\n"
     assert visible("\x1b\x07\r\x7f\x9b\u202e\udcff\n") == "\\x1b\\x07\\r\\x7f\\x9b\\u202e\\xff\\n"
     assert visible("a\rb", lines=True) == "a\\rb"
+
+
+def test_a_batch_shows_how_far_it_is_and_nothing_steers(
+    on_a_terminal: Callable[..., tuple[int, bytes]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "machine.toml").write_text(THREE_AXIS.format(effects=LONG_X))
+    (tmp_path / "in").mkdir()
+    for name in ("a.ngc", "b.ngc", f"w{PAYLOADS['title']}.ngc".replace("/", "")):
+        (tmp_path / "in" / name).write_bytes(PROGRAM if len(name) < 6 else b"G1 X1..2\nM2\n")
+    code, shown = on_a_terminal("fix", "in", "-m", "machine.toml", "--assume-zero", "-o", "out", "--jobs", "1")
+    assert code == ExitCode.USAGE  # a name with control characters is none for an output
+    assert steering(shown) == []
+    (bad,) = (tmp_path / "in").glob("w*")
+    bad.rename(tmp_path / "in" / "w.ngc")
+    code, shown = on_a_terminal("fix", "in", "-m", "machine.toml", "--assume-zero", "-o", "out", "--jobs", "1")
+    assert code == ExitCode.UNREADABLE
+    assert b"3 programs: 2 written, 1 not" in shown
+    assert steering(shown) == []
+    monkeypatch.setenv("TERM", "xterm")
+    options = ("-m", "machine.toml", "--assume-zero", "-o", "out", "--jobs", "1", "--resume")
+    code, shown = on_a_terminal("fix", "in", *options)
+    assert b"3/3" in shown
+    assert b"3 programs: 2 written, 1 not" in shown
