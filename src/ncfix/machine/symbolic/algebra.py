@@ -34,7 +34,11 @@ Poly = Any
 
 
 class Algebra:
-    """The ring in which some expressions live."""
+    """The ring in which some expressions live.
+
+    written   polynomials, with the shortest way to write them: the same ones come again and again
+    factored  polynomials, with their factors
+    """
 
     def __init__(self, expressions: Iterable[sp.Expr]) -> None:
         """The ring that holds sums and products of the expressions."""
@@ -53,6 +57,8 @@ class Algebra:
         self.ring = PolyRing(symbols or [sp.Dummy()], sp.QQ, lex)
         self._squares = [self._one_minus(cosine) for _, cosine in self.pairs]
         self._squares += [self.ring.from_expr(root.base) for root in self.roots]
+        self.written: dict[Poly, sp.Expr] = {}
+        self.factored: dict[Poly, list[sp.Expr]] = {}
 
     @property
     def pairs(self) -> list[tuple[int, int]]:
@@ -156,14 +162,19 @@ def _plain(algebra: Algebra, poly: Poly) -> bool:
 def _shortest(algebra: Algebra, poly: Poly) -> sp.Expr:
     if _plain(algebra, poly):
         return poly.as_expr()
-    forms = [_with_pairs_merged(algebra, poly), poly, algebra.with_sines(poly)]
-    ways = [way for form in forms if len(form) <= len(poly) for way in (form.as_expr(), sp.Mul(*_factors(form)))]
-    return min(ways, key=sp.count_ops)
+    if poly not in algebra.written:
+        forms = dict.fromkeys((_with_pairs_merged(algebra, poly), poly, algebra.with_sines(poly)))
+        short = [form for form in forms if len(form) <= len(poly)]
+        ways = [way for form in short for way in (form.as_expr(), sp.Mul(*_factors(algebra, form)))]
+        algebra.written[poly] = min(ways, key=sp.count_ops)
+    return algebra.written[poly]
 
 
-def _factors(poly: Poly) -> list[sp.Expr]:
-    factor, factors = poly.factor_list()
-    return [sp.sympify(factor), *(base.as_expr() ** power for base, power in factors)]
+def _factors(algebra: Algebra, poly: Poly) -> list[sp.Expr]:
+    if poly not in algebra.factored:
+        factor, factors = poly.factor_list()
+        algebra.factored[poly] = [sp.sympify(factor), *(base.as_expr() ** power for base, power in factors)]
+    return algebra.factored[poly]
 
 
 def _collected(algebra: Algebra, poly: Poly) -> sp.Expr:
@@ -175,7 +186,7 @@ def _collected(algebra: Algebra, poly: Poly) -> sp.Expr:
     parts = []
     for function, brackets in groups.items():
         lengths = poly.new(brackets)
-        outside = [lengths.as_expr()] if _plain(algebra, lengths) else _factors(lengths)
+        outside = [lengths.as_expr()] if _plain(algebra, lengths) else _factors(algebra, lengths)
         parts.append(sp.Mul(*outside, *sp.Mul.make_args(_shortest(algebra, function))))
     return sp.Add(*parts)
 
