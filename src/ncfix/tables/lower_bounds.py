@@ -105,18 +105,23 @@ def least_worst(
         for pair in combinations(range(axes), min(together, axes))
     ]
     weights = even = _shares(values.shape[:-1], turns)
-    left = values
-    best, bound = Remainder(nodes, turns, values, 0.0), 0.0
+    best, bound, worst, least = Remainder(nodes, turns, values, 0.0), 0.0, np.inf, np.inf
+    left, weighted = values.copy(), np.empty_like(values)
     for number in range(ROUNDS):
+        totals = [weights.sum(axis=others, keepdims=True)[..., None] for others in pairs]
+        each = np.repeat(weights[..., None], values.shape[-1], axis=-1)
         for _ in range(FIRST if number == 0 else SWEEPS):
-            for others in pairs:
-                left = left - _mean(left, weights, others)
-        bound = max(bound, _proven(left, weights, pairs))
+            for others, total in zip(pairs, totals, strict=True):
+                np.multiply(left, each, out=weighted)
+                left -= weighted.sum(axis=others, keepdims=True) / total
+        bound = max(bound, _proven(left, each, pairs))
         found = Remainder(nodes, turns, left, bound)
-        if number == 0 or found.largest * found.rms < best.largest * best.rms:
-            best = found
+        largest = found.largest
+        product = largest * found.rms
+        if number == 0 or product < least:
+            best, worst, least = replace(found, values=left.copy()), largest, product
         grown = weights * np.linalg.norm(left, axis=-1)
-        if best.largest <= max(NEAR * bound, enough) or not grown.any():
+        if worst <= max(NEAR * bound, enough) or not grown.any():
             break
         weights = (1 - BASE) * grown / grown.sum() + BASE * even
     return replace(best, bound=bound)
@@ -133,20 +138,16 @@ def _shares(counts: Sequence[int], turns: Sequence[bool]) -> Array:
     return shares
 
 
-def _mean(left: Array, weights: Array, others: tuple[int, ...]) -> Array:
-    share = weights.sum(axis=others, keepdims=True)[..., None]
-    found: Array = (left * weights[..., None]).sum(axis=others, keepdims=True) / share
-    return found
-
-
 def _proven(left: Array, weights: Array, pairs: Sequence[tuple[int, ...]]) -> float:
     """The least that can be left at the worst: what a measure sees that is blind to all functions of pairs.
 
+    weights  as `left`, for each output
+
     Means over even weights commute, so that one pass takes all of those out of the measure.
     """
-    measure = weights[..., None] * left
+    measure = weights * left
     for others in pairs:
-        measure = measure - measure.mean(axis=others, keepdims=True)
+        measure -= measure.mean(axis=others, keepdims=True)
     total = float(np.linalg.norm(measure, axis=-1).sum())
     return float((measure * left).sum()) / total if total else 0.0
 

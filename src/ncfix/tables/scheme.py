@@ -10,7 +10,9 @@ way an axis moves becomes tables for one way each.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from ncfix.tables.compensation import Compensation
 from ncfix.tables.correction import exact_correction, linear_axes, rotary_correction
 from ncfix.tables.grid import Array, full_grid, on_full_grid
 from ncfix.tables.lower_bounds import Remainder, least_worst
-from ncfix.tables.scheme_tables import AxisPositions, Corrections, StagedTables, TableSample, by_way, followed
+from ncfix.tables.scheme_tables import AxisPositions, Corrections, StagedTables, TableSample, by_way, checked, followed
 from ncfix.tables.separable import (
     Part,
     Separation,
@@ -83,6 +85,10 @@ class PartSelection:
 
     def __post_init__(self) -> None:
         self.kept = frozenset((face, n) for face, parts in self.faces.items() for n in range(len(parts.parts)))
+
+    def again(self) -> PartSelection:
+        """The same, to be changed on its own."""
+        return copy(self)
 
     @property
     def outputs(self) -> list[int]:
@@ -261,7 +267,7 @@ def automatic(task: SchemeTask, rotary: bool = True) -> Scheme:
     if columns:
         done, used = _rotary(task, columns)
         most -= used
-    moved, _ = _staged(task, linear_axes(task.machine), moving(task, done.tables), 1.0, most)
+    moved, _ = Stage(task, linear_axes(task.machine), moving(task, done.tables), 1.0).tables(most)
     tables = Compensation((*done.tables.terms, *moved.tables.terms))
     bound = moved.bound
     if bound > SMALL * task.target:
@@ -273,8 +279,9 @@ def _rotary(task: SchemeTask, columns: Sequence[int]) -> tuple[Scheme, int]:
     """The tables of the rotary axes, as many as leave the linear axes with least that no pair can say."""
     allowed = max(1, task.limits.tables // ROTARY_SHARE)
     tried: list[tuple[float, Scheme, int]] = []
+    stage = Stage(task, columns, turning(task), LEVER)
     for most in sorted({min(each, allowed) for each in (*FEWER, allowed)}):
-        done, used = _staged(task, columns, turning(task), LEVER, most)
+        done, used = stage.tables(most)
         tried.append((max(_bound(task, done), SMALL * task.target), done, used))
         if used < most and [each[-1] for each in tried[-2:]] == [used, used]:
             break
@@ -309,35 +316,51 @@ def moving(task: SchemeTask, done: Compensation) -> Corrections:
     return corrections
 
 
-def _staged(
-    task: SchemeTask, outputs: Sequence[int], correct: Corrections, scale: float, most: int
-) -> tuple[Scheme, int]:
-    """The tables of some axes, and how many of the `most` they take."""
-    lines = lines_of(task)
-    nodes = coarse_nodes(task.space, [line.modulo for line in lines])
-    selection, left = _parts(task, outputs, correct, scale, nodes)
-    selection.drop_small(selection.tolerance / MERGED)
-    allowed, used = most, most + 1
-    while used > most:
-        selection.fit_into(allowed)
-        layouts = _followed(selection, left, lines, correct, scale)
-        used = sum(needed(output, each, selection.free, selection.beside) for output, each in layouts.items())
-        allowed -= used - most
-    unscaled = {output: [one.scaled(1 / scale) for one in each] for output, each in layouts.items()}
-    stage = StagedTables(lines, unscaled, correct, scale)
-    tables, missed = stage.settled(max(task.target, AGAINST_REST * left.rms), task.limits.points, left.largest)
-    return Scheme(tables, missed, left.rms, selection.lost, left.bound), used
+class Stage:
+    """Axes that are corrected together: what they need is worked out once, however many tables are tried for it."""
 
+    def __init__(self, task: SchemeTask, outputs: Sequence[int], correct: Corrections, scale: float) -> None:
+        """`correct`: the corrections of the outputs; `scale`: how much one unit of them counts, mm."""
+        self.task, self.scale = task, scale
+        self.lines = lines_of(task)
+        self.evaluate = by_way(lambda q, direction: scale * correct(q, direction))
+        self.selection, self.left = _parts(task, outputs, correct, scale, coarse_nodes(task.space, self.turns))
+        self.selection.drop_small(self.selection.tolerance / MERGED)
+        self.sample = TableSample.of(self.left.nodes)
+        self.along = cache(self._along)
+        self.checked = checked(self.lines, correct)
 
-def _followed(
-    selection: PartSelection, left: Remainder, lines: Sequence[AxisPositions], correct: Corrections, scale: float
-) -> dict[int, list[TableLayout]]:
-    """The layouts with their functions over all positions of the axes; what they need may show there only."""
-    known = {output: selection.layouts(output) for output in selection.outputs}
-    fine = [line.fine for line in lines]
-    evaluate = by_way(lambda q, direction: scale * correct(q, direction))
-    found = followed(TableSample.of(left.nodes), known, fine, evaluate, left.along)
-    return {output: [absorbed(one, selection.tolerance) for one in each] for output, each in found.items()}
+    @property
+    def turns(self) -> list[bool]:
+        """Which axes repeat after a turn."""
+        return [line.modulo for line in self.lines]
+
+    def tables(self, most: int) -> tuple[Scheme, int]:
+        """The tables, and how many of the `most` they take."""
+        selection, left = self.selection.again(), self.left
+        allowed, used = most, most + 1
+        while used > most:
+            selection.fit_into(allowed)
+            layouts = self._followed(selection)
+            used = sum(needed(output, each, selection.free, selection.beside) for output, each in layouts.items())
+            allowed -= used - most
+        unscaled = {output: [one.scaled(1 / self.scale) for one in each] for output, each in layouts.items()}
+        stage = StagedTables(self.lines, unscaled, self.checked, self.scale)
+        target = max(self.task.target, AGAINST_REST * left.rms)
+        tables, missed = stage.settled(target, self.task.limits.points, left.largest)
+        return Scheme(tables, missed, left.rms, selection.lost, left.bound), used
+
+    def _followed(self, selection: PartSelection) -> dict[int, list[TableLayout]]:
+        """The layouts with their functions over all positions of the axes; what they need may show there only."""
+        known = {output: selection.layouts(output) for output in selection.outputs}
+        found = followed(self.sample, known, self.along)
+        return {output: [absorbed(one, selection.tolerance) for one in each] for output, each in found.items()}
+
+    def _along(self, axis: int, way: int | None) -> Array:
+        """The corrections along an axis, less what no pair of functions can say; see `AlongAxis`."""
+        positions, places = self.lines[axis].fine, self.sample.places
+        values = self.evaluate(self.sample.poses(axis, positions), way).reshape(len(positions), len(places), -1)
+        return values if way is not None else values - self.left.along(axis, positions, places)
 
 
 def _parts(

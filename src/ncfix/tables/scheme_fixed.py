@@ -25,7 +25,7 @@ from ncfix.tables.compensation import Compensation
 from ncfix.tables.correction import linear_axes, random_poses
 from ncfix.tables.grid import Array
 from ncfix.tables.scheme import LEVER, Scheme, SchemeTask, lines_of, moving, turning
-from ncfix.tables.scheme_tables import Corrections, StagedTables
+from ncfix.tables.scheme_tables import Corrections, StagedTables, checked
 from ncfix.tables.separable import Star, TableLayout
 
 POSES = 6000
@@ -176,7 +176,8 @@ def _fitted(task: SchemeTask, outputs: Sequence[int], form: Form, correct: Corre
         parts = np.split(shares, np.cumsum([column.shape[1] for column in columns])[:-1])
         layouts[output] = [_layout(pieces, parts, [line.fine for line in lines])]
     rest = scale * float(np.sqrt(missed))
-    tables, left = StagedTables(lines, layouts, correct, scale).settled(max(task.target, rest), task.limits.points)
+    stage = StagedTables(lines, layouts, checked(lines, correct), scale)
+    tables, left = stage.settled(max(task.target, rest), task.limits.points)
     return Scheme(tables, left, rest, 0.0)
 
 

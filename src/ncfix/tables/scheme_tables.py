@@ -37,8 +37,8 @@ Evaluate = Callable[[Array, int | None], Array]
 """Corrections of all outputs at poses (n, n_axes), (n, n_outputs): without direction, or what changes with a way."""
 TableLayouts = Mapping[int, Sequence[TableLayout]]
 """Output -> its layouts. The outputs are in the order in which `Evaluate` has them."""
-Left = Callable[[int, Array, NDArray[np.intp]], Array]
-"""What no layout is to say, without direction, at positions of an axis and nodes of the others: `Remainder.along`."""
+AlongAxis = Callable[[int, int | None], Array]
+"""What layouts are to say at all fine positions of an axis and combinations of the others, (n, m, n_outputs)."""
 ROUNDS = 6
 CHECKS = 1000
 GAIN = 0.95
@@ -147,17 +147,13 @@ class TableSample:
         return slots, known
 
 
-def followed(
-    sample: TableSample, layouts: TableLayouts, fine: Sequence[Array], evaluate: Evaluate, left: Left | None = None
-) -> dict[int, list[TableLayout]]:
-    """The same layouts with their functions at the positions `fine` of each axis."""
+def followed(sample: TableSample, layouts: TableLayouts, along: AlongAxis) -> dict[int, list[TableLayout]]:
+    """The same layouts with their functions at the fine positions of each axis."""
     curves: dict[tuple[int, int | None], Curves] = {}
-    for axis, positions in enumerate(fine):
+    for axis in range(len(sample.nodes)):
         concerned = [(output, one) for output, each in layouts.items() for one in each if axis in one.axes]
         for way in dict.fromkeys(layout.way for _, layout in concerned):
-            values = evaluate(sample.poses(axis, positions), way).reshape(len(positions), len(sample.places), -1)
-            if left is not None and way is None:
-                values = values - left(axis, positions, sample.places)
+            values = along(axis, way)
             for column, output in enumerate(layouts):
                 for layout in (one for key, one in concerned if key == output and one.way == way):
                     found = sample.curves(layout, axis, values[:, :, column])
@@ -187,19 +183,26 @@ def by_way(corrections: Corrections) -> Evaluate:
     return evaluate
 
 
+def checked(lines: Sequence[AxisPositions], correct: Corrections) -> tuple[Array, Array, Array]:
+    """Random poses and ways, and the corrections there: what tables are judged by."""
+    space = np.array([(line.low * line.unit, line.high * line.unit) for line in lines])
+    q, ways = random_poses(space, CHECKS, seed=3), random_ways(len(space), CHECKS, seed=4)
+    return q, ways, correct(q, ways)
+
+
 @dataclass(frozen=True, slots=True)
 class StagedTables:
     """Axes that are corrected together.
 
     lines    all axes of the machine
     layouts  output (its column) -> layouts with functions over the fine positions, mm or rad
-    correct  the corrections of the outputs, in the order of `layouts`
+    checked  poses, ways and corrections of the outputs there, in the order of `layouts`
     scale    how much one unit of them counts, mm
     """
 
     lines: Sequence[AxisPositions]
     layouts: Mapping[int, Sequence[TableLayout]]
-    correct: Corrections
+    checked: tuple[Array, Array, Array]
     scale: float = 1.0
 
     def settled(self, target: float, points: int, left: float = 0.0) -> tuple[Compensation, float]:
@@ -226,10 +229,9 @@ class StagedTables:
 
     def missed(self, tables: Compensation) -> float:
         """The largest correction that the tables lack at random poses, mm."""
-        space = np.array([(line.low * line.unit, line.high * line.unit) for line in self.lines])
-        q, ways = random_poses(space, CHECKS, seed=3), random_ways(len(space), CHECKS, seed=4)
+        q, ways, wanted = self.checked
         names = [line.name for line in self.lines]
-        lacking = tables.at(names, q, ways)[:, list(self.layouts)] - self.correct(q, ways)
+        lacking = tables.at(names, q, ways)[:, list(self.layouts)] - wanted
         return self.scale * float(np.linalg.norm(lacking, axis=1).max())
 
     def _tables(self, limit: float, points: int) -> Compensation:
