@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -242,6 +243,11 @@ class Pool:
     blocks: Array
     targets: Array
 
+    @cached_property
+    def power(self) -> float:
+        """The mean square of all numbers in the blocks."""
+        return max(float((self.blocks**2).mean()), 1e-300)
+
 
 def choose(pool: Pool, count: int, fixed: int = 0) -> Index:
     """Indices of the candidates to be measured; the first `fixed` blocks are measured anyway."""
@@ -313,7 +319,9 @@ def best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:
     bound = _left(pool.blocks, white, projected[:, first], present[first])
     bound[others] = np.inf
     best, worst = int(bound.argmin()), np.inf
-    for chunk in np.split(np.argsort(bound, kind="stable"), range(CHUNK, n, CHUNK)):
+    likely = np.argsort(bound, kind="stable")
+    for start in range(0, n, CHUNK):
+        chunk = likely[start : start + CHUNK]
         if bound[chunk[0]] >= worst:
             break
         left = bound[chunk]
@@ -347,7 +355,7 @@ def information(pool: Pool, rows: Sequence[int]) -> Array:
     """The information matrix (p, p) of some blocks, with next to nothing added so that it has an inverse."""
     p = pool.blocks.shape[2]
     stacked = pool.blocks[list(rows)].reshape(-1, p)
-    total: Array = stacked.T @ stacked + RIDGE * np.eye(p) * max(float((pool.blocks**2).mean()), 1e-300)
+    total: Array = stacked.T @ stacked + RIDGE * np.eye(p) * pool.power
     return total
 
 
