@@ -12,7 +12,7 @@ from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
 from ncfix.text.reader import read
-from ncfix_fanuc.macro.corners import axes_of_corner
+from ncfix_fanuc.macro.blocks import axes_of_corner
 from program.tracing import follow, reasons
 
 HEAD = "G21 G90 G17 G94 G54\nG0 X-150. Y-120. Z5.\nG1 Z-1. F300.\n"

@@ -1,11 +1,18 @@
 """One block of Fanuc by the grammar, and by the rules that a grammar cannot say.
 
 The decimal-point rule: which words count least increments where their number has no point.
+
+Corners that the control rounds (,R) or breaks (,C): the corner itself is corrected, the control puts in the rest.
+
+The two motions that meet must lie in one plane, and neither may be split: what they name between them is that plane,
+and words of other axes are not added to them.
+Source: Fanuc 30i operator's manual (machining centre), "Optional chamfering and corner R".
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from lark import Token, UnexpectedInput
@@ -26,7 +33,8 @@ from ncfix.text.build import (
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, explain
 from ncfix.text.grammar import Squeezed, parse
-from ncfix.text.tree import Binary, Expression, Item, Literal, OWordLine
+from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
+from ncfix.text.tree import Binary, Expression, Item, Literal, OWordLine, Program, Template, Word
 from ncfix_iso.rs274.blocks import check_repeats
 from ncfix_iso.rs274.groups import NON_MODAL, ROTATION
 from ncfix_iso.rs274.order import DWELL
@@ -43,6 +51,10 @@ DRILLING = frozenset("KLQ")
 """K and L may be the repeats of a cycle, Q is the depth of its pecks."""
 ANGLES = frozenset("IJKR")
 """Of a rotation (G68, G68.2)."""
+
+CORNER = frozenset((",R", ",C"))
+AXES = frozenset(AXIS_LETTERS)
+MOTION = AXES | frozenset(CENTRE_LETTERS)
 
 
 def is_scaled(control: MacroControl, plan: RS274Plan, letter: str) -> bool:
@@ -151,3 +163,32 @@ STATEMENTS = {"branch": "if goto", "condition": "if then", "jump": "goto", "loop
 def is_label(node: Node) -> bool:
     """Whether a node is a number that says where to go, and belongs to the shape."""
     return isinstance(node, Token) and kind(node) == "LABEL"
+
+
+# -- corners that the control rounds or breaks -------------------------------------------------------------------------
+
+
+def letters_of(template: Template) -> frozenset[str]:
+    """The addresses of the words of a shape."""
+    return frozenset(item.address for item in template.items if isinstance(item, Word))
+
+
+def has_corners(program: Program) -> bool:
+    """Whether the control puts in corners anywhere in a program."""
+    return any(CORNER & letters_of(template) for template in program.templates)
+
+
+def axes_of_corner(program: Program, block: int) -> frozenset[str] | None:
+    """The axes that a block at a corner may name, None for other blocks."""
+    own = letters_of(program.templates[int(program.template[block])])
+    before = neighbour(program, range(block - 1, -1, -1))
+    named = own | before if CORNER & before else frozenset()
+    if CORNER & own:
+        named |= own | neighbour(program, range(block + 1, len(program)))
+    return named & AXES if named else None
+
+
+def neighbour(program: Program, blocks: Iterable[int]) -> frozenset[str]:
+    """The addresses of the first of these blocks that has a motion."""
+    found = (letters_of(program.templates[int(program.template[each])]) for each in blocks)
+    return next((letters for letters in found if letters & MOTION), frozenset())

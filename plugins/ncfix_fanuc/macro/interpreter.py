@@ -13,9 +13,8 @@ from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import polar, scaling, system, tilt, vectors
-from ncfix_fanuc.macro.blocks import G15, G16, is_angle, is_scaled
+from ncfix_fanuc.macro.blocks import CORNER, G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl
-from ncfix_fanuc.macro.corners import CORNER
 from ncfix_fanuc.macro.expressions import is_vacant, variable_number
 from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
 from ncfix_fanuc.macro.lengths import LENGTH_IN_STEPS, lone_number

@@ -15,9 +15,8 @@ from ncfix.text.shapes import Scan, scan
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Literal, OWordLine, Program, Template
 from ncfix.writer.pieces import Pieces
-from ncfix_fanuc.macro.blocks import parse_block
+from ncfix_fanuc.macro.blocks import CORNER, axes_of_corner, has_corners, letters_of, parse_block
 from ncfix_fanuc.macro.control import MacroControl
-from ncfix_fanuc.macro.corners import CORNER, axes_of_corner, has_corners, letters_of
 from ncfix_fanuc.macro.interpreter import MacroInterpreter
 from ncfix_fanuc.macro.rules import RULES
 from ncfix_iso.rs274.language import RS274, writable

@@ -14,7 +14,6 @@ from ncfix.control.setup import WORK_OFFSET, Run, Setup, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
 from ncfix_heidenhain.klartext.free import ContourElement
-from ncfix_heidenhain.klartext.patterns import HolePosition
 from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING, FormulaScope, QParameters
 
 START = "PRESET"
@@ -42,6 +41,15 @@ SPATIAL = "where the axis {} stands by spatial angles (AXIS SPAT) the control wo
 LED_BY_CONTROL = frozenset({SPATIAL, RETRACTED, MOVED_ALONG, DEPARTED, AFTER_PROBING, FREELY, AFTER_CYCLE})
 """Rapids while an axis stands where the control itself has led it are passed: the tool is off the workpiece, and the
 next block that names the axis is corrected."""
+
+
+@dataclass(frozen=True, slots=True)
+class HolePosition:
+    """Where a hole is, and by how much its surface is above that of the cycle."""
+
+    x: float
+    y: float
+    height: float = 0.0
 
 
 @dataclass(slots=True)

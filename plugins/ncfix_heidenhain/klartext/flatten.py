@@ -14,9 +14,8 @@ from ncfix.control.flatten import Change, Flattener
 from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Constant, Expression, Literal, Span, StringLiteral, Word
 from ncfix_heidenhain.klartext.contours import written_out
-from ncfix_heidenhain.klartext.control import KlartextControl
-from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING
-from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, HolePosition, pattern_of_cycle
+from ncfix_heidenhain.klartext.control import HolePosition, KlartextControl
+from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING, ON_CIRCLE, ON_LINES, pattern_of_cycle
 from ncfix_heidenhain.klartext.plans import KlartextPlan, compiled
 from ncfix_heidenhain.klartext.units import KlartextUnit
 

@@ -23,7 +23,7 @@ from ncfix_heidenhain.klartext.targets import (
     polar,
     polar_axes,
 )
-from ncfix_heidenhain.klartext.tilting import check_normal
+from ncfix_heidenhain.klartext.transformations import check_normal
 
 MACHINE_COORDINATES = "machine coordinates ({})"
 NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"

@@ -19,7 +19,7 @@ from ncfix.text.tree import Constant
 from ncfix_heidenhain.klartext.arcs import Step
 from ncfix_heidenhain.klartext.contours import follow_free
 from ncfix_heidenhain.klartext.control import AFTER_PROBING, PRESET, RETRACTED, TOOL, KlartextControl
-from ncfix_heidenhain.klartext.patterns import pattern_of
+from ncfix_heidenhain.klartext.cycles import pattern_of
 from ncfix_heidenhain.klartext.plans import KlartextPlan
 from ncfix_heidenhain.klartext.targets import MotionWords
 from ncfix_heidenhain.klartext.transformations import is_plain, trans

@@ -17,7 +17,6 @@ from importlib.util import find_spec
 from threading import Event, Lock, Thread
 from typing import Any, TypeVar
 
-from ncfix.batch.work import SCHEME
 from ncfix.diagnostics import UsageError
 from ncfix.version import __version__
 
@@ -43,7 +42,7 @@ class ClusterExecutor(Executor):
 
     def __init__(self, address: str, workers: int) -> None:
         self.address = address
-        self.client = self._connected(address.removeprefix(SCHEME))
+        self.client = self._connected(address.rpartition("://")[2])
         self._check_workers()
         self._folder = os.getcwd()
         self._lock = Lock()
