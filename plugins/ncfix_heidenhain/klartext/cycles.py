@@ -323,7 +323,7 @@ FORMS: Mapping[str, Callable[[Values, list[HolePosition]], Iterator[HolePosition
 }
 
 
-# -- cycles that are patterns --------------------------------------------------------------------------------------------
+# -- cycles that are patterns ------------------------------------------------------------------------------------------
 
 
 def pattern_of_cycle(cycle: int, parameters: QParameters) -> tuple[HolePosition, ...] | None:
