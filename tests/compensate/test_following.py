@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow, kinematics_of
 from ncfix.control.moves import MotionKind, Rule, TcpState
@@ -260,3 +261,29 @@ def test_with_d0_the_spindle_reference_is_led_and_the_tip_is_corrected(root: Pat
     moves = follow(read(text.encode(), "a.mpf", "siemens"), machine, SETUP).trace.moves
     assert moves.rule[-1] == Rule.CORRECT
     assert (moves.tcp[-1], moves.tool_length[-1], moves.led_length[-1]) == (True, 100.0, 0.0)
+
+
+KEPT = {
+    "heidenhain": (
+        "BEGIN PGM U MM\nTOOL CALL 1 Z S1000\nL X+10 Y+5 Z+250 R0 FMAX\nL B+0 C+0 FMAX\nM128\n"
+        "L X+1 Y+2 Z+60 B+12 C+20 F1000\nL X+22.183 Y-12.737 Z+60 R0 FMAX\nL Z+50 F800\nL Y-15 R0 FMAX M91\n"
+        "L Z+14.91 F700\nEND PGM U MM\n"
+    ),
+    "fanuc": (
+        "%\nO1 (U)\nG21 G90 G54 T1 M6\nG43 H1 G0 X10. Y5. Z250. B0. C0.\nG43.4 H1\n"
+        "G1 X1. Y2. Z60. B12. C20. F1000.\nG0 X22.183 Y-12.737 Z60.\nG1 Z50. F800.\nG53 G0 Y-15.\n"
+        "G1 Z14.91 F700.\nM30\n%\n"
+    ),
+}
+
+
+def test_an_axis_that_machine_coordinates_leave_where_it_is_keeps_its_correction(root: Path) -> None:
+    """On this machine a head turns the tool, so that X of the tip stands still while Y of the machine moves."""
+    machine = load(str(root / "tests/goldens/machines/head.toml"))
+    setup = Setup(assume_zero=True, tools={1: Tool(80.0)}, no_point="calculator")
+    left = []
+    for dialect, text in KEPT.items():
+        fixed = fix_program(read(text.encode(), "a", dialect), machine, setup, FixOptions(strategy="position"))
+        left.append({each.axis: each.most for each in fixed.report.left if each.last >= 9})
+    klartext, fanuc = left
+    assert klartext["X"] == pytest.approx(fanuc["X"], abs=0.3e-3)  # digits of the control, two tenths each
