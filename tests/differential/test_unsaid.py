@@ -50,7 +50,7 @@ def test_the_judge_sees_what_was_not_corrected(dialect: str) -> None:
     assert sum(abs(a.tip[-1] - b.tip[-1]).max() > 2e-3 for a, b in zip(meant, done, strict=True)) > 3
 
 
-@pytest.mark.parametrize("dialect", ["fanuc", "iso", "siemens"])
+@pytest.mark.parametrize("dialect", ["fanuc", "iso", "siemens", "heidenhain"])
 def test_the_judge_sees_motions_that_are_believed_to_begin_elsewhere(
     dialect: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

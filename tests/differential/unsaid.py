@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import product
+from itertools import groupby, product
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -221,11 +221,21 @@ def by_tnc(text: str, actual: bool) -> list[Step]:
     control = LinedSwivel(dict(LENGTHS), dict(PRESETS), start, model=TABLES)
     control.run(re.sub(r" RL\b", "", text))
     tip = TABLES.actual_tip if actual else TABLES.tip
-    sorts = {"path": "cut", "machine": "fixed"}
-    return [
-        Step(0, line, sorts.get(each.kind, each.kind), tip(each.axes, np.full(len(each.axes), each.length)))
+    sorts, marks, mark = {"path": "cut", "machine": "fixed"}, [0], 0
+    for line in text.splitlines():
+        mark = int(found[1]) if (found := re.search(r";#(\d+)", line)) else mark
+        marks.append(mark)
+    steps = [
+        Step(marks[line], line, sorts.get(each.kind, each.kind), tip(each.axes, np.full(len(each.axes), each.length)))
         for line, each in zip(control.lines, control.travels, strict=True)
     ]
+    groups = (list(group) for _, group in groupby(steps, key=lambda step: (step.mark, step.sort)))
+    return [group[0]._replace(tip=np.concatenate([step.tip for step in group])) for group in groups]
+
+
+def marked_tnc(text: str) -> str:
+    """The program with a mark at the end of every line."""
+    return "".join(f"{line} ;#{n}\n" for n, line in enumerate(text.splitlines()))
 
 
 def by_linuxcnc(text: str, actual: bool) -> list[Step]:
@@ -264,7 +274,15 @@ LANGUAGES = {
         0.4e-3,
     ),
     "heidenhain": Language(
-        klartext, test_tnc_swivel.SETUP, test_tnc_swivel.FILE, by_tnc, str, 2000.0, 1e-3, events=EVENTS[:-1]
+        klartext,
+        test_tnc_swivel.SETUP,
+        test_tnc_swivel.FILE,
+        by_tnc,
+        marked_tnc,
+        1.0,
+        1e-3,
+        events=EVENTS[:-1],
+        on_the_way=2.4e-3,
     ),
     "linuxcnc": Language(
         unsaid_rs274.text,
@@ -338,7 +356,7 @@ def judge(dialect: str, strategy: str, name: str, text: str, found: Found) -> No
         turned, left = language.turned if strategy == "full" else 0.0, claims.left.get(wanted.line, {})
         off, excused = beyond(wanted.tip[-1] - made.tip[-1], left, led=name.startswith("tcp") and "length" not in name)
         allowed = language.at_ends + turned + excused
-        if wanted.sort == "cut" and language.tolerance_um < 10:
+        if wanted.sort == "cut":
             begins = float(np.linalg.norm(wanted.tip[0] - made.tip[0])) if fresh else 0.0
             allowed_along = language.on_the_way + turned + sum(left.values()) + begins
             allowed_along += claims.whole.get(wanted.line, 0.0)
