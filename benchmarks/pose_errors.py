@@ -4,8 +4,7 @@
 
 Three things of the engine, each for the same random poses: where the tip really is (`actual_tip`, the exact
 composition), the whole error with its rotation (`error`), and for comparison the perfect machine (`tip`). The
-time is that of the processor; drawing the poses and compiling are not in it. With numpy, and with the `fast` extra if
-it is installed.
+time is that of the processor; drawing the poses is not in it. With columns of numpy, and with the compiled core.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ncfix import fast
+from ncfix import core
 from ncfix.machine import Machine, State, load
 
 MACHINE = Path(__file__).with_name("five_axis.toml")
@@ -59,17 +58,16 @@ def main() -> None:
         "error": lambda q: machine.error(q, STATE),
     }
     found = {}
-    for name, switch in (("numpy", fast.disengage), ("fast", fast.engage)):
-        switch()
-        if name == "numpy" or fast.engaged():
-            found[name] = {key: measured(machine, way, options.poses, options.block) for key, way in ways.items()}
+    for name in ("plain", "compiled"):
+        core.use(name)
+        found[name] = {key: measured(machine, way, options.poses, options.block) for key, way in ways.items()}
     if options.json:
         print(json.dumps({"poses": options.poses, "effects": len(machine.effects), "poses_per_second": found}))
         return
     print(f"{options.poses:,} poses, {len(machine.axes)} axes, {len(machine.effects)} effects")
     for name, rates in found.items():
         for key, rate in rates.items():
-            print(f"{name:>6} {key:>11} {rate / 1e6:8.2f} million poses/s {options.poses / rate:8.1f} s")
+            print(f"{name:>8} {key:>11} {rate / 1e6:8.2f} million poses/s {options.poses / rate:8.1f} s")
 
 
 if __name__ == "__main__":

@@ -88,6 +88,9 @@ class Contender:
         return Run(self.scale * (usage.ru_utime + usage.ru_stime), self.scale * wall, usage.ru_maxrss / 1024)
 
 
+PLAIN, COMPILED = {"NCFIX_CORE": "plain"}, {"NCFIX_CORE": "compiled"}
+
+
 def contenders(program: Path, folder: Path, blocks: int) -> list[Contender]:
     """What is timed on a program."""
     ncfix = shutil.which("ncfix", path=str(Path(sys.executable).parent)) or "ncfix"
@@ -96,16 +99,11 @@ def contenders(program: Path, folder: Path, blocks: int) -> list[Contender]:
     fix += ["--offset", "G54=0,0,0,0,0", "--tool", "0=0"]
     two, fix = [*fix, "--jobs", "2"], [*fix, "--jobs", "1"]
     found = [
-        Contender("ncfix, plain", fix, {"NCFIX_NO_FAST": "1"}),
-        Contender("ncfix, plain, without figures", [*fix, "--no-figures"], {"NCFIX_NO_FAST": "1"}),
-        Contender("ncfix, plain, two jobs", two, {"NCFIX_NO_FAST": "1"}),
+        Contender("ncfix, plain", fix, PLAIN),
+        Contender("ncfix", fix, COMPILED),
+        Contender("ncfix, without figures", [*fix, "--no-figures"], COMPILED),
+        Contender("ncfix, two jobs", two, COMPILED),
     ]
-    if has_numba():
-        found += [
-            Contender("ncfix, `fast`", fix, {"NCFIX_NO_FAST": ""}),
-            Contender("ncfix, `fast`, without figures", [*fix, "--no-figures"], {"NCFIX_NO_FAST": ""}),
-            Contender("ncfix, `fast`, two jobs", two, {"NCFIX_NO_FAST": ""}),
-        ]
     if shutil.which("rs274"):
         ini, tools = folder / "bench.ini", folder / "tools.tbl"
         ini.write_text(INI.format(folder=folder))
@@ -115,13 +113,6 @@ def contenders(program: Path, folder: Path, blocks: int) -> list[Contender]:
         found.insert(0, Contender("rs274", [*command, str(program), os.devnull], {"HOME": str(folder)}))
     lark = [sys.executable, str(HERE / "plain_lark.py"), str(program), str(LARK_LINES)]
     return [*found, Contender("Lark alone, reads only", lark, {}, blocks / LARK_LINES, 1)]
-
-
-def has_numba() -> bool:
-    """Whether the `fast` extra is installed."""
-    from importlib.util import find_spec
-
-    return find_spec("numba") is not None
 
 
 def timed(program: Path, folder: Path, blocks: int, runs: int) -> dict[str, Run]:
@@ -220,7 +211,7 @@ def long_file(blocks: int, folder: Path) -> list[str]:
         path = folder / "long.nc"
         programs.write(path, count, "full")
         teams = {each.name: each for each in contenders(path, folder, count)}
-        run = (teams.get("ncfix, `fast`") or teams["ncfix, plain"]).run()
+        run = (teams["ncfix"]).run()
         times.append(run.cpu)
         rows.append(f"| {spaced(count)} | {run.cpu:.1f} | {run.wall:.1f} | {run.memory:.0f} |")
     return [*rows, "", f"Ratio of the times: {times[1] / times[0]:.2f}.", ""]
@@ -247,8 +238,7 @@ def ways_of(control: controls.OtherControl, program: Path) -> list[Contender]:
     ncfix = shutil.which("ncfix", path=str(Path(sys.executable).parent)) or "ncfix"
     fix = [ncfix, "fix", str(program), "-m", str(MACHINE), "-o", str(program.with_name(OUTPUT)), "--force"]
     fix += ["--dialect", control.dialect, "--assume-zero", "--allow-refused", "--jobs", "1", *control.options]
-    found = [Contender("plain", fix, {"NCFIX_NO_FAST": "1"})]
-    return [*found, Contender("`fast`", fix, {"NCFIX_NO_FAST": ""})] if has_numba() else found
+    return [Contender("plain", fix, PLAIN), Contender("compiled", fix, COMPILED)]
 
 
 def row_of(control: controls.OtherControl, style: str, way: Contender, run: Run, blocks: int) -> str:

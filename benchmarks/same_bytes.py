@@ -3,7 +3,7 @@
     make same-bytes                    shipped programs, the corpus (`NCFIX_SHARED`, else ../shared), long programs
     make same-bytes MOST=100000        only programs of the corpus up to so many bytes
 
-The ways: numpy and compiled kernels; as a whole, and in parts of several sizes; one, two and three processes; from a
+The ways: columns of numpy and the compiled core; as a whole, and in parts of several sizes; one, two and three processes; from a
 file and through a pipe. A program that cannot be corrected must be refused with the same words in each. Ends with exit
 code 1 if anything differs.
 """
@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import controls
 import programs
 
-from ncfix import fast
+from ncfix import core
 from ncfix.cli import console
 from ncfix.cli.shop.batch import FixJob
 from ncfix.cli.targets import OutputTarget
@@ -71,16 +71,14 @@ class Way:
     def name(self) -> str:
         """In words."""
         size = f"{self.part // MB} MB" if self.part >= MB else f"{self.part // KB} kB"
-        words = ["compiled" if self.compiled else "numpy", f"parts of {size}", f"{self.jobs} processes"]
+        words = ["compiled" if self.compiled else "plain", f"parts of {size}", f"{self.jobs} processes"]
         return ", ".join([*words, *(["through a pipe"] if self.pipe else [])])
 
     def enter(self) -> None:
         """Make it the way that this process goes, and those that it starts."""
-        fast.disengage()
-        os.environ["NCFIX_PART_BYTES"] = str(self.part)
-        os.environ["NCFIX_NO_FAST"] = "" if self.compiled else "1"
-        if self.compiled:
-            assert fast.engage(), "the `fast` extra is not installed"
+        form = "compiled" if self.compiled else "plain"
+        os.environ |= {"NCFIX_PART_BYTES": str(self.part), "NCFIX_CORE": form}
+        core.use(form)
 
 
 SHORT_WAYS = (

@@ -15,7 +15,6 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
-from ncfix import fast
 from ncfix.compensate import FixOptions, driver, plain, solve
 from ncfix.compensate.following import Task
 from ncfix.control import trace
@@ -49,13 +48,13 @@ def main() -> None:
     source = Path(sys.argv[1]).read_bytes()
     blocks = source.count(b"\n")
     ways = {}
-    for name, switch in (("plain", fast.disengage), ("`fast`", fast.engage)):
-        switch()
+    for name in ("plain", "compiled"):
+        core.use(name)
         corrected(source[:WARM])
         ways[name] = timed(source)
     print("\n".join(table(ways, blocks)))
     if "--profile" in sys.argv:
-        print("\n".join(["", "### Functions that take most, `fast`", "", *profile(source)]))
+        print("\n".join(["", "### Functions that take most, compiled", "", *profile(source)]))
 
 
 def corrected(source: bytes) -> None:

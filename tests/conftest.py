@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import hypothesis
 import pytest
+
+from ncfix import core
 
 hypothesis.settings.register_profile("same every time", deadline=None, derandomize=True)
 hypothesis.settings.register_profile("searching", deadline=None)
@@ -53,6 +55,26 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         for name, text in report.user_properties:
             if name == FIGURES:
                 terminalreporter.write_line(str(text))
+
+
+@pytest.fixture(autouse=True)
+def _own_form() -> Iterator[None]:
+    """After each test the core is used as the environment says."""
+    yield
+    core.use(None)
+
+
+@pytest.fixture
+def plain_form() -> None:
+    """The plain form of the core, for tests that compare it with the compiled one; they are skipped without that."""
+    require_core()
+
+
+def require_core() -> None:
+    """Skip the test if there is no compiled core, and take the plain form; fails if `NCFIX_CORE=compiled`."""
+    if core.fault():
+        missing(f"the core is {core.fault()}", "NCFIX_REQUIRE_TOOLS")
+    core.use("plain")
 
 
 def missing(reason: str, variable: str) -> None:

@@ -43,8 +43,8 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "a batch": Kind(20, 300, {"NCFIX_NO_FAST": "1"}),
-    "one long program": Kind(1, 20000, {"NCFIX_NO_FAST": "1", "NCFIX_PART_BYTES": "20000"}),
+    "a batch": Kind(20, 300, {}),
+    "one long program": Kind(1, 20000, {"NCFIX_PART_BYTES": "20000"}),
 }
 
 
@@ -126,19 +126,3 @@ def test_nothing_is_left(title: str, how: signal.Signals, moment: int) -> None:
     found = contents(out / "out")
     assert {name: found[name] for name in found if not name.startswith(".")}.items() <= expected.items()
     assert not [name for name in found if name.endswith(".tmp")]
-
-
-@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL], ids=lambda how: how.name)
-def test_what_compiles_kernels_is_not_left(how: signal.Signals, tmp_path: Path) -> None:
-    """One that would take ten minutes for it."""
-    (tmp_path / "slow_trial.py").write_text("import time\n\n\ndef passes():\n    time.sleep(600)\n")
-    code = "from ncfix import kernel; kernel.TRIAL = 'slow_trial'; kernel._started([]).communicate()"
-    mark = uuid.uuid4().hex
-    environment = {**os.environ, "NCFIX_MARK": mark, "PYTHONPATH": str(tmp_path)}
-    running = subprocess.Popen([sys.executable, "-c", code], env=environment)
-    begun = time.monotonic()
-    while len(list(alive(mark))) < 2 and time.monotonic() < begun + PATIENCE_S:
-        time.sleep(0.01)
-    os.kill(running.pid, how)
-    running.wait()
-    gone(mark, begun + 2 * PATIENCE_S)

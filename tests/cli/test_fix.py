@@ -342,7 +342,6 @@ def test_simulate_and_verify_say_what_they_took_for_granted(
 ) -> None:
     """Offsets that are taken as zero, and a code that may move anything; read as a whole and in parts."""
     monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")
     cuts = "".join(f"G1 X{10 + k}\n" for k in range(60))
     shop.program.write_text(f"G21 G90 G94 F600\nG0 X10 Y10 Z1\n{cuts}G777\n{cuts}M2\n")
     given = ("-m", shop.machine, "--assume-zero", "--dialect", "iso")

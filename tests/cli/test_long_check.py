@@ -29,7 +29,6 @@ def lines() -> list[str]:
 @pytest.fixture
 def check(ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
     """`check(part, text, *options)`: exit code, JSON and words, of a text read in parts of so many bytes."""
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")
     path = tmp_path / "a.ngc"
 
     def call(part: int, text: bytes, *given: object) -> tuple[int, Any, str]:

@@ -34,7 +34,6 @@ def fix(root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def call(part: int, *arguments: object, stdin: bytes = b"") -> Any:
         monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
-        monkeypatch.setenv("NCFIX_NO_FAST", "1")
         machine = root / "benchmarks" / "five_axis.toml"
         offsets = ("--offset", "G54=0,0,0,0,0", "--tool", "0=0", "--dialect", "linuxcnc")
         return ncfix("fix", *arguments, "-m", machine, *offsets, stdin=stdin)
@@ -102,7 +101,7 @@ def test_no_room_for_what_is_written(
     result = ncfix_process(
         *("fix", *given, "-m", root / "benchmarks" / "five_axis.toml", "--assume-zero", "--dialect", "linuxcnc"),
         stdin=long_program.read_bytes(),
-        env={**os.environ, "NCFIX_PART_BYTES": str(PART), "NCFIX_NO_FAST": "1"},
+        env={**os.environ, "NCFIX_PART_BYTES": str(PART)},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (5 * PART, 5 * PART)),
     )
     assert result.code == ExitCode.USAGE, result.err
@@ -170,7 +169,7 @@ def test_a_pipe_cannot_be_taken_back(long_program: Path, fix: Any) -> None:
 def test_writing_begins_before_the_input_ends(long_program: Path, root: Path) -> None:
     command = [sys.executable, "-m", "ncfix", "fix", "-", "-m", str(root / "benchmarks" / "five_axis.toml")]
     command += ["--offset", "G54=0,0,0,0,0", "--tool", "0=0", "--dialect", "linuxcnc"]
-    environment = {**os.environ, "NCFIX_PART_BYTES": str(PART), "NCFIX_NO_FAST": "1"}
+    environment = {**os.environ, "NCFIX_PART_BYTES": str(PART)}
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "env": environment}
     source = long_program.read_bytes()
     with subprocess.Popen(command, **pipes) as process:  # type: ignore[call-overload]

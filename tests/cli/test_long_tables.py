@@ -43,7 +43,6 @@ def program(tmp_path: Path) -> Path:
 @pytest.fixture
 def in_parts_of(ncfix: Any, monkeypatch: pytest.MonkeyPatch, root: Path) -> Any:
     """`in_parts_of(size, *command line)`: what it does where a part has so many bytes."""
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")
     monkeypatch.chdir(root)
 
     def call(size: int, *arguments: object, **given: Any) -> Any:

@@ -36,7 +36,6 @@ def verify(root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
 
     def call(part: int, original: list[str], fixed: list[str]) -> dict[str, Any]:
         monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
-        monkeypatch.setenv("NCFIX_NO_FAST", "1")
         paths = [tmp_path / "a.ngc", tmp_path / "b.ngc"]
         for path, each in zip(paths, (original, fixed), strict=True):
             path.write_text("\n".join(each))
@@ -126,7 +125,6 @@ def test_play_is_taken_up_in_any_parts(root: Path, ncfix: Any, monkeypatch: pyte
     wholes = [ncfix("verify", original, each, *given, "--json").json() for each in (fixed, original)]
     assert wholes[0]["within"]
     assert not wholes[1]["within"]
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")
     monkeypatch.setattr(ProgramPair, "_as_wholes", never)
     for part in (1000, 2500):
         monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
@@ -148,7 +146,6 @@ def test_play_that_is_half_taken_up_is_so_in_any_parts(
     given = ("-m", root / "examples/machines/wCBXFZYSt.toml", "--assume-zero", "--dialect", "linuxcnc", "--json")
     whole = ncfix("verify", original, original, *given).json()
     monkeypatch.setattr(ProgramPair, "_as_wholes", never)
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")
     monkeypatch.setenv("NCFIX_PART_BYTES", "1000")
     found = ncfix("verify", original, original, *given).json()
     assert same(found, whole)
@@ -168,7 +165,6 @@ def test_a_rapid_in_the_middle_of_a_cut_is_found_however_short_it_is(
     assert ncfix("fix", original, "-o", fixed, *given).code == ExitCode.DONE
     text = fixed.read_text().splitlines()
     monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")
     assert ncfix("verify", original, fixed, *given, "--json").json()["within"]
     place = [at for at, line in enumerate(text) if line.startswith("G1 X2")][30]
     for begin in (47.3, 132.49):
@@ -195,6 +191,5 @@ def test_parts_and_programs_that_cut_nothing_are_compared_on_a_machine_with_play
     for one, other in ((original, rapids), (rapids, original)):
         result = ncfix("verify", one, other, *given)
         assert (result.code, "NCF420" in result.err) == (ExitCode.FINDINGS, True)
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")
     monkeypatch.setenv("NCFIX_PART_BYTES", "1000")
     assert same(ncfix("verify", original, fixed, *given, "--json").json(), whole)

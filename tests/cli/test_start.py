@@ -8,8 +8,8 @@ import pytest
 
 FAMILIES = {"ncfix_iso.rs274", "ncfix_fanuc.macro", "ncfix_siemens.sinumerik", "ncfix_heidenhain.klartext"}
 ELSEWHERE = {
-    "scipy", "rich", "sympy", "numba", "llvmlite", "multiprocessing", "concurrent.futures", "numpy.ma",
-    "ncfix.diagnosis", "ncfix.measure", "ncfix.reports", "ncfix.machine.symbolic", "ncfix.kernel",
+    "scipy", "rich", "sympy", "multiprocessing", "concurrent.futures", "numpy.ma",
+    "ncfix.diagnosis", "ncfix.measure", "ncfix.reports", "ncfix.machine.symbolic",
     "ncfix_iso.rs274.flatten",
     "ncfix.control.setup_file",
 }  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,8 @@ import pytest
 
 from compensate.motions import motions
 from compensate.test_stream import OPTIONS, program, whole
-from ncfix import fast
+from conftest import require_core
+from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, arc_lengths
 from ncfix.compensate.figures.nearest import Search
 from ncfix.compensate.plan.deviation import bounds, deviations_seen, path_error, samples, uneasy_starts
@@ -26,13 +26,6 @@ from ncfix.machine import Machine, State, load
 from ncfix.machine.se3 import Array
 
 PM = 1e-9
-
-
-@pytest.fixture(autouse=True)
-def _plain_again(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-    yield
-    fast.disengage()
 
 
 def grid(rng: np.random.Generator, motions: int, most: int = 200) -> PathNodes:
@@ -50,10 +43,10 @@ def grid(rng: np.random.Generator, motions: int, most: int = 200) -> PathNodes:
 @pytest.mark.parametrize("most", [200, 5 * STRETCH])
 @pytest.mark.parametrize("seed", range(6))
 def test_fewest_pieces(seed: int, most: int) -> None:
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    require_core()
     nodes = grid(np.random.default_rng(seed), 40, most)
     plain = fewest(nodes, 0.002)
-    assert fast.engage()
+    core.use("compiled")
     for found, expected in zip(fewest(nodes, 0.002), plain, strict=True):
         assert np.array_equal(found, expected)
 
@@ -76,13 +69,13 @@ def wandering(rng: np.random.Generator, k: int, off: float) -> Curve:
 @pytest.mark.parametrize("near", [1e-5, 0.01, np.inf])
 @pytest.mark.parametrize("seed", range(4))
 def test_nearest_points(seed: int, near: float) -> None:
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    require_core()
     rng = np.random.default_rng(seed)
     curve, other = wandering(rng, 500, 0.0), wandering(rng, 500, 10.0 ** -rng.integers(1, 6))
     at = CurvePoints.of(other)
     expected = other.way(at.piece, at.share)
     plain = Search(curve, near).around(at.points, expected)
-    assert fast.engage()
+    core.use("compiled")
     found = Search(curve, near).around(at.points, expected)
     for column in ("piece", "share", "gap"):
         assert np.array_equal(getattr(found, column), getattr(plain, column)), column
@@ -168,8 +161,8 @@ def test_figures_from_what_is_known(root: Path, name: str, led: bool) -> None:
 @pytest.mark.parametrize("name", ["benchmarks/five_axis", "examples/machines/dmu50", "examples/machines/wCBXFZYSt"])
 def test_programs_come_out_the_same(root: Path, name: str, strategy: str) -> None:
     """With arcs, cycles, increments and refusals, on machines with tables and with play."""
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    require_core()
     machine, source = load(root / f"{name}.toml"), program(5, 60, 0.1)
     plain = whole(source, machine, replace(OPTIONS, strategy=strategy))[0]
-    assert fast.engage()
+    core.use("compiled")
     assert whole(source, machine, replace(OPTIONS, strategy=strategy))[0] == plain != source

@@ -15,7 +15,8 @@ import pytest
 from compensate import streaming
 from compensate import test_stream_others as others
 from compensate.test_stream import OPTIONS, streamed
-from ncfix import fast
+from conftest import require_core
+from ncfix import core
 from ncfix.compensate import FixOptions, driver, plain
 from ncfix.compensate.parts import ProgramPart
 from ncfix.compensate.plain import PlainPlan, Planner
@@ -36,11 +37,10 @@ def machine(root: Path) -> Machine:
 @pytest.fixture(params=[False, True], ids=["plain", "compiled"])
 def compiled(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[bool]:
     if request.param:
-        pytest.importorskip("numba", reason="the `fast` extra is not installed")
-        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-        assert fast.engage()
+        require_core()
+        core.use("compiled")
     yield bool(request.param)
-    fast.disengage()
+    core.use("plain")
 
 
 AMONG = (
@@ -206,8 +206,7 @@ def test_a_writer_that_gets_a_character_wrong_is_caught(
     word: bytes, machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In a number that was written, and in what should have stayed as it was."""
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    require_core()
     plainly, source = counted(monkeypatch), winding(0, 200)
 
     def wrong(source: bytes, splices: Splices) -> bytes:
@@ -216,20 +215,16 @@ def test_a_writer_that_gets_a_character_wrong_is_caught(
         return text if len(plainly) < 3 else text[:place] + bytes([text[place] ^ 1]) + text[place + 1 :]
 
     monkeypatch.setattr(driver, "spliced", wrong)
-    assert fast.engage()
-    try:
-        with pytest.raises((NotInPartsError, SelfCheckError)):
-            streamed(source, machine, 1500)
-    finally:
-        fast.disengage()
+    core.use("compiled")
+    with pytest.raises((NotInPartsError, SelfCheckError)):
+        streamed(source, machine, 1500)
     assert plainly == [False, True, True]
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_compiled_as_by_columns(seed: int, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same is said of limits, and bounds agree but for rounding."""
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    require_core()
     planner = Planner.of(machine, OPTIONS)
     assert planner is not None
     rng = np.random.default_rng(seed)
@@ -239,22 +234,19 @@ def test_compiled_as_by_columns(seed: int, machine: Machine, monkeypatch: pytest
     done = meant.copy()
     done[:, ~machine.rotary] += rng.uniform(-0.01, 0.01, (len(meant), 3))
     plain = planner._within_limits(meant, done), planner._bounds(meant, done, lengths)
-    assert fast.engage()
-    try:
-        found = planner._within_limits(meant, done), planner._bounds(meant, done, lengths)
-        assert plain[0]
-        assert found[0]
-        assert found[1] == pytest.approx(plain[1], rel=1e-12)
-        x, b = machine.axis_names.index("X"), machine.axis_names.index("B")
-        for row, axis, much in ((1, x, 0.06), (2, b, 1.0), (3, x, np.nan)):
-            wrong = done.copy()
-            wrong[row, axis] += much
-            assert not planner._within_limits(meant, wrong)
-            fast.disengage()
-            assert not planner._within_limits(meant, wrong)
-            assert fast.engage()
-    finally:
-        fast.disengage()
+    core.use("compiled")
+    found = planner._within_limits(meant, done), planner._bounds(meant, done, lengths)
+    assert plain[0]
+    assert found[0]
+    assert found[1] == pytest.approx(plain[1], rel=1e-12)
+    x, b = machine.axis_names.index("X"), machine.axis_names.index("B")
+    for row, axis, much in ((1, x, 0.06), (2, b, 1.0), (3, x, np.nan)):
+        wrong = done.copy()
+        wrong[row, axis] += much
+        assert not planner._within_limits(meant, wrong)
+        core.use("plain")
+        assert not planner._within_limits(meant, wrong)
+        core.use("compiled")
 
 
 def course_of(source: bytes, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> PlainPlan:
@@ -268,6 +260,5 @@ def course_of(source: bytes, machine: Machine, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(Planner, "plan", watched)
     streamed(source, machine, 4000)
     monkeypatch.undo()
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
     found = [course for course in courses if course is not None]
     return max(found, key=lambda course: len(course.part.moves))

@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from compensate.streaming import run
-from ncfix import fast
+from conftest import require_core
+from ncfix import core
 from ncfix.compensate import FixOptions, driver
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import Task
@@ -136,15 +137,11 @@ def test_a_fault_in_a_part_of_another_process_is_told(machine: Machine) -> None:
 
 
 def test_compiled_kernels_give_the_same_bytes(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    require_core()
     source = program(5, 300, 0.05)
     plain = streamed(source, machine, 4000)[0]
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-    assert fast.engage()
-    try:
-        assert streamed(source, machine, 4000)[0] == plain
-    finally:
-        fast.disengage()
+    core.use("compiled")
+    assert streamed(source, machine, 4000)[0] == plain
 
 
 def with_a_digit_wrong(text: bytes, rng: random.Random) -> bytes:
@@ -160,9 +157,8 @@ def test_a_writer_that_gets_one_digit_wrong_is_caught(
 ) -> None:
     """In whatever part: the proof reads what is really written."""
     if compiled:
-        pytest.importorskip("numba", reason="the `fast` extra is not installed")
-        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-        assert fast.engage()
+        require_core()
+        core.use("compiled")
     source, rng, parts = program(5, 60, 0.0), random.Random(2), 0
 
     def wrong(source: bytes, splices: Splices) -> bytes:
@@ -179,7 +175,7 @@ def test_a_writer_that_gets_one_digit_wrong_is_caught(
                 streamed(source, machine, 500)
             assert parts == broken
     finally:
-        fast.disengage()
+        core.use("plain")
 
 
 def test_play_remembers_the_way_across_parts(root: Path) -> None:

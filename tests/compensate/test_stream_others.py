@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from compensate.streaming import SETUP, compared, streamed, whole
-from ncfix import fast
+from conftest import require_core
+from ncfix import core
 from ncfix.compensate.following import traced
 from ncfix.control.lanes.lane import take
 from ncfix.diagnostics import NcfixError
@@ -166,15 +167,14 @@ def test_blocks_with_vectors_are_followed_at_once_as_one_by_one(
     source = program(1, 150, 0.02, siemens=True, vectors=True).replace(b"ORIAXES", orientation.encode())
     source = source.replace(b"\r", b"").replace(b"TRAFOOF", b"X150. A3=0.4 B3=0 C3=1\nX150.5 A3=0 B3=0 C3=1\nTRAFOOF")
     if compiled:
-        pytest.importorskip("numba", reason="the `fast` extra is not installed")
-        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-        assert fast.engage()
+        require_core()
+        core.use("compiled")
     taken = []
     try:
         monkeypatch.setattr(orienting, "take", lambda *given: (taken.append(given), take(*given)))
         at_once = traced(read(source, "p", "siemens"), machine, SETUP)
     finally:
-        fast.disengage()
+        core.use("plain")
     assert taken
     monkeypatch.setattr(orienting, "is_ready", lambda control: False)
     singly = traced(read(source, "p", "siemens"), machine, SETUP)
@@ -192,13 +192,9 @@ def test_blocks_are_written_in_bulk_as_one_by_one(
     sources = [program(seed, 150, 0.02, siemens=True, vectors=seed < 3) for seed in (1, 2, 3, 4)]
     sources += [coarse(source) for source in sources[2:]]
     if compiled:
-        pytest.importorskip("numba", reason="the `fast` extra is not installed")
-        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-        assert fast.engage()
-    try:
-        found = [whole(source, machine, "siemens", files=S_FILES)[0] for source in sources]
-    finally:
-        fast.disengage()
+        require_core()
+        core.use("compiled")
+    found = [whole(source, machine, "siemens", files=S_FILES)[0] for source in sources]
     layouts = [SINUMERIK.bulk(read(each, "p", "siemens"), 15) for each in sources[:2] if SINUMERIK.bulk is not None]
     assert all(layout is not None and layout.led for layout in layouts)
     monkeypatch.setattr(emit, "language_of", lambda dialect, part: replace(SINUMERIK, bulk=None))
@@ -250,17 +246,13 @@ def test_two_processes_give_the_same_bytes(siemens: bool, machine: Machine) -> N
 
 @pytest.mark.parametrize("siemens", [True, False], ids=["sinumerik", "fanuc"])
 def test_compiled_kernels_give_the_same_bytes(siemens: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    require_core()
     dialect = "siemens" if siemens else "fanuc"
     sources = [program(seed, 200, 0.0, siemens=siemens, vectors=siemens and seed == 1) for seed in (0, 1)]
     plain = [streamed(source, machine, dialect, 4000, setup=CALCULATOR)[0] for source in sources]
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-    assert fast.engage()
-    try:
-        assert [streamed(source, machine, dialect, 4000, setup=CALCULATOR)[0] for source in sources] == plain
-        assert [whole(source, machine, dialect, setup=CALCULATOR)[0] for source in sources] == plain
-    finally:
-        fast.disengage()
+    core.use("compiled")
+    assert [streamed(source, machine, dialect, 4000, setup=CALCULATOR)[0] for source in sources] == plain
+    assert [whole(source, machine, dialect, setup=CALCULATOR)[0] for source in sources] == plain
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from compensate.streaming import run
-from ncfix import fast
+from ncfix import core
 from ncfix.compensate import FixOptions
 from ncfix.compensate.checking import check_on
 from ncfix.compensate.driver import Fixed, fix_flat, fix_program
@@ -289,10 +289,10 @@ def test_part_by_part_and_compiled_make_the_same_bytes(lines: list[str]) -> None
         return
     assert without_stamp(written) == without_stamp(whole.text)
     assert done.report.left == whole.report.left
-    if fast.engage():
-        compiled = fix_program(read(text, "part.nc", "linuxcnc"), machine, ASSUMED, options)
-        fast.disengage()
-        assert compiled.text == whole.text
+    core.use("plain")
+    plain = fix_program(read(text, "part.nc", "linuxcnc"), machine, ASSUMED, options)
+    core.use(None)
+    assert plain.text == whole.text
 
 
 def without_stamp(text: bytes) -> bytes:

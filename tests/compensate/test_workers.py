@@ -149,7 +149,6 @@ def test_where_processes_cannot_be_forked_one_does_it_alone(machine: Machine, mo
 def test_what_is_said_of_it(machine: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     in_another_process(monkeypatch, PartCorrector, "_corrected", killed)
     monkeypatch.setenv("NCFIX_PART_BYTES", "1000")
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")  # to compile takes longer than `SECONDS` on a loaded computer
     source, output = tmp_path / "p.ngc", tmp_path / "out.ngc"
     source.write_bytes(program(5, 400, 0.0))
     with console.keeping() as said:

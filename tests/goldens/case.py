@@ -185,8 +185,8 @@ def inside(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def in_parts(size: int) -> Iterator[None]:
-    """The size of parts, and no compiled loops: they say the same, and compile anew on other machines."""
-    wanted = {"NCFIX_NO_FAST": "1"} | ({"NCFIX_PART_BYTES": str(size)} if size else {})
+    """The size of parts, where one is given."""
+    wanted = {"NCFIX_PART_BYTES": str(size)} if size else {}
     before = {name: os.environ.get(name) for name in wanted}
     os.environ |= wanted
     try:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from conftest import require_core
 from machine import chains
-from ncfix import fast
+from ncfix import core
 from ncfix.machine import Effect, Machine, State, load, loads
 from ncfix.machine.basis import Periodic, Polynomial
 from ncfix.machine.piecewise import PiecewiseLinear, Spline
@@ -20,13 +20,6 @@ TABLE_TABLE = "w C B F X Y Z S t"
 ELSEWHERE = ("w C F X Y Z B S t", "w F X Y Z C B S t", "w B X F Y C Z S t", "w C B X F Y Z S t")
 """The same machine with its rotary axes elsewhere: behind X, Y and Z, before them, and between them."""
 NM = 1e-6
-
-
-@pytest.fixture(autouse=True)
-def _plain_again(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-    yield
-    fast.disengage()
 
 
 def linear(machine: Machine) -> tuple[int, int, int]:
@@ -101,14 +94,14 @@ def test_a_pose_alone_is_a_pose_among_many(root: Path) -> None:
 
 
 def test_compiled_and_plain(root: Path) -> None:
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    require_core()
     for machine in shipped(root):
         q, given = poses(machine, 1000), state(machine, 1000)
         q[17, 0] = np.nan
         plain = machine.actual_tip(q, given), machine.aim(q, linear(machine), given)
-        assert fast.engage()
+        core.use("compiled")
         compiled = machine.actual_tip(q, given), machine.aim(q, linear(machine), given)
-        fast.disengage()
+        core.use("plain")
         assert np.array_equal(plain[0], compiled[0], equal_nan=True)
         for name in ("place", "arrived", "off"):
             assert np.array_equal(getattr(plain[1], name), getattr(compiled[1], name), equal_nan=True), name

@@ -1,35 +1,26 @@
-"""The compiled kernels do what the plain way does, to the last bit."""
+"""The compiled core does what the plain way does, to the last bit."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from machine import chains
-from ncfix import fast
+from ncfix import core
 from ncfix.machine import Effect, Machine, State, load
 from ncfix.machine.piecewise import Spline
 
-pytest.importorskip("numba", reason="the `fast` extra is not installed")
+pytestmark = pytest.mark.usefixtures("plain_form")
 
 SHIPPED = ("angle_head", "dmu50", "three_axis", "wCAYFXZSt", "wCBXFZYSt")
-
-
-@pytest.fixture(autouse=True)
-def _plain_again(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-    yield
-    fast.disengage()
 
 
 def both(machine: Machine, q: np.ndarray, state: State) -> list[tuple[np.ndarray, ...]]:
     results = []
     for compiled in (False, True):
-        fast.disengage()
-        assert not compiled or fast.engage()
+        core.use("compiled" if compiled else "plain")
         found = machine.tip(q, state.tool_length), machine.actual_tip(q, state), machine.actual(q, state)
         results.append((*found, machine.nominal(q, state.tool_length)))
     return results
@@ -53,8 +44,7 @@ def test_shipped_machines(name: str, root: Path) -> None:
 @pytest.mark.parametrize("name", SHIPPED)
 @pytest.mark.parametrize("compiled", [False, True])
 def test_gaps_are_the_difference_of_tips(name: str, compiled: bool, root: Path) -> None:
-    fast.disengage()
-    assert not compiled or fast.engage()
+    core.use("compiled" if compiled else "plain")
     machine, n = load(root / "examples" / "machines" / f"{name}.toml"), 5000
     meant, state = poses(machine, n), State(np.linspace(20, 90, n), 1, dict.fromkeys(machine.inputs, 1.5))
     turned = meant + 1e-5
@@ -73,8 +63,7 @@ def test_axes_led_to_a_point(name: str, root: Path) -> None:
     axes = tuple(machine.axis_names.index(axis) for axis in "XYZ")
     found = []
     for compiled in (False, True):
-        fast.disengage()
-        assert not compiled or fast.engage()
+        core.use("compiled" if compiled else "plain")
         found.append(machine.placed(q, axes, poses(machine, 301)[:300, :3], lengths))
     assert np.array_equal(*found)
 
@@ -95,9 +84,3 @@ def test_curves_that_come_transposed() -> None:
     bent = machine.replace(effects=tuple(effects))
     for plain, compiled in zip(*both(bent, poses(machine, 300), State(50.0)), strict=True):
         assert np.array_equal(plain, compiled)
-
-
-def test_the_environment_may_forbid_compiled_loops(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")
-    assert not fast.engage()
-    assert not fast.engaged()

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ncfix import fast
+from ncfix import core
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
@@ -62,11 +62,10 @@ def moved(moves: Moves, seed: int, size: float) -> Pieces:
 def in_all_ways(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emission, ...]:
     """Written many at a time, the same compiled if that is installed, and one by one."""
     found = []
-    for switch in (fast.disengage, fast.engage):
-        switch()
+    for form in ("plain", None):
+        core.use(form)
         with mock.patch.object(bulk, "SHORTEST", 1):
             found.append(emit(program, moves, pieces, STEPS))
-    fast.disengage()
     one_by_one = replace(language_of(program.dialect, WrittenLanguage), bulk=None)
     with mock.patch("ncfix.writer.emit.language_of", return_value=one_by_one):
         return *found, emit(program, moves, pieces, STEPS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ncfix import fast
+from ncfix import core
 from ncfix.text.shapes import Scan, scan, split_blocks
 
-pytest.importorskip("numba", reason="the `fast` extra is not installed")
+pytestmark = pytest.mark.usefixtures("plain_form")
 
 LINES = st.lists(
     st.one_of(
@@ -26,19 +26,10 @@ LINES = st.lists(
 )
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _plain_again() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.delenv("NCFIX_NO_FAST", raising=False)
-        yield
-    fast.disengage()
-
-
 def both(source: bytes, pointless: bool) -> list[Scan]:
     blocks, found = split_blocks(source), []
     for compiled in (False, True):
-        fast.disengage()
-        assert not compiled or fast.engage()
+        core.use("compiled" if compiled else "plain")
         found.append(scan(source, blocks, pointless=pointless).expanded())
     return found
 

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from ncfix import fast
+from conftest import require_core
+from ncfix import core
 from ncfix.text.writer import Edit, Splices, left_alone, spliced
-
-pytest.importorskip("numba", reason="the `fast` extra is not installed")
 
 SOURCE = b"".join(b"N%d G1 X%.3f Y-%.4f (AT %d)\n" % (10 * k, 1.5 * k, 0.25 * k, k) for k in range(40))
 
 
 @pytest.fixture(autouse=True)
-def _compiled(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-    assert fast.engage()
-    yield
-    fast.disengage()
+def _compiled() -> None:
+    require_core()
+    core.use("compiled")
 
 
 def edited(seed: int) -> Splices:

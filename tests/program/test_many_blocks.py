@@ -11,7 +11,8 @@ from random import Random
 
 import pytest
 
-from ncfix import fast
+from conftest import require_core
+from ncfix import core
 from ncfix.text.dialects import get
 from ncfix.text.reader import read, shapes_of
 from ncfix.text.tree import Literal, Template, Word
@@ -87,9 +88,8 @@ FRAMES = {"heidenhain": ("0 BEGIN PGM MANY MM", "9 END PGM MANY MM")}
 @pytest.mark.parametrize("name", list(FAMILIES))
 def test_many_blocks(name: str, compiled: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if compiled:
-        pytest.importorskip("numba", reason="the `fast` extra is not installed")
-        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-        assert fast.engage()
+        require_core()
+        core.use("compiled")
     random, block = Random(11), FAMILIES[name]
     first, last = FRAMES.get(name, ("", ""))
     try:
@@ -100,7 +100,7 @@ def test_many_blocks(name: str, compiled: bool, monkeypatch: pytest.MonkeyPatch)
             assert_read_right(program)
             assert len(program.templates) <= AT_ONCE - SHAPES
     finally:
-        fast.disengage()
+        core.use("plain")
 
 
 def test_a_broken_template_is_caught() -> None:

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ncfix import fast
+from ncfix import core
 from ncfix.control.lanes import lane
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup
@@ -31,13 +31,12 @@ ASSUMED = Setup(assume_zero=True)
 def stretches_of(shortest: int) -> Iterator[None]:
     """Which stretches go through the fast lane; a negative number: compiled if that is installed."""
     before, lane.SHORTEST = lane.SHORTEST, abs(shortest)
-    if shortest < 0:
-        fast.engage()
+    core.use(None if shortest < 0 else "plain")
     try:
         yield
     finally:
         lane.SHORTEST = before
-        fast.disengage()
+        core.use(None)
 
 
 def columns(text: str, shortest: int, dialect: str, setup: Setup = KNOWN) -> dict[str, object] | str:

@@ -15,7 +15,7 @@ import numpy as np
 from lark import Token, UnexpectedInput
 from numpy.typing import NDArray
 
-from ncfix import fast
+from ncfix import core
 from ncfix.control.expressions import Fault
 from ncfix.text.build import MAX_DEPTH, Branch, Node, Parsed, TooDeepError, TreeBuilder, edges, kind, tokens_of
 from ncfix.text.dialect import Dialect
@@ -91,7 +91,7 @@ def split(source: bytes) -> NDArray[np.int64]:
 
 def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """Find the numbers and the shape of every block. A block of several lines has none: it is taken as it is."""
-    if fast.engaged():
+    if core.engaged():
         text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
         found = scan_compiled(text, blocks, False, b";", FIXED, WITHIN_NONE)
         if found is not None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix import fast
+from ncfix import core
 from ncfix.control.arcs import CLOCKWISE, COUNTER
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.lanes.block_rows import LONGEST, filled, followed, followed_compiled
@@ -103,7 +103,7 @@ def stage_of(control: KlartextControl, unit: KlartextUnit, start: int, stop: int
     """What the blocks of a stretch say, and where they lead."""
     program, tables = unit.program, unit.lanes
     shapes, first = program.template[start:stop], program.first_number[start:stop]
-    follow = followed_compiled if fast.engaged() else followed
+    follow = followed_compiled if core.engaged() else followed
     found = follow(
         control, program.numbers, first, shapes, tables.words, (control.modal.unit, control.modal.feed, RAPID)
     )

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeVar
 
-from ncfix import fast
+from ncfix import core
 from ncfix.batch.programs import subprograms
 from ncfix.cli import console
 from ncfix.cli.options import dialect_of, load_machine, read_program
@@ -102,7 +102,7 @@ def through(sources: Sequence[Source], in_parts: Callable[[], Found], as_wholes:
     if any(long):
         from ncfix.control.trace import NotInPartsError
 
-        fast.engage(console.forewarn)
+        core.forewarn(console.forewarn)
         try:
             found = in_parts()
             for source in sources:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from ncfix import fast
+from ncfix import core
 from ncfix.arguments import TOLERANCE_UM, TOOL_LENGTH, NumberRange
 from ncfix.cli import console
 from ncfix.cli.streams import part_bytes
@@ -224,7 +224,7 @@ def read_program(
 
     source = read(path) if text is None else text
     if len(source) >= part_bytes():
-        fast.engage(console.forewarn)
+        core.forewarn(console.forewarn)
     if dialect is None and like is not None:
         return read_like(source, shown(path), like, (machine and machine.control) or "")
     return read_source(source, shown(path), dialect_of(source, shown(path), dialect, machine))

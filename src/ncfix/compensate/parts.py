@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ncfix import fast
+from ncfix import core
 from ncfix.compensate import FixOptions
 from ncfix.compensate.block_delete import Readings, Together
 from ncfix.compensate.following import Task, placed, refuse_stamped, with_tool_lengths
@@ -365,7 +365,7 @@ class PartProof:
         self, part: Part, solution: WrittenPlan, text: bytes, edits: Splices | None, own: Mask | None = None
     ) -> None:
         """Raise what `taught` does; `edits` make the text of that of the part, if known; `own` (m,): pieces in it."""
-        if edits is not None and fast.engaged() and not left_alone(part.program.source, edits, text):
+        if edits is not None and core.engaged() and not left_alone(part.program.source, edits, text):
             raise SelfCheckError("more of the text has changed than was written anew")
         try:
             program = self.again.read(text)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix import fast
+from ncfix import core
 from ncfix.compensate import FixOptions
 from ncfix.compensate.parts import Part, ProgramPart
 from ncfix.compensate.plan.arcs import Closure, fitted, full_circles
@@ -369,14 +369,14 @@ class Planner:
         """
         bow, linear = self.machine.bow, ~self.machine.rotary
         assert bow is not None
-        if not fast.engaged():
+        if not core.engaged():
             shift = (done - meant)[:, linear]
             return straight_bounds(bow, done[:-1], done[1:], (shift[:-1], shift[1:]), tool_length, linear)
-        from ncfix.compensate import kernels
+        from ncfix.core import motions
 
         constants = bow.shift, bow.turn, bow.arm(np.zeros(len(linear)), float(tool_length), ~linear), MORE, CORNER
         bound = np.empty(len(done) - 1)
-        kernels.bounds(meant, done, self._linear, (bow.slopes, bow.curvatures), constants, CLOSE, bound)
+        motions.bounds(meant, done, self._linear, bow.slopes, bow.curvatures, *constants, CLOSE, bound)
         return bound
 
     @property
@@ -387,12 +387,12 @@ class Planner:
     def _within_limits(self, meant: Array, done: Array) -> bool:
         """Whether corrected poses, and those of the program, come near no limit: as `limits`. Arrays as for bounds."""
         low, high = self.machine.ranges.T
-        if fast.engaged():
-            from ncfix.compensate import kernels
+        if core.engaged():
+            from ncfix.core import motions
 
             linear, rotary = (NEARLY * most for most in self.machine.max_correction)
             axes = low.copy(), high.copy(), np.where(self.machine.rotary, rotary, np.inf), self._linear
-            return bool(kernels.within_limits(meant, done, axes, (linear, NEARLY * JUMP, FUZZ)))
+            return bool(motions.within_limits(meant, done, *axes, linear, NEARLY * JUMP, FUZZ))
         for least, most in (extent(meant), extent(done)):
             if not ((low - least <= FUZZ).all() and (most - high <= FUZZ).all()):
                 return False

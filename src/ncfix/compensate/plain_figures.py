@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix import fast
+from ncfix import core
 from ncfix.compensate.plain import PlainPlan
 from ncfix.compensate.plan.arrays import (
     Array,
@@ -71,7 +71,7 @@ def figures(course: PlainPlan, text: Emission, rapids: bool) -> PathError:
     else:
         apart[passed(course.intent, written.start, written.end)[0]] = True
     tally = FigureTally()
-    counts = (_compiled if fast.engaged() else _by_columns)(course, text, written, (shown, apart), tally)
+    counts = (_compiled if core.engaged() else _by_columns)(course, text, written, (shown, apart), tally)
     inside = np.flatnonzero(counts)
     for part in batches(counts[inside], BATCH):
         tally.add(_inside(course, written, inside[part], counts[inside[part]]))
@@ -103,21 +103,36 @@ def _compiled(
     course: PlainPlan, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally
 ) -> Index:
     """As `_by_columns`."""
-    from ncfix.compensate import kernels
+    from ncfix.core import motions
 
     moves, machine, sums, places = course.part.moves, course.intent.machine, np.zeros(5), np.full(3, -1)
     assert machine.linear_ways is not None
     places[0], counts, (shown, apart), bending = 0, np.zeros(len(moves), dtype=np.intp), masks, features(machine)
     if moves.tcp[0]:
         counts, bending = _looks(course, shown, _led_bends(course)), np.full_like(bending, np.inf)
-    kernels.at_ends(
-        (moves.start, moves.end),
-        (text.start[0], text.end, course.first),
-        (course.real.end, course.before),
-        (bending, np.ascontiguousarray(machine.linear_ways), course.intent.columns, ~machine.rotary),
-        (STRAIGHT, TURNED, DENSITY, MOST_SHOWN),
-        (*masks, moves.kind == MotionKind.FEED),
-        (sums, places, counts),
+    linear, followed = ~machine.rotary, moves.kind == MotionKind.FEED
+    motions.at_ends(
+        moves.start,
+        moves.end,
+        text.start[0],
+        text.end,
+        course.first,
+        course.real.end,
+        course.before,
+        bending,
+        np.ascontiguousarray(machine.linear_ways),
+        course.intent.columns,
+        linear.view(np.uint8),
+        STRAIGHT,
+        TURNED,
+        DENSITY,
+        MOST_SHOWN,
+        shown.view(np.uint8),
+        apart.view(np.uint8),
+        followed.view(np.uint8),
+        sums,
+        places,
+        counts,
     )
     way, *squares = sums[:3].tolist()
     count, *rows = places.tolist()

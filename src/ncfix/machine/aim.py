@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix import fast
-from ncfix.machine.loops import room
-from ncfix.machine.route import Route, SplitRoute, Turns
+from ncfix import core
+from ncfix.machine.route import Route, SplitRoute, Turns, hand_of
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, behind_each_other, some
 from ncfix.machine.steps import SMALL, dot, has_arrived, volume
@@ -113,7 +112,7 @@ def aimed_ahead(poses: Poses, perfect: Route, split: SplitRoute, target: Array |
     Also the poses that it is not for: they need more passes, or small motions are large.
     """
     within, turns = split.within, split.within.turns(poses)
-    if fast.engaged() and poses.positions.shape[1] > 1:
+    if core.engaged() and poses.positions.shape[1] > 1:
         aim, largest = _compiled(poses, perfect, split, turns, target)
     else:
         goal = perfect.tips(poses, turns)[0] if target is None else target
@@ -125,15 +124,15 @@ def aimed_ahead(poses: Poses, perfect: Route, split: SplitRoute, target: Array |
 
 def _compiled(poses: Poses, perfect: Route, split: SplitRoute, turns: Turns, target: Array | None) -> tuple[Aim, Array]:
     """By compiled loops; also the largest squared angle of a small motion (n,)."""
-    from ncfix.machine import kernels
+    from ncfix.core import chain
 
     within, behind = split.within, split.behind
-    routes = perfect.compiled, within.compiled, behind.compiled
-    given = within.columns(poses, turns, behind.terms.given(poses) + within.terms.given(poses))
+    given = within.terms.given(poses)
+    hand = hand_of(poses, turns, [*behind.terms.given(poses), *given], within, behind)
     out = np.empty((6, poses.positions.shape[1]))
     goal = np.empty((3, 0)) if target is None else np.ascontiguousarray(target)
-    limits, columns = np.array([CLOSE, FLAT, WHOLE_STEPS]), np.array(split.axes, dtype=np.int64)
-    kernels.aim(*routes, given, columns, goal, limits, room(given, *routes), out)
+    routes, axes = (perfect.compiled, within.compiled, behind.compiled), np.array(split.axes, dtype=np.int64)
+    chain.aim(*routes, hand, axes, goal, CLOSE, FLAT, WHOLE_STEPS, out)
     return Aim(out[:3], out[5] > 0, out[3]), out[4]
 
 
@@ -160,7 +159,7 @@ def gaps(
 def _gaps(
     perfect: Route, route: Route | None, tips: RouteTips, meant: Poses, done: Sequence[Poses], target: Array | None
 ) -> Iterable[Array]:
-    if route is not None and fast.engaged() and meant.positions.shape[1] > 1:
+    if route is not None and core.engaged() and meant.positions.shape[1] > 1:
         found, angle = _compiled_gaps(perfect, route, meant, done, target)
         if not (angle >= SMALL).any():
             return found
@@ -175,13 +174,13 @@ def _compiled_gaps(
     perfect: Route, route: Route, meant: Poses, done: Sequence[Poses], target: Array | None
 ) -> tuple[Array, Array]:
     """The same, (k, n, 3), compiled; and the largest squared angles of small motions that were met with, (k, n)."""
-    from ncfix.machine import kernels
+    from ncfix.core import chain
 
     kinds = [meant, *(each for each in done if each is not meant)]
     poses, n = behind_each_other(kinds), meant.positions.shape[1]
-    given = route.columns(poses, route.turns(poses), route.terms.given(poses))
+    hand = hand_of(poses, route.turns(poses), route.terms.given(poses), route, perfect)
     goal = np.empty((3, 0)) if target is None else np.ascontiguousarray(target)
     sides = np.array([next(k for k, kind in enumerate(kinds) if kind is each) for each in done])
     out, angle = np.empty((len(done), n, 3)), np.empty((len(done), n))
-    kernels.gaps(perfect.compiled, route.compiled, given, goal, sides, room(given, route.compiled), out, angle)
+    chain.gaps(perfect.compiled, route.compiled, hand, goal, sides, out, angle)
     return out, angle

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix import fast
+from ncfix import core
 from ncfix.machine import se3
 from ncfix.machine.axes import Axis, GaugeLine, Vector
 from ncfix.machine.error_model import ErrorModel, Slot, Sort
@@ -51,11 +51,11 @@ def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> 
     if not axis.rotary:
         return moved + direction[:, None, None] * position * weight if np.any(weight) else moved
     if _is_many(moved) and position.shape == moved.shape[2:]:
-        from ncfix.machine import kernels
+        from ncfix.core import chain as loops
 
         constants = np.array(axis.direction, dtype=np.float64), np.array(axis.point, dtype=np.float64)
         out = np.empty_like(moved)
-        kernels.advanced(*constants, *turn(position), moved, _weights(moved, weight), out)
+        loops.advanced(*constants, *turn(position), moved, _weights(moved, weight), out)
         return out
     arm = moved - np.asarray(axis.point)[:, None, None] * weight
     once = cross_with(axis.direction, arm)
@@ -66,7 +66,7 @@ def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> 
 
 def _is_many(moved: Array) -> bool:
     """Whether compiled kernels are to take it: columns for each of many poses."""
-    return fast.engaged() and moved.shape[2] > 1 and moved.flags.c_contiguous
+    return core.engaged() and moved.shape[2] > 1 and moved.flags.c_contiguous
 
 
 def _weights(moved: Array, weight: Weight) -> Array:
@@ -142,22 +142,22 @@ class SmallMotion:
             return None
         if not rotation.shape == translation.shape == (3, 1, moved.shape[2]) or not np.abs(rotation).max() < SMALL:
             return None
-        from ncfix.machine import kernels
+        from ncfix.core import chain as loops
 
         center, out = np.broadcast_to(self.center, rotation.shape), np.empty_like(moved)
         rows = (np.ascontiguousarray(each[:, 0]) for each in (rotation, translation, center))
-        (kernels.forth if forwards else kernels.back)(*rows, moved, _weights(moved, weight), out)
+        loops.moved_small(*rows, not forwards, moved, _weights(moved, weight), out)
         return out
 
 
 def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array:
     """What is carried, after a small rotation about a center."""
     if vector.size == 3 and center.size == 3 and _is_many(moved):
-        from ncfix.machine import kernels
+        from ncfix.core import chain as loops
 
         first, second = (factor.item() for factor in se3.rotation_factors((vector * vector).sum(0)))
         out = np.empty_like(moved)
-        kernels.turned(vector.ravel(), first, second, center.ravel(), moved, _weights(moved, weight), out)
+        loops.turned(vector.ravel(), first, second, center.ravel(), moved, _weights(moved, weight), out)
         return out
     return moved + rotated_by(vector, moved - center * weight)
 

@@ -12,23 +12,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ncfix import fast
+from ncfix import core
 from ncfix.machine import se3, steps
 from ncfix.machine.axes import Axis, GaugeLine, Vector
 from ncfix.machine.basis import ConstantBasis, Fourier, Polynomial
 from ncfix.machine.chain import JointModel, SmallMotion, columns, lies_on_axis, turn
 from ncfix.machine.error_model import EffectGroup, ErrorModel, Slot
-from ncfix.machine.loops import Packed, PoseColumns, packed, room
 from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
 from ncfix.machine.steps import BACK, FORTH, GIVEN, PARTS, POWERS, SHIFT, TURN, WAVES, Functions, Number, Steps
 
+if TYPE_CHECKING:
+    from ncfix.core.chain import Hand, RouteSteps
+
 SUMS = (PiecewiseLinear, Spline, PiecewiseConstant)
 """Bases that add up their functions themselves, each sum on its own."""
+HANDFUL = 64
+"""Poses that the compiled core takes at a time."""
+CACHE_LINE = 8
+"""Numbers in a line of the cache: room that begins with one is gone through faster."""
 ANY = (1.0, -np.inf, np.inf, 0.0, 1.0)
 """A signal that is the position as it is."""
 ClampedAngle = tuple[int, float, float]
@@ -167,26 +175,33 @@ Turns = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class Route:
-    """The steps of a machine in two forms: lists, to go through with columns, and arrays for compiled kernels.
+    """The steps of a machine in two forms: lists, to go through with columns, and arrays for the compiled core.
 
     terms   what the small motions are made of
     rotary  the columns of the rotary axes
     """
 
     plain: tuple[Steps, Functions]
-    compiled: Packed
+    arrays: tuple[Steps, Functions]
     terms: Terms
     rotary: tuple[int, ...]
+
+    @cached_property
+    def compiled(self) -> RouteSteps:
+        """The steps as the compiled core takes them."""
+        from ncfix.core import chain
+
+        return chain.RouteSteps(*self.arrays[0], *self.arrays[1])
 
     def tips(self, poses: Poses, turns: Turns | None = None) -> tuple[Array, Array]:
         """The tip (3, n), and the largest squared angle of a small motion at each pose (n,); `turns` if known."""
         turns = turns or self.turns(poses)
         n = poses.positions.shape[1]
         if _are_many(n):
-            from ncfix.machine import kernels
+            from ncfix.core import chain
 
-            given, out = self.columns(poses, turns, self.terms.given(poses)), np.empty((4, n))
-            kernels.tips(*self.compiled, given, room(given, self.compiled), out)
+            hand, out = hand_of(poses, turns, self.terms.given(poses), self), np.empty((4, n))
+            chain.tips(self.compiled, hand, out)
             return out[:3], out[3]
         return self.carried(poses, turns, steps.at_tip(self.plain[0], poses.tool_length))
 
@@ -214,11 +229,11 @@ class Route:
         back  (3, 3) what takes a way of the tip to one of the axes: the inverse of `ways_together`
         """
         if _are_many(target.shape[1]):
-            from ncfix.machine import kernels
+            from ncfix.core import chain
 
-            given, out = self.columns(poses, self.turns(poses), []), np.empty(target.shape)
+            hand, out = hand_of(poses, self.turns(poses), [], self), np.empty(target.shape)
             goal, columns = np.ascontiguousarray(target), np.array(axes, dtype=np.int64)
-            kernels.placed(self.compiled, given, columns, back, goal, room(given, self.compiled), out)
+            chain.placed(self.compiled, hand, columns, back, goal, out)
             return out
         x, y, z = target
         way = steps.brought_back(self.plain[0], axes, x, y, z, poses.tool_length, poses.positions, self.turns(poses))
@@ -237,13 +252,6 @@ class Route:
                 return None
         return np.array([direction for _, direction in sorted(found)]).T if len(found) == len(axes) else None
 
-    def columns(self, poses: Poses, turns: Turns, given: Sequence[Array]) -> PoseColumns:
-        """What compiled kernels are given; `given` are the functions that come from elsewhere."""
-        n = poses.positions.shape[1]
-        others = np.array([np.broadcast_to(row, n) for row in given]).reshape(len(given), n)
-        rows = (np.ascontiguousarray(each) for each in (poses.positions, *turns, others, poses.tool_length))
-        return PoseColumns(*rows)
-
     def turns(self, poses: Poses) -> Turns:
         """Sines and versines by columns, (n_axes + k, n): of the rotary axes, and of the k held by their ranges."""
         q, held = poses.positions, self.terms.held
@@ -258,8 +266,27 @@ class Route:
         return sine, versed
 
 
+def hand_of(poses: Poses, turns: Turns, given: Sequence[Array], *routes: Route) -> Hand:
+    """Poses for the compiled core, with room for what routes need; `given` are the functions that come from elsewhere.
+
+    Each route has small motions of its own.
+    """
+    from ncfix.core import chain
+
+    n = poses.positions.shape[1]
+    others = np.array([np.broadcast_to(row, n) for row in given]).reshape(len(given), n)
+    q, sine, versine, length = (np.ascontiguousarray(each) for each in (poses.positions, *turns, poses.tool_length))
+    functions = max(len(route.plain[1].order) for route in routes)
+    small = sum(len(route.plain[0].kind) for route in routes)
+    rows = chain.rows_for(len(q), len(sine), len(others), functions, small)
+    memory = np.zeros(rows * HANDFUL + CACHE_LINE)
+    begin = -(memory.ctypes.data // memory.itemsize) % CACHE_LINE
+    work = memory[begin : begin + rows * HANDFUL].reshape(rows, HANDFUL)
+    return chain.Hand(q, sine, versine, others, length, work, functions, small)
+
+
 def _are_many(n: int) -> bool:
-    return fast.engaged() and n > 1
+    return core.engaged() and n > 1
 
 
 @dataclass(frozen=True)
@@ -348,7 +375,7 @@ def _written_out(
         np.array([len(link.slots) > 1 for link in links], dtype=np.int64),
     )
     listed = Steps(*(part.tolist() for part in legs)), Functions(*(part.tolist() for part in functions))
-    return Route(listed, packed(legs, functions), terms, tuple(i for i, axis in enumerate(axes) if axis.rotary))
+    return Route(listed, (legs, functions), terms, tuple(i for i, axis in enumerate(axes) if axis.rotary))
 
 
 @dataclass(frozen=True, slots=True)

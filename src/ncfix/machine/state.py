@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ncfix import fast
+from ncfix import core
 from ncfix.diagnostics import UsageError
 from ncfix.machine.axes import Axis
 from ncfix.machine.se3 import Array
@@ -50,7 +50,7 @@ class Poses:
 
     def chunks(self) -> Iterator[tuple[slice, Poses]]:
         """The poses in runs."""
-        size = LARGE if fast.engaged() else CHUNK
+        size = LARGE if core.engaged() else CHUNK
         for start in range(0, self.positions.shape[1], size):
             part = slice(start, start + size)
             yield part, self.part(part)

@@ -1,8 +1,8 @@
 """The tool tip carried through a machine step by step: formulas for numbers and for columns of numbers alike.
 
-The plain way gives them columns, many poses at a time; the compiled way (`kernels`) gives them numbers, pose after
-pose. Since both go through the same operations in the same order, and sines come from numpy in both, the results are
-the same to the last bit, and those of a pose do not depend on what other poses are worked out together with it.
+The compiled core (`core.chain`) goes through the same operations in the same order, and sines come from numpy in
+both: so the results are the same to the last bit, and those of a pose do not depend on what other poses are worked out
+together with it.
 """
 
 from __future__ import annotations
@@ -276,20 +276,3 @@ def dot(a: Any, b: Any) -> Any:
 def has_arrived(size: Number, before: Number, close: float) -> Any:
     """Whether a gap, falling by the ratio that the last two passes show, will be below `close`."""
     return (size < close) | (size * size < close * before)
-
-
-FORMULAS = (
-    turned,
-    factors,
-    screw_factor,
-    twice_crossed,
-    screwed,
-    moved_forth,
-    moved_back,
-    held_signal,
-    next_wave,
-    volume,
-    dot,
-    has_arrived,
-)
-"""What compiled kernels are made of, too."""

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix import fast
+from ncfix import core
 from ncfix.text.numbers import (
     BLANK,
     BLANKS,
@@ -136,7 +136,7 @@ def split_blocks(source: bytes) -> NDArray[np.int64]:
 def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -> Scan:
     """Find the numbers and the shape of every block; `pointless`: numbers without a point make another shape."""
     text = np.frombuffer(source, dtype=np.uint8)
-    if fast.engaged():
+    if core.engaged():
         found = scan_compiled(text, blocks, pointless)
         if found is not None:
             return found
@@ -183,6 +183,8 @@ def mixed(own: NDArray[np.bool_], some: NDArray[Any], others: NDArray[Any]) -> N
 SLICE_BYTES = 1 << 19
 """How much of a text of any kind is scanned at once: the columns take about a hundred times as much."""
 
+UNTOUCHED, CRAMPED = -1, -2
+"""What the compiled scan answers: there is a block that must be taken as it is, or more than there is room for."""
 SPARE, DENSE, VARIED = 1 << 12, 5, 16
 """What room there is at first: for so many numbers and characters of different shapes, and for one in so many bytes."""
 
@@ -233,31 +235,36 @@ def scan_compiled(
     fixed     a number after these belongs to the shape
     odd       bytes that a block may not hold
     """
-    from ncfix.text import kernels
+    from ncfix.core import scan as loop
 
     kinds = np.zeros(256, dtype=np.uint8)
-    for members, kind in ((NUMERIC, kernels.NUMERIC), (SIGN, kernels.SIGN), (odd, kernels.ODD)):
+    for kind, members in enumerate((NUMERIC, SIGN, list(comments), odd), start=1):
         kinds[members] = kind
-    kinds[list(comments)] = kernels.COMMENT
+    tables = (each.view(np.uint8) for each in (fixed, UNSIGNED_AFTER, BLANK))
+    scanner = loop.Scanner(kinds, *tables, BLANKS, EXACT_DIGITS, POWERS)
     n = len(blocks)
     group, comment, first = np.empty(n, np.int64), np.full(n, -1, np.int64), np.empty(n + 1, np.int64)
     shapes, starts = np.empty(len(text) + 1, np.uint8), np.empty(n + 1, np.int64)
     for most, rows in ((SPARE + len(text) // DENSE, SPARE + len(text) // VARIED), (len(text), len(text) + 1)):
         spans, values = np.empty((most, 2), np.int64), np.empty(most)
-        known = kernels.scan(
+        known = scanner.scan(
             text,
             np.ascontiguousarray(blocks),
-            (kinds, fixed, UNSIGNED_AFTER, BLANK),
-            (BLANKS, EXACT_DIGITS),
-            (NUMBER_MARK, POINTLESS_MARK if pointless else NUMBER_MARK, COMMENT_MARK),
-            POWERS,
-            (group, comment, first),
-            (spans, values),
-            (shapes, starts, np.empty((rows, 4), np.int32)),
+            NUMBER_MARK,
+            POINTLESS_MARK if pointless else NUMBER_MARK,
+            COMMENT_MARK,
+            group,
+            comment,
+            first,
+            spans,
+            values,
+            shapes,
+            starts,
+            np.empty((rows, 4), np.int32),
         )
-        if known != kernels.CRAMPED:
+        if known != CRAMPED:
             break
-    if known == kernels.UNTOUCHED:
+    if known == UNTOUCHED:
         return None
     edges, count = starts[: known + 1].tolist(), int(first[n])
     keys: list[bytes | None] = [shapes[slice(*each)].tobytes() for each in pairwise(edges)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix import fast
+from ncfix import core
 from ncfix.text.numbers import fill
 
 
@@ -121,13 +121,12 @@ def spliced(source: bytes, splices: Splices) -> bytes:
     start, stop = splices.start, splices.stop
     if start[0] < 0 or stop[-1] > len(source) or (start > stop).any() or (stop[:-1] > start[1:]).any():
         raise ValueError(f"edits overlap, or lie outside the {len(source)} bytes")
-    if fast.engaged():
-        from ncfix.writer import writing_kernels
+    if core.engaged():
+        from ncfix.core import edits
 
-        text, data = (np.frombuffer(each, dtype=np.uint8) for each in (source, splices.data))
-        out = np.empty(len(source) + len(data) - int((stop - start).sum()), dtype=np.uint8)
+        out = np.empty(len(source) + len(splices.data) - int((stop - start).sum()), dtype=np.uint8)
         columns = (np.ascontiguousarray(each) for each in (start, stop, splices.length))
-        writing_kernels.spliced(text, *columns, data, out)
+        edits.spliced(source, *columns, splices.data, out)
         return out.tobytes()
     other = np.flatnonzero(splices.length != stop - start)
     begun, others = _in_place(source, splices, other), splices.rows(other)
@@ -153,12 +152,10 @@ def overlong(source: bytes, blocks: NDArray[np.int64], splices: Splices, limit: 
 
 def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
     """Whether a text that was made by edits is the source, byte for byte, between them: only asked where compiled."""
-    from ncfix.text import kernels
+    from ncfix.core import edits
 
-    columns = tuple(np.ascontiguousarray(each) for each in (splices.start, splices.stop, splices.length))
-    old, new = (np.frombuffer(each, dtype=np.uint8) for each in (source, text))
-    fitting = len(new) - len(old) == int((splices.length + splices.start - splices.stop).sum())
-    return fitting and bool(kernels.left_alone(old, new, *columns))
+    columns = (np.ascontiguousarray(each) for each in (splices.start, splices.stop, splices.length))
+    return bool(edits.left_alone(source, text, *columns))
 
 
 FEW = 16

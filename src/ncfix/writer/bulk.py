@@ -14,10 +14,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix import fast
+from ncfix import core
 from ncfix.control.moves import Frame, MotionKind, Moves
 from ncfix.text.number_text import (
+    LARGEST,
+    MOST_DECIMALS,
     ROUNDED,
+    TIE,
     NumberColumns,
     Styles,
     in_style,
@@ -27,6 +30,10 @@ from ncfix.text.number_text import (
     rounded,
     styles_of,
 )
+from ncfix.text.number_text import (
+    LONGEST as LONGEST_NUMBER,
+)
+from ncfix.text.numbers import POWERS
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
 from ncfix.writer.bulk_arcs import CentreWords, OutputSteps, whole_arcs
@@ -140,7 +147,7 @@ class Bulk:
         """
         if self.stop[row] == row:
             return None
-        write = self._compiled if fast.engaged() else self._in_columns
+        write = self._compiled if core.engaged() else self._in_columns
         found = write(row, position, frame, self._steps_for(decimals))
         if found is None:
             return None
@@ -199,34 +206,46 @@ class Bulk:
         self, row: int, position: FloatArray, frame: FrameMap, steps: OutputSteps
     ) -> tuple[FloatArray, Splices] | None:
         """As `_in_columns`, compiled."""
-        from ncfix.text.number_kernels import ROOM
-        from ncfix.writer import writing_kernels
+        from ncfix.core import words
 
         stop, program, layouts = int(self.stop[row]), self.program, self.layouts
         pieces = self.first_piece[row : stop + 1]
-        ends, here, end_of_line = self.pieces.end[pieces[0] : pieces[-1]], position.copy(), program.line_end
-        axes, edits = len(here), (stop - row) * (len(here) + 1)
+        ends, axes = self.pieces.end[pieces[0] : pieces[-1]], len(position)
+        edits = (stop - row) * (axes + 1)
         blocks = self.moves.block[row:stop]
-        commands, data = np.empty_like(ends), np.empty(self._room(pieces, blocks, axes * ROOM), dtype=np.uint8)
+        commands, data = np.empty_like(ends), np.empty(self._room(pieces, blocks, axes * words.ROOM), dtype=np.uint8)
         start, end, length = (np.empty(edits, dtype=np.int64) for _ in range(3))
-        counts = np.zeros(2, dtype=np.int64)
-        done = writing_kernels.write(
+        pen = words.Pen(
+            words.Rules(POWERS, LONGEST_NUMBER, MOST_DECIMALS, LARGEST, TIE, ROUNDED),
             steps.text,
-            (program.blocks, blocks, program.first_number, program.template),
-            (program.numbers, program.number_spans),
-            (layouts.slots, layouts.by_place, layouts.by_letter, layouts.anchors, layouts.heads),
-            ends,
-            pieces - pieces[0],
-            here,
-            (frame.frame.offset, frame.scale),
-            (steps.decimals, steps.half, int(steps.signed)),
-            (np.frombuffer(end_of_line, dtype=np.uint8), layouts.leads, layouts.openings, layouts.closings),
-            (commands, start, end, length, data),
-            (np.empty(axes), np.empty(axes), np.empty(axes, dtype=np.bool_), counts),
+            program.blocks,
+            program.first_number,
+            program.template,
+            program.numbers,
+            program.number_spans,
+            layouts.slots,
+            layouts.by_place,
+            layouts.by_letter,
+            layouts.anchors,
+            layouts.heads,
+            layouts.leads,
+            layouts.openings,
+            layouts.closings,
+            program.line_end,
+            frame.frame.offset,
+            frame.scale,
+            steps.decimals,
+            steps.half,
+            steps.signed,
+            position.copy(),
+            np.empty(axes),
+            np.empty(axes),
+            np.empty(axes, dtype=np.int64),
         )
+        done = pen.write(blocks, ends, pieces - pieces[0], commands, start, end, length, data)
         if not done:
             return None
-        edits, size = counts.tolist()
+        edits, size = pen.edits, pen.size
         return commands[:done], Splices(start[:edits], end[:edits], length[:edits], data[:size].tobytes())
 
     def _room(self, pieces: IntArray, blocks: NDArray[np.int32], words: int) -> int:

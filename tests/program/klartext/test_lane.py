@@ -10,7 +10,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from ncfix import fast
+from ncfix import core
 from ncfix.control.builder import Circles
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Setup
@@ -73,13 +73,12 @@ OTHERS = (
 def stretches_of(shortest: int) -> Iterator[None]:
     """Which stretches go through the fast lane; `COMPILED`: all of them, compiled if that is installed."""
     before, lane.SHORTEST = lane.SHORTEST, abs(shortest)
-    if shortest == COMPILED:
-        fast.engage()
+    core.use(None if shortest == COMPILED else "plain")
     try:
         yield
     finally:
         lane.SHORTEST = before
-        fast.disengage()
+        core.use(None)
 
 
 def columns(body: str, shortest: int, setup: Setup, unit: str) -> dict[str, object] | str:

@@ -8,7 +8,8 @@ from random import Random
 import pytest
 
 from compensate.streaming import assert_alike, compared, streamed, whole
-from ncfix import fast
+from conftest import require_core
+from ncfix import core
 from ncfix.control.trace import NotInPartsError
 from ncfix.machine import Machine, load
 
@@ -92,16 +93,12 @@ def test_several_processes_give_the_same_bytes(jobs: int, machine: Machine) -> N
 
 
 def test_compiled_kernels_give_the_same_bytes(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    require_core()
     source = program(4, 100, 0.0)
     plain = streamed(source, machine, "heidenhain", 4000)[0]
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-    assert fast.engage()
-    try:
-        assert streamed(source, machine, "heidenhain", 4000)[0] == plain
-        assert whole(source, machine, "heidenhain")[0] == plain
-    finally:
-        fast.disengage()
+    core.use("compiled")
+    assert streamed(source, machine, "heidenhain", 4000)[0] == plain
+    assert whole(source, machine, "heidenhain")[0] == plain
 
 
 @pytest.mark.parametrize("block", list(WHOLE))

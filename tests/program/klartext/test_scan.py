@@ -7,7 +7,8 @@ from random import Random
 import numpy as np
 import pytest
 
-from ncfix import fast
+from conftest import require_core
+from ncfix import core
 from ncfix_heidenhain.klartext.blocks import scan, split
 from program.test_many_blocks import klartext
 
@@ -24,12 +25,8 @@ CYCLE = [
 def assert_same(source: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     blocks = split(source)
     plain = scan(source, blocks).expanded()
-    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-    assert fast.engage()
-    try:
-        found = scan(source, blocks).expanded()
-    finally:
-        fast.disengage()
+    core.use("compiled")
+    found = scan(source, blocks).expanded()
     assert found.shapes == plain.shapes
     for name in ("comment", "first_number", "spans", "values"):
         np.testing.assert_array_equal(getattr(found, name), getattr(plain, name), err_msg=name)
@@ -38,7 +35,7 @@ def assert_same(source: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("ends", ["\n", "\r\n"])
 @pytest.mark.parametrize("odd", [False, True])
 def test_both_scans_find_the_same(ends: str, odd: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    require_core()
     random = Random(5)
     lines = [klartext(Random(random.randrange(150)), random) for _ in range(1500)]
     if odd:

@@ -14,7 +14,7 @@ from functools import cache, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from ncfix import fast, files
+from ncfix import core, files
 from ncfix.batch.journal import JOURNAL, Find, Journal, JournalRecord, RecordingFinder, announce, digest_of, text_digest
 from ncfix.batch.programs import subprograms
 from ncfix.batch.work import ExecutorMaker, results_in_order
@@ -163,7 +163,7 @@ class FixJob:
         from ncfix.compensate.following import Task
 
         if source.size is None or source.size >= part_bytes():
-            fast.engage(console.forewarn)
+            core.forewarn(console.forewarn)
         path = shown(source.path)
         with outlet_for(
             target, not self.setup.assume_zero and self.setup.probed is None, lambda: bool(stream.stamped)

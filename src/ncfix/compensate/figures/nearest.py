@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix import fast
+from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, length
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places
 from ncfix.control.trace import NotInPartsError
@@ -151,7 +151,7 @@ class Search:
         return better
 
     def _downhill(self, points: Array, expected: Array) -> Nearest:
-        down = self._down_compiled if fast.engaged() else self._down
+        down = self._down_compiled if core.engaged() else self._down
         return down(np.ascontiguousarray(points.T), expected)
 
     def _down(self, points: Array, expected: Array) -> Nearest:
@@ -179,18 +179,13 @@ class Search:
 
     def _down_compiled(self, points: Array, expected: Array) -> Nearest:
         """As `_down`."""
-        from ncfix.compensate import kernels
+        from ncfix.core import motions
 
-        n, path = len(expected), (getattr(self.curve, name) for name in kernels.CurveColumns._fields)
+        n, path = len(expected), self.curve
         found = Nearest(np.empty(n, dtype=np.intp), np.empty(n), np.empty(n))
-        kernels.down(
-            points,
-            expected,
-            kernels.CurveColumns(*path),
-            (self.near, CLOSE),
-            (STEPS, HOPS),
-            (found.piece, found.share, found.gap),
-        )
+        opens = path.opens.view(np.uint8)
+        columns = motions.CurveColumns(path.parabolas, path.lengths, path.ways, opens, path.upto, path.lying)
+        columns.down(points, expected, self.near, CLOSE, STEPS, HOPS, found.piece, found.share, found.gap)
         return found
 
     def _at_gap(self, piece: Index, share: Array) -> Array:

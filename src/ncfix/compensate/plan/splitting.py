@@ -26,7 +26,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ncfix import fast
+from ncfix import core
 from ncfix.compensate.plan.arcs import APART, NUDGE, Closure, across
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, largest, offsets, owners, picked, places, sums
 from ncfix.compensate.plan.ends import as_commands, path_of, with_rotary_held
@@ -101,12 +101,13 @@ def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
 
     A piece from one node to the next is always allowed: it has no nodes between.
     """
-    if fast.engaged() and isinstance(grid, PathNodes):
-        from ncfix.compensate import kernels
+    if core.engaged() and isinstance(grid, PathNodes):
+        from ncfix.core import motions as loops
 
         nodes, motions = np.zeros(len(grid.fraction), dtype=bool), np.zeros(len(grid.counts))
         follow = np.ascontiguousarray(grid.follow)
-        kernels.fewest(grid.counts, grid.fraction, grid.command, follow, (tolerance, STRETCH), nodes, motions)
+        own = nodes.view(np.uint8)
+        loops.fewest(grid.counts, grid.fraction, grid.command, follow, tolerance, STRETCH, own, motions)
         return nodes, motions
     stretches, at, stop = _stretches(grid.counts)
     ends = np.zeros(int(grid.counts.sum()), dtype=bool)

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix import fast
+from ncfix import core
 from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import N_LETTERS
 from ncfix.control.lanes.lane_tables import LaneTables
@@ -77,7 +77,7 @@ def stage_of(control: ProgramControl, unit: ProgramText, start: int, stop: int) 
     """What blocks say, and where they lead."""
     program = unit.program
     shapes, first = program.template[start:stop], program.first_number[start:stop]
-    follow = followed_compiled if fast.engaged() else followed
+    follow = followed_compiled if core.engaged() else followed
     before = feed_unit(control), control.modal.feed, float(control.modal.motion)
     stage = follow(control, program.numbers, first, shapes, unit.lanes, before)
     return replace(stage, turns=unit.lanes.turns.take(shapes)) if unit.lanes.turns.any() else stage
@@ -129,7 +129,7 @@ def followed_compiled(
     control: ProgramControl, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
 ) -> BlockRows:
     """As `followed`."""
-    from ncfix.control.lanes import lane_kernel
+    from ncfix.core import motions
 
     position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
     n = len(first)
@@ -141,12 +141,25 @@ def followed_compiled(
         np.empty(n, dtype=np.bool_),
         np.empty(n, dtype=np.int64),
     )
-    lane_kernel.followed(
-        (numbers, first, shapes),
-        (tables.axes, tables.feed, tables.motion, tables.mask),
-        (position, *before),
-        (offset, scale, int(control.modal.incremental)),
-        (stage.path, stage.feed, stage.fed, stage.motion, stage.coded, stage.mask),
+    motions.followed(
+        numbers,
+        first,
+        shapes,
+        tables.axes,
+        tables.feed,
+        tables.motion,
+        tables.mask,
+        position,
+        *before,
+        offset,
+        scale,
+        control.modal.incremental,
+        stage.path,
+        stage.feed,
+        stage.fed.view(np.uint8),
+        stage.motion,
+        stage.coded.view(np.uint8),
+        stage.mask,
     )
     return stage
 

@@ -1,0 +1,723 @@
+# cython: boundscheck=False, cdivision=True
+"""The tool tip carried through a machine, for many poses: as `machine.steps` and `machine.chain` do it by columns.
+
+The operations and their order are the same, and sines come from numpy in both, so that the results are the same to the
+last bit; a test holds them together. Poses are taken by the handful, so that what is worked out for them stays in the
+processor's cache, and so that sums are loops over poses, which a compiler turns into vector instructions.
+
+No index is looked at again inside: `RouteSteps` and `Hand` look at all of them before. Quotients of whole numbers are
+written with points: Cython makes a whole number of `1 / 6`.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+HANDFUL = 64
+SPARE = 14
+"""Rows for those who do more with a handful of poses."""
+SHIFT, TURN, FORTH, BACK = 0, 1, 2, 3
+POWERS, WAVES, GIVEN = 0, 1, 2
+PARTS = 9
+"""See `machine.steps`."""
+
+
+class RouteSteps:
+    """The numbers of `machine.steps.Steps` and `Functions`, by their names there; `signal_axis` is that of functions.
+
+    axes, turns, given  rows of positions and of sines that it needs, and functions that come from elsewhere
+    """
+
+    def __init__(
+        self,
+        start: Array,
+        kind: Ints,
+        axis: Ints,
+        direction: Array,
+        point: Array,
+        center: Array,
+        small: Ints,
+        rotates: Ints,
+        screws: Ints,
+        family: Ints,
+        signal_axis: Ints,
+        signal: Array,
+        first: Ints,
+        order: Ints,
+        part: Ints,
+        function: Ints,
+        gain: Array,
+    ) -> None:
+        self.start, self.kind, self.axis, self.direction, self.point = start, kind, axis, direction, point
+        self.center, self.small, self.rotates, self.screws, self.family = center, small, rotates, screws, family
+        self.signal_axis, self.signal, self.first, self.order = signal_axis, signal, first, order
+        self.part, self.function, self.gain = part, function, gain
+        steps, groups, terms = len(kind), len(family), len(part)
+        self.steps, self.functions, self.axes, self.turns, self.given = steps, len(order), 0, 0, 0
+        sizes = (len(start) - 6, len(axis) - steps, len(direction) - 3 * steps, len(point) - 3 * steps)
+        sizes += (len(center) - 3 * steps, len(small) - steps, len(rotates) - steps, len(screws) - steps)
+        sizes += (len(signal_axis) - groups, len(signal) - 5 * groups, len(first) - groups - 1)
+        sizes += (len(function) - terms, len(gain) - terms, first[0], first[groups] - len(order))
+        right = not any(sizes)
+        for i in range(steps):
+            if kind[i] == SHIFT:
+                right, self.axes = right and axis[i] >= 0, max(self.axes, axis[i] + 1)
+            else:
+                right, self.turns = right and (axis[i] >= 0 or kind[i] != TURN), max(self.turns, axis[i] + 1)
+            right = right and (kind[i] in (SHIFT, TURN) or 0 <= small[i] < steps)
+        for g in range(groups):
+            right = right and first[g] <= first[g + 1]
+            if family[g] == GIVEN:
+                self.given += first[g + 1] - first[g]
+            elif family[g] == POWERS:
+                right, self.axes = right and signal_axis[g] >= 0, max(self.axes, signal_axis[g] + 1)
+            else:
+                right, self.turns = right and signal_axis[g] >= 0, max(self.turns, signal_axis[g] + 1)
+                right = right and (first[g + 1] - first[g]) % 2 == 0
+        for t in range(terms):
+            right = right and 0 <= part[t] < PARTS * steps and 0 <= function[t] < len(order)
+        if not right:
+            raise IndexError("these are not the steps of a route")
+
+    # -- what is done to a handful ------------------------------------------------------------------------------------
+
+    def set_off(self, hand: Hand, count: int, tip: int) -> int:
+        """Where the tips of a handful of poses are before all steps, in rows from `tip` on: as `steps.at_tip`."""
+        work, length = hand.work, hand.length
+        x, y, z = self.start[0], self.start[1], self.start[2]
+        u, v, w = self.start[3], self.start[4], self.start[5]
+        for k in range(count):
+            work[tip, k], work[tip + 1, k] = x + u * work[length, k], y + v * work[length, k]
+            work[tip + 2, k], work[tip + 3, k] = z + w * work[length, k], 0.0
+        return 0
+
+    def carry(self, hand: Hand, count: int, tip: int, values: int, stop: int) -> int:
+        """Where points of a handful of poses go up to a step, rows from `tip` on: as `steps.carried`.
+
+        values  the first row of the numbers of small motions
+        """
+        work = hand.work
+        for i in range(stop):
+            kind, axis, j, at = self.kind[i], self.axis[i], 3 * i, values + PARTS * self.small[i]
+            dx, dy, dz = self.direction[j], self.direction[j + 1], self.direction[j + 2]
+            if kind == SHIFT:
+                for k in range(count):
+                    way = work[axis, k]
+                    work[tip, k] = work[tip, k] + dx * way
+                    work[tip + 1, k] = work[tip + 1, k] + dy * way
+                    work[tip + 2, k] = work[tip + 2, k] + dz * way
+            elif kind == TURN:
+                self.turn(hand, i, count, tip, 1.0)
+            elif not self.rotates[i]:
+                sign = 1.0 if kind == FORTH else -1.0
+                for k in range(count):
+                    work[tip, k] = work[tip, k] + sign * work[at, k]
+                    work[tip + 1, k] = work[tip + 1, k] + sign * work[at + 1, k]
+                    work[tip + 2, k] = work[tip + 2, k] + sign * work[at + 2, k]
+            elif axis < 0 and not self.screws[i]:
+                if kind == FORTH:
+                    self.nudge_forth(hand, i, count, tip, at)
+                else:
+                    self.nudge_back(hand, i, count, tip, at)
+            else:
+                self.screw(hand, i, count, tip, at)
+        return 0
+
+    def turn(self, hand: Hand, i: int, count: int, tip: int, sense: float) -> int:
+        """Turn points about the axis of step i, back if `sense` is -1: as `steps.turned`."""
+        work, j, sine, versine = hand.work, 3 * i, hand.sine + self.axis[i], hand.versine + self.axis[i]
+        dx, dy, dz = self.direction[j], self.direction[j + 1], self.direction[j + 2]
+        px, py, pz = self.point[j], self.point[j + 1], self.point[j + 2]
+        for k in range(count):
+            s, c = sense * work[sine, k], work[versine, k]
+            x, y, z = work[tip, k], work[tip + 1, k], work[tip + 2, k]
+            ax, ay, az = x - px, y - py, z - pz
+            ox, oy, oz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
+            tx, ty, tz = dy * oz - dz * oy, dz * ox - dx * oz, dx * oy - dy * ox
+            work[tip, k] = x + (s * ox + c * tx)
+            work[tip + 1, k] = y + (s * oy + c * ty)
+            work[tip + 2, k] = z + (s * oz + c * tz)
+        return 0
+
+    def nudge_forth(self, hand: Hand, i: int, count: int, tip: int, at: int) -> int:
+        """Move points by the small motion of step i about one point: as `steps.moved_forth`."""
+        work, a, b, c = hand.work, self.center[3 * i], self.center[3 * i + 1], self.center[3 * i + 2]
+        for k in range(count):
+            u, v, w = work[at + 3, k], work[at + 4, k], work[at + 5, k]
+            s = u * u + v * v + w * w
+            work[tip + 3, k] = max(work[tip + 3, k], s)
+            x, y, z = work[tip, k], work[tip + 1, k], work[tip + 2, k]
+            first = 1 - s * (1.0 / 6.0) * (1 - s * (1.0 / 20.0))
+            second = 0.5 - s * (1.0 / 24.0) * (1 - s * (1.0 / 30.0))
+            ax, ay, az = x - a, y - b, z - c
+            ox, oy, oz = v * az - w * ay, w * ax - u * az, u * ay - v * ax
+            tx, ty, tz = v * oz - w * oy, w * ox - u * oz, u * oy - v * ox
+            work[tip, k] = x + (first * ox + second * tx) + work[at, k]
+            work[tip + 1, k] = y + (first * oy + second * ty) + work[at + 1, k]
+            work[tip + 2, k] = z + (first * oz + second * tz) + work[at + 2, k]
+        return 0
+
+    def nudge_back(self, hand: Hand, i: int, count: int, tip: int, at: int) -> int:
+        """Undo that: as `steps.moved_back`."""
+        work, a, b, c = hand.work, self.center[3 * i], self.center[3 * i + 1], self.center[3 * i + 2]
+        for k in range(count):
+            u, v, w = -work[at + 3, k], -work[at + 4, k], -work[at + 5, k]
+            s = u * u + v * v + w * w
+            work[tip + 3, k] = max(work[tip + 3, k], s)
+            x, y, z = work[tip, k] - work[at, k], work[tip + 1, k] - work[at + 1, k], work[tip + 2, k] - work[at + 2, k]
+            first = 1 - s * (1.0 / 6.0) * (1 - s * (1.0 / 20.0))
+            second = 0.5 - s * (1.0 / 24.0) * (1 - s * (1.0 / 30.0))
+            ax, ay, az = x - a, y - b, z - c
+            ox, oy, oz = v * az - w * ay, w * ax - u * az, u * ay - v * ax
+            tx, ty, tz = v * oz - w * oy, w * ox - u * oz, u * oy - v * ox
+            work[tip, k] = x + (first * ox + second * tx)
+            work[tip + 1, k] = y + (first * oy + second * ty)
+            work[tip + 2, k] = z + (first * oz + second * tz)
+        return 0
+
+    def screw(self, hand: Hand, i: int, count: int, tip: int, at: int) -> int:
+        """Move points by a small motion with rotations about several points, or about one that is carried."""
+        work, j, axis, forth = hand.work, 3 * i, self.axis[i], self.kind[i] == FORTH
+        dx, dy, dz = self.direction[j], self.direction[j + 1], self.direction[j + 2]
+        px, py, pz = self.point[j], self.point[j + 1], self.point[j + 2]
+        for k in range(count):
+            t0, t1, t2 = work[at, k], work[at + 1, k], work[at + 2, k]
+            u, v, w = work[at + 3, k], work[at + 4, k], work[at + 5, k]
+            s = u * u + v * v + w * w
+            work[tip + 3, k] = max(work[tip + 3, k], s)
+            first = 1 - s * (1.0 / 6.0) * (1 - s * (1.0 / 20.0))
+            second = 0.5 - s * (1.0 / 24.0) * (1 - s * (1.0 / 30.0))
+            if self.screws[i]:
+                third = 1.0 / 6.0 - s * (1.0 / 120.0) * (1 - s * (1.0 / 42.0))
+                x, y, z = work[at + 6, k], work[at + 7, k], work[at + 8, k]
+                ox, oy, oz = v * z - w * y, w * x - u * z, u * y - v * x
+                tx, ty, tz = v * oz - w * oy, w * ox - u * oz, u * oy - v * ox
+                t0 = t0 + (x + (second * ox + third * tx))
+                t1 = t1 + (y + (second * oy + third * ty))
+                t2 = t2 + (z + (second * oz + third * tz))
+            a, b, c = self.center[j], self.center[j + 1], self.center[j + 2]
+            if axis >= 0:
+                sine, versine = work[hand.sine + axis, k], work[hand.versine + axis, k]
+                ax, ay, az = a - px, b - py, c - pz
+                ox, oy, oz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
+                tx, ty, tz = dy * oz - dz * oy, dz * ox - dx * oz, dx * oy - dy * ox
+                a, b, c = a + (sine * ox + versine * tx), b + (sine * oy + versine * ty), c + (sine * oz + versine * tz)
+            x, y, z = work[tip, k], work[tip + 1, k], work[tip + 2, k]
+            if not forth:
+                x, y, z, u, v, w = x - t0, y - t1, z - t2, -u, -v, -w
+            ax, ay, az = x - a, y - b, z - c
+            ox, oy, oz = v * az - w * ay, w * ax - u * az, u * ay - v * ax
+            tx, ty, tz = v * oz - w * oy, w * ox - u * oz, u * oy - v * ox
+            x, y, z = x + (first * ox + second * tx), y + (first * oy + second * ty), z + (first * oz + second * tz)
+            if forth:
+                x, y, z = x + t0, y + t1, z + t2
+            work[tip, k], work[tip + 1, k], work[tip + 2, k] = x, y, z
+        return 0
+
+    def work_out(self, hand: Hand, count: int, used: int, values: int) -> int:
+        """The numbers of the small motions, rows from `values` on: as `steps.work_out_functions` and `add_up`.
+
+        The tips lend their room to it. `used`: how many of the functions from elsewhere are for other routes; those
+        after them are added to it.
+        """
+        work, found, last = hand.work, hand.found, -1
+        for g in range(self.family.shape[0]):
+            if self.family[g] == GIVEN:
+                for f in range(self.first[g], self.first[g + 1]):
+                    for k in range(count):
+                        work[found + f, k] = work[hand.others + used, k]
+                    used += 1
+            elif self.family[g] == POWERS:
+                self.powers(hand, g, count)
+            else:
+                self.waves(hand, g, count)
+        for t in range(self.part.shape[0]):
+            part, function, gain = self.part[t], found + self.function[t], self.gain[t]
+            if part == last:
+                for k in range(count):
+                    work[values + part, k] = work[values + part, k] + gain * work[function, k]
+            else:
+                for k in range(count):
+                    work[values + part, k] = gain * work[function, k]
+            last = part
+        return used
+
+    def powers(self, hand: Hand, g: int, count: int) -> int:
+        """Powers of a position."""
+        work, u, value, axis, at, power = hand.work, hand.tip, hand.tip + 1, self.signal_axis[g], 5 * g, 1
+        unit, low, high = self.signal[at], self.signal[at + 1], self.signal[at + 2]
+        center, scale = self.signal[at + 3], self.signal[at + 4]
+        for k in range(count):
+            work[u, k] = (min(max(work[axis, k] / unit, low), high) - center) / scale
+            work[value, k] = work[u, k]
+        for f in range(self.first[g], self.first[g + 1]):
+            order, row = self.order[f], hand.found + f
+            while power < order:
+                power += 1
+                for k in range(count):
+                    work[value, k] = work[value, k] * work[u, k]
+            if order > 0:
+                for k in range(count):
+                    work[row, k] = work[value, k]
+            else:
+                for k in range(count):
+                    work[row, k] = 1.0
+        return 0
+
+    def waves(self, hand: Hand, g: int, count: int) -> int:
+        """Harmonics of an angle."""
+        work, tip, axis, order = hand.work, hand.tip, self.signal_axis[g], 1
+        sine, versine = hand.sine + axis, hand.versine + axis
+        for k in range(count):
+            work[tip, k] = 1 - work[versine, k]
+            work[tip + 1, k], work[tip + 2, k] = work[tip, k], work[sine, k]
+        for f in range(self.first[g], self.first[g + 1], 2):
+            row = hand.found + f
+            while order < self.order[f]:
+                order += 1
+                for k in range(count):
+                    c, s = work[tip + 1, k], work[tip + 2, k]
+                    work[tip + 1, k] = c * work[tip, k] - s * work[sine, k]
+                    work[tip + 2, k] = s * work[tip, k] + c * work[sine, k]
+            for k in range(count):
+                work[row, k], work[row + 1, k] = work[tip + 1, k], work[tip + 2, k]
+        return 0
+
+    def follow(self, hand: Hand, column: int, count: int, way: int) -> int:
+        """How the tips of a handful follow a linear axis, mm per mm, rows from `way` on: as `steps.follows`."""
+        work, found = hand.work, False
+        for k in range(count):
+            work[way, k], work[way + 1, k], work[way + 2, k] = 0.0, 0.0, 0.0
+        for i in range(self.kind.shape[0]):
+            axis, j = self.axis[i], 3 * i
+            dx, dy, dz = self.direction[j], self.direction[j + 1], self.direction[j + 2]
+            if self.kind[i] == SHIFT and axis == column:
+                found = True
+                for k in range(count):
+                    work[way, k], work[way + 1, k], work[way + 2, k] = dx, dy, dz
+            elif self.kind[i] == TURN and found:
+                sine, versine = hand.sine + axis, hand.versine + axis
+                for k in range(count):
+                    x, y, z = work[way, k], work[way + 1, k], work[way + 2, k]
+                    ox, oy, oz = dy * z - dz * y, dz * x - dx * z, dx * y - dy * x
+                    tx, ty, tz = dy * oz - dz * oy, dz * ox - dx * oz, dx * oy - dy * ox
+                    work[way, k] = x + (work[sine, k] * ox + work[versine, k] * tx)
+                    work[way + 1, k] = y + (work[sine, k] * oy + work[versine, k] * ty)
+                    work[way + 2, k] = z + (work[sine, k] * oz + work[versine, k] * tz)
+        return 0
+
+
+class Hand:
+    """Many poses in columns, and room for what is worked out for a handful of them.
+
+    q              (n_axes, n) positions
+    sine, versine  (k, n) of rotary axes; as numbers the first of their rows in `work`
+    others         functions that come from elsewhere
+    length         (n,) or (1,) of the tool, mm
+    work           room, see `rows_for`; positions come first
+    """
+
+    def __init__(
+        self,
+        q: Array,
+        sine: Array,
+        versine: Array,
+        others: Array,
+        length: Array,
+        work: Array,
+        functions: int,
+        small: int,
+    ) -> None:
+        self.q, self.sines, self.versines, self.given, self.lengths, self.work = q, sine, versine, others, length, work
+        self.n = q.shape[1]
+        self.sine = q.shape[0]
+        self.versine = self.sine + sine.shape[0]
+        self.others = self.versine + sine.shape[0]
+        self.found = self.others + others.shape[0]
+        self.values = self.found + functions
+        self.tip = self.values + PARTS * small
+        self.length, self.spare = self.tip + 4, self.tip + 5
+        rows = self.spare + SPARE
+        if work.shape[0] < rows or work.shape[1] != HANDFUL or versine.shape[0] != sine.shape[0]:
+            raise IndexError("there is no room for what is worked out for a handful of poses")
+        if {sine.shape[1], versine.shape[1], others.shape[1]} != {self.n} or length.shape[0] not in (1, self.n):
+            raise IndexError("there are not as many of everything as there are poses")
+
+    def fits(self, route: RouteSteps, given: int) -> bool:
+        """Whether all rows are there that a route needs; `given` functions from elsewhere are for other routes."""
+        return (
+            route.axes <= self.q.shape[0]
+            and route.turns <= self.sines.shape[0]
+            and route.given <= self.given.shape[0] - given
+            and route.functions <= self.values - self.found
+        )
+
+    def take_up(self, begin: int, count: int) -> int:
+        """Put a handful of poses next to each other."""
+        for i in range(self.q.shape[0]):
+            for k in range(count):
+                self.work[i, k] = self.q[i, begin + k]
+        for i in range(self.sines.shape[0]):
+            for k in range(count):
+                self.work[self.sine + i, k], self.work[self.versine + i, k] = (
+                    self.sines[i, begin + k],
+                    self.versines[i, begin + k],
+                )
+        for i in range(self.given.shape[0]):
+            for k in range(count):
+                self.work[self.others + i, k] = self.given[i, begin + k]
+        for k in range(count):
+            self.work[self.length, k] = self.lengths[begin + k if self.lengths.shape[0] > 1 else 0]
+        return 0
+
+
+def rows_for(axes: int, turns: int, others: int, functions: int, small: int) -> int:
+    """Rows of `HANDFUL` numbers that the room of a `Hand` has.
+
+    axes, turns, others  rows of `q`, `sine` and `others`
+    functions, small     functions of a route, and small motions of all routes; what none of the functions of a route
+                         adds to has to stay zero
+    """
+    return axes + 2 * turns + others + functions + PARTS * small + 5 + SPARE
+
+
+def tips(route: RouteSteps, hand: Hand, out: Array) -> int:
+    """The tips of all poses: out (4, n) are x, y, z in mm, and the largest squared angle of a small motion."""
+    if (
+        not hand.fits(route, 0)
+        or out.shape[0] != 4
+        or out.shape[1] != hand.n
+        or hand.tip - hand.values < PARTS * route.steps
+    ):
+        raise IndexError("a route needs more than it is given")
+    begin = 0
+    while begin < hand.n:
+        count = min(HANDFUL, hand.n - begin)
+        hand.take_up(begin, count)
+        route.work_out(hand, count, 0, hand.values)
+        route.set_off(hand, count, hand.tip)
+        route.carry(hand, count, hand.tip, hand.values, route.steps)
+        for i in range(4):
+            for k in range(count):
+                out[i, begin + k] = hand.work[hand.tip + i, k]
+        begin += HANDFUL
+    return 0
+
+
+def set_goal(perfect: RouteSteps, hand: Hand, count: int, target: Array, begin: int, point: int) -> int:
+    """Put down where the tips shall be: at `target` (3, n) mm, or (3, 0) where a perfect machine has them."""
+    work = hand.work
+    if target.shape[1]:
+        for k in range(count):
+            work[point, k], work[point + 1, k] = target[0, begin + k], target[1, begin + k]
+            work[point + 2, k], work[point + 3, k] = target[2, begin + k], 0.0
+    else:
+        perfect.set_off(hand, count, point)
+        perfect.carry(hand, count, point, hand.values, perfect.steps)
+    return 0
+
+
+def gaps(
+    perfect: RouteSteps, real: RouteSteps, hand: Hand, target: Array, sides: Ints, out: Array, angle: Array
+) -> int:
+    """How far the tips of all poses are from where they shall be: out (k, n, 3) mm.
+
+    hand    n poses as they are meant, and others behind them, n of each kind
+    target  (3, n) mm; (3, 0): where a perfect machine has the tip as meant
+    sides   (k,) which kind each of the results is of
+    angle   (k, n) the largest squared angle of a small motion
+    """
+    n, work, tip, point = out.shape[1], hand.work, hand.tip, hand.spare
+    right = hand.fits(perfect, 0) and hand.fits(real, 0) and hand.tip - hand.values >= PARTS * real.steps
+    right = right and perfect.part.shape[0] == 0 and out.shape[2] == 3 and target.shape[1] in (0, n)
+    right = right and hand.tip - hand.values >= PARTS * perfect.steps and target.shape[0] == 3
+    right = right and angle.shape[0] == out.shape[0] == sides.shape[0] and angle.shape[1] == n <= hand.n
+    for side in range(sides.shape[0]):
+        right = right and sides[side] >= 0 and (sides[side] + 1) * n <= hand.n
+    if not right:
+        raise IndexError("a route needs more than it is given")
+    begin = 0
+    while begin < n:
+        count = min(HANDFUL, n - begin)
+        hand.take_up(begin, count)
+        set_goal(perfect, hand, count, target, begin, point)
+        for side in range(sides.shape[0]):
+            hand.take_up(sides[side] * n + begin, count)
+            real.work_out(hand, count, 0, hand.values)
+            real.set_off(hand, count, tip)
+            real.carry(hand, count, tip, hand.values, real.steps)
+            for k in range(count):
+                angle[side, begin + k] = work[tip + 3, k]
+                for i in range(3):
+                    out[side, begin + k, i] = work[tip + i, k] - work[point + i, k]
+        begin += HANDFUL
+    return 0
+
+
+# -- linear axes that bring the tip to a point ------------------------------------------------------------------------
+
+
+def aim(
+    perfect: RouteSteps,
+    within: RouteSteps,
+    behind: RouteSteps,
+    hand: Hand,
+    axes: Ints,
+    target: Array,
+    close: float,
+    flat: float,
+    passes: int,
+    out: Array,
+) -> int:
+    """Newton's method for all poses: as `machine.aim.aimed`, by whole steps.
+
+    within, behind  the two of `route.SplitRoute`; the other functions in `hand` are of the second, then of the first
+    axes            the columns of X, Y and Z
+    target          (3, n) mm; (3, 0): where a perfect machine has the tip
+    close, flat     when a tip has arrived, mm, and which volume of its motions is none
+    passes          how many steps there are
+    out             (6, n): positions of the axes, how far off the tip is at the beginning, mm, largest squared angles
+                    of small motions, and whether the tip has arrived
+    """
+    n, work, tip, point = hand.n, hand.work, hand.tip, hand.spare
+    ahead = hand.values + PARTS * within.steps
+    right = hand.fits(perfect, 0) and hand.fits(behind, 0) and hand.fits(within, behind.given)
+    right = right and hand.tip - hand.values >= PARTS * (within.steps + behind.steps) and perfect.part.shape[0] == 0
+    right = right and hand.tip - hand.values >= PARTS * perfect.steps and target.shape[0] == 3
+    right = right and target.shape[1] in (0, n) and out.shape[0] == 6 and out.shape[1] == n and axes.shape[0] == 3
+    for i in range(axes.shape[0]):
+        right = right and 0 <= axes[i] < hand.q.shape[0]
+    if not right:
+        raise IndexError("a route needs more than it is given")
+    begin = 0
+    while begin < n:
+        count = min(HANDFUL, n - begin)
+        hand.take_up(begin, count)
+        set_goal(perfect, hand, count, target, begin, point)
+        used = behind.work_out(hand, count, 0, ahead)
+        behind.carry(hand, count, point, ahead, behind.steps)
+        left = set_out(within, axes, hand, count, flat)
+        for k in range(count):
+            out[3, begin + k], out[4, begin + k], out[5, begin + k] = 0.0, work[point + 3, k], 0.0
+        number = 0
+        while left and number < passes:
+            within.work_out(hand, count, used, hand.values)
+            within.set_off(hand, count, tip)
+            within.carry(hand, count, tip, hand.values, within.steps)
+            left -= step_closer(axes, close, number == 0, hand, count, begin, out)
+            number += 1
+        for i in range(3):
+            for k in range(count):
+                out[i, begin + k] = work[axes[i], k]
+        begin += HANDFUL
+    return 0
+
+
+def set_out(steps: RouteSteps, axes: Ints, hand: Hand, count: int, flat: float) -> int:
+    """Put down how the tips follow the axes; how many can be brought to their goals at all.
+
+    Of the rows to spare, four are the goals, and the largest squared angle behind them; nine what takes a gap of the
+    tip to positions of the axes; and one the size of the gap before, mm, -1 if the axes cannot bring the tip there.
+    """
+    work, point, back, before, whole, total = (
+        hand.work,
+        hand.spare,
+        hand.spare + 4,
+        hand.spare + 13,
+        hand.tip,
+        hand.tip + 1,
+    )
+    left = 0
+    for i in range(3):
+        steps.follow(hand, axes[i], count, back + 3 * i)
+    for k in range(count):
+        ax, ay, az = work[back, k], work[back + 1, k], work[back + 2, k]
+        bx, by, bz = work[back + 3, k], work[back + 4, k], work[back + 5, k]
+        cx, cy, cz = work[back + 6, k], work[back + 7, k], work[back + 8, k]
+        px, py, pz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+        qx, qy, qz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+        rx, ry, rz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        size = ax * px + ay * py + az * pz
+        share = 1 / size if size != 0 else inf
+        work[whole, k] = size
+        work[back, k], work[back + 1, k], work[back + 2, k] = px * share, py * share, pz * share
+        work[back + 3, k], work[back + 4, k], work[back + 5, k] = qx * share, qy * share, qz * share
+        work[back + 6, k], work[back + 7, k], work[back + 8, k] = rx * share, ry * share, rz * share
+        work[total, k] = work[point, k] + work[point + 1, k] + work[point + 2, k]
+    for i in range(hand.q.shape[0]):
+        for k in range(count):
+            work[total, k] = work[total, k] + work[i, k]
+    for k in range(count):
+        possible = abs(work[total, k]) < inf and not abs(work[whole, k]) < flat
+        work[before, k] = 0.0 if possible else -1.0
+        left += 1 if possible else 0
+    return left
+
+
+def step_closer(axes: Ints, close: float, begins: bool, hand: Hand, count: int, begin: int, out: Array) -> int:
+    """Move the axes against the gaps of the tips; how many have arrived with that."""
+    work, gap, point, back, last, arrived = hand.work, hand.tip, hand.spare, hand.spare + 4, hand.spare + 13, 0
+    for i in range(3):
+        for k in range(count):
+            work[gap + i, k] = work[gap + i, k] - work[point + i, k]
+    for i in range(3):
+        q, row = axes[i], back + 3 * i
+        for k in range(count):
+            step = (
+                work[row, k] * work[gap, k] + work[row + 1, k] * work[gap + 1, k] + work[row + 2, k] * work[gap + 2, k]
+            )
+            if work[last, k] >= 0 and out[5, begin + k] == 0:
+                work[q, k] = work[q, k] - step
+    for k in range(count):
+        before, x, y, z = work[last, k], work[gap, k], work[gap + 1, k], work[gap + 2, k]
+        size = sqrt(x * x + y * y + z * z)
+        if before >= 0 and out[5, begin + k] == 0:
+            if begins:
+                out[3, begin + k] = size
+            out[4, begin + k] = max(out[4, begin + k], work[gap + 3, k])
+            if size < close or size * size < close * before:
+                out[5, begin + k] = 1.0
+                arrived += 1
+            work[last, k] = size
+    return arrived
+
+
+def placed(perfect: RouteSteps, hand: Hand, axes: Ints, ways_back: Array, target: Array, out: Array) -> int:
+    """Where linear axes have to be for all tips to be at `target` (3, n) mm, out (3, n): as `Route.placed`.
+
+    axes       the columns of X, Y and Z; no rotary axis stands between them
+    ways_back  (3, 3) what takes a way of the tip to one of the axes
+    """
+    work, tip, point, n, first = hand.work, hand.tip, hand.spare, hand.n, perfect.steps
+    right = hand.fits(perfect, 0) and axes.shape[0] == 3 and ways_back.shape[0] == ways_back.shape[1] == 3
+    right = right and perfect.part.shape[0] == 0 and hand.tip - hand.values >= PARTS * perfect.steps
+    right = right and target.shape[0] == out.shape[0] == 3 and target.shape[1] == out.shape[1] == n
+    for i in range(axes.shape[0]):
+        right = right and 0 <= axes[i] < hand.q.shape[0]
+    if not right:
+        raise IndexError("a route needs more than it is given")
+    for i in range(perfect.steps - 1, -1, -1):
+        if perfect.kind[i] == SHIFT and is_one_of(perfect.axis[i], axes):
+            first = i
+    begin = 0
+    while begin < n:
+        count = min(HANDFUL, n - begin)
+        hand.take_up(begin, count)
+        perfect.set_off(hand, count, tip)
+        perfect.carry(hand, count, tip, hand.values, first)
+        for i in range(3):
+            for k in range(count):
+                work[point + i, k] = target[i, begin + k]
+        for i in range(perfect.steps - 1, first - 1, -1):
+            axis, j = perfect.axis[i], 3 * i
+            if perfect.kind[i] == TURN:
+                perfect.turn(hand, i, count, point, -1.0)
+            elif not is_one_of(axis, axes):
+                dx, dy, dz = perfect.direction[j], perfect.direction[j + 1], perfect.direction[j + 2]
+                for k in range(count):
+                    way = work[axis, k]
+                    work[point, k] = work[point, k] - dx * way
+                    work[point + 1, k] = work[point + 1, k] - dy * way
+                    work[point + 2, k] = work[point + 2, k] - dz * way
+        for i in range(3):
+            a, b, c = ways_back[i, 0], ways_back[i, 1], ways_back[i, 2]
+            for k in range(count):
+                x, y, z = (
+                    work[point, k] - work[tip, k],
+                    work[point + 1, k] - work[tip + 1, k],
+                    work[point + 2, k] - work[tip + 2, k],
+                )
+                out[i, begin + k] = a * x + b * y + c * z
+        begin += HANDFUL
+    return 0
+
+
+def is_one_of(axis: int, axes: Ints) -> bool:
+    """Whether a column is that of X, Y or Z."""
+    return bool(axis == axes[0] or axis == axes[1] or axis == axes[2])
+
+
+# -- points and directions of `machine.chain` -------------------------------------------------------------------------
+
+
+def fit(moved: Array, weight: Array, out: Array) -> bool:
+    """Whether columns have room for results of the same shape, and a weight each."""
+    same = moved.shape[0] == out.shape[0] == 3 and moved.shape[1] == out.shape[1] == weight.shape[0]
+    return same and moved.shape[2] == out.shape[2]
+
+
+def advanced(d: Array, p: Array, sine: Array, versine: Array, moved: Array, weight: Array, out: Array) -> int:
+    """Columns (3, m, n) of weights (m,) after a rotary axis with direction d through p has turned."""
+    if not (
+        fit(moved, weight, out)
+        and d.shape[0] == p.shape[0] == 3
+        and sine.shape[0] == versine.shape[0] == moved.shape[2]
+    ):
+        raise IndexError("columns of other shapes")
+    dx, dy, dz = d[0], d[1], d[2]
+    for i in range(moved.shape[1]):
+        px, py, pz = p[0] * weight[i], p[1] * weight[i], p[2] * weight[i]
+        for k in range(moved.shape[2]):
+            x, y, z, s, v = moved[0, i, k], moved[1, i, k], moved[2, i, k], sine[k], versine[k]
+            ax, ay, az = x - px, y - py, z - pz
+            ox, oy, oz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
+            tx, ty, tz = dy * oz - dz * oy, dz * ox - dx * oz, dx * oy - dy * ox
+            out[0, i, k] = (x + s * ox) + v * tx
+            out[1, i, k] = (y + s * oy) + v * ty
+            out[2, i, k] = (z + s * oz) + v * tz
+    return 0
+
+
+def moved_small(r: Array, t: Array, c: Array, back: bool, moved: Array, weight: Array, out: Array) -> int:
+    """Columns (3, m, n) after small motions r, t (3, n) about c (3, n): as `SmallMotion.forth`, or as its `back`."""
+    n = moved.shape[2]
+    if not (
+        fit(moved, weight, out)
+        and r.shape[0] == t.shape[0] == c.shape[0] == 3
+        and r.shape[1] == t.shape[1] == c.shape[1] == n
+    ):
+        raise IndexError("columns of other shapes")
+    for i in range(moved.shape[1]):
+        weighed = weight[i]
+        for k in range(n):
+            x, y, z = moved[0, i, k], moved[1, i, k], moved[2, i, k]
+            u, v, w, tx, ty, tz = r[0, k], r[1, k], r[2, k], t[0, k] * weighed, t[1, k] * weighed, t[2, k] * weighed
+            if back:
+                x, y, z, u, v, w = x - tx, y - ty, z - tz, -u, -v, -w
+            ax, ay, az = x - c[0, k] * weighed, y - c[1, k] * weighed, z - c[2, k] * weighed
+            s = (u * u + v * v) + w * w
+            first = 1 - s / 6 * (1 - s / 20 * (1 - s / 42 * (1 - s / 72)))
+            second = 0.5 - s / 24 * (1 - s / 30 * (1 - s / 56 * (1 - s / 90)))
+            ox, oy, oz = v * az - w * ay, w * ax - u * az, u * ay - v * ax
+            ex, ey, ez = v * oz - w * oy, w * ox - u * oz, u * oy - v * ox
+            x, y, z = x + (first * ox + second * ex), y + (first * oy + second * ey), z + (first * oz + second * ez)
+            if not back:
+                x, y, z = x + tx, y + ty, z + tz
+            out[0, i, k], out[1, i, k], out[2, i, k] = x, y, z
+    return 0
+
+
+def turned(r: Array, first: float, second: float, c: Array, moved: Array, weight: Array, out: Array) -> int:
+    """Columns (3, m, n) after one rotation r with its factors about c: as `SmallMotion.forth` without translation."""
+    if not (fit(moved, weight, out) and r.shape[0] == c.shape[0] == 3):
+        raise IndexError("columns of other shapes")
+    u, v, w = r[0], r[1], r[2]
+    for i in range(moved.shape[1]):
+        cx, cy, cz = c[0] * weight[i], c[1] * weight[i], c[2] * weight[i]
+        for k in range(moved.shape[2]):
+            x, y, z = moved[0, i, k], moved[1, i, k], moved[2, i, k]
+            ax, ay, az = x - cx, y - cy, z - cz
+            ox, oy, oz = v * az - w * ay, w * ax - u * az, u * ay - v * ax
+            tx, ty, tz = v * oz - w * oy, w * ox - u * oz, u * oy - v * ox
+            out[0, i, k] = x + (first * ox + second * tx)
+            out[1, i, k] = y + (first * oy + second * ty)
+            out[2, i, k] = z + (first * oz + second * tz)
+    return 0

@@ -1,0 +1,205 @@
+"""The scan of a text: numbers, comments and shapes of its blocks in one pass over the bytes.
+
+It finds what `text.shapes.scan` finds by columns, to the last bit; a test holds the two together.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Bytes = NDArray[np.uint8]
+    Ints = NDArray[np.int64]
+    Floats = NDArray[np.float64]
+    Rows = NDArray[np.int32]
+
+UNTOUCHED, CRAMPED = -1, -2
+"""Instead of the number of shapes: there is a block that must be taken as it is, or more than there is room for."""
+NONE, BROKEN = -1, -2
+FREE, FIXED = 1, 2
+"""A number, and one that belongs to the shape."""
+LITERAL, NUMERIC, SIGN, COMMENT, ODD = 0, 1, 2, 3, 4
+"""Kinds of bytes: of the shape as they are, of a number, a sign, the beginning of a comment, or not to be scanned."""
+CHARACTER, CHILD, SIBLING, SHAPE = 0, 1, 2, 3
+"""Columns of the tree of shapes, a row for each beginning of one: its last character, the first of the rows that go on
+from it (0: none), the next row that goes on from where this one does, and the number of the shape that ends there (-1:
+none does). Row 0 is the beginning of all."""
+POINT, ZERO, MINUS, OPEN, CLOSE, TAIL = 46, 48, 45, 40, 41, 59
+"""The characters . 0 - ( ) ;"""
+
+
+class Scanner:
+    """What one kind of text is made of, tables of the 256 bytes.
+
+    kinds           LITERAL, NUMERIC, SIGN, COMMENT or ODD
+    fixed           a number after these belongs to the shape
+    unsigned_after  a sign after these does not belong to the number behind it
+    blank           blanks and tabs
+    blanks, digits  see `numbers.BLANKS` and `numbers.EXACT_DIGITS`
+    powers          of ten
+    """
+
+    def __init__(
+        self, kinds: Bytes, fixed: Bytes, unsigned_after: Bytes, blank: Bytes, blanks: int, digits: int, powers: Floats
+    ) -> None:
+        self.kinds, self.fixed, self.unsigned_after, self.blank = kinds, fixed, unsigned_after, blank
+        self.blanks, self.digits, self.powers = blanks, digits, powers
+        self.start = self.past = self.size = 0
+        self.pointed = False
+        self.value = 0.0
+
+    def scan(
+        self,
+        text: Bytes,
+        blocks: Ints,
+        number_mark: int,
+        pointless_mark: int,
+        comment_mark: int,
+        group: Ints,
+        comment: Ints,
+        first: Ints,
+        spans: Ints,
+        values: Floats,
+        shapes: Bytes,
+        starts: Ints,
+        tree: Rows,
+    ) -> int:
+        """Scan the n blocks (n, 2) of a text; how many shapes there are, or `UNTOUCHED`, or `CRAMPED`.
+
+        The marks stand for a number, for one without a point, for the comment that ends a block.
+
+        Room for results, that of numbers and of the tree for each byte of the text, or for fewer:
+
+        group          (n,) which shape each block has
+        comment        (n,) where its last comment begins; left as it is if it has none
+        first          (n + 1,) its first number
+        spans, values  of the numbers
+        shapes         one after the other
+        starts         where each begins
+        tree           see `CHARACTER`
+        """
+        count, known, end = 0, 0, 0
+        self.size, starts[0] = 1, 0
+        tree[0, CHILD], tree[0, SHAPE] = 0, NONE
+        for block in range(blocks.shape[0]):
+            first[block], end, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
+            row, row_at_sign, end_at_sign = 0, 0, end
+            if max(count - values.shape[0], self.size - tree.shape[0]) + stop - place > 0:
+                return CRAMPED
+            while place < stop:
+                character, past = text[place], place + 1
+                kind = self.kinds[character]
+                if kind == NUMERIC:
+                    form = self.number(text, place, stop)
+                    past = self.past
+                    if form == BROKEN:
+                        return UNTOUCHED
+                    if form == FREE:
+                        if self.start < place:
+                            row, end = row_at_sign, end_at_sign
+                        spans[count, 0], spans[count, 1], values[count] = self.start, past, self.value
+                        count += 1
+                        place, character = past - 1, number_mark if self.pointed else pointless_mark
+                elif kind == COMMENT:
+                    close = self.comment_end(text, place, stop)
+                    if close == BROKEN:
+                        return UNTOUCHED
+                    past = max(past, close)
+                    if close > 0 and self.is_last(text, close, stop):
+                        comment[block], place, character = place, close - 1, comment_mark
+                elif kind == SIGN:
+                    row_at_sign, end_at_sign = row, end
+                elif kind == ODD:
+                    return UNTOUCHED
+                while True:
+                    row = self.led(tree, row, character)
+                    shapes[end] = character
+                    place, end = place + 1, end + 1
+                    if place >= past:
+                        break
+                    character = text[place]
+            if tree[row, SHAPE] < 0:
+                tree[row, SHAPE] = known
+                known += 1
+                starts[known] = end
+            group[block] = tree[row, SHAPE]
+        first[blocks.shape[0]] = count
+        return known
+
+    def number(self, text: Bytes, place: int, stop: int) -> int:
+        """What the run of digits and points at a place is: `FREE`, `FIXED` or `BROKEN`.
+
+        Put down where it starts, with a sign before it, and ends, whether it has a point, and its value.
+        """
+        past, points, point, mantissa = place, 0, stop, 0
+        while past < stop:
+            character = text[past]
+            if ZERO <= character <= ZERO + 9:
+                if past - place - points <= self.digits:  # more are broken anyhow
+                    mantissa = 10 * mantissa + (character - ZERO)
+            elif character == POINT:
+                points += 1
+                point = min(point, past)
+            else:
+                break
+            past += 1
+        digits, decimals = past - place - points, past - point - 1 if points else 0
+        self.start, self.past, self.pointed, self.value = place, past, points > 0, 0.0
+        at = self.before(text, place)
+        leader = text[at] if at >= 0 else 0
+        if self.fixed[leader]:
+            return FIXED
+        if points > 1 or digits == 0 or digits > self.digits:
+            return BROKEN
+        self.value = float(mantissa) / self.powers[decimals]
+        if self.kinds[leader] == SIGN and at >= 0:
+            further = self.before(text, at)
+            if not self.unsigned_after[text[further] if further >= 0 else 0]:
+                self.start = at
+                if leader == MINUS:
+                    self.value = -self.value
+        return FREE
+
+    def before(self, text: Bytes, place: int) -> int:
+        """Where the last character before a place is that is no blank: as `numbers.last_before`."""
+        at = place - 1
+        least = max(at - self.blanks, 0)
+        while at > least and self.blank[text[at]]:
+            at -= 1
+        return at
+
+    def comment_end(self, text: Bytes, place: int, stop: int) -> int:
+        """Where the comment that begins at a place ends; `NONE` if none does, `BROKEN` with something odd in it."""
+        tail = text[place] == TAIL
+        for at in range(place + 1, stop):
+            character = text[at]
+            if self.kinds[character] == ODD:
+                return BROKEN
+            if not tail and character == CLOSE:
+                return at + 1
+            if not tail and character == OPEN:
+                return NONE
+        return stop if tail else NONE
+
+    def is_last(self, text: Bytes, place: int, stop: int) -> bool:
+        """Whether nothing but blanks follows in the block."""
+        while place < stop and self.blank[text[place]]:
+            place += 1
+        return place == stop
+
+    def led(self, tree: Rows, row: int, character: int) -> int:
+        """The row of a tree of shapes to which a character leads from another; a new one if none does."""
+        at = tree[row, CHILD]
+        while at and tree[at, CHARACTER] != character:
+            at = tree[at, SIBLING]
+        if at:
+            return int(at)
+        new = self.size
+        tree[new, CHARACTER], tree[new, CHILD], tree[new, SHAPE] = character, 0, NONE
+        tree[new, SIBLING] = tree[row, CHILD]
+        tree[row, CHILD] = new
+        self.size += 1
+        return new

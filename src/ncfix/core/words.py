@@ -1,0 +1,330 @@
+"""A stretch of corrected motions as text: one pass over its words, digits put where they belong.
+
+What `writer.bulk.WrittenStretch` does by columns, with the same operations on each number, so that the bytes are the
+same; a test holds the two together.
+"""
+
+from __future__ import annotations
+
+from math import copysign
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Bytes = NDArray[np.uint8]
+    Ints = NDArray[np.int64]
+    Rows = NDArray[np.int32]
+    Floats = NDArray[np.float64]
+
+POINT, ZERO, MINUS, PLUS = 46, 48, 45, 43
+"""The characters . 0 - +"""
+LED_HEAD = 1
+"""See `writer.bulk_layouts`."""
+MOST_STEPS = 18
+"""Decimals of the finest output step that is written here."""
+ROOM = 16 + MOST_STEPS + 4
+"""Bytes that a word takes at most: its head, a sign, digits before the point and behind it."""
+
+
+class Rules:
+    """Numbers as `text.number_text` has them.
+
+    powers           of ten
+    longest          bytes, but for its sign, of the longest number that is rewritten here
+    decimals         digits behind the point of the finest one
+    largest, tie     output steps from which on, and how near to the middle between two outputs, as a share of it, a
+                     value is not clear
+    rounded          half output steps by which an axis may stand off its place for nothing but rounding
+    """
+
+    def __init__(self, powers: Floats, longest: int, decimals: int, largest: float, tie: float, rounded: float) -> None:
+        self.powers, self.longest, self.decimals = powers, longest, decimals
+        self.largest, self.tie, self.rounded = largest, tie, rounded
+
+
+class Pen:
+    """Writes motions of a program into a buffer.
+
+    text       of the program
+    blocks     of the program: `edges` (n, 2) their spans, `first` number and `template` of each
+    numbers    of the program: `values` and `spans`
+    layouts    `slots`, `by_place`, `by_letter`, `anchors`, `heads`, `leads`, `openings`, `closings` of `Layouts`
+    line_end   the end of a line
+    offset     and `scale` (axes,): a command is `offset + scale * number`
+    least      (axes,) decimals that the least increment needs
+    half       (axes,) half output steps
+    signed     numbers carry signs
+    here       (axes,) where the control stands
+    """
+
+    def __init__(
+        self,
+        rules: Rules,
+        text: Bytes,
+        edges: Ints,
+        first: Ints,
+        template: Rows,
+        values: Floats,
+        spans: Ints,
+        slots: Ints,
+        by_place: Ints,
+        by_letter: Ints,
+        anchors: Ints,
+        heads: Bytes,
+        leads: Ints,
+        openings: Bytes,
+        closings: Bytes,
+        line_end: Bytes,
+        offset: Floats,
+        scale: Floats,
+        least: Ints,
+        half: Floats,
+        signed: bool,
+        here: Floats,
+        wanted: Floats,
+        now: Floats,
+        told: Ints,
+    ) -> None:
+        self.rules, self.text, self.edges, self.first, self.template = rules, text, edges, first, template
+        self.values, self.spans, self.slots, self.by_place, self.by_letter = values, spans, slots, by_place, by_letter
+        self.anchors, self.heads, self.leads, self.openings, self.closings = anchors, heads, leads, openings, closings
+        self.line_end, self.offset, self.scale, self.least, self.half = line_end, offset, scale, least, half
+        self.signed, self.here, self.wanted, self.now, self.told = signed, here, wanted, now, told
+        self.edits = self.size = self.at = self.own = self.whole = 0
+        self.point = self.plus = False
+        self.read = 0.0
+
+    def write(
+        self, rows: Rows, ends: Floats, pieces: Ints, commands: Floats, start: Ints, stop: Ints, length: Ints,
+        data: Bytes,
+    ) -> int:  # fmt: skip
+        """Write motions up to the first one that is not clear; how many pieces are written.
+
+        rows      (k,) their blocks
+        ends      (m, axes) commands at the ends of their pieces
+        pieces    (k + 1,) the first piece of each motion, and m
+        commands  room for the commands at the ends of the pieces written
+        start, stop, length, data  room for what changes in the source, as in `Splices`; see `edits` and `size`
+        """
+        done = 0
+        for row in range(rows.shape[0]):
+            block, edits, size = rows[row], self.edits, self.size
+            first_piece, last_piece = pieces[row], pieces[row + 1] - 1
+            shape, number, several = self.template[block], self.first[block], first_piece < last_piece
+            for axis in range(self.here.shape[0]):
+                self.now[axis] = (self.here[axis] - self.offset[axis]) / self.scale[axis]
+                self.wanted[axis] = (ends[first_piece, axis] - self.offset[axis]) / self.scale[axis]
+                self.told[axis] = 0
+            clear = self.rewrite_words(number, shape, several, start, stop, length, data)
+            if clear:
+                place = self.place_of(self.anchors[shape, 0], self.anchors[shape, 1], block, number)
+                clear = self.add_words(place, shape, start, stop, length, data)
+            if clear:
+                self.arrive(commands, first_piece)
+            if clear and several:
+                begun = self.size
+                lead = self.place_of(self.leads[shape, 0], self.leads[shape, 1], block, number)
+                for piece in range(first_piece + 1, last_piece + 1):
+                    for axis in range(self.here.shape[0]):
+                        self.wanted[axis] = (ends[piece, axis] - self.offset[axis]) / self.scale[axis]
+                    clear = clear and self.put_line(self.edges[block, 0], lead, shape, data)
+                    if clear:
+                        self.arrive(commands, piece)
+                if clear:
+                    self.note(start, stop, length, self.edges[block, 1], self.edges[block, 1], self.size - begun)
+            if not clear:
+                self.edits, self.size = edits, size
+                break
+            done = last_piece + 1
+            for axis in range(self.here.shape[0]):
+                self.here[axis] = commands[last_piece, axis]
+        return done
+
+    def arrive(self, commands: Floats, piece: int) -> None:
+        """Commands of the numbers `now` of axes that were told to move; the others stay `here`."""
+        for axis in range(self.here.shape[0]):
+            if self.told[axis]:
+                commands[piece, axis] = self.now[axis] * self.scale[axis] + self.offset[axis]
+            else:
+                commands[piece, axis] = self.here[axis]
+
+    def place_of(self, slot: int, beyond: int, block: int, number: int) -> int:
+        """The byte that an anchor of a block stands for; `number` is its first one."""
+        place = self.spans[number + slot, 1] if slot >= 0 else self.edges[block, -1 - slot]
+        return int(beyond + place)
+
+    def note(self, start: Ints, stop: Ints, length: Ints, begin: int, end: int, size: int) -> None:
+        """Note an edit."""
+        start[self.edits], stop[self.edits], length[self.edits] = begin, end, size
+        self.edits += 1
+
+    def rewrite_words(
+        self, number: int, shape: int, several: bool, start: Ints, stop: Ints, length: Ints, data: Bytes
+    ) -> bool:
+        """Write the words of a block anew whose values change, all if `several` pieces follow; whether it is clear."""
+        for k in range(self.by_place.shape[1]):
+            axis = self.by_place[shape, k]
+            if axis < 0:
+                break
+            word, begun = number + self.slots[shape, axis], self.size
+            self.now[axis], self.told[axis] = self.values[word], 1
+            if abs(self.wanted[axis] - self.now[axis]) >= self.half[axis] or several:
+                begin, end = self.spans[word, 0], self.spans[word, 1]
+                if not self.put_in_style(data, begin, end, self.wanted[axis], self.least[axis]):
+                    return False
+                self.now[axis] = self.read
+                self.note(start, stop, length, begin, end, self.size - begun)
+        return True
+
+    def add_words(self, place: int, shape: int, start: Ints, stop: Ints, length: Ints, data: Bytes) -> bool:
+        """Add words at `place` for axes that must move and have none; whether that is clear."""
+        for k in range(self.by_letter.shape[0]):
+            axis, begun = self.by_letter[k], self.size
+            if self.heads[shape, axis, 1] == LED_HEAD:
+                self.now[axis], self.told[axis] = self.wanted[axis], 1
+            off = abs(self.wanted[axis] - self.now[axis])
+            if self.told[axis] or off < self.half[axis]:
+                continue
+            if self.heads[shape, axis, 1] == 0:
+                if not off <= self.rules.rounded * self.half[axis]:
+                    return False
+                continue
+            if not self.put_new(data, shape, axis, 0):
+                return False
+            self.now[axis], self.told[axis] = self.read, 1
+            self.note(start, stop, length, place, place, self.size - begun)
+        return True
+
+    def put_line(self, lead_from: int, lead_to: int, shape: int, data: Bytes) -> bool:
+        """Write a further piece of a motion on a line of its own, and take the axes there; whether that is clear.
+
+        A piece that moves nothing is not: it is for `BlockWriter` to say. The line repeats the bytes of the text from
+        `lead_from` to `lead_to`.
+        """
+        for k in range(self.line_end.shape[0]):
+            self.put_byte(data, self.line_end[k])
+        for at in range(lead_from, lead_to):
+            self.put_byte(data, self.text[at])
+        for k in range(self.openings.shape[1]):
+            if self.openings[shape, k]:
+                self.put_byte(data, self.openings[shape, k])
+        skip, moved = 0 if self.openings[shape, 0] else 1, False
+        for k in range(self.by_letter.shape[0]):
+            axis = self.by_letter[k]
+            off = abs(self.wanted[axis] - self.now[axis])
+            if not off >= self.half[axis]:
+                continue
+            if self.heads[shape, axis, 1] == 0:
+                if not off <= self.rules.rounded * self.half[axis]:
+                    return False
+                continue
+            if not self.put_new(data, shape, axis, skip):
+                return False
+            self.now[axis], self.told[axis], skip, moved = self.read, 1, 0, True
+        for k in range(self.closings.shape[1]):
+            if self.closings[shape, k]:
+                self.put_byte(data, self.closings[shape, k])
+        return moved
+
+    # -- single numbers -----------------------------------------------------------------------------------------------
+
+    def put_byte(self, data: Bytes, character: int) -> None:
+        """Write a character."""
+        data[self.size] = character
+        self.size += 1
+
+    def put_new(self, data: Bytes, shape: int, axis: int, skip: int) -> bool:
+        """Write a missing word, its head but for `skip` characters; whether it is clear."""
+        value, decimals = self.wanted[axis], self.least[axis]
+        steps = self.steps_of(value, decimals)
+        if steps < 0:
+            return False
+        for k in range(skip, self.heads.shape[2]):
+            if self.heads[shape, axis, k]:
+                self.put_byte(data, self.heads[shape, axis, k])
+        negative = copysign(1.0, value) < 0
+        sign = MINUS if negative else 0
+        if self.signed:
+            sign = MINUS if value < 0 and steps != 0 else PLUS
+        self.put(data, steps, decimals, sign, 1, False)
+        self.read = copysign(steps / self.rules.powers[decimals], value)
+        return True
+
+    def put_in_style(self, data: Bytes, start: int, stop: int, value: float, least: int) -> bool:
+        """Write a value in the style of the number at a span, as `NumberStyle.write`; whether that is clear.
+
+        Put down what a reader makes of it.
+        """
+        if not self.style_of(start, stop):
+            return False
+        most = max(self.own, least)
+        steps = self.steps_of(value, most)
+        if steps < 0:
+            return False
+        self.read = copysign(steps / self.rules.powers[most], value) + 0.0
+        while most > self.own and steps % 10 == 0:
+            steps //= 10
+            most -= 1
+        sign = MINUS if value < 0 and steps != 0 else PLUS if self.plus else 0
+        digits = 1 if self.whole else -1
+        if self.whole > 1 and self.text[stop - self.own - (1 if self.point else 0) - self.whole] == ZERO:
+            digits = self.whole
+        self.put(data, steps, most, sign, digits, self.point)
+        return True
+
+    def style_of(self, start: int, stop: int) -> bool:
+        """Decimals, point, plus, digits before the point of the number at a span; whether it is nothing but that.
+
+        Where numbers carry signs a minus counts as a plus, too: what had a sign keeps one.
+        """
+        head, first, point = self.text[start], start, -1
+        if head in (PLUS, MINUS):
+            first = start + 1
+        for place in range(first, stop):
+            character = self.text[place]
+            if character == POINT and point < 0:
+                point = place
+            elif character < ZERO or character > ZERO + 9:
+                return False
+        self.point, self.own = point >= 0, stop - point - 1 if point >= 0 else 0
+        self.plus = head == PLUS or (self.signed and head == MINUS)
+        self.whole = stop - first - self.own - (1 if point >= 0 else 0)
+        return stop - first <= self.rules.longest and self.own <= self.rules.decimals
+
+    def steps_of(self, value: float, decimals: int) -> int:
+        """The output steps of a number; -1 where it is too large, or too near to the middle between two outputs."""
+        if decimals > MOST_STEPS:
+            return -1
+        size = abs(value) * self.rules.powers[decimals]
+        if not size < self.rules.largest:
+            return -1
+        steps = int(size)
+        rest = size - steps
+        if not abs(rest - 0.5) > self.rules.tie * size:
+            return -1
+        return steps + 1 if rest > 0.5 else steps
+
+    def put(self, data: Bytes, steps: int, decimals: int, sign: int, least: int, point: bool) -> None:
+        """Write a number of so many output steps; `least`: digits before the point, -1 for none if it is zero."""
+        if sign:
+            self.put_byte(data, sign)
+        count, rest = 0, steps
+        while rest:
+            rest //= 10
+            count += 1
+        digits = max(count - decimals, least, 1 if least >= 0 or decimals == 0 else 0)
+        pointed = point or decimals > 0
+        length = digits + decimals + (1 if pointed else 0)
+        rest = steps
+        data[self.size + length - 1] = ZERO  # there is room for all
+        for k in range(decimals):
+            data[self.size + length - 1 - k] = ZERO + rest % 10
+            rest //= 10
+        if pointed:
+            data[self.size + digits] = POINT
+        for k in range(digits):
+            data[self.size + digits - 1 - k] = ZERO + rest % 10
+            rest //= 10
+        self.size += length
