@@ -3,9 +3,9 @@
     make same-bytes                    shipped programs, the corpus (`NCFIX_SHARED`, else ../shared), long programs
     make same-bytes MOST=100000        only programs of the corpus up to so many bytes
 
-The ways: columns of numpy and the compiled core; as a whole, and in parts of several sizes; one, two and three processes; from a
-file and through a pipe. A program that cannot be corrected must be refused with the same words in each. Ends with exit
-code 1 if anything differs.
+The ways: columns of numpy and the compiled core; as a whole, and in parts of several sizes; one, two and three
+processes; from a file and through a pipe. A program that cannot be corrected must be refused with the same words in
+each. Ends with exit code 1 if anything differs.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
+from ncfix import core
 from ncfix.compensate import FixOptions, driver, plain, solve
 from ncfix.compensate.following import Task
 from ncfix.control import trace

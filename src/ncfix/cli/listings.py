@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import get_completion_class
 
+from ncfix import core
 from ncfix.cli import console
 from ncfix.cli.options import DIALECT, OneOf, json_option
 from ncfix.diagnostics import Code, ExitCode, UsageError
@@ -108,7 +109,7 @@ def explain(code: str | None, as_json: bool) -> None:
 @click.command()
 @json_option
 def plugins(as_json: bool) -> int:
-    """List the plugins and what each adds; exit code 1 if one was left out."""
+    """List the plugins, what each adds, and whether the core is compiled; exit code 1 if one was left out."""
     found = load_plugins()
     if as_json:
         entries = [
@@ -118,13 +119,14 @@ def plugins(as_json: bool) -> int:
             }
             for plugin in found.loaded
         ]
-        console.put_json(plugins=entries, left_out=[problem.as_dict() for problem in found.problems])
+        console.put_json(plugins=entries, left_out=[problem.as_dict() for problem in found.problems], core=core.status())
     else:
         rows = []
         for each in found.loaded:
             adds = "; ".join(f"{kind}: {', '.join(things)}" for kind, things in each.things.items() if things)
             rows.append((each.name, f"{each.distribution} {each.version}".strip(), adds))
         console.table(("name", "from", "adds"), rows)
+        console.put(f"core: {core.status()}\n")
     return ExitCode.FINDINGS if found.problems else ExitCode.DONE
 
 

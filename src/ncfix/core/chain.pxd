@@ -56,6 +56,7 @@ cdef class Hand:
     cdef double[:, ::1] work
     cdef readonly int64_t n, sine, versine, others, found, values, tip, length, spare
 
+    @cython.locals(rows=bint)
     cdef bint fits(self, RouteSteps route, int64_t given) except -1 nogil
     cdef int64_t take_up(self, int64_t begin, int64_t count) except -1 nogil
 

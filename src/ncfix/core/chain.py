@@ -62,7 +62,7 @@ class RouteSteps:
         self.part, self.function, self.gain = part, function, gain
         steps, groups, terms = len(kind), len(family), len(part)
         self.steps, self.functions, self.axes, self.turns, self.given = steps, len(order), 0, 0, 0
-        sizes = (len(start) - 6, len(axis) - steps, len(direction) - 3 * steps, len(point) - 3 * steps)
+        sizes: tuple[int, ...] = (len(start) - 6, len(axis) - steps, len(direction) - 3 * steps, len(point) - 3 * steps)
         sizes += (len(center) - 3 * steps, len(small) - steps, len(rotates) - steps, len(screws) - steps)
         sizes += (len(signal_axis) - groups, len(signal) - 5 * groups, len(first) - groups - 1)
         sizes += (len(function) - terms, len(gain) - terms, first[0], first[groups] - len(order))
@@ -353,12 +353,8 @@ class Hand:
 
     def fits(self, route: RouteSteps, given: int) -> bool:
         """Whether all rows are there that a route needs; `given` functions from elsewhere are for other routes."""
-        return (
-            route.axes <= self.q.shape[0]
-            and route.turns <= self.sines.shape[0]
-            and route.given <= self.given.shape[0] - given
-            and route.functions <= self.values - self.found
-        )
+        rows = route.axes <= self.q.shape[0] and route.turns <= self.sines.shape[0]
+        return bool(rows and route.given <= self.given.shape[0] - given and route.functions <= self.values - self.found)
 
     def take_up(self, begin: int, count: int) -> int:
         """Put a handful of poses next to each other."""
@@ -651,7 +647,7 @@ def is_one_of(axis: int, axes: Ints) -> bool:
 def fit(moved: Array, weight: Array, out: Array) -> bool:
     """Whether columns have room for results of the same shape, and a weight each."""
     same = moved.shape[0] == out.shape[0] == 3 and moved.shape[1] == out.shape[1] == weight.shape[0]
-    return same and moved.shape[2] == out.shape[2]
+    return bool(same and moved.shape[2] == out.shape[2])
 
 
 def advanced(d: Array, p: Array, sine: Array, versine: Array, moved: Array, weight: Array, out: Array) -> int:

@@ -9,11 +9,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    Bytes = NDArray[np.uint8] | bytes
+    Bytes = NDArray[np.uint8]
     Ints = NDArray[np.int64]
 
 
-def spliced(source: Bytes, start: Ints, stop: Ints, length: Ints, data: Bytes, out: NDArray[np.uint8]) -> int:
+def spliced(source: Bytes, start: Ints, stop: Ints, length: Ints, data: Bytes, out: Bytes) -> int:
     """Put a text into `out` with edits made that are as in `writer.Splices`; returns where the next byte would go.
 
     Raises IndexError for edits that overlap or lie outside.

@@ -145,8 +145,8 @@ class SmallMotion:
         from ncfix.core import chain as loops
 
         center, out = np.broadcast_to(self.center, rotation.shape), np.empty_like(moved)
-        rows = (np.ascontiguousarray(each[:, 0]) for each in (rotation, translation, center))
-        loops.moved_small(*rows, not forwards, moved, _weights(moved, weight), out)
+        r, t, c = (np.ascontiguousarray(each[:, 0]) for each in (rotation, translation, center))
+        loops.moved_small(r, t, c, not forwards, moved, _weights(moved, weight), out)
         return out
 
 

@@ -232,7 +232,7 @@ OWN = np.array([0, *((1 << 64) - (1 << 64 - 8 * count) for count in range(1, EIG
 """The highest so many bytes of eight."""
 MASKS = {8: 0x00FF00FF00FF00FF, 16: 0x0000FFFF0000FFFF, 32: 0x00000000FFFFFFFF}
 """Every second group of so many bits."""
-POWERS = 10.0 ** np.arange(23)
+POWERS: NDArray[np.float64] = (10.0 ** np.arange(23)).astype(np.float64)
 """Those powers of ten that a double holds exactly."""
 
 

@@ -238,10 +238,12 @@ def scan_compiled(
     from ncfix.core import scan as loop
 
     kinds = np.zeros(256, dtype=np.uint8)
-    for kind, members in enumerate((NUMERIC, SIGN, list(comments), odd), start=1):
+    starting = np.zeros(256, dtype=np.bool_)
+    starting[list(comments)] = True
+    for kind, members in enumerate((NUMERIC, SIGN, starting, odd), start=1):
         kinds[members] = kind
-    tables = (each.view(np.uint8) for each in (fixed, UNSIGNED_AFTER, BLANK))
-    scanner = loop.Scanner(kinds, *tables, BLANKS, EXACT_DIGITS, POWERS)
+    held, unsigned, blank = (each.view(np.uint8) for each in (fixed, UNSIGNED_AFTER, BLANK))
+    scanner = loop.Scanner(kinds, held, unsigned, blank, BLANKS, EXACT_DIGITS, POWERS)
     n = len(blocks)
     group, comment, first = np.empty(n, np.int64), np.full(n, -1, np.int64), np.empty(n + 1, np.int64)
     shapes, starts = np.empty(len(text) + 1, np.uint8), np.empty(n + 1, np.int64)

@@ -124,9 +124,10 @@ def spliced(source: bytes, splices: Splices) -> bytes:
     if core.engaged():
         from ncfix.core import edits
 
-        out = np.empty(len(source) + len(splices.data) - int((stop - start).sum()), dtype=np.uint8)
-        columns = (np.ascontiguousarray(each) for each in (start, stop, splices.length))
-        edits.spliced(source, *columns, splices.data, out)
+        text, data = (np.frombuffer(each, dtype=np.uint8) for each in (source, splices.data))
+        out = np.empty(len(text) + len(data) - int((stop - start).sum()), dtype=np.uint8)
+        begins, ends, lengths = (np.ascontiguousarray(each) for each in (start, stop, splices.length))
+        edits.spliced(text, begins, ends, lengths, data, out)
         return out.tobytes()
     other = np.flatnonzero(splices.length != stop - start)
     begun, others = _in_place(source, splices, other), splices.rows(other)
@@ -155,7 +156,8 @@ def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
     from ncfix.core import edits
 
     columns = (np.ascontiguousarray(each) for each in (splices.start, splices.stop, splices.length))
-    return bool(edits.left_alone(source, text, *columns))
+    old, new = (np.frombuffer(each, dtype=np.uint8) for each in (source, text))
+    return bool(edits.left_alone(old, new, *columns))
 
 
 FEW = 16

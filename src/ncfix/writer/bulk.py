@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +44,9 @@ from ncfix.writer.bulk_layouts import CLOSING, NONE, OPENING, Layouts, lines_of,
 from ncfix.writer.frames import FrameMap
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
+
+if TYPE_CHECKING:
+    from ncfix.core.words import Rules
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -216,7 +221,7 @@ class Bulk:
         commands, data = np.empty_like(ends), np.empty(self._room(pieces, blocks, axes * words.ROOM), dtype=np.uint8)
         start, end, length = (np.empty(edits, dtype=np.int64) for _ in range(3))
         pen = words.Pen(
-            words.Rules(POWERS, LONGEST_NUMBER, MOST_DECIMALS, LARGEST, TIE, ROUNDED),
+            rules(),
             steps.text,
             program.blocks,
             program.first_number,
@@ -231,7 +236,7 @@ class Bulk:
             layouts.leads,
             layouts.openings,
             layouts.closings,
-            program.line_end,
+            np.frombuffer(program.line_end, dtype=np.uint8),
             frame.frame.offset,
             frame.scale,
             steps.decimals,
@@ -257,6 +262,14 @@ class Bulk:
         rows = blocks[several > 0].astype(np.int64)
         leads = self.layouts.lead_ends(self.program, rows) - self.program.blocks[rows, 0]
         return lines * line + int((several[several > 0] * leads).sum())
+
+
+@cache
+def rules() -> Rules:
+    """How numbers are written, as the compiled core takes it."""
+    from ncfix.core import words
+
+    return words.Rules(POWERS, LONGEST_NUMBER, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
 
 
 def _stops(fit: Mask) -> IntArray:

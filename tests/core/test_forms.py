@@ -1,0 +1,106 @@
+"""The compiled core and the same source interpreted do the same, bit by bit."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compensate.test_stream import program
+from conftest import require_core
+from core.twins import CALLS, DifferentFormsError, both_forms
+from machine import chains
+from ncfix import core
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
+from ncfix.control.setup import Setup
+from ncfix.diagnostics import NcfixError
+from ncfix.machine import Machine, State, load
+from ncfix.text.reader import read
+from ncfix.writer import bulk
+from program.test_many_blocks import klartext, rs274, sinumerik
+
+OPTIONS = FixOptions(tolerance_um=5.0, allow_refused=True)
+SETUP = Setup(assume_zero=True)
+
+
+@pytest.fixture(autouse=True)
+def _compared(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    require_core()
+    bulk.rules.cache_clear()
+    with both_forms():
+        yield
+    bulk.rules.cache_clear()
+
+
+def fixed(source: bytes, machine: Machine, dialect: str, options: FixOptions = OPTIONS) -> bytes:
+    try:
+        return fix_program(read(source, "p.ngc", dialect), machine, SETUP, options).text
+    except NcfixError:
+        return b""
+
+
+@pytest.mark.parametrize(
+    ("name", "strategy"),
+    [
+        ("benchmarks/five_axis", "rotary-then-linear"),
+        ("examples/machines/dmu50", "position"),
+        ("examples/machines/wCBXFZYSt", "full"),
+    ],
+)
+def test_programs(name: str, strategy: str, root: Path) -> None:
+    options = FixOptions(tolerance_um=5.0, allow_refused=True, strategy=strategy)
+    assert fixed(program(5, 60, 0.05), load(root / f"{name}.toml"), "linuxcnc", options)
+    assert CALLS["scan.Scanner.scan"]
+    assert CALLS["motions.followed"]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_machines(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    machine = chains.random_errors(rng, chains.random_chain(rng, 4), 1e-4)
+    q = rng.uniform(-1, 1, (70, len(machine.axes))) * np.where(machine.rotary, 2.0, 300.0)
+    machine.actual_tip(q, State(50.0))
+    machine.actual(q, State(50.0))
+    assert any(name.startswith("chain.") for name in CALLS)
+
+
+@pytest.mark.parametrize("folder", ["linuxcnc", "fanuc", "siemens", "heidenhain"])
+def test_the_corpus(folder: str, shared: Callable[[str], Path], root: Path) -> None:
+    machine = load(root / "examples/machines/dmu50.toml")
+    for path in sorted(shared("corpus").glob(f"{folder}/*"))[::40]:
+        source = path.read_bytes()
+        if len(source) < 8000:
+            fixed(source, machine, folder)
+
+
+@pytest.mark.parametrize(("family", "dialect"), [(rs274, "linuxcnc"), (sinumerik, "siemens"), (klartext, "heidenhain")])
+def test_generated_blocks_and_mutations(family: Callable[..., str], dialect: str, root: Path) -> None:
+    chance = random.Random(dialect)
+    lines = [family(random.Random(chance.randrange(150)), chance) for _ in range(600)]
+    head = b"0 BEGIN PGM P MM\n" if dialect == "heidenhain" else b""
+    text = head + "\n".join(lines).encode("latin-1")
+    read(text, "p", dialect)
+    for _ in range(30):
+        at = chance.randrange(len(text))
+        text = text[:at] + bytes([chance.choice(b"0123456789.+-XYZ();\n \x00\xff")]) + text[at + chance.randrange(3) :]
+        part = chance.randrange(len(text) - 2000)
+        try:
+            read(head + text[part : part + 2000], "p", dialect)
+        except NcfixError:
+            continue
+    assert CALLS["scan.Scanner.scan"] or dialect == "siemens"  # it has a scan of its own, by columns
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "value"), [("scan", "ZERO", 49), ("words", "ZERO", 49), ("chain", "FORTH", 9)]
+)
+def test_a_planted_difference_is_caught(
+    module: str, name: str, value: int, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(core.interpreted(module), name, value)
+    with pytest.raises(DifferentFormsError, match=f"{module}[.]"):
+        fixed(program(5, 10, 0.0), load(root / "benchmarks/five_axis.toml"), "linuxcnc")
