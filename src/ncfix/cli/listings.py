@@ -119,7 +119,9 @@ def plugins(as_json: bool) -> int:
             }
             for plugin in found.loaded
         ]
-        console.put_json(plugins=entries, left_out=[problem.as_dict() for problem in found.problems], core=core.status())
+        console.put_json(
+            plugins=entries, left_out=[problem.as_dict() for problem in found.problems], core=core.status()
+        )
     else:
         rows = []
         for each in found.loaded:

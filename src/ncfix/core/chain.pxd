@@ -1,10 +1,6 @@
 cimport cython
 from libc.stdint cimport int64_t
 
-cdef extern from "math.h" nogil:
-    cpdef double sqrt(double)
-
-cdef double inf
 cdef int64_t HANDFUL, SPARE, SHIFT, TURN, FORTH, BACK, POWERS, WAVES, GIVEN, PARTS
 
 @cython.final
@@ -37,6 +33,9 @@ cdef class RouteSteps:
     cdef int64_t nudge_back(self, Hand hand, int64_t i, int64_t count, int64_t tip, int64_t at) except -1 nogil
     @cython.locals(j=int64_t, axis=int64_t, forth=bint, k=int64_t, sine=double, versine=double, x=double, y=double, z=double, u=double, v=double, w=double, a=double, b=double, c=double, t0=double, t1=double, t2=double, s=double, first=double, second=double, third=double, ax=double, ay=double, az=double, ox=double, oy=double, oz=double, tx=double, ty=double, tz=double)
     cdef int64_t screw(self, Hand hand, int64_t i, int64_t count, int64_t tip, int64_t at) except -1 nogil
+    cdef int64_t set_goal(
+        self, Hand hand, int64_t count, const double[:, ::1] target, int64_t begin, int64_t point
+    ) except -1 nogil
     @cython.locals(found=int64_t, last=int64_t, part=int64_t, function=int64_t, gain=double, g=int64_t, f=int64_t, t=int64_t)
     cdef int64_t work_out(self, Hand hand, int64_t count, int64_t used, int64_t values) except -1 nogil
     @cython.locals(u=int64_t, value=int64_t, axis=int64_t, at=int64_t, power=int64_t, f=int64_t, order=int64_t, row=int64_t)
@@ -64,46 +63,8 @@ cpdef int64_t rows_for(int64_t axes, int64_t turns, int64_t others, int64_t func
 
 @cython.locals(begin=int64_t, count=int64_t, i=int64_t, k=int64_t)
 cpdef int64_t tips(RouteSteps route, Hand hand, double[:, ::1] out) except -1 nogil
-cdef int64_t set_goal(
-    RouteSteps perfect, Hand hand, int64_t count, const double[:, ::1] target, int64_t begin, int64_t point
-) except -1 nogil
 @cython.locals(n=int64_t, tip=int64_t, point=int64_t, begin=int64_t, count=int64_t, i=int64_t, k=int64_t, side=int64_t, right=bint)
 cpdef int64_t gaps(
     RouteSteps perfect, RouteSteps real, Hand hand, const double[:, ::1] target, const int64_t[::1] sides,
     double[:, :, ::1] out, double[:, ::1] angle,
-) except -1 nogil
-@cython.locals(n=int64_t, tip=int64_t, point=int64_t, before=int64_t, ahead=int64_t, begin=int64_t, count=int64_t, i=int64_t, k=int64_t, used=int64_t, left=int64_t, number=int64_t, right=bint)
-cpdef int64_t aim(
-    RouteSteps perfect, RouteSteps within, RouteSteps behind, Hand hand, const int64_t[::1] axes,
-    const double[:, ::1] target, double close, double flat, int64_t passes, double[:, ::1] out,
-) except -1 nogil
-@cython.locals(point=int64_t, back=int64_t, before=int64_t, whole=int64_t, total=int64_t, left=int64_t, i=int64_t, k=int64_t, possible=bint, share=double)
-cdef int64_t set_out(RouteSteps steps, const int64_t[::1] axes, Hand hand, int64_t count, double flat) except -1 nogil
-@cython.locals(gap=int64_t, point=int64_t, back=int64_t, last=int64_t, arrived=int64_t, i=int64_t, k=int64_t, q=int64_t, row=int64_t, before=double)
-cdef int64_t step_closer(
-    const int64_t[::1] axes, double close, bint begins, Hand hand, int64_t count, int64_t begin, double[:, ::1] out
-) except -1 nogil
-@cython.locals(tip=int64_t, point=int64_t, n=int64_t, first=int64_t, begin=int64_t, count=int64_t, i=int64_t, k=int64_t, axis=int64_t, j=int64_t, right=bint)
-cpdef int64_t placed(
-    RouteSteps perfect, Hand hand, const int64_t[::1] axes, const double[:, ::1] ways_back,
-    const double[:, ::1] target, double[:, ::1] out,
-) except -1 nogil
-cdef bint is_one_of(int64_t axis, const int64_t[::1] axes) noexcept nogil
-
-@cython.locals(same=bint)
-cdef bint fit(const double[:, :, ::1] moved, const double[::1] weight, double[:, :, ::1] out) noexcept nogil
-@cython.locals(i=int64_t, k=int64_t)
-cpdef int64_t advanced(
-    const double[::1] d, const double[::1] p, const double[::1] sine, const double[::1] versine,
-    const double[:, :, ::1] moved, const double[::1] weight, double[:, :, ::1] out,
-) except -1 nogil
-@cython.locals(i=int64_t, k=int64_t, n=int64_t, x=double, y=double, z=double, u=double, v=double, w=double, s=double, first=double, second=double, ax=double, ay=double, az=double, ox=double, oy=double, oz=double, tx=double, ty=double, tz=double, ex=double, ey=double, ez=double, weighed=double)
-cpdef int64_t moved_small(
-    const double[:, ::1] r, const double[:, ::1] t, const double[:, ::1] c, bint back,
-    const double[:, :, ::1] moved, const double[::1] weight, double[:, :, ::1] out,
-) except -1 nogil
-@cython.locals(i=int64_t, k=int64_t)
-cpdef int64_t turned(
-    const double[::1] r, double first, double second, const double[::1] c,
-    const double[:, :, ::1] moved, const double[::1] weight, double[:, :, ::1] out,
 ) except -1 nogil

@@ -124,7 +124,7 @@ def aimed_ahead(poses: Poses, perfect: Route, split: SplitRoute, target: Array |
 
 def _compiled(poses: Poses, perfect: Route, split: SplitRoute, turns: Turns, target: Array | None) -> tuple[Aim, Array]:
     """By compiled loops; also the largest squared angle of a small motion (n,)."""
-    from ncfix.core import chain
+    from ncfix.core import aim
 
     within, behind = split.within, split.behind
     given = within.terms.given(poses)
@@ -132,7 +132,7 @@ def _compiled(poses: Poses, perfect: Route, split: SplitRoute, turns: Turns, tar
     out = np.empty((6, poses.positions.shape[1]))
     goal = np.empty((3, 0)) if target is None else np.ascontiguousarray(target)
     routes, axes = (perfect.compiled, within.compiled, behind.compiled), np.array(split.axes, dtype=np.int64)
-    chain.aim(*routes, hand, axes, goal, CLOSE, FLAT, WHOLE_STEPS, out)
+    aim.aim(*routes, hand, axes, goal, CLOSE, FLAT, WHOLE_STEPS, out)
     return Aim(out[:3], out[5] > 0, out[3]), out[4]
 
 

@@ -51,11 +51,11 @@ def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> 
     if not axis.rotary:
         return moved + direction[:, None, None] * position * weight if np.any(weight) else moved
     if _is_many(moved) and position.shape == moved.shape[2:]:
-        from ncfix.core import chain as loops
+        from ncfix.core import points
 
         constants = np.array(axis.direction, dtype=np.float64), np.array(axis.point, dtype=np.float64)
         out = np.empty_like(moved)
-        loops.advanced(*constants, *turn(position), moved, _weights(moved, weight), out)
+        points.advanced(*constants, *turn(position), moved, _weights(moved, weight), out)
         return out
     arm = moved - np.asarray(axis.point)[:, None, None] * weight
     once = cross_with(axis.direction, arm)
@@ -142,22 +142,22 @@ class SmallMotion:
             return None
         if not rotation.shape == translation.shape == (3, 1, moved.shape[2]) or not np.abs(rotation).max() < SMALL:
             return None
-        from ncfix.core import chain as loops
+        from ncfix.core import points
 
         center, out = np.broadcast_to(self.center, rotation.shape), np.empty_like(moved)
         r, t, c = (np.ascontiguousarray(each[:, 0]) for each in (rotation, translation, center))
-        loops.moved_small(r, t, c, not forwards, moved, _weights(moved, weight), out)
+        points.moved_small(r, t, c, not forwards, moved, _weights(moved, weight), out)
         return out
 
 
 def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array:
     """What is carried, after a small rotation about a center."""
     if vector.size == 3 and center.size == 3 and _is_many(moved):
-        from ncfix.core import chain as loops
+        from ncfix.core import points
 
         first, second = (factor.item() for factor in se3.rotation_factors((vector * vector).sum(0)))
         out = np.empty_like(moved)
-        loops.turned(vector.ravel(), first, second, center.ravel(), moved, _weights(moved, weight), out)
+        points.turned(vector.ravel(), first, second, center.ravel(), moved, _weights(moved, weight), out)
         return out
     return moved + rotated_by(vector, moved - center * weight)
 

@@ -229,11 +229,11 @@ class Route:
         back  (3, 3) what takes a way of the tip to one of the axes: the inverse of `ways_together`
         """
         if _are_many(target.shape[1]):
-            from ncfix.core import chain
+            from ncfix.core import aim
 
             hand, out = hand_of(poses, self.turns(poses), [], self), np.empty(target.shape)
             goal, columns = np.ascontiguousarray(target), np.array(axes, dtype=np.int64)
-            chain.placed(self.compiled, hand, columns, back, goal, out)
+            aim.placed(self.compiled, hand, columns, back, goal, out)
             return out
         x, y, z = target
         way = steps.brought_back(self.plain[0], axes, x, y, z, poses.tool_length, poses.positions, self.turns(poses))

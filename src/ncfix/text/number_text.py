@@ -7,12 +7,16 @@ nearer is marked, and written by itself.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
+
+if TYPE_CHECKING:
+    from ncfix.core.words import Rules
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -31,6 +35,14 @@ ROUNDED = 1.01
 """Half output steps by which an axis may stand off its place for nothing but rounding."""
 
 ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
+
+
+@cache
+def rules() -> Rules:
+    """These numbers, as the compiled core takes them."""
+    from ncfix.core import words
+
+    return words.Rules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +17,7 @@ from numpy.typing import NDArray
 from ncfix import core
 from ncfix.control.moves import Frame, MotionKind, Moves
 from ncfix.text.number_text import (
-    LARGEST,
-    MOST_DECIMALS,
     ROUNDED,
-    TIE,
     NumberColumns,
     Styles,
     in_style,
@@ -30,12 +25,9 @@ from ncfix.text.number_text import (
     laid_out,
     plain,
     rounded,
+    rules,
     styles_of,
 )
-from ncfix.text.number_text import (
-    LONGEST as LONGEST_NUMBER,
-)
-from ncfix.text.numbers import POWERS
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
 from ncfix.writer.bulk_arcs import CentreWords, OutputSteps, whole_arcs
@@ -44,9 +36,6 @@ from ncfix.writer.bulk_layouts import CLOSING, NONE, OPENING, Layouts, lines_of,
 from ncfix.writer.frames import FrameMap
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
-
-if TYPE_CHECKING:
-    from ncfix.core.words import Rules
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -228,14 +217,7 @@ class Bulk:
             program.template,
             program.numbers,
             program.number_spans,
-            layouts.slots,
-            layouts.by_place,
-            layouts.by_letter,
-            layouts.anchors,
-            layouts.heads,
-            layouts.leads,
-            layouts.openings,
-            layouts.closings,
+            *layouts.arrays,
             np.frombuffer(program.line_end, dtype=np.uint8),
             frame.frame.offset,
             frame.scale,
@@ -262,14 +244,6 @@ class Bulk:
         rows = blocks[several > 0].astype(np.int64)
         leads = self.layouts.lead_ends(self.program, rows) - self.program.blocks[rows, 0]
         return lines * line + int((several[several > 0] * leads).sum())
-
-
-@cache
-def rules() -> Rules:
-    """How numbers are written, as the compiled core takes it."""
-    from ncfix.core import words
-
-    return words.Rules(POWERS, LONGEST_NUMBER, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
 
 
 def _stops(fit: Mask) -> IntArray:

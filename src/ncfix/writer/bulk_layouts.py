@@ -16,6 +16,7 @@ from ncfix.text.writer import Splices
 from ncfix.writer.language import WrittenLanguage
 
 IntArray = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
 
 OPENING, CLOSING = 4, 8
 """Bytes that stand at most before and behind the axis words of a further piece."""
@@ -72,6 +73,12 @@ class Layouts:
     alone: NDArray[np.bool_]
     spelling: Spelling
     lined: bool = False
+
+    @property
+    def arrays(self) -> tuple[IntArray, IntArray, IntArray, IntArray, Bytes, IntArray, Bytes, Bytes]:
+        """What the compiled core goes by."""
+        text = self.openings, self.closings
+        return self.slots, self.by_place, self.by_letter, self.anchors, self.heads, self.leads, *text
 
     @classmethod
     def of(cls, language: WrittenLanguage, program: Program, moves: Moves) -> Layouts:
