@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +49,7 @@ LONGEST = 1 << 14
 """Motions that are taken at once; where one is not clear, those behind it were taken in vain."""
 
 
-@dataclass(slots=True)
+@dataclass
 class Bulk:
     """The stretches of one emission.
 
@@ -91,6 +92,12 @@ class Bulk:
         changes = np.append(np.flatnonzero(np.diff(frame)) + 1, len(moves))
         stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
         return cls(program, moves, pieces, first_piece, layouts, stop)
+
+    @cached_property
+    def wordless(self) -> Mask | None:
+        """(n, n_axes) axes that must get no word, which a stretch does not begin with if they stand elsewhere."""
+        wordless = self.moves.wordless
+        return wordless if wordless.any() else None
 
     @property
     def text(self) -> NDArray[np.uint8]:
@@ -140,6 +147,11 @@ class Bulk:
         Returns the commands at the ends of the pieces written, (k, n_axes); None if there are none.
         """
         if self.stop[row] == row:
+            return None
+        if (
+            self.wordless is not None
+            and (self.wordless[row] & (position != self.pieces.end[self.first_piece[row]])).any()
+        ):
             return None
         write = self._compiled if core.engaged() else self._in_columns
         found = write(row, position, frame, self._steps_for(decimals))
