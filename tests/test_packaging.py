@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from conftest import require_core
 from ncfix import __version__
 
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
@@ -27,10 +28,10 @@ def packages() -> set[str]:
     return {path.split("/")[-1] for path in project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]}
 
 
-def build(source: Path, folder: Path) -> Path:
-    """The wheel of a source tree or sdist."""
+def build(source: Path, folder: Path, form: str = "plain") -> Path:
+    """The wheel of a source tree or sdist, with the compiled core if `form` is "require"."""
     command = [*PIP, "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", str(folder), str(source)]
-    subprocess.run(command, check=True)
+    subprocess.run(command, check=True, env={**os.environ, "NCFIX_BUILD": form})
     (wheel,) = folder.glob("*.whl")
     return wheel
 
@@ -44,7 +45,7 @@ def install(source: Path, folder: Path) -> Path:
 
 def run(arguments: list[str], cwd: Path, *path: Path) -> Any:
     """What `ncfix ... --json` prints in a folder that has nothing to do with the project."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path))}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path)), "NCFIX_CORE": ""}
     command = [sys.executable, "-m", "ncfix", *arguments, "--json"]
     done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, check=False, text=True)
     assert done.returncode == 0, done.stderr
@@ -107,6 +108,17 @@ def test_the_wheel_works_from_a_foreign_folder(installed: Path, tmp_path: Path) 
     (tmp_path / "part.ngc").write_text(PROGRAM)
     checked = run(["check", "part.ngc", "--assume-zero"], tmp_path, installed)
     assert checked["files"][0]["blocks"] == 3
+
+
+def test_a_wheel_with_the_compiled_core(root: Path, tmp_path: Path, installed: Path) -> None:
+    assert run(["plugins"], tmp_path, installed)["core"].startswith("not compiled")
+    require_core()
+    wheel = build(root, tmp_path / "wheel", "require")
+    assert "none-any" not in wheel.name
+    names = zipfile.ZipFile(wheel).namelist()
+    assert not [name for name in names if name.endswith(".c")]
+    folder = install(wheel, tmp_path / "site")
+    assert run(["plugins"], tmp_path, folder)["core"] == "compiled"
 
 
 def test_this_installation_works_from_a_foreign_folder(root: Path, tmp_path: Path) -> None:

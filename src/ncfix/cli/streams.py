@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def part_bytes() -> int:
     """Bytes of a part: `NCFIX_PART_BYTES` if that is set; the output does not depend on it.
 
-    A program of so many is long: a shorter one is read as a whole, and to load compiled kernels for it does not pay.
+    A program of so many is long: a shorter one is read as a whole.
     """
     from ncfix.compensate.following import PART_BYTES
 

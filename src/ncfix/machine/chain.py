@@ -65,7 +65,7 @@ def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> 
 
 
 def _is_many(moved: Array) -> bool:
-    """Whether compiled kernels are to take it: columns for each of many poses."""
+    """Whether the compiled core is to take it: columns for each of many poses."""
     return core.engaged() and moved.shape[2] > 1 and moved.flags.c_contiguous
 
 
@@ -136,7 +136,7 @@ class SmallMotion:
         return moved if self.rotation is None else _turned(-self.rotation, self.center, moved, weight)
 
     def _compiled(self, moved: Array, weight: Weight, forwards: bool) -> Array | None:
-        """The same by compiled kernels; None unless rotation and translation differ from pose to pose."""
+        """The same by the compiled core; None unless rotation and translation differ from pose to pose."""
         rotation, translation = self.rotation, self.translation
         if rotation is None or translation is None or not _is_many(moved):
             return None
