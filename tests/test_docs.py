@@ -150,5 +150,6 @@ def test_the_floors_and_modules_of_the_documents_are_there(root: Path) -> None:
     named = {(page.name, name) for page in pages for name in re.findall(r"`([\w/]+\.py)`", page.read_text())}
     folders = ("src", "plugins", "tests", "benchmarks", "examples")
     there = {f"/{path.relative_to(root)}" for folder in folders for path in (root / folder).rglob("*.py")}
+    there |= {f"/{path.name}" for path in root.glob("*.py")}
     assert len(named) > 20
     assert not [found for found in named if not any(path.endswith(f"/{found[1]}") for path in there)]

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from ncfix import core
 from ncfix.cli import doctor
 from ncfix.cli.main import VERBS
 from ncfix.cli.manual import ENVIRONMENT, page, shared_files
@@ -14,20 +15,19 @@ from ncfix.diagnostics import ExitCode
 
 
 @pytest.fixture(autouse=True)
-def without_loops(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NCFIX_NO_FAST", "1")
+def plain_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NCFIX_CORE", "plain")
+    core.use(None)
 
 
 def test_what_is_as_it_should_be(ncfix: Any) -> None:
     result = ncfix("doctor", "--json")
     found = {each["what"]: each for each in result.json()["findings"]}
-    assert {"ncfix", "Python", "computer", "numpy", "rich", "numba", "plugin iso", "cache", "compiled loops"} <= set(
-        found
-    )
-    assert found["environment"]["found"] == "NCFIX_NO_FAST=1"
+    assert {"ncfix", "Python", "computer", "numpy", "rich", "plugin iso", "cache", "core"} <= set(found)
+    assert "NCFIX_CORE=plain" in found["environment"]["found"]
     assert [each for each in found.values() if each["wrong"]] == []
     assert result.code == ExitCode.DONE
-    assert "NCFIX_NO_FAST is set" in ncfix("doctor").out.decode()
+    assert core.status() in ncfix("doctor").out.decode()
 
 
 def test_what_is_wrong(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import click
 
-from ncfix import fast, host
+from ncfix import core, host
 from ncfix.cli import console
 from ncfix.cli.options import json_option
 from ncfix.diagnostics import ExitCode, visible
@@ -22,7 +22,6 @@ from ncfix.plugins import load_plugins
 from ncfix.version import __version__
 
 EXTRAS = {
-    "numba": ("fast", "long programs take two or three times as long"),
     "sympy": ("symbolic", "`ncfix derive` does not work"),
     "watchfiles": ("watch", "`ncfix watch` looks every second"),
     "distributed": ("cluster", "`--executor dask://HOST:PORT` does not work"),
@@ -53,7 +52,7 @@ def findings() -> Iterator[Looked]:
     yield Looked("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "3.11 or later is needed")
     yield Looked("computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} to be used")
     yield from _packages()
-    yield _loops()
+    yield _core()
     yield from _plugins()
     yield from _caches()
     yield _temporary()
@@ -100,18 +99,10 @@ def _numbers(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in re.findall(r"\d+", text)[:3])
 
 
-def _loops() -> Looked:
-    """Whether long programs are corrected by compiled loops."""
-    if not fast.wanted():
-        return Looked("compiled loops", "not used: NCFIX_NO_FAST is set")
-    if _version("numba") is None:
-        return Looked("compiled loops", "not used: numba is not installed")
-    said: list[str] = []
-    if fast.engage(said.append):
-        return Looked("compiled loops", "used for long programs" + ("; they have just been compiled" if said else ""))
-    return Looked(
-        "compiled loops", "cannot be compiled", "another release of numba (0.61 or later), or NCFIX_NO_FAST=1"
-    )
+def _core() -> Looked:
+    """Whether the compiled core is used; one that is not of these sources is wrong."""
+    stale = core.fault() and core.has_binary()
+    return Looked("core", core.status(), core.fault() if stale else "")
 
 
 def _plugins() -> Iterator[Looked]:
@@ -124,9 +115,9 @@ def _plugins() -> Iterator[Looked]:
 
 
 def _caches() -> Iterator[Looked]:
-    """Where compiled loops and grammars are kept: in the first of these folders that can be written to."""
+    """Where grammars are kept: in the first of these folders that can be written to."""
     writable = False
-    for folder in host.cache_folders(str(Path(fast.__file__))):
+    for folder in host.cache_folders(str(Path(__file__).parents[1] / "text" / "grammar.py")):
         can = _writable(folder)
         writable = writable or can
         size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else 0
@@ -187,7 +178,7 @@ def _has_unnamed(folder: str) -> bool:
 @click.command()
 @json_option
 def doctor(as_json: bool) -> int:
-    """Look at this computer as ncfix does: packages, plugins, compiled loops, caches.
+    """Look at this computer as ncfix does: packages, plugins, the compiled core, caches.
 
     Exit code 1 if something is wrong.
     """

@@ -24,7 +24,7 @@ EXIT_CODES = (
 ENVIRONMENT = (
     ("NCFIX_MACHINE, NCFIX_SETUP, NCFIX_OUTPUT, NCFIX_DIALECT", "defaults of the options of these names"),
     ("NCFIX_PROJECT", "the project file, instead of the ncfix.toml above the program"),
-    ("NCFIX_NO_FAST", "1: use no compiled loops"),
+    ("NCFIX_CORE", "plain: do not use the compiled core; compiled: fail without it"),
     ("NCFIX_PART_BYTES", "from what length on a program is corrected in parts"),
     ("NCFIX_DEBUG", "1: show the traceback of a fault"),
     ("NO_COLOR", "use no colours"),

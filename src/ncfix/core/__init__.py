@@ -32,10 +32,15 @@ def names() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.pxd"))
 
 
+def has_binary() -> bool:
+    """Whether a compiled form is there, of these sources or of others."""
+    return any(FOLDER.joinpath("scan" + suffix).exists() for suffix in EXTENSION_SUFFIXES)
+
+
 @cache
 def fault() -> str:
     """Why there is no compiled form that may be used; empty if there is one."""
-    if not any(FOLDER.joinpath("scan" + suffix).exists() for suffix in EXTENSION_SUFFIXES):
+    if not has_binary():
         return f"not compiled, two to four times slower: {BUILD}"
     try:
         right = FOLDER.joinpath("compiled.txt").read_text().strip() == digest(FOLDER)
