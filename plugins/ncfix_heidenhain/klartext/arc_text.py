@@ -27,7 +27,7 @@ POLE_DIGITS, ANGLE_DIGITS = 4, 4
 ASIDE = 1e-4
 """How far (in program units) an arc may pass beside its place so that an angle of so many digits leads to its end."""
 
-FULL = 2 * math.pi - 1e-6
+LEAST_FULL_TURN = 2 * math.pi - 1e-6
 
 NUMBER = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)"
 LINE = re.compile(
@@ -125,7 +125,7 @@ def arc_text(arc: PieceOfArc, style: Spelling) -> ArcText:
     )
     sense = "DR-" if arc.clockwise else "DR+"
     rises = across >= 0 and abs(end[across] - begin[across]) >= 0.5 * 10.0 ** -int(arc.decimals[across])
-    if rises or (arc.turn is not None and abs(arc.turn) > FULL + 1e-3):
+    if rises or (arc.turn is not None and abs(arc.turn) > LEAST_FULL_TURN + 1e-3):
         pole, angle, reached = helix(flat, style)
         ending = arc.end.copy()
         ending[first], ending[second] = reached

@@ -20,7 +20,7 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix.writer.pieces import Pieces
-from ncfix_heidenhain.klartext.layout import CORNERS, FULL, is_between, layout_of
+from ncfix_heidenhain.klartext.layout import CORNERS, TURN_DEGREES, is_between, layout_of
 
 Mask = NDArray[np.bool_]
 
@@ -77,7 +77,7 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDAr
     offset = np.array([frame.offset for frame in moves.frames])[moves.frame][:, moves.rotary]
     before, after = np.degrees(nominal - offset), np.degrees(end - offset)
     found |= (corrected & (before > -FEW) & (after < FEW)).any(axis=1)
-    found |= (corrected & (before < FULL + FEW) & (after > FULL - FEW)).any(axis=1)
+    found |= (corrected & (before < TURN_DEGREES + FEW) & (after > TURN_DEGREES - FEW)).any(axis=1)
     return found
 
 

@@ -38,7 +38,7 @@ OF_LINES, OF_ARCS = frozenset({"X", "Y", "AN", "LEN"}), frozenset({"X", "Y", "CC
 CORNERS = frozenset({"rnd", "chf"})
 
 
-def leg_of(control: KlartextControl, unit: KlartextUnit, block: int) -> ContourElement | None:
+def solved_element(control: KlartextControl, unit: KlartextUnit, block: int) -> ContourElement | None:
     """The element of a block, worked out from where the control stands; None if its contour is not certain."""
     known = control.path.free
     if (unit.external, block) not in known:
@@ -52,16 +52,16 @@ def follow_free(control: KlartextControl, unit: KlartextUnit, block: int) -> Non
 
     It lies in the working plane: only X and Y of the frame are not known after one that is not certain.
     """
-    leg = leg_of(control, unit, block)
+    element = solved_element(control, unit, block)
     control.path.free.pop((unit.external, block))
     where = here(control)
-    if leg is None:
+    if element is None:
         where.unknown |= {X: FREELY, Y: FREELY}
         somewhere(control, 0, *command_of(control, where, IN_PLANE), FREE_CONTOUR)
         return
-    where.inner[X], where.inner[Y] = control.scale[X] * leg.end.real, control.scale[Y] * leg.end.imag
+    where.inner[X], where.inner[Y] = control.scale[X] * element.end.real, control.scale[Y] * element.end.imag
     somewhere(control, 0, *command_of(control, where, IN_PLANE), WRITTEN_OUT)
-    x, y, z = rotated(control.rotation, [leg.heading.real, leg.heading.imag, 0.0])
+    x, y, z = rotated(control.rotation, [element.heading.real, element.heading.imag, 0.0])
     control.path.tangent = x, y, z
 
 
@@ -82,8 +82,8 @@ def worked_out(
     known = [element for element in elements if element is not None]
     begin = here(control).inner
     start = complex(begin[X] / control.scale[X], begin[Y] / control.scale[Y])
-    legs = solved(known, start, heading_of(control), NEAR / control.stretch) if len(known) == len(blocks) else None
-    return dict.fromkeys(keys) if legs is None else dict(zip(keys, legs, strict=True))
+    found = solved(known, start, heading_of(control), NEAR / control.stretch) if len(known) == len(blocks) else None
+    return dict.fromkeys(keys) if found is None else dict(zip(keys, found, strict=True))
 
 
 def blocks_of_contour(unit: KlartextUnit, first: int) -> Iterator[int]:
@@ -178,14 +178,14 @@ def written_out(control: KlartextControl, unit: KlartextUnit, block: int, place:
     statement = unit.plan(block).statement
     if statement is None or not FUNCTION.match(statement_text(unit, block)):
         return []
-    leg = leg_of(control, unit, block)
-    if leg is None:
+    element = solved_element(control, unit, block)
+    if element is None:
         return []
     others = others_of(statement_text(unit, block))
-    if leg.circle is None:
-        return [f"L {place(leg.end)} {others}".rstrip()]
-    sense = "DR+" if leg.circle.sense > 0 else "DR-"
-    blocks = [f"CC {place(leg.circle.centre)}", f"C {place(leg.end)} {sense} {others}".rstrip()]
+    if element.circle is None:
+        return [f"L {place(element.end)} {others}".rstrip()]
+    sense = "DR+" if element.circle.sense > 0 else "DR-"
+    blocks = [f"CC {place(element.circle.centre)}", f"C {place(element.end)} {sense} {others}".rstrip()]
     pole = control.path.pole
     if pole is not None:
         blocks.append(f"CC {place(complex(pole[0] / control.scale[X], pole[1] / control.scale[Y]))}")

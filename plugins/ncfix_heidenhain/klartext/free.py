@@ -94,7 +94,7 @@ class NoSolutionError(Exception):
 def solved(
     elements: Sequence[Element], start: complex, heading: complex | None, near: float
 ) -> list[ContourElement] | None:
-    """The legs of a contour from where it starts; None if they are not all certain.
+    """The elements of a contour from where it starts; None if they are not all certain.
 
     heading  the direction in which the element before ends, if there is one
     near     by how much data may contradict each other
@@ -105,7 +105,7 @@ def solved(
             chain.add(element, following)
     except NoSolutionError:
         return None
-    return None if chain.open else chain.legs
+    return None if chain.open else chain.done
 
 
 class _Chain:
@@ -115,7 +115,7 @@ class _Chain:
         self.at = start
         self.heading = heading
         self.near = near
-        self.legs: list[ContourElement] = []
+        self.done: list[ContourElement] = []
         self.open: DirectedCircle | None = None
         self.home: complex | None = None
 
@@ -276,9 +276,9 @@ class _Chain:
         self.open = None
         self._append(ContourElement(end, circle.heading(end), circle))
 
-    def _append(self, leg: ContourElement) -> None:
-        self.legs.append(leg)
-        self.at, self.heading = leg.end, leg.heading
+    def _append(self, element: ContourElement) -> None:
+        self.done.append(element)
+        self.at, self.heading = element.end, element.heading
 
     def _agree(self, one: complex, other: complex) -> None:
         if abs(one - other) > self.near:

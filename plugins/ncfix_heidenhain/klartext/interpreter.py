@@ -26,7 +26,7 @@ from ncfix_heidenhain.klartext.arcs import Step, circular, circular_by_radius, c
 from ncfix_heidenhain.klartext.blocks import unread_line
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.lane import run_lane
-from ncfix_heidenhain.klartext.layout import CORNERS, FULL, axis_numbers, poles_move
+from ncfix_heidenhain.klartext.layout import CORNERS, TURN_DEGREES, axis_numbers, poles_move
 from ncfix_heidenhain.klartext.lines import straight, straight_polar
 from ncfix_heidenhain.klartext.plans import CARTESIAN, MOVING, POLAR, VECTOR, KlartextPlan
 from ncfix_heidenhain.klartext.statements import (
@@ -399,5 +399,5 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             words = words[~np.isnan(words)]
             offset = moves.frames[int(moves.frame[0])].offset[column]
             began = math.degrees(moves.start[0, column] - offset)
-            if len(words) and (began < 0.0 <= words.min() or words.max() < FULL <= began):
+            if len(words) and (began < 0.0 <= words.min() or words.max() < TURN_DEGREES <= began):
                 raise NotInPartsError(f"{moves.axes[column]} comes back from beyond a turn")

@@ -29,7 +29,7 @@ from ncfix_heidenhain.klartext.plans import opens_block, own_words
 CORNERS = frozenset({"rnd", "chf"})
 """Corners that the control makes of the end of one motion and the beginning of the next."""
 
-FULL = 360.0
+TURN_DEGREES = 360.0
 
 POLAR = frozenset({"PR", "PA", "IPR", "IPA"})
 VECTOR = frozenset({"TX", "TY", "TZ"})

@@ -92,7 +92,7 @@ CHOSEN = "M138: the control takes only some of the rotary axes into account"
 UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
 RETRACT = Passing(Pass.RETRACTION, "retract along the tool axis (M140)")
 COUNTED = "from where the axis {} counts after M126 depends on a parameter of the machine: it went past a turn"
-FULL = 2 * math.pi
+FULL_TURN = 2 * math.pi
 COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}
 
 
@@ -132,7 +132,7 @@ def end_of_short_ways(control: KlartextControl, on: bool) -> None:
     tilts = None if pointing is None else control.machine[pointing.columns[1]]
     for index in control.turning if on and control.shortest else ():
         below = control.position[index] < 0 and index != tilts
-        if index not in control.unknown and (below or control.position[index] >= FULL):
+        if index not in control.unknown and (below or control.position[index] >= FULL_TURN):
             control.lose([index], COUNTED)
     control.shortest = not on
 

@@ -22,7 +22,7 @@ from ncfix.writer.block import EXACT, BlockWriter
 from ncfix.writer.target import Target
 from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text, is_relied_on, pole_in_force
 from ncfix_heidenhain.klartext.control import BY_DEPTH, FROM_START
-from ncfix_heidenhain.klartext.layout import FULL, VECTOR, KlartextLayout, poles_move, tilts, uses_comma
+from ncfix_heidenhain.klartext.layout import TURN_DEGREES, VECTOR, KlartextLayout, poles_move, tilts, uses_comma
 
 FloatArray = NDArray[np.float64]
 
@@ -378,6 +378,6 @@ def on_its_side(source: bytes, letter: str, nominal: float, angle: float, step: 
         return angle
     if nominal >= 0.0 > angle and extremes(source, letter)[0] >= 0.0:
         return 0.0
-    if nominal < FULL <= angle and extremes(source, letter)[1] < FULL:
-        return FULL - step
+    if nominal < TURN_DEGREES <= angle and extremes(source, letter)[1] < TURN_DEGREES:
+        return TURN_DEGREES - step
     return angle
