@@ -51,6 +51,8 @@ AIM = 0.95
 """Share of a target that is aimed at: poses that were not looked at may miss a little more than those that were."""
 LAST = 3
 """Of the largest grids, how many are tried."""
+REMEMBERED = 1 << 16
+"""Grids with more points than this are not kept for when they are asked for again."""
 Counts = NDArray[np.intp]
 
 
@@ -86,6 +88,7 @@ class Volume:
     anchors: tuple[float | None, ...] = ()
     _bending: dict[int, Bending] = field(default_factory=dict, init=False)
     _checks: list[tuple[Array, Array]] = field(default_factory=list, init=False)
+    _grids: dict[tuple[int, ...], Grid] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         if not len(self.covered):
@@ -149,6 +152,15 @@ class Volume:
 
     def grid(self, counts: Sequence[int]) -> Grid:
         """The table with that many nodes along each input, at positions that files can say."""
+        key = tuple(counts)
+        if key in self._grids:
+            return self._grids[key]
+        found = self._grid(key)
+        if found.points <= REMEMBERED:
+            self._grids[key] = found
+        return found
+
+    def _grid(self, counts: tuple[int, ...]) -> Grid:
         nodes = tuple(self._nodes(index, count) for index, count in enumerate(counts))
         within = WITHIN if len(nodes) <= 3 else WITHIN // 2
         looked_at = tuple(self._around(index, line, within) for index, line in enumerate(nodes)) if self.area else nodes
@@ -357,17 +369,28 @@ def _first(volume: Volume, target: float, ladder: Counts) -> Mesh:
 
 
 def _bisected(volume: Volume, target: float, ladder: Counts) -> Mesh:
-    """The first of a ladder that is good enough, if they get better and better; or the best of the last few."""
+    """The first of a ladder that is good enough, if they get better and better; or the best of the last few.
+
+    Those are looked at only if the last of all is not good enough, or none before it is.
+    """
     low, high = 0, len(ladder) - 1
-    best = min((_at(volume, counts, target) for counts in ladder[-LAST:]), key=lambda mesh: mesh.left)
-    while best.reached and low < high:
+    last = _at(volume, ladder[-1], target)
+    best = None if last.reached else _best_of_last(volume, target, ladder, last)
+    if best is not None and not best.reached:
+        return best
+    while low < high:
         middle = (low + high) // 2
         found = _at(volume, ladder[middle], target)
         if found.reached:
             best, high = found, middle
         else:
             low = middle + 1
-    return best
+    return best or _best_of_last(volume, target, ladder, last)
+
+
+def _best_of_last(volume: Volume, target: float, ladder: Counts, last: Mesh) -> Mesh:
+    before = [_at(volume, counts, target) for counts in ladder[-LAST:-1]]
+    return min((*before, last), key=lambda mesh: mesh.left)
 
 
 def _thinned(volume: Volume, mesh: Mesh, target: float) -> Mesh:
