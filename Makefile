@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint share format accuracy bench same-bytes tables study hidden metamorphic refusals inserted-blocks \
+.PHONY: demo test lint share format accuracy bench batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
 	goldens goldens-update ci clean
 
 demo:            ## fix the shipped five-axis example
@@ -28,6 +28,9 @@ accuracy:        ## work out docs/accuracy.md (an hour), or STUDIES="plans ..." 
 
 bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md; SIZES="1000000" RUNS=5 LONG=10000000 OTHERS=200000
 	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/run.py $(if $(filter-out undefined,$(origin SIZES)),--sizes $(SIZES)) $(if $(RUNS),--runs $(RUNS)) $(if $(LONG),--long $(LONG)) $(if $(OTHERS),--others $(OTHERS))
+
+batch:           ## time batches, again and on a cluster, into docs/performance.md (minutes); PROGRAMS=2000
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) benchmarks/batch.py $(if $(PROGRAMS),--programs $(PROGRAMS))
 
 same-bytes:      ## correct programs in all ways, compare, into docs/performance.md (an hour; MOST=20000 ten minutes)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) benchmarks/same_bytes.py $(if $(MOST),--most $(MOST))

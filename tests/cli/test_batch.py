@@ -246,6 +246,22 @@ def test_what_is_said_of_many(ncfix: Any, shop: Any, parts: Path) -> None:
     assert ncfix(*one, "-q").err.splitlines() == of_machine
 
 
+def test_a_reason_that_many_programs_have_is_counted(
+    ncfix: Any, shop: Any, parts: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ncfix.cli import console
+
+    monkeypatch.setattr(console, "MOST", 2)
+    for number in range(5):
+        (parts / f"bad{number}.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
+    said = ncfix("fix", parts, "-m", shop.machine, "--assume-zero", "-o", shop.folder / "out", "-q").err.splitlines()[
+        2:
+    ]
+    assert [Path(line.split(":")[0]).name for line in said[:2]] == ["bad0.ngc", "bad1.ngc"]
+    assert len(said) == 3
+    assert "are only counted" in said[2]
+
+
 def test_json_lines(ncfix: Any, shop: Any, parts: Path) -> None:
     (parts / "bad.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
     result = ncfix("fix", parts, "-m", shop.machine, "-o", shop.folder / "out", "--assume-zero", "--json-lines", "-q")

@@ -21,7 +21,7 @@ from ncfix.batch.work import ExecutorMaker, results_in_order
 from ncfix.cli import console
 from ncfix.cli.console import owned
 from ncfix.cli.options import dialect_of
-from ncfix.cli.shop.summary import Loudness, brief, progress, told
+from ncfix.cli.shop.summary import Loudness, Teller, brief, progress
 from ncfix.cli.streams import FixedText, Outlet, Source, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
@@ -305,13 +305,14 @@ class Batch:
         self, targets: Sequence[OutputTarget], kept: Mapping[OutputTarget, JournalRecord], fresh: Iterator[Finished]
     ) -> Iterator[FixOutcome]:
         """All outcomes in their order, each with what there is to say of it."""
+        teller = Teller(self.loudness, self._many)
         with progress(len(targets)) as step:
             for target in targets:
                 if target in kept:
                     outcome, said = _done_before(target, kept[target])
                 else:
                     outcome, said = next(fresh)
-                told(outcome.entry, said, self.loudness, self._many)
+                teller.tell(outcome.entry, said)
                 step()
                 yield outcome
 

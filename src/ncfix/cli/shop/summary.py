@@ -143,11 +143,27 @@ def progress(total: int) -> Iterator[Advance]:
         yield step
 
 
-def told(entry: Mapping[str, Any], said: list[str], loudness: Loudness, many: bool) -> None:
-    """Say what there is to say of a program that is done; `said`: all of it."""
-    wrong = bool(reasons(entry))
-    if loudness == Loudness.ALL or (not many and (loudness == Loudness.USUAL or wrong)):
-        for line in said:
-            console.say(line)
-    elif many and wrong:
-        console.say(brief(entry))
+@dataclass(slots=True)
+class Teller:
+    """Says what there is to say of programs that are done.
+
+    many  they are many: of each of which nothing was written there is a line, at most `console.MOST` for each reason
+    """
+
+    loudness: Loudness
+    many: bool
+    seen: Counter[str] = field(default_factory=Counter)
+
+    def tell(self, entry: Mapping[str, Any], said: list[str]) -> None:
+        """Say what there is to say of one of them; `said`: all of it."""
+        wrong = reasons(entry)
+        if self.loudness == Loudness.ALL or (not self.many and (self.loudness == Loudness.USUAL or wrong)):
+            for line in said:
+                console.say(line)
+        elif self.many and wrong:
+            code = wrong[0][0]
+            self.seen[code] += 1
+            if self.seen[code] <= console.MOST:
+                console.say(brief(entry))
+            elif self.seen[code] == console.MOST + 1:
+                console.say(f"more programs with {code} are only counted; -v and --json name all")
