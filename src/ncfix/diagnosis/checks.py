@@ -8,9 +8,10 @@ import numpy as np
 from scipy.special import chdtrc
 
 from ncfix.diagnosis.noise import ENOUGH_REPEATS, repeat_scatter
-from ncfix.diagnosis.residual_data import ResidualData, misfit
+from ncfix.diagnosis.residual_data import AS_IT_STANDS_UM, ResidualData, misfit
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
+from ncfix.machine.plausible import much
 from ncfix.measure.estimate import Problem
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.selection import Selection
@@ -19,11 +20,9 @@ SPARE = 12
 """Values that must be left beside what is free."""
 NEIGHBOURS = 60
 """Rows from which on neighbouring poses tell the noise."""
-STRANGE_UM = 300.0
-"""Residuals, rms, that no machine tool has."""
+STRANGE = 3e3
+"""Residuals, rms um, that no machine has, per mm of what is much of where an axis lies (an arm errs more)."""
 WORSE = 1.3
-AS_IT_STANDS_UM = 0.01
-"""Constants are not refitted where the file itself is judged."""
 EXPLAINED = 0.5
 """Constants are wrong where, set free, they leave less than this share of what a file without errors leaves."""
 CONTRADICTION = 1e-6
@@ -51,7 +50,7 @@ def sensible(measurements: Sequence[Measurement], machine: Machine) -> None:
     """Refuse what no mistake explains. Raises `UsageError` NCF654, NCF655."""
     now = misfit(measurements, machine)
     free = now.free
-    if free > STRANGE_UM:
+    if free > STRANGE * max(much(machine, f"EX0{axis.name}") for axis in machine.axes):
         text = f"{free:.0f} um rms are left after the set-up was fitted"
         raise UsageError.of("NCF654", text, hint="a measurement of another machine, or exchanged columns?")
     left, bare = now.left(AS_IT_STANDS_UM), misfit(measurements, machine.replace(effects=()))

@@ -77,6 +77,7 @@ class ConstantsVerdict:
     size_um   how far the changes move what was measured, rms beside the set-up
     shown     (m,) what they show, um
     solution  of the fit: what could not be told, and of which only combinations are seen
+    paid      what the changes pay
     whole     the file as a whole is off: more constants than can be named one by one
     """
 
@@ -89,6 +90,7 @@ class ConstantsVerdict:
     shown: Array
     solution: Solution
     whole: bool
+    paid: float
 
     @property
     def p_value(self) -> float:
@@ -248,7 +250,8 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     change = np.zeros(k)
     change[chosen] = spread @ seen[places]
     plain = asked.likelihood()
-    odds = asked.likelihood(chosen) - plain - _price(len(chosen), len(offered)) if chosen else 0.0
+    paid = _price(len(chosen), len(offered))
+    odds = asked.likelihood(chosen) - plain - paid if chosen else 0.0
     basis = orthonormal(asked.setup / data.relative[:, None])
 
     def beside(shown: Array) -> Array:
@@ -280,7 +283,7 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     shown = beside(asked.constants @ change)
     moved.sort(key=lambda each: -each.size_um)
     return ConstantsVerdict(
-        change, tuple(moved), odds, distance, len(kept), data.rms(shown), shown, solution, bool(whole)
+        change, tuple(moved), odds, distance, len(kept), data.rms(shown), shown, solution, bool(whole), paid
     )
 
 

@@ -19,7 +19,7 @@ from ncfix.diagnosis import checks
 from ncfix.diagnosis.assessment import Plausibility, plausibility
 from ncfix.diagnosis.catalogue import Candidate, catalogue, without
 from ncfix.diagnosis.constants import ConstantsVerdict, FileLikelihood, MovedConstant, judged_constants, names_of
-from ncfix.diagnosis.evidence import Comparison, Evidence, Member
+from ncfix.diagnosis.evidence import Comparison, Evidence, Member, entry_price
 from ncfix.diagnosis.forms import VisibleForms, scaled_axes, unnamed_alternatives, visible_forms
 from ncfix.diagnosis.joint_fit import (
     RATHER,
@@ -54,6 +54,7 @@ from ncfix.diagnosis.selection import (
     with_constants,
     with_constants_free,
 )
+from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import component_title
 from ncfix.measure.least_squares import orthonormal
@@ -67,6 +68,8 @@ MUCH = 1 / 3
 """Nor below this share of what all names together show."""
 LACKING = 1e-3
 """Probability of what is left by chance, below which something is missing that follows no pattern either."""
+AS_GOOD = 1.5
+"""A file that is refused as it stands is put right by a mistake that leaves no more than this times the noise."""
 CONSTANT_FAMILY = "constant of the file"
 ANEW = "use the new machine file, or calibrate the machine anew"
 NO_PATTERN = "something that follows no pattern that was looked for"
@@ -143,6 +146,7 @@ class Diagnosis:
     rest           what has no name
     machine        with the findings added, or None if there is nothing to add
     before, after  (m,) residuals with the constants alone and with the findings, um; p_lack, p_left by chance
+    likelihood     log likelihood of the values about the file with all that was found, less its prices
     named_odds, unnamed_odds  log odds of all names together, and of what has none beside them
     clustering     how much neighbouring residuals are alike, before and after
     constants      what the data say of the constants of the machine file; the gap before is after that
@@ -166,6 +170,7 @@ class Diagnosis:
     findable: Mapping[str, float]
     proposal: Proposal | None = None
     mistake: Mistake | None = None
+    likelihood: float = 0.0
     named_odds: float = 0.0
     unnamed_odds: float = 0.0
 
@@ -273,6 +278,7 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
         constants=constants,
         findable=findable_sizes(scale),
         proposal=proposed(scale, selected, sigma) if told else None,
+        likelihood=_likelihood(scale, selected, constants, share),
         named_odds=weights[1] - weights[0],
         unnamed_odds=weights[2] - weights[1],
     )
@@ -291,6 +297,13 @@ def _findings(
             EffectFinding(owner, selected.odds[name], selected.p_value(name), alike, size, effects, shown, judgement)
         )
     return tuple(found)
+
+
+def _likelihood(scale: Comparison, selected: Selected, constants: ConstantsVerdict, share: float) -> float:
+    """Of the values about the file with constants, names and alternatives, less what they pay."""
+    asked = FileLikelihood(scale.evidence, scale.all(selected.members), share)
+    paid = sum(map(scale.price, selected.members)) + entry_price(len(selected.members)) + constants.paid
+    return asked.likelihood([each.index for each in constants.moved]) - paid
 
 
 def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: float) -> tuple[EffectFinding, ...]:
@@ -371,10 +384,26 @@ def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Seq
     """
     checks.before(measurements, machine)
     wrong = find(measurements, machine, refused)
-    if wrong is not None:
-        measurements, machine = wrong.measurements, wrong.machine
-    else:
+    if wrong is None:
         checks.sensible(measurements, machine)
+        return _explained(measurements, machine, refused)
+    undone = _explained(wrong.measurements, wrong.machine, refused)
+    if not wrong.sure:
+        try:
+            checks.sensible(measurements, machine)
+            given = _explained(measurements, machine, refused)
+        except UsageError:
+            if undone.gap.given > AS_GOOD * undone.gap.floor:
+                raise
+            return _with_mistake(undone, wrong)
+        stretched = len(undone.data.y) * float(np.log(wrong.stretch))
+        if given.likelihood >= undone.likelihood + stretched - wrong.paid:
+            return given
+    return _with_mistake(undone, wrong)
+
+
+def _explained(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str]) -> Diagnosis:
+    """Constants and names, whatever mistakes there may be. Raises `UsageError` NCF650, NCF656."""
     seen = residual_data(measurements, machine)
     checks.enough(seen)
     candidates, unheard_of = without(catalogue(seen.measured), refused)
@@ -385,8 +414,7 @@ def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Seq
     background = estimated_background(seen, everything, relative, visible.groups)
     evidence = Evidence(background, groups, len(visible.groups))
     case, scale = Case(seen, candidates, unheard_of, visible, outlying, evidence), Comparison(evidence)
-    found = concluded(case, scale, _selected(scale))
-    return _with_mistake(found, wrong) if wrong else found
+    return concluded(case, scale, _selected(scale))
 
 
 def _selected(scale: Comparison) -> Selected:
@@ -399,8 +427,8 @@ def _selected(scale: Comparison) -> Selected:
 def _with_mistake(diagnosis: Diagnosis, wrong: Mistake) -> Diagnosis:
     """The diagnosis with the mistake as its first finding."""
     candidate = Candidate(wrong.name, wrong.title, wrong.axis, "mistake", (), (), remedy="correct the mistake")
-    size = float(np.sqrt(max(wrong.before_um**2 - wrong.after_um**2, 0.0)))
-    first = EffectFinding(candidate, size**2, 0.0, wrong.aliases, size, (), np.zeros(len(diagnosis.data.y)))
+    size = float(np.sqrt(max(wrong.given_um**2 - diagnosis.gap.given**2, 0.0)))
+    p_value = float(np.exp(-max(wrong.odds, 0.0)))
+    first = EffectFinding(candidate, wrong.odds, p_value, wrong.aliases, size, (), np.zeros(len(diagnosis.data.y)))
     verdict = (AMBIGUOUS if wrong.aliases else FOUND) if diagnosis.verdict == NOTHING else diagnosis.verdict
-    gap = replace(diagnosis.gap, before=wrong.before_um)
-    return replace(diagnosis, verdict=verdict, findings=(first, *diagnosis.findings), gap=gap, mistake=wrong)
+    return replace(diagnosis, verdict=verdict, findings=(first, *diagnosis.findings), mistake=wrong)

@@ -3,52 +3,67 @@
 Each mistake is undone in turn, and it is looked how well the machine file as it stands, its constants nearly fixed,
 then agrees with the data. A mistake that is real explains nearly all at once, with nothing fitted: no missing effect
 does.
-
-A table that was made before reference points were moved: the same curves, some way beside their place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
 
 import numpy as np
 
 from ncfix.diagnosis.catalogue import plain
-from ncfix.diagnosis.residual_data import Misfit, ResidualData, misfit, residual_data
+from ncfix.diagnosis.evidence import SURE
+from ncfix.diagnosis.residual_data import (
+    AS_IT_STANDS_UM,
+    TIGHT_UM,
+    UM,
+    Misfit,
+    is_free,
+    misfit,
+)
+from ncfix.diagnosis.stale_tables import shifted_tables
+from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
+from ncfix.machine.plausible import much
+from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Measurement
 
-SUSPECT, SUSPECT_UM = 1.4, 1.5
-"""Times the noise, and um above it, from which on a mistake is looked for."""
-BETTER, BETTER_UM = 0.75, 1.5
-"""A mistake is one if undoing it leaves at most this share of the misfit, and this much less."""
-AS_GOOD = 1.5
-"""And no more than this times what is left with all constants free."""
+SUSPECT = 1.15
+"""Times the noise from which on a mistake is looked for."""
 AS_SIMPLE = 1.03
 """Of mistakes that leave no more than this times the least, the simplest is taken."""
+TRIED = 8
+"""Of mistakes that can be judged to first order so many, the best, are judged exactly."""
+NAMES_COST = 25.0
+"""What names pay at least, log odds: a mistake that reaches the noise is never worse."""
+A_LITTLE_UM = 0.6
+"""What machines have of everything, of one value: the noise is never reached closer."""
+PLAUSIBLE_UM, DECADE = 3.0, float(np.log(10.0))
+"""Usual noise of a value, and the spread of its logarithm: a unit may be wrong where noise is a thousand times that."""
 LARGE_RAD = 2e-4
 """An angle above this may have been typed in degrees."""
-LIKELIER = 10.0
-"""Log odds by which the data must prefer the angle in radians."""
+TYPED = 5.0
+"""Log odds beforehand for a mistake that the file itself looks like."""
 TURN_RAD = 6.6
-OFF_MM = 0.3
-"""An axis point that is off by more was measured to the wrong face."""
+OFF = 3.0
+"""Times what is much of a machine of its size and kind: an axis point that is further off was measured wrongly."""
 NOWHERE_MM = 0.1
 """A first step that is smaller leads to none that is off: what it leaves is of second order."""
 PIVOT_STEPS = 3
 """Steps in which the point of an axis is moved to where the data have it."""
 INCH = 25.4
-SHIFT_REACH = 0.16
-"""Of the travel measured: how far a table may be off."""
-SHIFTS = 33
-"""Shifts that are tried over that reach, to both sides; the middle one is none."""
-OF_FILE = "stale table: the curves of the file belong some way beside: "
-OF_CONTROL = "stale table: the control corrects with a table shifted by "
-SHIFT_ROUNDS = 4
-"""How often the shift of each axis is chosen beside those of the others."""
+TINY_UM = 1e-6
+ALIKE = 3.0
+"""Log odds (20 to 1) within which another mistake explains the data as well."""
+TOOL_STEP_MM, TOOL_LEAST_MM, MOST_TOOLS = 50.0, 1.0, 4
+"""Steps in which a tool's length is tried; the least error; and of how many tools."""
+WARM_STEP_K, WARM_LEAST_K, STEEL = 20.0, 8.0, 11.5e-6
+"""The same for the temperature of a workpiece, and the growth of steel per kelvin."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,6 +73,11 @@ class Mistake:
     before_um, after_um  misfit with it and without it
     likely               the file itself looks like it
     aliases              mistakes of its kind that explain the data as well
+    stretch              values of the file are to be multiplied with this: densities are stretched by as much
+    fitted               how many numbers were fitted to undo it
+    given_um             rms of the lengths that the file as given leaves
+    odds, paid           log odds against the file as given, after what the mistake pays
+    sure                 it reaches the noise: no names do better
     """
 
     name: str
@@ -69,57 +89,218 @@ class Mistake:
     after_um: float = 0.0
     likely: bool = False
     aliases: tuple[str, ...] = ()
+    stretch: float = 1.0
+    fitted: int = 0
     given_um: float = 0.0
     odds: float = 0.0
+    paid: float = 0.0
+    sure: bool = False
 
 
 def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = ()) -> Mistake | None:
-    """The mistake that explains nearly everything, if one does."""
+    """The mistake that explains the data better than the file as it stands, if one does: by log odds."""
     measurements = tuple(measurements)
     now = misfit(measurements, machine)
     left = now.left()
-    agrees = left < SUSPECT * now.noise or left < now.noise + SUSPECT_UM
-    if agrees and not any(_looks_typed(effect) for effect in machine.effects):
+    if left < SUSPECT * now.noise and not any(_looks_typed(effect) for effect in machine.effects):
         return None
     names = {plain(name) for name in refused}
-    return _convincing(
-        [_tried(each, left) for each in _offered(measurements, machine) if plain(each.name) not in names], now
+    quick = [each for each in _quick(measurements, machine, now) if plain(each[1].name) not in names]
+    quick.sort(key=lambda pair: _weight(pair[0], pair[1], now))
+    offered = [each for _, each in quick[-TRIED:]]
+    offered += [each for each in _offered(measurements, machine) if plain(each.name) not in names]
+    count = len(offered) + len(quick)
+    tried = [_tried(each, left, now, count) for each in offered]
+    tried = [each for each in tried if np.isfinite(each.odds)]
+    if not tried:
+        return None
+    best = max(tried, key=lambda each: each.odds)
+    slack = now.count * float(np.log(AS_SIMPLE))
+    alike = [each for each in tried if each.odds > best.odds - slack and each.stretch == best.stretch]
+    simplest = min(alike, key=lambda each: (each.fitted, -each.odds))
+    if simplest.odds <= 0:
+        return None
+    components = len(now.problem.values) / max(sum(map(len, measurements)), 1)
+    given = now.left(AS_IT_STANDS_UM) * float(np.sqrt(components))
+    near = [each for each in alike if each.odds > simplest.odds - ALIKE and each is not simplest]
+    return replace(
+        simplest, given_um=given, aliases=tuple(dict.fromkeys(each.name for each in near if each.name != simplest.name))
     )
 
 
-def _convincing(tried: Sequence[Mistake], now: Misfit) -> Mistake | None:
-    """The simplest that leaves as little as any: one that the file itself looks like, or that explains nearly all."""
-    left, least = now.left(), min((each.after_um for each in tried), default=np.inf)
-    alike = [each for each in tried if each.after_um <= AS_SIMPLE * least]
-    typed = next((each for each in alike if each.likely), None)
-    if typed is not None and now.count * np.log(left / typed.after_um) > LIKELIER:
-        return typed
-    if not alike or not _explains(least, left, now):
-        return None
-    return replace(alike[0], aliases=_of_its_kind(alike))
+def _weight(left: float, mistake: Mistake, now: Misfit) -> float:
+    """Log likelihood of the values as they are in the file, where undoing the mistake leaves so much, um."""
+    fit = -now.count * (float(np.log(max(left, TINY_UM))) - float(np.log(mistake.stretch)))
+    return fit - 0.5 * (float(np.log(max(left, TINY_UM) / PLAUSIBLE_UM)) / DECADE) ** 2
 
 
-def _of_its_kind(alike: Sequence[Mistake]) -> tuple[str, ...]:
-    """The names of the others that begin with the same word as the first: `pivot B` beside `pivot C`."""
-    first = alike[0].name
-    return tuple(each.name for each in alike[1:] if each.name.split()[0] == first.split()[0] and each.name != first)
+def _tried(mistake: Mistake, before: float, now: Misfit, count: int) -> Mistake:
+    """The mistake with what undoing it leaves, and its log odds."""
+    try:
+        fixed = misfit(mistake.measurements, mistake.machine)
+        left = fixed.left()
+    except (NcfixError, np.linalg.LinAlgError, ValueError):
+        return replace(mistake, odds=-np.inf)
+    paid = float(np.log(count)) + SURE + 0.5 * mistake.fitted * float(np.log(now.count)) - TYPED * mistake.likely
+    own = _weight(left, mistake, now) - paid
+    still = _weight(max(left, fixed.left(AS_IT_STANDS_UM)), mistake, now) - paid
+    floor = float(np.hypot(fixed.noise, A_LITTLE_UM)) / mistake.stretch
+    return replace(
+        mistake,
+        before_um=before,
+        after_um=left,
+        odds=own - _weight(before, replace(mistake, stretch=1.0), now),
+        paid=paid,
+        sure=still >= _weight(floor, replace(mistake, stretch=1.0), now) - NAMES_COST,
+    )
 
 
-def _tried(mistake: Mistake, before: float) -> Mistake:
-    """The mistake with what undoing it leaves."""
-    return replace(mistake, before_um=before, after_um=misfit(mistake.measurements, mistake.machine).left())
+def _quick(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[tuple[float, Mistake]]:
+    """Mistakes that change what the file says by a known column, or the values: with what is left to first order."""
+    rest, problem = FirstOrder.of(now), now.problem
+    shown = [UM * (problem_design @ np.asarray(effect.coefficients)) for effect, problem_design in _designs(problem)]
+    for factor, parts, name, title, axis in _scalings(machine):
+        change = sum((shown[k] for k in parts), np.zeros(len(problem.values)))
+        effects = tuple(
+            replace(e, coefficients=tuple(factor * c for c in e.coefficients)) if k in parts else e
+            for k, e in enumerate(machine.effects)
+        )
+        undone = Mistake(name, title, axis, machine.replace(effects=effects), measurements)
+        yield rest.left(rest.y + (1.0 - factor) * change), undone
+    yield from _of_values(measurements, machine, rest)
 
 
-def _explains(left: float, before: float, now: Misfit) -> bool:
-    if left >= BETTER * before or left >= before - BETTER_UM:
-        return False
-    return left < AS_GOOD * max(now.noise, min(now.free, 2 * now.noise))
+def _designs(problem: Problem) -> list[tuple[Effect, Array]]:
+    """Each effect of the file with its columns (m, p), mm."""
+    return [
+        (effect, np.concatenate([each.design([effect]) for each in problem.observations]))
+        for effect in problem.machine.effects
+    ]
+
+
+def _scalings(machine: Machine) -> Iterator[tuple[float, tuple[int, ...], str, str, str]]:
+    """Factor of some effects of the file, which ones, name, title and axis."""
+    effects = machine.effects
+    if machine.is_perfect:
+        return
+    every = tuple(range(len(effects)))
+    title = "table already active: the control compensates what the model predicts"
+    yield 0.0, every, "table active", title, ""
+    title = "wrong sign: the model holds corrections instead of errors"
+    yield -1.0, every, "wrong sign", title, ""
+    title = "wrong sign of the table in the control: errors are doubled"
+    yield 2.0, every, "wrong sign", title, ""
+    for joint in dict.fromkeys(effect.joint for effect in effects):
+        own = tuple(k for k in every if effects[k].joint == joint)
+        if len(own) < len(every):
+            yield -1.0, own, f"sign of {joint}", f"wrong sign of all errors of {joint} in the machine file", joint
+            title = f"table already active for {joint}: the control compensates its errors"
+            yield 0.0, own, f"table active {joint}", title, joint
+            title = f"wrong sign of the table of {joint} in the control: its errors are doubled"
+            yield 2.0, own, f"wrong sign {joint}", title, joint
+    for name in dict.fromkeys(effect.name for effect in effects):
+        own = tuple(k for k in every if effects[k].name == name)
+        joint = effects[own[0]].joint
+        yield -1.0, own, f"sign of {name}", f"wrong sign of {name} in the machine file", joint
+        curves = tuple(k for k in own if not is_free(effects[k]))
+        if curves:
+            title = f"table already active for {joint}: the control compensates {name}"
+            yield 0.0, curves, f"table active {name}", title, joint
+            if len(curves) < len(own):
+                yield -1.0, curves, f"sign of {name}", f"wrong sign of the table of {name} in the machine file", joint
+
+
+def _of_values(
+    measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder
+) -> Iterator[tuple[float, Mistake]]:
+    """Measured values of another sign, unit or column."""
+    if any(each.kind not in ("tcp", "tcp6", "axis") for each in measurements):
+        return
+    names = [name for name in measurements[0].measured if all(name in each.columns for each in measurements)]
+    lengths = [name for name in names if name in ("dx", "dy", "dz", "value")]
+
+    def undone(name: str, title: str, columns: dict[str, tuple[str, float]], stretch: float = 1.0) -> Mistake:
+        changed = tuple(
+            each.with_columns({to: factor * each.columns[of] for to, (of, factor) in columns.items()})
+            for each in measurements
+        )
+        return Mistake(name, title, "", machine, changed, stretch=stretch)
+
+    offered = [
+        undone("sign of values", "wrong sign of all measured values", {name: (name, -1.0) for name in names}),
+    ]
+    if len(names) > 1:
+        offered += [
+            undone(f"sign of {name}", f"wrong sign of the measured values {name}", {name: (name, -1.0)})
+            for name in names
+        ]
+    for first, second in combinations(lengths, 2):
+        columns = {first: (second, 1.0), second: (first, 1.0)}
+        offered.append(undone(f"swapped {first} {second}", f"the columns {first} and {second} are exchanged", columns))
+    if len(lengths) == 3:
+        for order in ((1, 2, 0), (2, 0, 1)):
+            columns = {to: (lengths[k], 1.0) for to, k in zip(lengths, order, strict=True)}
+            listed = ", ".join(lengths[k] for k in order)
+            offered.append(undone("swapped columns", f"the measured columns are in the order {listed}", columns))
+    for unit, factor in (("um", 1e-3), ("m", 1e3), ("inch", INCH)):
+        share = len(lengths) / len(names)
+        columns = {name: (name, factor) for name in lengths}
+        title = f"unit of values: the measured values are in {unit}, not in mm"
+        offered.append(undone("unit of values", title, columns, factor**share))
+    for each in offered:
+        yield rest.left(rest.of_values(each.measurements)), each
+
+
+@dataclass(frozen=True, repr=False)
+class FirstOrder:
+    """The misfit of a file to first order: its set-up free, its constants nearly fixed.
+
+    y         (m,) values minus what the file says, um
+    basis     orthonormal columns of what is free, with the rows of the prior below, (m + k, r)
+    """
+
+    now: Misfit
+    y: Array
+    basis: Array
+
+    @staticmethod
+    def of(now: Misfit) -> FirstOrder:
+        """About the first guess of the set-up."""
+        problem = now.problem
+        free = UM * problem.nuisance(problem.start) / now.relative[:, None]
+        own = UM * problem.design / now.relative[:, None]
+        size = np.sqrt((own**2).mean(axis=0))
+        prior = np.diag(now.noise / TIGHT_UM * np.where(size > 0, size, 1.0))
+        below = np.concatenate([np.zeros((len(prior), free.shape[1])), prior], axis=1)
+        columns = np.concatenate([np.concatenate([free, own], axis=1), below])
+        y = UM * problem.residual(problem.selection.start, problem.start)
+        return FirstOrder(now, y, orthonormal(columns))
+
+    def of_values(self, measurements: Sequence[Measurement]) -> Array:
+        """(m,) other values minus what the file says, um."""
+        problem = self.now.problem
+        pairs = zip(measurements, problem.observations, strict=True)
+        values = np.concatenate([
+            np.concatenate([
+                np.stack([each.column(name) for name in seen.components], axis=1).ravel(), seen.extra_values
+            ])
+            for each, seen in pairs
+        ])  # fmt: skip
+        changed: Array = self.y + UM * (values - problem.values)
+        return changed
+
+    def left(self, y: Array) -> float:
+        """Root mean square of what these values leave, um, without the largest."""
+        scaled = np.concatenate([y / self.now.relative, np.zeros(len(self.basis) - len(y))])
+        rest = np.abs(without(self.basis, scaled[:, None])[:, 0])
+        kept = np.sort(rest[: len(y)])[: self.now.count]
+        return float(np.sqrt(((kept**2).sum() + (rest[len(y) :] ** 2).sum()) / len(kept)))
 
 
 def _offered(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Simple ones first."""
-    yield from _signs(measurements, machine)
+    """Mistakes of positions, tools and axes, whose effect is not of first order."""
     yield from _units(measurements, machine)
+    yield from _exchanged_axes(measurements, machine)
     for axis in machine.axes:
         if axis.rotary:
             title = f"rotary sign: the machine file turns {axis.name} the other way round"
@@ -128,32 +309,101 @@ def _offered(measurements: tuple[Measurement, ...], machine: Machine) -> Iterato
             moved = _pivot(measurements, machine, axis)
             if moved is not None:
                 yield moved
-    for shifted, title in _shifted_tables(measurements, machine):
-        yield Mistake("stale table", title, "", shifted, measurements)
+        else:
+            title = f"axis sign: the positions of {axis.name} count the other way"
+            yield Mistake(
+                f"axis sign {axis.name}",
+                title,
+                axis.name,
+                machine,
+                _times(measurements, [axis.name], -1.0),
+            )
+    yield from _tools(measurements, machine)
+    yield from _warm(measurements, machine)
+    for shifted, title in shifted_tables(measurements, machine):
+        axes = sum(not axis.rotary for axis in machine.axes)
+        yield Mistake("stale table", title, "", shifted, measurements, fitted=axes)
 
 
-def _signs(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """The control corrects already, or corrects the wrong way, or the file holds corrections."""
-    if machine.is_perfect:
+def _exchanged_axes(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """Columns of positions of two axes under each other's names."""
+    for kind in (False, True):
+        names = [axis.name for axis in machine.axes if axis.rotary == kind]
+        for first, second in combinations(names, 2):
+            if all(first in each.columns and second in each.columns for each in measurements):
+                changed = tuple(
+                    each.with_columns({first: each.columns[second], second: each.columns[first]})
+                    for each in measurements
+                )
+                title = f"the columns {first} and {second} are exchanged"
+                yield Mistake(f"swapped {first} {second}", title, "", machine, changed)
+
+
+def _tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """A tool of another length than was stated, all of another unit, or two of them exchanged."""
+    if any("tool_length" not in each.columns for each in measurements):
         return
-    title = "table already active: the control compensates what the model predicts"
-    yield Mistake("table active", title, "", _scaled(machine, 0.0), measurements)
-    title = "wrong sign: the model holds corrections instead of errors"
-    yield Mistake("wrong sign", title, "", _scaled(machine, -1.0), measurements)
-    title = "wrong sign of the table in the control: errors are doubled"
-    yield Mistake("wrong sign", title, "", _scaled(machine, 2.0), measurements)
+    lengths = sorted({float(x) for each in measurements for x in each.column("tool_length")})
+    title = "tool length: the lengths of the two tools are exchanged"
+    if len(lengths) == 2:
+        swapped = _lengths(measurements, lambda length: sum(lengths) - length)
+        yield Mistake("tool length", title, "", machine, swapped)
+    for unit, factor in (("m", 1e3), ("inch", INCH)):
+        title = f"tool length: the lengths of the tools are in {unit}, not in mm"
+        yield Mistake("tool length", title, "", machine, _times(measurements, ["tool_length"], factor))
+    for length in [None, *lengths] if 1 < len(lengths) <= MOST_TOOLS else [None]:
+        off = _vertex(partial(_longer, measurements, length), machine, TOOL_STEP_MM)
+        if abs(off) > TOOL_LEAST_MM:
+            which = "the tools" if length is None else f"the tool of {length:g} mm"
+            title = f"tool length: {which} {'are' if length is None else 'is'} {off:+.1f} mm longer than stated"
+            yield Mistake("tool length", title, "", machine, _longer(measurements, length, off), fitted=1)
 
 
-def _scaled(machine: Machine, factor: float) -> Machine:
-    effects = tuple(replace(e, coefficients=tuple(factor * c for c in e.coefficients)) for e in machine.effects)
-    return machine.replace(effects=effects)
+def _lengths(measurements: tuple[Measurement, ...], change: Callable[[Array], Array]) -> tuple[Measurement, ...]:
+    return tuple(each.with_columns({"tool_length": change(each.column("tool_length"))}) for each in measurements)
+
+
+def _longer(measurements: tuple[Measurement, ...], length: float | None, by: float) -> tuple[Measurement, ...]:
+    return _lengths(measurements, lambda x: x + by if length is None else np.where(x == length, x + by, x))
+
+
+def _warm(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """The workpiece or artefact was warmer than it should be: all it shows grows from a point that the set-up has."""
+    if any(each.kind != "tcp" or not set(each.measured) & {"dx", "dy", "dz"} for each in measurements):
+        return
+    kelvin = _vertex(lambda by: _grown(measurements, machine, by), machine, WARM_STEP_K)
+    if abs(kelvin) > WARM_LEAST_K:
+        title = f"workpiece {abs(kelvin):.1f} K too {'warm' if kelvin > 0 else 'cold'}, if it is of steel"
+        yield Mistake("workpiece temperature", title, "", machine, _grown(measurements, machine, kelvin), fitted=1)
+
+
+def _grown(measurements: tuple[Measurement, ...], machine: Machine, kelvin: float) -> tuple[Measurement, ...]:
+    """The measurements less what a workpiece of steel grows by."""
+    found = []
+    for each in measurements:
+        tip = machine.tip(each.positions(machine), each.column("tool_length"))
+        names = [name for name in ("dx", "dy", "dz") if name in each.columns]
+        found.append(
+            each.with_columns(
+                {name: each.columns[name] - STEEL * kelvin * tip[:, "xyz".index(name[1])] for name in names}
+            )
+        )
+    return tuple(found)
+
+
+def _vertex(changed: Callable[[float], tuple[Measurement, ...]], machine: Machine, step: float) -> float:
+    """Where the squares of the misfit are least along one number, by a parabola through three places."""
+    low, middle, high = (misfit(changed(by), machine).left() ** 2 for by in (-step, 0.0, step))
+    bent = low + high - 2 * middle
+    return 0.5 * step * (low - high) / bent if bent > 0 else 0.0
 
 
 def _units(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
     linear = [axis.name for axis in machine.axes if not axis.rotary]
-    yield Mistake(
-        "inch", "inch: positions of the linear axes are in inches", "", machine, _times(measurements, linear, INCH)
-    )
+    for name, said, factor in (("inch", "inches", INCH), ("metre", "metres", 1e3), ("um", "micrometres", 1e-3)):
+        changed = _times(measurements, linear, factor)
+        title = f"{name}: positions of the linear axes are in {said}"
+        yield Mistake(name, title, "", machine, changed, stretch=_stretch(measurements, linear, factor))
     rotary = [axis.name for axis in machine.axes if axis.rotary]
     if rotary and max(float(np.abs(each.column(a)).max()) for each in measurements for a in rotary) < TURN_RAD:
         title = "radian: angles in the measurement are in radians instead of degrees"
@@ -183,6 +433,13 @@ def _times(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: f
     )
 
 
+def _stretch(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> float:
+    """By how much the readings are stretched: those of a probe are positions of axes."""
+    names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
+    shares = [len(names & set(each.measured)) / max(len(each.measured), 1) for each in measurements]
+    return float(factor ** np.mean(shares))
+
+
 def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) -> Mistake | None:
     """The axis point moved to where the data have it."""
     located = [Effect(f"E{letter}0{axis.name}", (0.0,)) for letter in "XYZ"]
@@ -196,81 +453,11 @@ def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) 
             return None
         moved = _with(machine, replace(axis, point=tuple(float(x) for x in point)))  # type: ignore[arg-type]
     off = float(np.linalg.norm(point - np.asarray(axis.point)))
-    if off < OFF_MM:
+    if off < OFF * much(machine, f"EX0{axis.name}"):
         return None
     title = f"pivot: the point of {axis.name} is {off:.2f} mm off in the machine file"
-    return Mistake(f"pivot {axis.name}", title, axis.name, moved, measurements)
+    return Mistake(f"pivot {axis.name}", title, axis.name, moved, measurements, fitted=2)
 
 
 def _with(machine: Machine, axis: Axis) -> Machine:
     return machine.replace(axes=tuple(axis if each.name == axis.name else each for each in machine.axes))
-
-
-def _shifted_tables(measurements: Sequence[Measurement], machine: Machine) -> Iterator[tuple[Machine, str]]:
-    """The machine with its curves at the likeliest other place, and with a control that corrects there."""
-    seen = residual_data(measurements, machine)
-    basis = orthonormal(seen.base / seen.relative[:, None])
-    curves = {
-        axis.name: [e for e in machine.effects if _bent(e) and e.signal == axis.name] for axis in seen.measured.linear
-    }
-    curves = {name: effects for name, effects in curves.items() if effects}
-    if not curves:
-        return
-    ways = {name: _ways(seen.measured.spans[name]) for name in curves}
-    shown = {name: _shown(seen, basis, curves[name], ways[name]) for name in curves}
-    own = {name: rows[len(rows) // 2] for name, rows in shown.items()}
-    y = _left(basis, seen.y / seen.relative) + sum(own.values(), np.zeros(len(seen.y)))
-    corrected = {name: own[name] - rows for name, rows in shown.items()}
-    for title, by_control, patterns in ((OF_FILE, False, shown), (OF_CONTROL, True, corrected)):
-        beside = _found(y, patterns)
-        if any(k != SHIFTS // 2 for k in beside.values()):
-            yield _machine(machine, curves, ways, beside, by_control), title + _said(ways, beside)
-
-
-def _shown(seen: ResidualData, basis: Array, curves: Sequence[Effect], ways: Array) -> Array:
-    """What curves of one axis show at every other place, beside what is free, (places, m)."""
-    moved = [replace(e, center=e.center - float(way)) for way in ways for e in curves]
-    values = np.concatenate([np.asarray(e.coefficients) for e in curves])
-    designs = np.split(seen.design(moved), len(ways), axis=1)
-    columns = np.stack([design @ values for design in designs], axis=1)
-    left: Array = without(basis, columns / seen.relative[:, None]).T
-    return left
-
-
-def _bent(effect: Effect) -> bool:
-    return effect.active and effect.basis.needs_signal and not effect.location
-
-
-def _ways(span: tuple[float, float]) -> Array:
-    return np.linspace(-SHIFT_REACH, SHIFT_REACH, SHIFTS) * (span[1] - span[0])
-
-
-def _left(basis: Array, values: Array) -> Array:
-    return without(basis, values[:, None])[:, 0]
-
-
-def _found(y: Array, shown: dict[str, Array]) -> dict[str, int]:
-    """The place of each axis's curves that leaves least, one axis after another."""
-    chosen = dict.fromkeys(shown, SHIFTS // 2)
-    for _ in range(SHIFT_ROUNDS):
-        for name, rows in shown.items():
-            rest = y - sum((shown[other][k] for other, k in chosen.items() if other != name), np.zeros(len(y)))
-            chosen[name] = int(((rest - rows) ** 2).sum(axis=1).argmin())
-    return chosen
-
-
-def _machine(
-    machine: Machine, curves: dict[str, list[Effect]], ways: dict[str, Array], at: dict[str, int], corrected: bool
-) -> Machine:
-    moved = {id(e): replace(e, center=e.center - float(ways[name][at[name]])) for name in curves for e in curves[name]}
-    if not corrected:
-        return machine.replace(effects=tuple(moved.get(id(e), e) for e in machine.effects))
-    against = tuple(replace(e, coefficients=tuple(-c for c in e.coefficients)) for e in moved.values())
-    constants = tuple(
-        e if id(e) in moved else replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects
-    )
-    return machine.replace(effects=(*constants, *against))
-
-
-def _said(ways: dict[str, Array], at: dict[str, int]) -> str:
-    return ", ".join(f"{ways[name][k]:+.0f} mm in {name}" for name, k in at.items())

@@ -20,7 +20,7 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import SPINDLE, Axis
 from ncfix.machine.basis import ConstantBasis, Polynomial
 from ncfix.measure.estimate import Problem
-from ncfix.measure.least_squares import gauss_newton
+from ncfix.measure.least_squares import gauss_newton, solve
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.selection import Selection
 
@@ -33,6 +33,8 @@ UNTELLABLE = 1e-5
 """Singular values below this, of the largest, are taken for what cannot be told."""
 TIGHT_UM = 4.0
 """How far each constant of a machine file may have moved since, at the tool tip."""
+AS_IT_STANDS_UM = 0.01
+"""The same where the file itself is judged."""
 FREE_UM = 500.0
 """The same where they are free: no more, or what cannot be told runs away."""
 WIDE_UM = 1e5
@@ -201,19 +203,26 @@ class ResidualData:
 
 
 def residual_data(measurements: Sequence[Measurement], machine: Machine) -> ResidualData:
-    """Fit what is free, and take everything else to first order about it."""
+    """Fit what is free, and take everything else to first order about it.
+
+    Constants that the data cannot tell are held as `calibrate` holds them, with the Jacobian at the first guess: else
+    what cannot be told at all would be told by second order, and run away.
+    """
     selection = Selection(machine.effects, tuple(is_free(effect) for effect in machine.effects))
     problem = Problem.of(measurements, machine, selection)
     relative = relative_noise(problem)
-    base: Array
+    scale = UM * problem.sigma.mean() * relative
+    nuisance = problem.nuisance(problem.start)
+    base = UM * np.concatenate([nuisance, problem.design], axis=1)
+    seen, free = UM * problem.design / scale[:, None], UM * nuisance / scale[:, None]
 
     def step(at: tuple[Array, Array]) -> tuple[tuple[Array, Array], float]:
-        nonlocal base
         coefficients, unknowns = at
-        base = UM * np.concatenate([problem.nuisance(unknowns), problem.design], axis=1)
-        change = damped(base / relative[:, None], UM * problem.residual(coefficients, unknowns) / relative)
-        moved = coefficients + change[len(unknowns) :], unknowns + change[: len(unknowns)]
-        return moved, float(np.abs(base @ change).max(initial=0.0))
+        target = UM * problem.residual(coefficients, unknowns) / scale
+        change = solve(seen, free, target, problem.limits).change
+        moved = damped(free, target - seen @ change)
+        size = float(np.abs((seen @ change + free @ moved) * scale).max(initial=0.0))
+        return (coefficients + change, unknowns + moved), size
 
     (coefficients, unknowns), _ = gauss_newton(step, (selection.start, problem.start), STEPS, SETTLED_UM)
     residual = problem.residual(coefficients, unknowns)

@@ -1,0 +1,130 @@
+"""Mistakes of software and set-up: undone, one is found by its odds; a file that is right has none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from measure.poses import machine, plan
+from ncfix.diagnosis.mistakes import find
+from ncfix.machine import Effect, Machine
+from ncfix.machine.basis import Polynomial
+from ncfix.measure.instruments import Faults, simulate
+from ncfix.measure.measurement import Measurement
+
+Changed = tuple[Measurement, Machine]
+
+
+def scaled(known: Machine, factor: float, wanted: Callable[[Effect], bool]) -> Machine:
+    return known.replace(
+        effects=tuple(
+            replace(e, coefficients=tuple(factor * c for c in e.coefficients)) if wanted(e) else e
+            for e in known.effects
+        )
+    )
+
+
+@pytest.fixture(scope="module")
+def known() -> Machine:
+    """Its location errors, large, and bowed positioning errors."""
+    lines = machine("wCBXFZYSt")
+    lines = lines.replace(effects=tuple(effect for effect in lines.effects if effect.location))
+    bows = [
+        Effect(f"E{axis.name}{axis.name}", (0.03, 0.02), Polynomial(degree=(2, 3)), center=sum(axis.range) / 2,
+               scale=(axis.range[1] - axis.range[0]) / 2)
+        for axis in lines.axes
+        if not axis.rotary
+    ]  # fmt: skip
+    return scaled(lines, 4.0, lambda effect: True).replace(
+        effects=(*scaled(lines, 4.0, lambda effect: True).effects, *bows)
+    )
+
+
+@pytest.fixture(scope="module")
+def data(known: Machine) -> Measurement:
+    return simulate(plan(known, "tcp", 120, 3), known, Faults(2.0), 3)
+
+
+def columns(data: Measurement, factor: float, *names: str) -> Measurement:
+    return data.with_columns({name: factor * data.columns[name] for name in names})
+
+
+def exchanged(data: Measurement, first: str, second: str) -> Measurement:
+    return data.with_columns({first: data.columns[second], second: data.columns[first]})
+
+
+def turned(known: Machine, name: str) -> Machine:
+    axes = tuple(
+        replace(axis, direction=tuple(-x for x in axis.direction)) if axis.name == name else axis for axis in known.axes
+    )
+    return known.replace(axes=axes)
+
+
+def corrected(data: Measurement, known: Machine, factor: float, wanted: Callable[[Effect], bool]) -> Measurement:
+    """What is measured where the control corrects these errors of the file, so many times."""
+    part = known.replace(effects=tuple(e for e in known.effects if wanted(e)))
+    quiet = simulate(plan(known, "tcp", 120, 3), part, Faults(0.0, setup=0.0), 3)
+    return data.with_columns({n: data.columns[n] - factor * quiet.columns[n] for n in ("dx", "dy", "dz")})
+
+
+VALUES = ("dx", "dy", "dz")
+CASES: dict[str, Callable[[Measurement, Machine], Changed]] = {
+    "table active": lambda d, m: (corrected(d, m, 1.0, lambda e: True), m),
+    "table active X": lambda d, m: (corrected(d, m, 1.0, lambda e: e.name == "EXX"), m),
+    "wrong sign": lambda d, m: (d, scaled(m, -1.0, lambda e: True)),
+    "wrong sign control": lambda d, m: (corrected(d, m, -1.0, lambda e: True), m),
+    "sign of EYY": lambda d, m: (d, scaled(m, -1.0, lambda e: e.name == "EYY")),
+    "sign of Z": lambda d, m: (d, scaled(m, -1.0, lambda e: e.joint == "Z")),
+    "sign of values": lambda d, m: (columns(d, -1.0, *VALUES), m),
+    "sign of dy": lambda d, m: (columns(d, -1.0, "dy"), m),
+    "unit of values: um": lambda d, m: (columns(d, 1e3, *VALUES), m),
+    "unit of values: m": lambda d, m: (columns(d, 1e-3, *VALUES), m),
+    "unit of values: inch": lambda d, m: (columns(d, 1 / 25.4, *VALUES), m),
+    "swapped dx dy": lambda d, m: (exchanged(d, "dx", "dy"), m),
+    "swapped X Y": lambda d, m: (exchanged(d, "X", "Y"), m),
+    "inch": lambda d, m: (columns(d, 1 / 25.4, "X", "Y", "Z"), m),
+    "metre": lambda d, m: (columns(d, 1e-3, "X", "Y", "Z"), m),
+    "um": lambda d, m: (columns(d, 1e3, "X", "Y", "Z"), m),
+    "degree": lambda d, m: (columns(d, np.pi / 180, "B", "C"), m),
+    "axis sign X": lambda d, m: (columns(d, -1.0, "X"), m),
+    "rotary sign B": lambda d, m: (d, turned(m, "B")),
+    "tool length": lambda d, m: (d.with_columns({"tool_length": 320.0 - d.columns["tool_length"]}), m),
+    "workpiece": lambda d, m: (
+        d.with_columns(
+            {
+                name: d.columns[name]
+                + 230e-6 * m.tip(d.positions(m), d.column("tool_length"))[:, "xyz".index(name[1])]
+                for name in VALUES
+            }
+        ),
+        m,
+    ),
+}  # fmt: skip
+ALSO = {
+    "sign of values": {"wrong sign"},
+    "wrong sign": {"sign of values"},
+    "wrong sign control": {"wrong sign"},
+    "table active X": {"table active EXX"},
+}
+
+
+@pytest.mark.parametrize("kind", list(CASES))
+def test_a_mistake_is_found_by_its_odds(kind: str, data: Measurement, known: Machine) -> None:
+    wrong = find([CASES[kind](data, known)[0]], CASES[kind](data, known)[1])
+    assert wrong is not None
+    assert kind.split(":")[0] in (wrong.name, wrong.name.split()[0]) or wrong.name in ALSO.get(kind, ())
+    assert wrong.odds > 20
+    assert wrong.sure
+    assert wrong.after_um < 0.6 * wrong.before_um
+
+
+def test_a_file_that_is_right_has_no_mistake(data: Measurement, known: Machine) -> None:
+    assert find([data], known) is None
+
+
+def test_a_mistake_that_is_refused_is_not_named(data: Measurement, known: Machine) -> None:
+    wrong = find([columns(data, -1.0, "dy")], known, ["sign-of-dy"])
+    assert wrong is None or wrong.name != "sign of dy"
