@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from runpy import run_path
 from sysconfig import get_platform
 from typing import Any
 
@@ -74,9 +75,7 @@ def compiled(root: Path, *, stable: bool) -> list[Path]:
     from setuptools import Distribution, Extension
     from setuptools.command.build_ext import build_ext
 
-    sys.path.insert(0, str(root / "src/ncfix/core"))
-    from record import digest  # the package itself is not importable yet
-
+    digest = run_path(str(root / CORE / "__init__.py"))["digest"]  # the package itself is not importable yet
     before = Path.cwd()
     os.chdir(root / "src")
     try:
@@ -97,4 +96,3 @@ def compiled(root: Path, *, stable: bool) -> list[Path]:
         return found
     finally:
         os.chdir(before)
-        sys.path.pop(0)

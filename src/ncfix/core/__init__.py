@@ -11,12 +11,11 @@ import os
 import sys
 from collections.abc import Callable
 from functools import cache
+from hashlib import sha256
 from importlib.machinery import EXTENSION_SUFFIXES, SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from types import ModuleType
-
-from ncfix.core.record import digest
 
 FOLDER = Path(__file__).parent
 WISH = "NCFIX_CORE"
@@ -25,6 +24,15 @@ BUILD = "with a C compiler and Python's headers, pip install --no-cache-dir --fo
 
 _form: str | None = None
 _said = False
+
+
+def digest(folder: Path) -> str:
+    """A digest of all sources in a folder that are compiled: an old binary must not be taken for an edited source."""
+    found = sha256()
+    for declarations in sorted(folder.glob("*.pxd")):
+        for path in (declarations, declarations.with_suffix(".py")):
+            found.update(path.name.encode() + b"\0" + path.read_bytes().replace(b"\r\n", b"\n") + b"\0")
+    return found.hexdigest()
 
 
 def names() -> list[str]:

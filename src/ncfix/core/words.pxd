@@ -7,14 +7,14 @@ cdef extern from "math.h" nogil:
 cdef int64_t POINT, ZERO, MINUS, PLUS, LED_HEAD, MOST_STEPS
 
 @cython.final
-cdef class Rules:
+cdef class NumberRules:
     cdef const double[::1] powers
     cdef int64_t longest, decimals
     cdef double largest, tie, rounded
 
 @cython.final
 cdef class Pen:
-    cdef Rules rules
+    cdef NumberRules rules
     cdef const uint8_t[::1] text
     cdef const int64_t[:, ::1] edges
     cdef const int64_t[::1] first

@@ -28,7 +28,7 @@ ROOM = 16 + MOST_STEPS + 4
 """Bytes that a word takes at most: its head, a sign, digits before the point and behind it."""
 
 
-class Rules:
+class NumberRules:
     """Numbers as `text.number_text` has them.
 
     powers           of ten
@@ -61,7 +61,7 @@ class Pen:
 
     def __init__(
         self,
-        rules: Rules,
+        rules: NumberRules,
         text: Bytes,
         edges: Ints,
         first: Ints,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
 
 if TYPE_CHECKING:
-    from ncfix.core.words import Rules
+    from ncfix.core.words import NumberRules
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -38,11 +38,11 @@ ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
 
 
 @cache
-def rules() -> Rules:
+def rules() -> NumberRules:
     """These numbers, as the compiled core takes them."""
     from ncfix.core import words
 
-    return words.Rules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
+    return words.NumberRules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
 
 
 @dataclass(frozen=True, slots=True)
