@@ -18,7 +18,7 @@ import pytest
 from ncfix.cli.main import VERBS, cli
 
 FILES = re.compile(r"\b(FILE|DIR|TABLEDIR|PROGRAM|MACHINE)\b")
-NAMED = {"file", "program", "original", "fixed", "measured", "programs", "sources", "folder"}
+NAMED = {"file", "program", "original", "fixed", "measured", "programs", "sources", "folder", "output"}
 
 
 def params() -> list[Any]:

@@ -71,7 +71,7 @@ def test_wrong_use_is_said_in_json_too(ncfix: Ncfix) -> None:
 
 
 def test_a_fault_ends_one_program_and_not_the_others(shop: Shop, ncfix: Ncfix, monkeypatch: pytest.MonkeyPatch) -> None:
-    from ncfix.cli import batch
+    from ncfix.cli.shop import batch
 
     other = shop.folder / "other.ngc"
     other.write_bytes(shop.program.read_bytes())
