@@ -109,6 +109,57 @@ def test_what_is_no_folder(ncfix: Any, shop: Any) -> None:
     assert "NCF014" in result.err
 
 
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [
+        ("in/part.ngc", "NCF018"),
+        ("machine.toml", "NCF005"),
+        ("precious.html", "NCF004"),
+        ("link.html", "NCF005"),
+        ("new.toml", "NCF018"),
+        ("none/nul\n.html", "NCF023"),
+    ],
+)
+def test_the_page_takes_the_place_of_no_other_file(ncfix: Any, shop: Any, name: str, code: str) -> None:
+    (shop.folder / "in").mkdir()
+    (shop.folder / "in/part.ngc").write_bytes(PROGRAM)
+    (shop.folder / "precious.html").write_text("<p>figures of last year")
+    (shop.folder / "link.html").symlink_to("new.html")
+    before = {path: path.read_bytes() for path in shop.folder.rglob("*") if path.is_file()}
+    command = ("watch", shop.folder / "in", shop.folder / "out", "-m", shop.machine, "--assume-zero", "--once")
+    result = ncfix(*command, "--status", shop.folder / name)
+    assert (result.code, code in result.err) == (ExitCode.USAGE, True), result.err
+    assert {path: path.read_bytes() for path in shop.folder.rglob("*") if path.is_file()} == before
+
+
+def test_a_page_that_cannot_be_written_stops_nothing(
+    ncfix: Any, shop: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+) -> None:
+    from ncfix.cli.shop.watch import StatusPage
+
+    (shop.folder / "in").mkdir()
+    (shop.folder / "in/part.ngc").write_bytes(PROGRAM)
+    folder, add = shop.folder / "pages", StatusPage.add
+
+    def lose(self: StatusPage, entry: Any) -> None:
+        folder.rename(tmp_path / "gone")
+        folder.write_text("")
+        add(self, entry)
+
+    monkeypatch.setattr(StatusPage, "add", lose)
+    command = ("watch", shop.folder / "in", shop.folder / "out", "-m", shop.machine, "--assume-zero", "--once")
+    result = ncfix(*command, "--settle-s", "0.1", "--status", folder / "s.html")
+    assert result.code == ExitCode.DONE
+    assert result.err.count("s.html: NCF0") == 1
+    assert (shop.folder / "out/part.ngc").exists()
+
+
+def test_programs_do_not_go_where_they_come_from(ncfix: Any, shop: Any) -> None:
+    (shop.folder / "in").mkdir()
+    result = ncfix("watch", shop.folder / "in", f"{shop.folder}/in/", "-m", shop.machine, "--once")
+    assert (result.code, "NCF005" in result.err) == (ExitCode.USAGE, True)
+
+
 def test_nothing_of_a_name_steers_the_page(shop: Any) -> None:
     from ncfix.cli.shop.watch import StatusPage
 

@@ -21,11 +21,17 @@ from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import ProgramGroup, ProjectCommand
 from ncfix.cli.shop.summary import Became, Loudness, reasons
 from ncfix.cli.targets import Outputs, targets
-from ncfix.diagnostics import NcfixError, Place, UsageError, visible
+from ncfix.diagnostics import ExitCode, NcfixError, Place, UsageError, visible
+from ncfix.inputs import identities
+from ncfix.outputs import check_target
 
 if TYPE_CHECKING:
     from ncfix.cli.shop.batch import FixJob
 
+HEAD = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="5">
+<meta name="viewport" content="width=device-width"><title>ncfix watch</title>"""
+"""How each status page begins, and nothing else."""
 LAST = 200
 """So many programs are on the status page."""
 STYLE = """:root { color-scheme: light dark; font: 15px/1.4 system-ui, sans-serif }
@@ -60,6 +66,7 @@ class StatusPage:
     """What has become of the programs since the start, as a page that a browser reads again and again.
 
     path  of the page; None: there is none
+    lost  why it could not be written last; empty if it was
     """
 
     path: str | None
@@ -67,6 +74,21 @@ class StatusPage:
     counts: Counter[str] = field(default_factory=Counter)
     last: list[tuple[float, Mapping[str, Any]]] = field(default_factory=list)
     trouble: str = ""
+    lost: str = ""
+
+    def check(self, inputs: Iterable[str]) -> None:
+        """Refuse to write the page in the place of an input, or of a file that is no status page.
+
+        Raises `UsageError` NCF003, NCF004, NCF005, NCF007, NCF018, NCF023.
+        """
+        if self.path is None:
+            return
+        check_target(self.path, identities(inputs), replace=True)
+        if os.path.splitext(self.path)[1].lower() not in (".html", ".htm"):
+            raise UsageError.of("NCF018", "a status page is an .html file", Place(self.path), "--status FILE.html")
+        if os.path.lexists(self.path) and not files.read_bytes(self.path).startswith(HEAD.encode()):
+            text = "exists already, and is no status page of ncfix watch"
+            raise UsageError.of("NCF004", text, Place(self.path), "give the page another name")
 
     def add(self, entry: Mapping[str, Any]) -> None:
         """Take in what became of a program."""
@@ -74,18 +96,23 @@ class StatusPage:
         self.last = [(time.time(), entry), *self.last[: LAST - 1]]
 
     def write(self) -> None:
-        """Write the page anew."""
-        if self.path is not None:
+        """Write the page anew; programs are corrected all the same if that cannot be, which is said once."""
+        if self.path is None:
+            return
+        try:
             files.write_whole(self.path, self.text().encode(), replace=True)
+            self.lost = ""
+        except NcfixError as error:
+            if str(error) != self.lost:
+                console.tell(*error.messages)
+                self.lost = str(error)
 
     def text(self) -> str:
         """The page."""
         rows = "\n".join(self._row(at, entry) for at, entry in self.last)
         counts = ", ".join(f"{count} {became}" for became, count in sorted(self.counts.items())) or "no program yet"
         trouble = f'<p class="failed">{escape(visible(self.trouble, lines=True))}</p>' if self.trouble else ""
-        return f"""<!doctype html>
-<html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="5">
-<meta name="viewport" content="width=device-width"><title>ncfix watch</title><style>{STYLE}</style>
+        return f"""{HEAD}<style>{STYLE}</style>
 <h1>ncfix watch</h1>
 <p>Since {_clock(self.began)}: {counts}. Written {_clock(time.time())}.</p>{trouble}
 <table><tr><th>when<th>program<th>what became of it<th>why</tr>
@@ -156,13 +183,18 @@ def watch(
     """
     if not os.path.isdir(folder):
         raise UsageError.of("NCF014", "is not a folder", Place(folder), "make it, or name another one")
+    if os.path.isdir(output) and os.path.samefile(folder, output):
+        raise UsageError.of("NCF005", "is the folder of the programs, too", Place(output), "name another folder OUT")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     inputs = [path for path in (machine_path, *given.files) if path]
     loudness = Loudness.ALL if verbose else Loudness.QUIET if quiet else Loudness.USUAL
     page = StatusPage(status)
     watched, watching = WatchedFolder(folder, output, settle_s), _Watching(folder, output, given, options, loudness)
     known, worst = None, 0
+    page.check(inputs)
     page.write()
+    if page.lost:
+        return ExitCode.USAGE
     try:
         for _ in moments(folder, inputs, settle_s, poll_s):
             now = tuple(map(state_of, inputs))
