@@ -89,6 +89,16 @@ class Project:
         line = line_of(keys, key_lines(self.text))
         return Message(CODE, text, place_of(line, self.text, self.path), hint)
 
+    def way_to(self, key: str, value: object) -> tuple[str | int, ...]:
+        """Where the file gives a key this value, from the outermost table on."""
+        programs = self.content.get("programs", ())
+        tables = [((), self.content), *((("programs", number), each) for number, each in enumerate(programs))]
+        for way, table in tables:
+            for keys, values in ((way, table), ((*way, "options"), table.get("options", {}))):
+                if key in values and values[key] is value:
+                    return (*keys, key)
+        return ()
+
     def from_here(self, path: str) -> str:
         """A path that the file gives, as it is called from the working folder."""
         return os.path.join(self.folder, path)

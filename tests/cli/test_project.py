@@ -40,7 +40,8 @@ def test_a_post_names_the_program_only(ncfix: Any, yard: Path, monkeypatch: pyte
     monkeypatch.chdir(yard.parent)
     result = ncfix("fix", yard / "jobs/a/part.ngc")
     assert result.code == ExitCode.DONE, result.err
-    assert "ncfix.toml says what is not said here\n" in result.err
+    assert "ncfix.toml: options that are not given here come from this file\n" in result.err
+    assert "ncfix.toml" not in ncfix("fix", yard / "jobs/plate.ngc", "-q").err
     assert outputs(yard / "done") == {"jobs/a/part.ngc": "mill"}
 
 
@@ -139,7 +140,20 @@ def test_verify_and_check_know_the_machine(ncfix: Any, yard: Path) -> None:
         ("machine = 'a", "not TOML"),
         ("[options]\ntolerance = 2", "did you mean tolerance_um?"),
         ("[options]\nflatten = 2", "neither true nor false"),
-        ("[options]\ntolerance_um = 'x'", "--tolerance-um"),
+        ("[options]\ntolerance_um = 'x'", "ncfix.toml:2:1: NCF028: tolerance_um: 'x' is not a number above zero"),
+        ("[options]\ntolerance_um = [1, 2]", "tolerance_um: 2 values"),
+        ("[options]\ntolerance_um = { a = 1 }", "neither a text nor a number"),
+        ("[options]\ntolerance_um = 2020-01-01", "neither a text nor a number"),
+        ("[options]\nstrategy = true", "neither a text nor a number"),
+        ("[options]\njobs = 2.5", "NCF028: jobs: "),
+        ("[options]\noffset = 3", "NCF028: offset: '3' has no ="),
+        ("[options]\nforce = true", "NCF028: force: is said on the command line"),
+        ("[options]\nin_place = true", "hint: --in-place"),
+        ("[options]\nexecutor = 'dask://elsewhere:8786'", "NCF028: executor: is said on the command line"),
+        ("setup = ''", "NCF028: setup: the text is empty"),
+        ('output = "a\\u0000b"', "has a NUL character"),
+        ("\n[[programs]]\nmatch = '*'\ntool_table = ''", "ncfix.toml:4:1"),
+        ("[options]\ntool = '1=1'\n[[programs]]\nmatch='*'\n[programs.options]\ntool = '1'", "ncfix.toml:6:1"),
         ("programs = 3", "list of tables"),
         ("[[programs]]\nmachine = 'x'", "needs match"),
         ("options = 3", "is a table"),
@@ -151,6 +165,8 @@ def test_what_is_wrong_is_named(ncfix: Any, yard: Path, text: str, said: str) ->
     assert result.code in (ExitCode.UNREADABLE, ExitCode.USAGE)
     assert said in result.err
     assert not (yard / "x.ngc").exists()
+    assert (yard / "jobs/plate.ngc").read_bytes() == PROGRAM
+    assert "NCF000" not in result.err
 
 
 def test_init_writes_what_fix_needs(ncfix: Any, yard: Path) -> None:

@@ -115,7 +115,8 @@ CODES = {
         "a fault in a project file",
         "`ncfix.toml` says what holds for the programs of a folder: `machine`, `setup`, `output`, `dialect`, "
         "`tool_table`, a table `[options]` of options of `ncfix fix`, and `[[programs]]` with a `match`. "
-        "Something else stands there, or another kind of value.",
+        "Something else stands there, or another kind of value. `force`, `in_place` and `executor` are said on the "
+        "command line only: a project file may come with programs from anywhere.",
         "docs/formats.md has the keys; `--no-project` goes without the file.",
     ),
     "NCF029": Code(

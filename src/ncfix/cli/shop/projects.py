@@ -23,6 +23,13 @@ from ncfix.outputs import exists_already
 if TYPE_CHECKING:
     from ncfix.project import Project
 
+SAID = frozenset({"force", "in_place", "executor"})
+"""Options that replace files, or have programs worked on elsewhere: they are said anew each time.
+
+A project file may come with programs from anywhere.
+"""
+QUIET = "ncfix.quiet"
+"""Whether a context says only what went wrong."""
 STATE = "ncfix.groups"
 """Where a context keeps the groups of programs."""
 
@@ -64,6 +71,7 @@ class ProjectCommand(click.Command):
         first = next(param.name for param in self.params if isinstance(param, click.Argument))
         given = said.get(first or "")
         given = [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else []
+        ctx.meta[QUIET] = said.get("quiet") is True
         if said.get("help") is True or said.get("no_project") is True or not given:
             return [ProgramGroup()]
         named = said.get("project") or os.environ.get("NCFIX_PROJECT")
@@ -88,8 +96,7 @@ class ProjectCommand(click.Command):
             if not os.path.isdir(path):
                 self._put(found, path, project_of(path))
         several = len(found) > 1
-        for project in {id(project): project for project, _, _ in found.values() if project}.values():
-            console.say(f"{visible(project.path)} says what is not said here")
+        tell_of(*{id(project): project for project, _, _ in found.values() if project}.values())
         return [
             ProgramGroup(
                 settings, frozenset(paths) if several else None, None if project is None else project.folder or "."
@@ -112,10 +119,20 @@ class ProjectCommand(click.Command):
 
                 close = get_close_matches(key, others, 1)
                 hint = f"did you mean {close[0]}?" if close else "ncfix fix --help shows the options"
-                raise ConfigError((project.fault(f"{key}: there is no such option", "options", key, hint=hint),))
-            if (option := own.get(key)) and option.name and (taken := _taken(option, value, project)) is not None:
+                raise _wrong(project, key, value, "there is no such option", hint)
+            if key in SAID:
+                text = "is said on the command line, and not in a project file"
+                raise _wrong(project, key, value, text, f"--{key.replace('_', '-')}")
+            if (option := own.get(key)) and option.name and (taken := _taken(option, key, value, project)) is not None:
                 found[option.name] = taken
         return found
+
+
+def tell_of(*projects: Project) -> None:
+    """Say which project files are used, unless little is to be said."""
+    if not click.get_current_context().meta.get(QUIET):
+        for project in projects:
+            console.say(f"{visible(project.path)}: options that are not given here come from this file")
 
 
 def _options(params: Iterable[click.Parameter]) -> dict[str, click.Option]:
@@ -132,21 +149,35 @@ def _all_options() -> frozenset[str]:
     return frozenset(_options(fix.params)) - {"project", "no_project"}
 
 
-def _taken(option: click.Option, value: Any, project: Project) -> Any:
+def _taken(option: click.Option, key: str, value: Any, project: Project) -> Any:
     """The value of an option in a project file as the command line would give it; None for a flag that is off."""
     if option.is_flag:
         if not isinstance(value, bool):
-            text = f"{value!r} is neither true nor false"
-            raise ConfigError((project.fault(text, "options", (option.name or "")),))
+            raise _wrong(project, key, value, f"{value!r} is neither true nor false")
         return option.flag_value is not False if value else None
     several = value if isinstance(value, list) else [value]
+    if len(several) != 1 and not option.multiple:
+        raise _wrong(project, key, value, f"{len(several)} values, where one is needed")
+    if odd := [each for each in several if isinstance(each, bool) or not isinstance(each, (str, int, float))]:
+        raise _wrong(project, key, value, f"{odd[0]!r} is neither a text nor a number")
+    texts = [str(each) for each in several]
+    if any(not each or "\0" in each for each in texts):
+        raise _wrong(project, key, value, "the text is empty, or has a NUL character")
     if isinstance(option.type, (PathName, click.Path)):
-        several = [project.from_here(str(each)) for each in several]
-        if option.name == "output" and several[0] and several[0][-1] != os.sep:
-            several[0] += os.sep
-    if option.multiple:
-        return several
-    return several[0] if len(several) == 1 else value
+        texts = [project.from_here(each) for each in texts]
+        if option.name == "output" and texts[0][-1] != os.sep:
+            texts[0] += os.sep
+    taken = texts if option.multiple else texts[0]
+    try:
+        option.type_cast_value(click.get_current_context(), taken)
+    except click.BadParameter as error:
+        raise _wrong(project, key, value, error.message) from error
+    return taken
+
+
+def _wrong(project: Project, key: str, value: object, text: str, hint: str = "") -> ConfigError:
+    """The error NCF028 for a value in a project file."""
+    return ConfigError((project.fault(f"{key}: {text}", *project.way_to(key, value), hint=hint),))
 
 
 def group_of(context: click.Context) -> ProgramGroup:

@@ -18,7 +18,7 @@ from ncfix.cli import console
 from ncfix.cli.fix import fix, processes_for
 from ncfix.cli.options import FOLDER, PATH, Positive, load_machine, sound
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.shop.projects import ProgramGroup, ProjectCommand
+from ncfix.cli.shop.projects import ProgramGroup, ProjectCommand, tell_of
 from ncfix.cli.shop.summary import Became, Loudness, reasons
 from ncfix.cli.targets import Outputs, targets
 from ncfix.diagnostics import ExitCode, NcfixError, Place, UsageError, visible
@@ -57,7 +57,7 @@ class FolderCommand(ProjectCommand):
         project = Project.load(named) if named else Project.of(folder)
         if project is None:
             return [ProgramGroup()]
-        console.say(f"{visible(project.path)} says what is not said here")
+        tell_of(project)
         return [ProgramGroup(self._parameters(project, project.settings(folder)), None, project.folder or os.curdir)]
 
 
