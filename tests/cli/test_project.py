@@ -41,8 +41,8 @@ def test_a_post_names_the_program_only(ncfix: Any, yard: Path, monkeypatch: pyte
     result = ncfix("fix", yard / "jobs/a/part.ngc")
     assert result.code == ExitCode.DONE, result.err
     assert "ncfix.toml: options that are not given here come from this file\n" in result.err
-    assert "ncfix.toml" not in ncfix("fix", yard / "jobs/plate.ngc", "-q").err
     assert outputs(yard / "done") == {"jobs/a/part.ngc": "mill"}
+    assert "ncfix.toml" not in ncfix("fix", yard / "jobs/plate.ngc", "-q").err
 
 
 def test_programs_of_the_same_name_keep_apart(ncfix: Any, yard: Path) -> None:

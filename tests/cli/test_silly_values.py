@@ -89,6 +89,11 @@ def test_a_fault_ends_one_program_and_not_the_others(shop: Shop, ncfix: Ncfix, m
     assert [file["output"] is None for file in result.json()["files"]] == [True, False]
     assert "Traceback" not in result.err
     assert "Traceback" in ncfix("--debug", *arguments, "--force").err
+    again = ncfix("--debug", *arguments, "--resume")
+    assert [file.get("resumed", False) for file in again.json()["files"]] == [False, True]
+    assert "Traceback" in again.err
+    monkeypatch.undo()
+    assert ncfix(*arguments, "--resume").code == 0
 
 
 def test_tables_are_written_all_or_not_at_all(shop: Shop, ncfix: Ncfix, monkeypatch: pytest.MonkeyPatch) -> None:

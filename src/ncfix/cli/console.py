@@ -308,11 +308,16 @@ def owned(error: Exception) -> NcfixError:
     return fault(error)
 
 
+def is_debugging() -> bool:
+    """Whether tracebacks are asked for."""
+    return os.environ.get(DEBUG, "") not in ("", "0")
+
+
 def _trace(error: BaseException) -> None:
     """The traceback, if that is asked for."""
     import traceback
 
-    if os.environ.get(DEBUG, "") not in ("", "0"):
+    if is_debugging():
         say("".join(traceback.format_exception(error)))
 
 

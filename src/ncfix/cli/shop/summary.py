@@ -147,7 +147,8 @@ def progress(total: int) -> Iterator[Advance]:
 class Teller:
     """Says what there is to say of programs that are done.
 
-    many  they are many: of each of which nothing was written there is a line, at most `console.MOST` for each reason
+    many  they are many: of each of which nothing was written there is a line, at most `console.MOST` for each reason;
+          all that there is to say of it where tracebacks are asked for
     """
 
     loudness: Loudness
@@ -157,7 +158,8 @@ class Teller:
     def tell(self, entry: Mapping[str, Any], said: list[str]) -> None:
         """Say what there is to say of one of them; `said`: all of it."""
         wrong = reasons(entry)
-        if self.loudness == Loudness.ALL or (not self.many and (self.loudness == Loudness.USUAL or wrong)):
+        everything = self.loudness == Loudness.ALL or (bool(wrong) and console.is_debugging())
+        if everything or (not self.many and (self.loudness == Loudness.USUAL or wrong)):
             for line in said:
                 console.say(line)
         elif self.many and wrong:
