@@ -256,12 +256,29 @@ def test_measurements_count_once(measured: Measurement) -> None:
         (Room(inputs={"load_kg": (0.0, math.inf)}), "is an empty range"),
         (Room(balls={"one": (0.0, math.nan, 0.0)}), "the ball one stands nowhere"),
         (Room(tool_lengths=()), "there is no tool"),
+        (Room(ranges={"X": (1.0,)}), "the range of X is not two numbers"),  # type: ignore[dict-item]
+        (Room(reach={"x": (1.0, 2.0, 3.0)}), "the range of x is not"),  # type: ignore[dict-item]
+        (Room(inputs={"load_kg": ()}), "the range of load_kg is not"),  # type: ignore[dict-item]
+        (Room(balls={"one": (0.0, 1.0)}), "the ball one is not three numbers"),  # type: ignore[dict-item]
     ],
 )
 def test_a_room_that_the_machine_does_not_have(shop: Path, room: Room, said: str) -> None:
     with pytest.raises(UsageError, match="NCF636") as caught:
         ncfix.plan("machine.toml", room=room)
     assert said in str(caught.value)
+
+
+def test_a_range_of_tables_is_two_numbers(shop: Path) -> None:
+    for limits in ((1.0,), (1.0, 2.0, 3.0)):
+        bad: dict[str, Any] = {"X": limits}
+        assert code_of(lambda bad=bad: ncfix.export("linuxcnc", "machine.toml", ranges=bad)) == "NCF483"
+
+
+def test_names_of_effects_are_a_list_and_those_that_do_not_exist_are_said(measured: Measurement) -> None:
+    assert code_of(lambda: ncfix.diagnose(measured, "machine.toml", without="EXX")) == "NCF025"
+    assert code_of(lambda: ncfix.plan("machine.toml", separate="EXX")) == "NCF025"
+    found = ncfix.diagnose(measured, "machine.toml", without=["no such name"])
+    assert "NCF657" in [message.code for message in found.messages]
 
 
 def test_what_is_not_there_has_a_code(shop: Path) -> None:

@@ -90,7 +90,7 @@ def test_a_fault_ends_one_program_and_not_the_others(shop: Shop, ncfix: Ncfix, m
     assert "Traceback" not in result.err
     assert "Traceback" in ncfix("--debug", *arguments, "--force").err
     again = ncfix("--debug", *arguments, "--resume")
-    assert [file.get("resumed", False) for file in again.json()["files"]] == [False, True]
+    assert "resumed" not in again.json()["files"][0]
     assert "Traceback" in again.err
     monkeypatch.undo()
     assert ncfix(*arguments, "--resume").code == 0

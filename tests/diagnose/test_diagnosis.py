@@ -178,7 +178,7 @@ def test_a_name_that_must_not_be_used_is_not_used(known: Machine) -> None:
     found = diagnose([measured(worn, 80)], known, ("backlash-x", "no such name"))
     assert all(each.candidate.name != "backlash X" for each in found.findings)
     assert found.case.unheard_of == ("no such name",)
-    assert any(message.code == "NCF657" for message in remarks(found.data, found.case.unheard_of))
+    assert any(message.code == "NCF657" for message in found.messages)
 
 
 def test_nothing_is_named_where_nothing_is(known: Machine) -> None:

@@ -103,6 +103,13 @@ def subprograms_of(setup: Setup, *programs: Program) -> Resolve | None:
     return subprograms(setup, *paths) if paths or setup.subprograms else None
 
 
+def as_names(argument: str, given: Sequence[str]) -> tuple[str, ...]:
+    """Several names; raises `UsageError` NCF025 for a single text, which would be taken for its letters."""
+    if isinstance(given, str):
+        raise UsageError.of("NCF025", f"{argument}={given!r}", hint=f"{argument}=[{given!r}], a list of names")
+    return tuple(given)
+
+
 def as_measurements(measured: Measured | Sequence[Measured], machine: Machine) -> list[Measurement]:
     """One measurement or several, or those of files; raises `UsageError` NCF020 for one twice, NCF025 for none."""
     from ncfix.measure.measurement import Measurement

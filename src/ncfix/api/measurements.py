@@ -7,7 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ncfix.api.given import PathName, as_machine, as_measurements, check_writable, sound_machine, write_output
+from ncfix.api.given import (
+    PathName,
+    as_machine,
+    as_measurements,
+    as_names,
+    check_writable,
+    sound_machine,
+    write_output,
+)
 from ncfix.diagnostics import Message, RefusedError
 
 if TYPE_CHECKING:
@@ -48,7 +56,7 @@ def plan(
     check_writable(output, force, machine, existing)
     known = as_machine(machine)
     before = None if existing is None else as_measurements(existing, known)[0]
-    found = planned(known, kind, count, room or Room(), effects, list(separate), before, seed)
+    found = planned(known, kind, count, room or Room(), effects, list(as_names("separate", separate)), before, seed)
     write_output(output, dumps(found.plan, found.plan.form.measured if kind != "probe" else ()).encode(), force)
     return found
 
@@ -126,16 +134,17 @@ def diagnose(
 ) -> Diagnosis:
     """Say where machine and model disagree, and name the effect that is missing.
 
-    without  effects that are not to be considered
+    without  names of effects that are not to be considered; `messages` of the result say which do not exist (NCF657)
     output   where the machine with the effects added goes; nothing is written where there is nothing to add
     """
     from ncfix.diagnosis.diagnosis import diagnose as diagnosed
     from ncfix.diagnosis.presentation import with_provenance
     from ncfix.machine import dumps
 
+    refused = as_names("without", without)
     check_writable(output, force, measured, machine)
     known = as_machine(machine)
-    found = diagnosed(as_measurements(measured, known), known, tuple(without))
+    found = diagnosed(as_measurements(measured, known), known, refused)
     if found.machine is not None and output is not None:
         sound_machine(found.machine, force)
         write_output(output, dumps(with_provenance(found)).encode(), force)

@@ -376,7 +376,6 @@ def diagnose(
     """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     from ncfix import api
-    from ncfix.diagnosis.checks import remarks
     from ncfix.diagnosis.diagnosis import NOTHING
     from ncfix.diagnosis.presentation import as_dict, text, with_provenance
     from ncfix.machine import dumps
@@ -398,7 +397,7 @@ def diagnose(
         console.tell_some(each.remarks)
     with console.busy("diagnosing"):
         diagnosis = api.diagnose(data, machine, without=without)
-    console.tell(*remarks(diagnosis.data, diagnosis.case.unheard_of))
+    console.tell(*diagnosis.messages)
     written = None
     if machine_target is not None and diagnosis.machine is not None:
         sound(diagnosis.machine, machine_target.path, force)

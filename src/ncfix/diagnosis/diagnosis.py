@@ -54,7 +54,7 @@ from ncfix.diagnosis.selection import (
     with_constants,
     with_constants_free,
 )
-from ncfix.diagnostics import UsageError
+from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import component_title
 from ncfix.measure.least_squares import orthonormal
@@ -178,6 +178,11 @@ class Diagnosis:
     def data(self) -> ResidualData:
         """The data."""
         return self.case.data
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """What there is to say of the data, and of names to be left out that do not exist."""
+        return tuple(checks.remarks(self.data, self.case.unheard_of))
 
     @property
     def moved(self) -> tuple[MovedConstant, ...]:

@@ -80,6 +80,9 @@ class Room:
 
     def _faults(self, machine: Machine) -> Iterator[tuple[str, str]]:
         """What is the matter, with what to do about it."""
+        if faults := list(self._miscounted()):
+            yield from faults
+            return
         for option, given in (("--range", self.ranges), ("--reach", self.reach), ("--input", self.inputs)):
             for name, (low, high) in given.items():
                 if not -np.inf < low < high < np.inf:
@@ -99,6 +102,16 @@ class Room:
                 yield f"the ball {name} stands nowhere", f"--ball {name}=X,Y,Z"
         if not len(self.tool_lengths):
             yield "there is no tool to measure with", "--tool-length MM"
+
+    def _miscounted(self) -> Iterator[tuple[str, str]]:
+        """Ranges that are not two numbers, and balls without three coordinates."""
+        for option, given in (("--range", self.ranges), ("--reach", self.reach), ("--input", self.inputs)):
+            for name, limits in given.items():
+                if len(limits) != 2:
+                    yield f"the range of {name} is not two numbers", f"{option} {name}=LOW,HIGH"
+        for name, at in self.balls.items():
+            if len(at) != 3:
+                yield f"the place of the ball {name} is not three numbers", f"--ball {name}=X,Y,Z"
 
 
 def candidates(machine: Machine, kind: str, count: int, room: Room, seed: int = 0) -> Measurement:

@@ -117,6 +117,8 @@ def ranges_of(machine: Machine, given: Ranges | None = None) -> Array:
     for name, limits in (given or {}).items():
         if name not in machine.axis_names:
             raise _wrong_range(f"the machine has no axis {name!r}", f"one of {', '.join(machine.axis_names)}")
+        if len(limits) != 2:
+            raise _wrong_range(f"the range of {name} is not two numbers", "LOW,HIGH")
         index = machine.axis_names.index(name)
         low, high = machine.ranges[index]
         if not limits[0] < limits[1]:
