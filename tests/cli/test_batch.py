@@ -275,6 +275,18 @@ def test_json_lines(ncfix: Any, shop: Any, parts: Path) -> None:
     assert remarks.keys() == {each["code"] for each in found[1]["warnings"]}
 
 
+def test_json_lines_are_lines_where_the_verb_fails(ncfix: Any, shop: Any, parts: Path) -> None:
+    for more in (("-m", "none.toml"), ("-m", shop.machine, "--diff"), ("-m", shop.machine, "--no-such-option")):
+        result = ncfix("fix", parts, "-o", shop.folder / "out", "--assume-zero", "--json-lines", *more)
+        assert result.code in (ExitCode.USAGE, ExitCode.UNREADABLE)
+        assert [list(json.loads(line)) for line in result.out.splitlines()] == [["schema", "errors"]]
+
+
+def test_retry_is_for_what_resume_leaves_out(ncfix: Any, shop: Any, parts: Path) -> None:
+    result = ncfix("fix", parts, "-m", shop.machine, "-o", shop.folder / "out", "--assume-zero", "--retry")
+    assert (result.code, "hint: --resume --retry" in result.err) == (ExitCode.USAGE, True)
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_program_that_takes_too_long(
     ncfix: Any, shop: Any, parts: Path, jobs: int, monkeypatch: pytest.MonkeyPatch

@@ -145,3 +145,10 @@ def talk(terminal: int, words: str, answer: str) -> None:
         assert time.monotonic() < until, heard
         if select.select([terminal], [], [], 1)[0]:
             heard += os.read(terminal, 1 << 16).decode(errors="replace")
+
+
+def test_a_shell_that_is_not_known_or_not_named(ncfix: Any) -> None:
+    for shell in ((), ("powershell",)):
+        said = ncfix("completion", *shell).err
+        assert "bash" in said
+        assert "\\n" not in said

@@ -41,6 +41,28 @@ def test_what_is_wrong(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     assert result.out.decode().count("WRONG") == 2
 
 
+def test_what_only_extras_ask_for_is_not_needed(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = ["lark>=1.2", "numpy!=2.0,>=1.26", "pluggy", "cython<4,>=3.2; extra == 'dev'", 'ruff>=0.9 ; extra == "dev"']
+    monkeypatch.setattr(doctor, "_requirements", lambda: lines)
+    monkeypatch.setattr(doctor, "_version", lambda name: "1.3" if name == "lark" else None)
+    said = ncfix("doctor").out.decode()
+    assert said.count("WRONG") == 2
+    assert "pip install 'numpy>=1.26'" in said
+    assert "pip install 'pluggy'" in said
+    assert "cython" not in said
+
+
+def test_a_disk_that_is_full(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from ncfix import files
+
+    def full(path: str, *_: Any) -> None:
+        raise files.unwritable(path, OSError(28, "No space left on device"))
+
+    monkeypatch.setattr(files, "write_whole", full)
+    result = ncfix("doctor")
+    assert (result.code, "WRONG: make room" in result.out.decode()) == (ExitCode.FINDINGS, True)
+
+
 def test_a_folder_that_cannot_be_written_to(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def locked(*_: Any, **more: Any) -> None:
         raise PermissionError(13, "Permission denied")

@@ -17,7 +17,7 @@ import click
 from ncfix import core, host
 from ncfix.cli import console
 from ncfix.cli.options import json_option
-from ncfix.diagnostics import ExitCode, visible
+from ncfix.diagnostics import ExitCode, NcfixError, visible
 from ncfix.plugins import load_plugins
 from ncfix.version import __version__
 
@@ -27,7 +27,8 @@ EXTRAS = {
     "distributed": ("cluster", "`--executor dask://HOST:PORT` does not work"),
 }
 """What is not needed: package -> its extra, and what it is like without."""
-NEEDS = re.compile(r"^([A-Za-z0-9_.-]+)\s*(?:>=([0-9.]+))?\s*(?:;.*extra\s*==\s*['\"](\w+)['\"])?")
+NEEDS = re.compile(r"([A-Za-z0-9_.-]+)(?:[^;]*?>=\s*([0-9.]+))?[^;]*(;.*\bextra\b)?")
+"""A requirement: the package, the least version, and something if only an extra asks for it."""
 OLDEST_PYTHON = (3, 11)
 
 
@@ -71,7 +72,7 @@ def _packages() -> Iterator[Looked]:
     for name, wanted in least.items():
         there = _version(name)
         if there is None:
-            yield Looked(name, "not installed", f"pip install '{name}>={wanted}'")
+            yield Looked(name, "not installed", f"pip install '{name}{f'>={wanted}' if wanted else ''}'")
         elif _numbers(there) < _numbers(wanted):
             yield Looked(name, there, f"{wanted} or later is needed")
         else:
@@ -163,6 +164,8 @@ def _outputs() -> Looked:
             unnamed = hasattr(os, "O_TMPFILE") and _has_unnamed(folder)
     except OSError as error:
         return Looked("working folder", f"cannot be written to: {error.strerror}")
+    except NcfixError as error:
+        return Looked("working folder", f"{visible(os.getcwd())}: {error.messages[0].text}", error.messages[0].advice)
     how = "without a name at first" if unnamed else "under another name at first"
     return Looked("working folder", f"{visible(os.getcwd())}: outputs are written {how}")
 

@@ -188,6 +188,10 @@ def fix(
 
     if as_json and json_lines:
         raise UsageError.of("NCF001", "--json and --json-lines are two forms of one output", hint="leave one out")
+    if json_lines and (diff or diff_motions):
+        raise UsageError.of("NCF001", "what would change is printed as text or as one object", hint="--json")
+    if retry and not resume:
+        raise UsageError.of("NCF001", "--retry tries again what --resume would leave out", hint="--resume --retry")
     context = click.get_current_context()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     looks = diff or diff_motions

@@ -131,7 +131,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _run(arguments: Sequence[str]) -> int:
-    as_json = "--json" in arguments or "--json-lines" in arguments
+    as_json = _json_form(arguments)
     try:
         if any("\0" in argument for argument in arguments):
             raise UsageError.of("NCF001", "an argument has a NUL character", hint="no name of a file has one")
@@ -148,7 +148,12 @@ def _run(arguments: Sequence[str]) -> int:
         return failed(owned(error), as_json)
 
 
-def wrong_use(error: click.ClickException, arguments: Sequence[str], as_json: bool) -> int:
+def _json_form(arguments: Sequence[str]) -> str | None:
+    """The option that asks for JSON on standard output; None if none does."""
+    return next((option for option in ("--json", "--json-lines") if option in arguments), None)
+
+
+def wrong_use(error: click.ClickException, arguments: Sequence[str], as_json: str | None) -> int:
     """Say what is wrong with the command line."""
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         console.say(error.format_message())
@@ -156,15 +161,17 @@ def wrong_use(error: click.ClickException, arguments: Sequence[str], as_json: bo
     context = getattr(error, "ctx", None)
     verb = next((argument for argument in arguments if argument in VERBS), "")
     command = context.command_path if context else f"ncfix {verb}".strip()
-    return failed(UsageError.of("NCF001", error.format_message(), hint=f"{command} --help"), as_json)
+    text = error.format_message().replace("\n\t", " ")  # names of choices, each on a line
+    return failed(UsageError.of("NCF001", text, hint=f"{command} --help"), as_json)
 
 
-def failed(error: NcfixError, as_json: bool) -> int:
-    """Say what failed, also on standard output where that was asked to be JSON."""
+def failed(error: NcfixError, as_json: str | None) -> int:
+    """Say what failed, also on standard output where that was asked to be JSON, by this option."""
     console.tell(*error.messages)
     if as_json:
         with suppress(NcfixError, console.ReaderGoneError):
-            console.put_json(errors=[message.as_dict() for message in error.messages])
+            indent = 1 if as_json == "--json" else None
+            console.put(console.json_text(indent, errors=[message.as_dict() for message in error.messages]))
     return error.exit_code
 
 
