@@ -132,6 +132,9 @@ def test_a_pipe(recipes: dict[str, str], yard: Path) -> None:
     (yard / "post").chmod(0o755)
     assert called(["sh", "-c", f"PATH=.:$PATH; {recipes['Any other']}"], yard) == 0
     assert " MACHINE " in (yard / "part.nc").read_text().splitlines()[2]
+    spoil(yard)
+    assert called(["sh", "-c", f"PATH=.:$PATH; {recipes['Any other']}"], yard) == 3
+    assert not (yard / "part.nc").exists()
 
 
 def test_a_program_is_posted_again(recipes: dict[str, str], yard: Path) -> None:

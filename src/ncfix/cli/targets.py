@@ -15,7 +15,7 @@ from ncfix.batch.programs import ProgramFile, program_files
 from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
 from ncfix.inputs import identities, identity
-from ncfix.outputs import check_named, check_output, check_target, exists_already, folded_name
+from ncfix.outputs import check_named, check_output, check_target, folded_name
 
 STREAM = "-"
 """Standard input or output as a file name."""
@@ -108,7 +108,8 @@ class OutputTarget:
         elif self.resume and not self.force and os.path.lexists(self.path):
             if not files.holds(self.path, data):
                 if not self.is_own:
-                    raise exists_already(self.path)
+                    text = "exists already, and is not what ncfix has written for this program"
+                    raise UsageError.of("NCF004", text, Place(self.path), "--force replaces it; or move it away")
                 files.write_whole(self.path, data, True, self.root, mode)
         else:
             files.write_whole(self.path, data, self.force, self.root, mode)

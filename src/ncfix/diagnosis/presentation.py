@@ -21,6 +21,8 @@ from ncfix.measure.calibrate import untold
 
 HEAD = ("rung", "left, um", "held out", "share", "log odds", "found")
 """Of the table of the ladder."""
+LEAST_P = 1e-300
+"""Smaller probabilities are not told from zero."""
 SHOWN = 0.05
 """um and urad: what is smaller is not there."""
 NEARLY = 0.925
@@ -197,7 +199,8 @@ def hopeless(proposal: Proposal) -> str:
 def why(diagnosis: Diagnosis, finding: EffectFinding) -> str:
     """One sentence on why this name."""
     name = finding.candidate.name
-    said = f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} (p = {finding.p_value:.1g})"
+    chance = f"p = {finding.p_value:.1g}" if finding.p_value > LEAST_P else f"p < {LEAST_P:g}"
+    said = f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} ({chance})"
     runners_up = diagnosis.selected.runners_up.get(name, {})
     if not runners_up:
         return said
