@@ -40,7 +40,7 @@ def check_target(
     check_named(path)
     check_output(path, root, replace)
     if identity(path) in inputs:
-        hint = "--in-place, or another -o"
+        hint = "another output; ncfix fix has --in-place, too"
         raise UsageError.of("NCF005", "is an input too, and inputs are not changed", Place(path), hint)
     if os.path.lexists(path) and not (replace or resume):
         raise exists_already(path)

@@ -154,6 +154,21 @@ def test_a_page_that_cannot_be_written_stops_nothing(
     assert (shop.folder / "out/part.ngc").exists()
 
 
+def test_a_setup_that_is_not_there_yet(shop: Any) -> None:
+    from ncfix.batch import watching
+
+    pytest.importorskip("watchfiles")
+    (shop.folder / "in").mkdir()
+    setup = shop.folder / "later/setup.toml"
+    looks = watching.moments(str(shop.folder / "in"), [str(setup)], 0.1, None)
+    assert [next(looks), next(looks)] == [None, None]
+    time.sleep(0.1)
+    setup.parent.mkdir()
+    setup.write_text("assume_zero = true\n")
+    assert next(looks) is None
+    looks.close()
+
+
 def test_programs_do_not_go_where_they_come_from(ncfix: Any, shop: Any) -> None:
     (shop.folder / "in").mkdir()
     result = ncfix("watch", shop.folder / "in", f"{shop.folder}/in/", "-m", shop.machine, "--once")

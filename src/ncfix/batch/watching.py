@@ -85,7 +85,7 @@ class WatchedFolder:
 def moments(folder: str, others: Sequence[str], settle_s: float, poll_s: float | None) -> Iterator[None]:
     """When it is worth looking at a folder: at first, when something has changed, and a while after that.
 
-    others  files whose changes count, too
+    others  files whose changes count, too; they need not be there
     poll_s  look so often, whatever the system says; None: as the system says, if it can
     """
     if poll_s is None and find_spec("watchfiles"):
@@ -101,9 +101,9 @@ def _told(folder: str, others: Sequence[str], settle_s: float) -> Iterator[None]
 
     yield None
     every = max(int(1e3 * min(settle_s, LOOK_S)), 50)
-    folders = dict.fromkeys((folder, *(os.path.dirname(path) or os.curdir for path in others)))
+    known = [state_of(path) for path in others]
     changes = watchfiles.watch(
-        *folders,
+        folder,
         watch_filter=None,
         debounce=int(1e3 * EVENTS_S),
         rust_timeout=every,
@@ -113,6 +113,8 @@ def _told(folder: str, others: Sequence[str], settle_s: float) -> Iterator[None]
     )
     quiet_s = 0.0
     for change in changes:
-        quiet_s = 0.0 if change else quiet_s + every / 1e3
+        states = [state_of(path) for path in others]
+        quiet_s = quiet_s + every / 1e3 if not change and states == known else 0.0
+        known = states
         if quiet_s <= 2 * settle_s + LOOK_S or quiet_s % 60 < every / 1e3:  # once a minute in any case
             yield None

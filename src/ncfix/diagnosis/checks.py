@@ -65,7 +65,7 @@ def enough(data: ResidualData) -> None:
     """Refuse too few values for the unknowns. Raises `UsageError` NCF650."""
     free = int(np.linalg.matrix_rank(data.base))
     if len(data.y) < free + SPARE:
-        text = f"{len(data.y)} values for {free} unknowns of set-up and constants"
+        text = f"{len(data.y)} values, and {free} unknowns of set-up and constants need {free + SPARE} or more"
         raise UsageError.of("NCF650", text, hint="measure more poses")
 
 
