@@ -84,6 +84,15 @@ class Project:
             found |= table.get("options", {})
         return found
 
+    def is_output(self, program: str, below: str) -> bool:
+        """Whether a program lies in one of the output folders, of those that are themselves below a folder."""
+        tables = (self.content, *self.content.get("programs", ()))
+        named = [
+            place["output"] for table in tables for place in (table, table.get("options", {})) if "output" in place
+        ]
+        folders = [self.from_here(each) for each in named if isinstance(each, str)]
+        return any(way_below(each, program) and way_below(below, each) not in ("", os.curdir) for each in folders)
+
     def fault(self, text: str, *keys: str | int, hint: str = "") -> Message:
         """What is wrong with a key, with its place."""
         line = line_of(keys, key_lines(self.text))

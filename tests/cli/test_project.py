@@ -96,6 +96,20 @@ def test_settings_by_pattern(ncfix: Any, yard: Path) -> None:
     assert len(ncfix("check", "jobs", "--json").json()["files"]) == 3
 
 
+def test_outputs_of_all_groups_are_no_programs_the_next_night(ncfix: Any, yard: Path) -> None:
+    (yard / "ncfix.toml").write_text(
+        'machine = "mill.toml"\noutput = "done"\n[options]\nassume_zero = true\nresume = true\n'
+        '[[programs]]\nmatch = "jobs/b/*"\nmachine = "other.toml"\noutput = "rest"\n'
+    )
+    assert ncfix("fix", ".").code == ExitCode.DONE
+    result = ncfix("fix", ".", "--json")
+    assert result.code == ExitCode.DONE, result.err
+    assert [each["resumed"] for each in result.json()["files"]] == [True] * 3
+    assert result.err.count("options that are not given here") == 1
+    assert len(ncfix("check", ".", "--json").json()["files"]) == 3
+    assert len(ncfix("check", "rest", "--json").json()["files"]) == 1
+
+
 def test_the_nearest_file_counts(ncfix: Any, yard: Path) -> None:
     (yard / "jobs/b/ncfix.toml").write_text(
         'machine = "../../other.toml"\noutput = "."\n[options]\nassume_zero = true\n'

@@ -78,7 +78,10 @@ class ProjectCommand(click.Command):
         return self._by_settings(given, named if isinstance(named, str) else os.environ.get("NCFIX_PROJECT"))
 
     def _by_settings(self, given: Iterable[str], named: str | None) -> list[ProgramGroup]:
-        """Programs, those below folders each for itself, together if their settings are the same."""
+        """Programs, those below folders each for itself, together if their settings are the same.
+
+        What lies in the output folders of a project is no program of it, unless there is nothing else.
+        """
         from ncfix.project import Project
 
         known: dict[str, Project | None] = {}
@@ -90,13 +93,18 @@ class ProjectCommand(click.Command):
             return known[folder]
 
         found: dict[str, tuple[Project | None, dict[str, Any], list[str]]] = {}
+        all_of_them = True
         for path in given:
-            for program in program_files([path]) if os.path.isdir(path) else ():
-                self._put(found, program.path, project_of(program.path))
             if not os.path.isdir(path):
                 self._put(found, path, project_of(path))
-        several = len(found) > 1
-        tell_of(*{id(project): project for project, _, _ in found.values() if project}.values())
+                continue
+            programs = [(each.path, project_of(each.path)) for each in program_files([path])]
+            meant = [(each, project) for each, project in programs if not (project and project.is_output(each, path))]
+            all_of_them = all_of_them and len(meant) in (0, len(programs))
+            for program, project in meant or programs:
+                self._put(found, program, project)
+        several = len(found) > 1 or not all_of_them
+        tell_of(*{project.path: project for project, _, _ in found.values() if project}.values())
         return [
             ProgramGroup(
                 settings, frozenset(paths) if several else None, None if project is None else project.folder or "."
