@@ -91,7 +91,7 @@ def limited(seconds: float | None, megabytes: int | None) -> Iterator[None]:
 
     megabytes  of data of this process; with more a `MemoryError` is raised
 
-    Raises `FaultError` NCF025 when the time is over. Where the system has no such limits there are none.
+    Raises `FaultError` NCF030 when the time is over. Where the system has no such limits there are none.
     """
     with _in_memory(megabytes), _in_time(seconds):
         yield
@@ -115,7 +115,7 @@ def _in_time(seconds: float | None) -> Iterator[None]:
         yield
     except TimeIsUpError:
         text = f"took more than {seconds:g} s, its limit"
-        raise FaultError.of("NCF025", text, hint="--time-limit-s gives it more") from None
+        raise FaultError.of("NCF030", text, hint="--time-limit-s gives it more") from None
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)

@@ -306,7 +306,7 @@ def test_a_program_that_takes_too_long(
     result = ncfix(*command, "--jobs", jobs, "--time-limit-s", "4")
     assert result.code == ExitCode.FAULT
     failed = [each for each in result.json()["files"] if "errors" in each]
-    assert [(Path(each["path"]).name, each["errors"][0]["code"]) for each in failed] == [("part2.ngc", "NCF025")]
+    assert [(Path(each["path"]).name, each["errors"][0]["code"]) for each in failed] == [("part2.ngc", "NCF030")]
     begun = time.monotonic()
     assert ncfix(*command, "--time-limit-s", "4").code == ExitCode.FAULT
     assert time.monotonic() - begun < 4

@@ -27,6 +27,13 @@ def test_every_explained_code_is_used(root: Path) -> None:
     assert all_codes().keys() - used_codes(root) == set()
 
 
+def test_no_code_has_two_meanings(root: Path) -> None:
+    sources = [path for folder in ("src", "plugins") for path in (root / folder).rglob("*codes.py")]
+    found = [code for path in sources for code in re.findall(r'"(NCF\d{3})": Code\(', path.read_text())]
+    assert sorted(found) == sorted(set(found))
+    assert set(all_codes()) - set(found) == set()
+
+
 @pytest.mark.parametrize(("code", "entry"), all_codes().items())
 def test_an_explanation_says_something(code: str, entry: Any) -> None:
     assert re.fullmatch(r"NCF[0-6]\d\d", code)

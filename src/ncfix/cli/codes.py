@@ -92,12 +92,6 @@ CODES = {
         "can be; what has to be looked at as a whole takes many times the memory of its text.",
         "Do it on a computer with more memory, or in smaller pieces; `--jobs 1` takes the least.",
     ),
-    "NCF025": Code(
-        "a program took too long",
-        "`--time-limit-s` says how many seconds a program of a batch may take. Nothing was written for it; the other "
-        "programs are not concerned. It is not tried again by `--resume` until something changes.",
-        "Give it more time, or fix it alone; `--retry` tries again.",
-    ),
     "NCF026": Code(
         "two batches for one folder",
         "While a batch runs, its journal (`.ncfix-journal.jsonl` in the folder of the outputs) is locked, so that two "
@@ -124,5 +118,11 @@ CODES = {
         "`--executor dask://HOST:PORT` gives the programs of a batch to a Dask cluster. Its scheduler does not answer "
         "or is gone, or it has no workers, or these have another version of ncfix. What is done is in the journal.",
         "Start scheduler and workers, with the same ncfix and the same folders; then the same command with `--resume`.",
+    ),
+    "NCF030": Code(
+        "a program took too long",
+        "`--time-limit-s` says how many seconds a program of a batch may take. Nothing was written for it; the other "
+        "programs are not concerned. It is not tried again by `--resume` until something changes.",
+        "Give it more time, or fix it alone; `--retry` tries again.",
     ),
 }

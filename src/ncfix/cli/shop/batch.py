@@ -41,7 +41,7 @@ STALE = "is of an earlier state of the program, the machine, the set-up or the o
 ACCEPT = "--allow-refused writes the program with the refused motions as they were"
 OF_PROGRAMS = 100
 """Messages with this number and above are about programs, machines and set-ups; those below about files and use."""
-LASTING = frozenset({"NCF017", "NCF024", "NCF025"})
+LASTING = frozenset({"NCF017", "NCF024", "NCF030"})
 """Programs that take too much time or memory: that would come again, and cost as much again."""
 
 
