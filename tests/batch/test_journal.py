@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from ncfix.batch import journal as journals
 from ncfix.batch.journal import Journal, JournalRecord, RecordingFinder, announce, digest_of, text_digest
 from ncfix.diagnostics import UsageError
+
+ENTRY: dict[str, Any] = {"changed": True, "refused": [], "warnings": []}
+"""What is reported of a program, as far as a journal looks at it."""
 
 
 @pytest.fixture
@@ -22,7 +27,7 @@ def output(tmp_path: Path) -> Path:
 def record(output: Path) -> JournalRecord:
     digest = digest_of(str(output))
     assert digest
-    return JournalRecord("part.nc", "key", digest, {"100": text_digest(b"M99\n"), "200": ""}, {"output": str(output)})
+    return JournalRecord("part.nc", "key", digest, {"100": text_digest(b"M99\n"), "200": ""}, ENTRY)
 
 
 def find(name: str) -> bytes | None:
@@ -31,7 +36,7 @@ def find(name: str) -> bytes | None:
 
 def test_what_was_noted_is_read_again(tmp_path: Path, record: JournalRecord) -> None:
     journal = Journal(str(tmp_path))
-    journal.add(JournalRecord("part.nc", "old", "0"))
+    journal.add(JournalRecord("part.nc", "old", "0", entry=ENTRY))
     journal.add(record)
     again = Journal(str(tmp_path))
     assert again.records == journal.records == {"part.nc": record}
@@ -45,7 +50,7 @@ def test_a_line_that_was_cut_off_spoils_no_other(tmp_path: Path, record: Journal
     journal.add(record)
     whole = Path(journal.path).read_bytes()
     Path(journal.path).write_bytes(whole + whole[:cut])
-    journal.add(JournalRecord("other.nc", "key", "0"))
+    journal.add(JournalRecord("other.nc", "key", "0", entry=ENTRY))
     assert set(Journal(str(tmp_path)).records) == {"part.nc", "other.nc"}
 
 
@@ -55,6 +60,20 @@ def test_what_is_no_line_of_a_journal_does_not_count(tmp_path: Path, record: Jou
     journal.add(record)
     with open(journal.path, "ab") as handle:
         handle.write(b"\n" + line)
+    assert Journal(str(tmp_path)).records == {"part.nc": record}
+
+
+@pytest.mark.parametrize(
+    "changed", [{"entry": {}}, {"entry": {"errors": []}}, {"called": 3}, {"code": "0"}, {"key": None}, {"digest": [1]}]
+)
+def test_a_record_that_somebody_changed_does_not_count(
+    tmp_path: Path, record: JournalRecord, changed: dict[str, Any]
+) -> None:
+    journal = Journal(str(tmp_path))
+    journal.add(record)
+    odd = {"schema": journals.SCHEMA, **record.as_dict(), **changed}
+    with open(journal.path, "a") as handle:
+        handle.write(f"\n{json.dumps(odd)}")
     assert Journal(str(tmp_path)).records == {"part.nc": record}
 
 

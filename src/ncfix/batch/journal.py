@@ -31,6 +31,8 @@ PATIENCE_S = 5.0
 """How long the processes of a batch that was killed may hold its journal."""
 ROOM_BYTES = 1 << 20
 """A journal is written anew where more than this, and more than half of it, does not count any more."""
+REPORTED = frozenset({"changed", "refused", "warnings"})
+"""What is reported at least of a program that was followed to its end."""
 Find = Callable[[str], bytes | None]
 """Gives the text of a subprogram by its name."""
 
@@ -102,6 +104,15 @@ class JournalRecord:
         if not self.digest and limits != self.limits:
             return False
         return all(text_digest(find(name)) == digest for name, digest in self.called.items())
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether it is as ncfix writes it; what somebody has changed in the journal does not count."""
+        texts = (self.name, self.key, self.digest, self.limits, self.source)
+        maps = isinstance(self.called, Mapping) and isinstance(self.entry, Mapping)
+        if not (maps and isinstance(self.code, int) and all(isinstance(each, str) for each in texts)):
+            return False
+        return bool(self.entry.get("errors")) or self.entry.keys() >= REPORTED
 
     def as_dict(self) -> dict[str, Any]:
         """The record as plain data."""
@@ -198,8 +209,8 @@ class Journal:
             return
         if "writes" in found:
             self.written.setdefault(str(found["name"]), {})[str(found["writes"])] = str(found["source"])
-        else:
-            self._take(JournalRecord(**found), size)
+        elif (record := JournalRecord(**found)).is_sound:
+            self._take(record, size)
 
 
 @contextmanager
