@@ -206,8 +206,7 @@ def fix(
     job = FixJob(machine, given.load(), dialect, options, ProgramLimits(time_limit_s, memory_limit_mb))
     if looks:
         return _changes(context, job, programs, outputs.folder(programs), diff_motions, as_json)
-    debugged = os.environ.get(console.DEBUG, "") not in ("", "0")  # tracebacks are among what is said of a program
-    loudness = Loudness.ALL if verbose or debugged else Loudness.QUIET if quiet else Loudness.USUAL
+    loudness = Loudness.ALL if verbose else Loudness.QUIET if quiet else Loudness.USUAL
     batch = Batch(job, wanted, outputs.folder(programs), resume, retry, loudness)
     workers = max(processes_for(jobs, wanted), 2 if executor.startswith(SCHEME) else 1)
     batches = [*context.meta.get(BATCHES, ()), (batch, workers, executor_of(executor))]
