@@ -197,6 +197,14 @@ def test_init_writes_what_fix_needs(ncfix: Any, yard: Path) -> None:
     assert outputs(yard / "corrected") == {"jobs/plate.ngc": "mill"}
 
 
+@pytest.mark.parametrize("output", ["", "-"])
+def test_init_takes_a_folder_for_outputs_only(ncfix: Any, yard: Path, output: str) -> None:
+    (yard / "ncfix.toml").unlink()
+    result = ncfix("init", yard, "-m", "mill.toml", "-o", output)
+    assert (result.code, "NCF003" in result.err) == (ExitCode.USAGE, True)
+    assert not (yard / "ncfix.toml").exists()
+
+
 def test_init_asks_nobody_where_nobody_is(ncfix: Any, tmp_path: Path) -> None:
     result = ncfix("init", tmp_path)
     assert result.code == ExitCode.USAGE

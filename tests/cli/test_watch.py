@@ -173,6 +173,9 @@ def test_programs_do_not_go_where_they_come_from(ncfix: Any, shop: Any) -> None:
     (shop.folder / "in").mkdir()
     result = ncfix("watch", shop.folder / "in", f"{shop.folder}/in/", "-m", shop.machine, "--once")
     assert (result.code, "NCF005" in result.err) == (ExitCode.USAGE, True)
+    for nowhere in ("", "-"):
+        result = ncfix("watch", shop.folder / "in", nowhere, "-m", shop.machine, "--once")
+        assert (result.code, "NCF003" in result.err) == (ExitCode.USAGE, True)
 
 
 def test_nothing_of_a_name_steers_the_page(shop: Any) -> None:

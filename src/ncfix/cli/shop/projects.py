@@ -249,6 +249,8 @@ def init(folder: str, machine: str | None, setup: str | None, output: str | None
         "setup": _asked("setup", setup, "setup file, empty for none", _only(folder, ("[work_offsets]", "[tools]"))),
         "output": _asked("output", output, "folder of corrected programs", "corrected"),
     }
+    if values["output"] in ("", "-"):
+        raise UsageError.of("NCF003", "corrected programs go to a folder", hint="-o DIR")
     load(os.path.join(folder, values["machine"]))
     if values["setup"]:
         from ncfix.control.setup_file import load as load_setup

@@ -20,7 +20,7 @@ from ncfix.cli.options import FOLDER, PATH, Positive, load_machine, sound
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import ProgramGroup, ProjectCommand, tell_of
 from ncfix.cli.shop.summary import Became, Loudness, reasons
-from ncfix.cli.targets import Outputs, targets
+from ncfix.cli.targets import STREAM, Outputs, targets
 from ncfix.diagnostics import ExitCode, NcfixError, Place, UsageError, visible
 from ncfix.inputs import identities
 from ncfix.outputs import check_target
@@ -183,6 +183,8 @@ def watch(
     """
     if not os.path.isdir(folder):
         raise UsageError.of("NCF014", "is not a folder", Place(folder), "make it, or name another one")
+    if output in ("", STREAM):
+        raise UsageError.of("NCF003", "corrected programs go to a folder", hint="name the folder OUT")
     if os.path.isdir(output) and os.path.samefile(folder, output):
         raise UsageError.of("NCF005", "is the folder of the programs, too", Place(output), "name another folder OUT")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
