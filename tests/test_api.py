@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 import ncfix
-from ncfix.control.setup import Setup
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import RefusedError, SourceError, UsageError
 from ncfix.measure.candidates import Room
 from ncfix.measure.instruments import Faults
@@ -268,6 +268,34 @@ def test_a_room_that_the_machine_does_not_have(shop: Path, room: Room, said: str
     assert said in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"work_offsets": {"G54": {"X": math.nan}}},
+        {"work_offsets": {"G54": {"Q": 1.0}}},
+        {"initial": {"Z": math.inf}},
+        {"initial": {"x": 1.0}},
+        {"references": {"G30": {"Z": -math.inf}}},
+        {"probed": {"Z": math.nan}},
+        {"tools": {1: Tool(length=math.nan)}},
+        {"named_tools": {"DRILL": Tool(length=1.0, radius=math.inf)}},
+        {"variables": {"#100": "1"}},
+        {"inputs": {"temp_spindle": math.nan}},
+        {"workpiece_offset": (0.0, math.nan, 0.0)},
+    ],
+)
+def test_a_setup_has_finite_numbers_for_axes_that_there_are(
+    program: Program, shop: Path, given: dict[str, Any]
+) -> None:
+    setup = Setup(**given)
+    for call in (
+        lambda: ncfix.fix(program, "machine.toml", setup=setup),
+        lambda: ncfix.verify(program, program, "machine.toml", setup=setup),
+        lambda: ncfix.simulate(program, "machine.toml", setup=setup),
+    ):
+        assert code_of(call) == "NCF025"
+
+
 def test_a_range_of_tables_is_two_numbers(shop: Path) -> None:
     for limits in ((1.0,), (1.0, 2.0, 3.0)):
         bad: dict[str, Any] = {"X": limits}
@@ -277,6 +305,7 @@ def test_a_range_of_tables_is_two_numbers(shop: Path) -> None:
 def test_names_of_effects_are_a_list_and_those_that_do_not_exist_are_said(measured: Measurement) -> None:
     assert code_of(lambda: ncfix.diagnose(measured, "machine.toml", without="EXX")) == "NCF025"
     assert code_of(lambda: ncfix.plan("machine.toml", separate="EXX")) == "NCF025"
+    assert code_of(lambda: ncfix.plan("machine.toml", existing=[measured, measured.with_columns({})])) == "NCF025"
     found = ncfix.diagnose(measured, "machine.toml", without=["no such name"])
     assert "NCF657" in [message.code for message in found.messages]
 

@@ -36,6 +36,8 @@ class NumberRange:
         """Refuse another number, given under this name: `UsageError` NCF025."""
         if not self.has(value):
             number = "an integer" if self.whole else "a number"
+            if self.low == -math.inf:
+                raise UsageError.of("NCF025", f"{name}={value!r}", hint=f"{number} that is finite")
             low = f"above {self.low:g}" if self.inside else f"from {self.low:g}"
             high = "" if self.high == math.inf else f"{' and below' if self.inside else ' to'} {self.high:g}"
             raise UsageError.of("NCF025", f"{name}={value!r}", hint=f"{number} {low}{high}")
@@ -47,6 +49,10 @@ def check_choice(name: str, value: object, known: Sequence[str]) -> None:
         raise UsageError.of("NCF025", f"{name}={value!r}", hint=f"one of {', '.join(known)}")
 
 
+OFFSET_AXES = tuple("XYZABCUVW")
+"""The axes that a set-up may name."""
+FINITE = NumberRange(-math.inf, inside=True)
+"""Any number that is one."""
 TOLERANCE_UM = NumberRange(0.01)
 """No control has digits for a finer tolerance, and pieces without number would be sought for it."""
 TARGET_UM = NumberRange(0.0, inside=True)

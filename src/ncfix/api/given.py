@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
+from ncfix.arguments import FINITE, OFFSET_AXES, check_choice
 from ncfix.batch.programs import subprograms
-from ncfix.control.setup import Setup
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import UsageError
 from ncfix.files import read_bytes, write_whole
 from ncfix.inputs import each_once, given_twice, identities
@@ -87,14 +88,37 @@ def as_program(program: Program | PathName, machine: Machine) -> Program:
 
 
 def as_setup(setup: Setup | PathName | None) -> Setup:
-    """A set-up, or that of a file; without one nothing is given."""
+    """A set-up, or that of a file; without one nothing is given.
+
+    Raises `UsageError` NCF025 for a value that is not finite and for an axis that there is not.
+    """
     if setup is None:
         return Setup()
     if isinstance(setup, Setup):
+        _check_values(setup)
         return setup
     from ncfix.control.setup_file import load
 
     return load(os.fspath(setup))
+
+
+def _check_values(setup: Setup) -> None:
+    """Refuse a set-up with a value that is no finite number, or for an axis that no machine has: NCF025."""
+    by_axis = {f"work_offsets[{name!r}]": values for name, values in setup.work_offsets.items()}
+    by_axis |= {f"references[{name!r}]": values for name, values in setup.references.items()}
+    by_axis |= {"initial": setup.initial, "probed": setup.probed or {}}
+    for where, values in by_axis.items():
+        for axis in values:
+            check_choice(f"{where}: axis", axis, OFFSET_AXES)
+    tools: list[tuple[object, Tool]] = [*setup.tools.items(), *setup.named_tools.items()]
+    lengths = {name: tool.length for name, tool in tools if tool.length is not None}
+    radii = {name: tool.radius for name, tool in tools if tool.radius is not None}
+    named: dict[str, Mapping[Any, float]] = {**by_axis, "variables": setup.variables, "inputs": setup.inputs}
+    named |= {"lengths of tools": lengths, "radii of tools": radii}
+    named |= {"workpiece_offset": dict(enumerate(setup.workpiece_offset))}
+    for where, values in named.items():
+        for key, value in values.items():
+            FINITE.check(f"{where}[{key!r}]", value)
 
 
 def subprograms_of(setup: Setup, *programs: Program) -> Resolve | None:

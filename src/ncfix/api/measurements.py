@@ -16,7 +16,7 @@ from ncfix.api.given import (
     sound_machine,
     write_output,
 )
-from ncfix.diagnostics import Message, RefusedError
+from ncfix.diagnostics import Message, RefusedError, UsageError
 
 if TYPE_CHECKING:
     from ncfix.api.given import Measured
@@ -55,8 +55,19 @@ def plan(
 
     check_writable(output, force, machine, existing)
     known = as_machine(machine)
-    before = None if existing is None else as_measurements(existing, known)[0]
-    found = planned(known, kind, count, room or Room(), effects, list(as_names("separate", separate)), before, seed)
+    before = [] if existing is None else as_measurements(existing, known)
+    if len(before) > 1:
+        raise UsageError.of("NCF025", f"existing: {len(before)} measurements", hint="one of them")
+    found = planned(
+        known,
+        kind,
+        count,
+        room or Room(),
+        effects,
+        list(as_names("separate", separate)),
+        before[0] if before else None,
+        seed,
+    )
     write_output(output, dumps(found.plan, found.plan.form.measured if kind != "probe" else ()).encode(), force)
     return found
 
