@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import replace
 from unittest import mock
 
@@ -223,6 +224,50 @@ def test_long_stretches_of_arcs(dialect: str) -> None:
     assert arcs > 1000
     assert sum(len(call.args[0].block) for call in written.call_args_list) > 0.4 * arcs
     assert_same(program, moves, pieces)
+
+
+def written_from(
+    program: Program, moves: Moves, pieces: Pieces, begin: np.ndarray | None = None
+) -> list[tuple[str, list[list[float]]]]:
+    """The text and the ends of pieces, both forms many at a time, and one by one; `begin`: where the first one ends."""
+    found = []
+    one_by_one = replace(language_of(program.dialect, WrittenLanguage), bulk=None)
+    for form, language in (("plain", None), (None, None), (None, one_by_one)):
+        core.use(form)
+        with mock.patch.object(bulk, "SHORTEST", 1), ExitStack() as patches:
+            if language is not None:
+                patches.enter_context(mock.patch("ncfix.writer.emit.language_of", return_value=language))
+            emission = emit(program, moves, pieces, STEPS, done=begin)
+        found.append((spliced(program.source, emission.splices).decode(), emission.end.tolist()))
+    return found
+
+
+def in_one_piece_each(moves: Moves, end: np.ndarray) -> Pieces:
+    nothing = np.zeros(len(moves), dtype=bool)
+    return Pieces(np.arange(len(moves)), np.ones(len(moves)), end, nothing, moves.centre.copy(), nothing)
+
+
+def test_an_axis_without_a_word_that_stands_elsewhere_gets_none() -> None:
+    """What the machine did before is not what was planned: X, of which the program says nothing, is not led back."""
+    program, moves = followed(b"G90 G21 G94 G1 F1000 Y0 Z0 B0 C0\nB1\nB2 Y1\nB3\nM2\n")
+    moves = replace(moves, placed=np.tile(np.array(AXES) != "X", (len(moves), 1)))
+    pieces = in_one_piece_each(moves, moves.end.copy())
+    for text, ends in written_from(program, moves, pieces, pieces.end[0] + [0.5, 0, 0, 0, 0]):
+        assert text.encode() == program.source
+        assert [end[0] for end in ends[1:]] == [0.5, 0.5, 0.5]
+
+
+def test_an_axis_that_must_get_no_word_from_a_motion_on_gets_none() -> None:
+    """X rests from the third motion on, where a correction of the second has left it."""
+    program, moves = followed(b"G90 G21 G94 G1 F1000 X0 Y0 Z0 B0 C0\nX1 B1\nB2 Y1\nB3\nM2\n")
+    moves = replace(moves, resting=np.zeros_like(moves.programmed))
+    assert moves.resting is not None
+    moves.resting[2:, 0] = True
+    end = moves.end.copy()
+    end[1, 0] += 0.5
+    for text, ends in written_from(program, moves, in_one_piece_each(moves, end)):
+        assert text.splitlines()[1:4] == ["X1.5 B1", "B2 Y1", "B3"]
+        assert [each[0] for each in ends[1:]] == [1.5, 1.5, 1.5]
 
 
 def test_arcs_and_dwells_do_not_part_a_stretch() -> None:

@@ -89,13 +89,13 @@ class Bulk:
             fit &= ~moves.spelled.any(axis=1)
         fit = with_dwells(fit, program, moves, pieces, first_piece, layouts)
         stop = _stops(fit & ~jumps.any(axis=1) if jumps.any() else fit)
-        changes = np.append(np.flatnonzero(np.diff(frame)) + 1, len(moves))
+        changes = np.append(np.flatnonzero((np.diff(frame) != 0) | _silenced(moves)) + 1, len(moves))
         stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
         return cls(program, moves, pieces, first_piece, layouts, stop)
 
     @cached_property
     def wordless(self) -> Mask | None:
-        """(n, n_axes) axes that must get no word, which a stretch does not begin with if they stand elsewhere."""
+        """(n, n_axes) axes that must get no word: no stretch begins where one of them stands elsewhere. None: none."""
         wordless = self.moves.wordless
         return wordless if wordless.any() else None
 
@@ -262,6 +262,13 @@ def _stops(fit: Mask) -> IntArray:
     """(n + 1,) for each motion, and behind the last one, the first from there on that is not `fit` (n,)."""
     ends = np.append(np.flatnonzero(~fit), len(fit))
     return np.repeat(ends, np.diff(ends, prepend=-1))
+
+
+def _silenced(moves: Moves) -> Mask:
+    """(n - 1,) motions but the first in which an axis must get no word that might have got one in the motion before."""
+    wordless = moves.wordless
+    found: Mask = (wordless[1:] & ~wordless[:-1]).any(axis=1)
+    return found
 
 
 def _halves(decimals: IntArray) -> FloatArray:
