@@ -30,6 +30,14 @@ def test_what_is_as_it_should_be(ncfix: Any) -> None:
     assert core.status() in ncfix("doctor").out.decode()
 
 
+def test_a_form_of_the_core_that_there_is_not(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NCFIX_CORE", "fast")
+    core.use(None)
+    result = ncfix("plugins")
+    assert result.code == ExitCode.USAGE
+    assert "NCF001: NCFIX_CORE is 'fast'; it may be 'plain' or 'compiled'\n  hint: unset NCFIX_CORE" in result.err
+
+
 def test_what_is_wrong(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     there = {"numpy": "1.2", "lark": None}
     version = doctor._version

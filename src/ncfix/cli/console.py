@@ -292,6 +292,8 @@ def _abandon(stream: TextIO) -> None:
 
 def owned(error: Exception) -> NcfixError:
     """An exception as the error that is told: a remedy where there is one, else a fault of ncfix."""
+    from ncfix import core
+
     if isinstance(error, NcfixError):
         if error.__cause__ is not None and isinstance(error, PluginError):
             _trace(error.__cause__)
@@ -305,6 +307,8 @@ def owned(error: Exception) -> NcfixError:
     if isinstance(error, MemoryError):
         hint = "leave out what is not needed, or do it on a computer with more memory"
         return FaultError.of("NCF024", "there is not enough memory for this", hint=hint)
+    if isinstance(error, core.UnusableCoreError):
+        return UsageError.of("NCF001", str(error), hint=f"unset {core.WISH}")
     return fault(error)
 
 

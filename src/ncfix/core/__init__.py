@@ -22,6 +22,11 @@ WISH = "NCFIX_CORE"
 """The environment: `plain` or `compiled`; whichever there is, if unset."""
 BUILD = "with a C compiler and Python's headers, pip install --no-cache-dir --force-reinstall --no-deps ncfix"
 
+
+class UnusableCoreError(ImportError):
+    """The form of the core that is asked for is not there."""
+
+
 _form: str | None = None
 _said = False
 
@@ -66,19 +71,22 @@ def engaged() -> bool:
 
 
 def use(form: str | None) -> None:
-    """Take the `plain` or the `compiled` form from here on; None: as the environment says. Raises ImportError."""
+    """Take the `plain` or the `compiled` form from here on; None: as the environment says.
+
+    Raises UnusableCoreError.
+    """
     global _form
     if form == "compiled" and fault():
-        raise ImportError(f"the core is {fault()}")
+        raise UnusableCoreError(f"the core is {fault()}")
     _form = form
 
 
 def _wished() -> str:
     wish = os.environ.get(WISH, "")
     if wish not in ("", "plain", "compiled"):
-        raise ImportError(f"{WISH} is {wish!r}; it may be 'plain' or 'compiled'")
+        raise UnusableCoreError(f"{WISH} is {wish!r}; it may be 'plain' or 'compiled'")
     if wish == "compiled" and fault():
-        raise ImportError(f"{WISH}=compiled, but the core is {fault()}")
+        raise UnusableCoreError(f"{WISH}=compiled, but the core is {fault()}")
     return "plain" if wish == "plain" or fault() else "compiled"
 
 
