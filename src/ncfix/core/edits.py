@@ -12,12 +12,16 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Ints = NDArray[np.int64]
 
+OTHER_LENGTH = "the text has another length than its room"
+
 
 def spliced(source: Bytes, start: Ints, stop: Ints, length: Ints, data: Bytes, out: Bytes) -> int:
-    """Put a text into `out` with edits made that are as in `writer.Splices`; returns where the next byte would go.
+    """Put a text into `out` with edits made that are as in `writer.Splices`.
 
-    Raises IndexError for edits that overlap or lie outside.
+    Raises IndexError for edits that overlap or lie outside, and for another length of `out` than the text has then.
     """
+    if not start.shape[0] == stop.shape[0] == length.shape[0]:
+        raise IndexError("not as many of everything as there are edits")
     at, done, taken = 0, 0, 0
     for edit in range(start.shape[0] + 1):
         last = edit == start.shape[0]
@@ -27,18 +31,25 @@ def spliced(source: Bytes, start: Ints, stop: Ints, length: Ints, data: Bytes, o
         if not (done <= begin <= end <= source.shape[0] and 0 <= more <= data.shape[0] - taken):
             raise IndexError("edits overlap, or lie outside the text")
         if at + begin - done + more > out.shape[0]:
-            raise IndexError("there is no room for the text")
+            raise IndexError(OTHER_LENGTH)
         for k in range(begin - done):
             out[at + k] = source[done + k]
         at += begin - done
         for k in range(more):
             out[at + k] = data[taken + k]
         at, taken, done = at + more, taken + more, end
-    return at
+    if at < out.shape[0]:
+        raise IndexError(OTHER_LENGTH)
+    return 0
 
 
 def left_alone(old: Bytes, new: Bytes, start: Ints, stop: Ints, length: Ints) -> bool:
-    """Whether all between some edits, as in `Splices`, is the same in the text that they make of the old one."""
+    """Whether all between some edits, as in `Splices`, is the same in the text that they make of the old one.
+
+    Raises IndexError as `spliced` does.
+    """
+    if not start.shape[0] == stop.shape[0] == length.shape[0]:
+        raise IndexError("not as many of everything as there are edits")
     at, to, different = 0, 0, 0
     for edit in range(start.shape[0] + 1):
         last = edit == start.shape[0]
