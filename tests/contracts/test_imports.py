@@ -9,8 +9,6 @@ from functools import cache
 from pathlib import Path
 
 ROOTS = ("src", "plugins")
-EXCEPT = frozenset({("ncfix.text.writer", "ncfix.writer.writing_kernels")})
-"""Imports that do not count: the one exception that docs/architecture.md names."""
 
 
 @cache
@@ -34,7 +32,7 @@ def imported(name: str, known: dict[str, Path]) -> set[str]:
         elif isinstance(node, ast.Import):
             found |= {each.name for each in node.names}
     found |= {package for each in found for package in packages(each)} - packages(name)
-    return {each for each in found & known.keys() - {name} if (name, each) not in EXCEPT}
+    return found & known.keys() - {name}
 
 
 def packages(name: str) -> set[str]:
