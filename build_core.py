@@ -47,7 +47,7 @@ class CompiledCore(BuildHookInterface):  # type: ignore[type-arg]
         if version == "editable":
             for old in (*core.glob("*.so"), *core.glob("*.pyd"), *core.glob(RECORD)):
                 old.unlink()
-        if wish == "plain" or sys.implementation.name != "cpython":
+        if wish == "plain" or (not wish and sys.implementation.name != "cpython"):
             return
         try:
             found = compiled(Path(self.root), stable=wish == "abi3")
@@ -84,10 +84,11 @@ def compiled(root: Path, *, stable: bool) -> list[Path]:
         wanted = [Extension(f"ncfix.core.{n}", [f"ncfix/core/{n}.py"], extra_compile_args=flags, **more) for n in names]
         wanted.append(Extension(SHARED, [], extra_compile_args=flags, **more))
         build = root / "build"
+        anew = is_newer(Path(__file__), build / RECORD)
         options = {"compiler_directives": DIRECTIVES, "shared_utility_qualified_name": SHARED, "quiet": True}
-        modules = cythonize(wanted, build_dir=str(build / "c"), **options)
+        modules = cythonize(wanted, build_dir=str(build / "c"), force=anew, **options)
         command = build_ext(Distribution({"ext_modules": modules}))
-        command.build_lib, command.build_temp = str(build / "lib"), str(build / "temp")
+        command.build_lib, command.build_temp, command.force = str(build / "lib"), str(build / "temp"), anew
         command.ensure_finalized()
         command.run()
         found = [Path(command.get_ext_fullpath(each.name)).resolve() for each in wanted]
@@ -96,3 +97,8 @@ def compiled(root: Path, *, stable: bool) -> list[Path]:
         return found
     finally:
         os.chdir(before)
+
+
+def is_newer(script: Path, record: Path) -> bool:
+    """Whether nothing was compiled yet, or this script, and with it flags and directives, has changed since."""
+    return not record.exists() or record.stat().st_mtime < script.stat().st_mtime
