@@ -1,4 +1,4 @@
-"""The Fanuc family as a `Language`."""
+"""The Fanuc family as a `WrittenLanguage`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Heidenhain Klartext as a `Language`."""
+"""Heidenhain Klartext as a `WrittenLanguage`."""
 
 from __future__ import annotations
 

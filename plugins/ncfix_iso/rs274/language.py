@@ -1,4 +1,4 @@
-"""The RS274 family as a `Language`: LinuxCNC, plain ISO code and their like."""
+"""The RS274 family as a `WrittenLanguage`: LinuxCNC, plain ISO code and their like."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 
 def unroll(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
-    """See `Language`; raises SourceError where no flat program can say what is executed."""
+    """See `FollowedLanguage`; raises SourceError where no flat program can say what is executed."""
     from ncfix.control.flatten import RUNTIME
     from ncfix_iso.rs274.flatten import RS274Flattener
 

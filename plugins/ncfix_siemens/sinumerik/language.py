@@ -1,4 +1,4 @@
-"""SINUMERIK as a `Language`."""
+"""SINUMERIK as a `WrittenLanguage`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def runs_straight_on(template: Template) -> bool:
 
 
 def unroll(interpreter: SinumerikInterpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
-    """See `Language`."""
+    """See `FollowedLanguage`."""
     interpreter.watcher = SinumerikFlattener(interpreter.control, steps, limit)
     interpreter.run()
     return interpreter.watcher.lines

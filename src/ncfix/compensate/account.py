@@ -231,7 +231,7 @@ class Account:
 
     passed   block -> why it was passed, in the words of its program
     refused  block -> why
-    rules    block that was passed -> the rule (`program.passing`) by which
+    rules    block that was passed -> the rule (`Pass`) by which
     """
 
     compensated: frozenset[int]

@@ -76,7 +76,7 @@ BUFFERED = 65536
 class MotionBuilder:
     """Gathers motions; `moves()` makes the columns of them.
 
-    rolls       (n_axes,) rotary axes that may roll over (see `rollover`); None: none
+    rolls       (n_axes,) rotary axes that may roll over (see `turns`); None: none
     winding     how they came to where they stand, where that matters
     overturned  the block of the first motion so far that might lead one of them the other way round
     brought_back  that of the first one that brings one of them back from beyond a full turn

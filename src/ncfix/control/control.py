@@ -277,7 +277,7 @@ class ProgramControl(ControlState):
         return self._dragged(motion, unplaced)
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
-        """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
+        """Whether a motion is a rapid that passes, see `moves.leaves_unknown`."""
         if not rapid.unknown or rapid.kind != MotionKind.RAPID or rapid.refusal or self.refusal or self.suspended:
             return False
         before = {*self.unknown.values(), *self.lost_in_frame().values()}

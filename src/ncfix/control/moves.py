@@ -163,15 +163,15 @@ class Moves:
     approach     (n, n_axes) of canned cycles: the command over the hole at the level R from which it feeds, and to
                  which it may return; NaN elsewhere and where such a level is not a word of the block's. None: nowhere
     placed       (n, n_axes) the program itself has brought the axis to where it stands, in the coordinates in force:
-                 only then may it get a word that its block lacks (see `rs274.places`). None: all are
+                 only then may it get a word that its block lacks (see `Places`). None: all are
     fixed_centre (n,) of arcs: a word says where the centre is, not how far from the start. None: where `arc_absolute`
     counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
-    resting      (n, n_axes) axes that stay where they stand, whatever words say (see `rs274.contour`), or that have no
+    resting      (n, n_axes) axes that stay where they stand, whatever words say (see `control.control`), or that have no
                  words in such a block: rotary axes in many cycles. None: none
     beside       (n,) radius by which the control offsets the contour to the left of the way, mm: negative to the right,
                  NaN where it is not known, 0 where nothing is offset. None: nowhere
     across       (n,) which of X Y Z of the program is normal to the plane of such contours. None: nothing is offset
-    passing      (n,) the rule by which a motion passes (`passing.Pass`). None: none does, or nobody says by which
+    passing      (n,) the rule by which a motion passes (`Pass`). None: none does, or nobody says by which
     measured     (n, n_axes) axes whose words are computed from what the machine has measured itself: `end` is nominal,
                  and the words stay as they are, since what was measured has the machine's error in it. None: none
     angles       (n_axes, 2) smallest and largest angle, rad, to which plain words lead rotary axes that a control

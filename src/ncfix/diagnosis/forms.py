@@ -85,8 +85,9 @@ VARIATIONS = 16
 FULL_TURN = 270.0
 """degree: an axis that turned further is taken for one that turns round and round."""
 JOINT_BEND = 0.4
-"""Length of the bends of what a joint may do, of half its travel; of what time does, `SLOW`."""
+"""Length of the bends of what a joint may do, of half its travel."""
 TIME_BEND = 0.3
+"""The same of what time does."""
 WAVES = (1.0, 0.7, 0.5, 0.3, 0.2, 0.2)
 """Variances of the waves a turn."""
 PLAY = (1.0, 1.0, 0.5, 0.3)

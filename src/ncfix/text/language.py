@@ -2,7 +2,7 @@
 
 The tree, the motions, the frames and the walk of the emitter are the same for all. What a line is, what a number is,
 what a block means and how a corrected motion is put into words is a family's own, and a `Dialect` names its family.
-How programs are followed, `control.language` adds, and how they are written, `writer.language`.
+`control.interpreter` adds how its programs are followed, and `writer.language` how they are written.
 """
 
 from __future__ import annotations
