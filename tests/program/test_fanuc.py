@@ -443,3 +443,14 @@ def test_a_rotation_turns_in_the_tilted_plane_and_ends_with_the_next_plane(
 ) -> None:
     found = last(follow(f"G0 X0 Y0 Z0\n{lines}", "XYZBC", dialect="fanuc"))
     assert found[:3] == pytest.approx(end, abs=1e-9)
+
+
+@pytest.mark.parametrize(("angle", "known"), [("0.", True), ("30.", False)])
+def test_machine_coordinates_under_tcp_without_kinematics(angle: str, known: bool) -> None:
+    """Where axes stand that the tip says nothing of is not put down as if the tip's place were theirs."""
+    text = f"%\nO1\nG21 G90 G94 G54\nG43.4 H1\nG0 X10. Y0. Z50. A{angle}\nG53 G0 X0. Y0. Z400. A0.\nM30\n%\n"
+    setup = Setup(assume_zero=True, tools={1: Tool(100.0)})
+    moves = trace(read(text.encode(), "p.nc", "fanuc"), setup, ("X", "Y", "Z", "A"), frozenset("A")).moves
+    assert moves.tcp.tolist() == [True, not known]
+    assert moves.start[1, 2] == (150.0 if known else 50.0)
+    assert moves.end[1, 2] == (400.0 if known else 300.0)

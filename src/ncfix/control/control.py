@@ -216,8 +216,8 @@ class ProgramControl(ControlState):
         if fate.kind != MotionKind.DWELL:
             self.block_words = ()
         start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
-        if fate.in_machine is not None:
-            start, end, style = in_machine(self), fate.in_machine, self._without_tcp(style)
+        if fate.in_machine is not None and (begin := in_machine(self)) is not None:
+            start, end, style = begin, fate.in_machine, self._without_tcp(style)
         self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, unplaced)
         if self.ends is not None:
             self.ends.append(fate.target[:])

@@ -166,8 +166,8 @@ class Moves:
                  only then may it get a word that its block lacks (see `Places`). None: all are
     fixed_centre (n,) of arcs: a word says where the centre is, not how far from the start. None: where `arc_absolute`
     counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
-    resting      (n, n_axes) axes that stay where they stand, whatever words say (see `control.control`), or that have no
-                 words in such a block: rotary axes in many cycles. None: none
+    resting      (n, n_axes) axes that stay where they stand, whatever words say (see `control.control`), or that have
+                 no words in such a block: rotary axes in many cycles. None: none
     beside       (n,) radius by which the control offsets the contour to the left of the way, mm: negative to the right,
                  NaN where it is not known, 0 where nothing is offset. None: nowhere
     across       (n,) which of X Y Z of the program is normal to the plane of such contours. None: nothing is offset

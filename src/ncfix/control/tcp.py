@@ -44,7 +44,7 @@ class LedInMachine(NamedTuple):
     """Where a motion ends that leads axes to places of the machine.
 
     target, unknown  the command, and what is not known of it
-    in_machine       under TCP the same in axes of the machine, where all of it is known
+    in_machine       under TCP the same in axes of the machine, where all of it, and where they start, is known
     """
 
     target: Vector
@@ -78,14 +78,16 @@ def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: Unk
     for index in still:
         if abs(target[index] - control.position[index]) < ALIKE:
             target[index] = control.position[index]
-    return LedInMachine(target, unknown, None if control.unknown or unknown else end)
+    known = not (control.unknown or unknown) and in_machine(control) is not None
+    return LedInMachine(target, unknown, end if known else None)
 
 
-def in_machine(control: ControlState) -> Vector:
-    """Where the axes of the machine stand under TCP, if that is known."""
+def in_machine(control: ControlState) -> Vector | None:
+    """Where the axes of the machine stand under TCP; None if that is not known."""
     position = control.position[:]
-    converted(control, position, {}, TcpState(True, control.led_length), MACHINE)
-    return position
+    return (
+        position if converted(control, position, control.unknown, TcpState(True, control.led_length), MACHINE) else None
+    )
 
 
 def converted(control: ControlState, position: Vector, unknown: UnknownAxes, before: TcpState, after: TcpState) -> bool:
