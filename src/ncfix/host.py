@@ -15,7 +15,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Thread, Timer, current_thread, main_thread
-from time import sleep
 
 from ncfix.diagnostics import FaultError
 
@@ -42,8 +41,6 @@ GONE = 1
 PR_SET_PDEATHSIG = 1
 """Linux, `prctl(2)`: the signal that a process gets when the thread that started it ends."""
 SIGKILL = 9
-EVERY_S = 0.2
-"""How often is asked who started a process, where there is no pipe."""
 
 
 def tie() -> None:
@@ -61,17 +58,6 @@ def tie() -> None:
 
     def watch() -> None:
         parent.join()
-        os._exit(GONE)
-
-    Thread(target=watch, daemon=True).start()
-
-
-def tie_to(parent: int) -> None:
-    """Tie this process to the one with this number, which has started it in whatever way."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            sleep(EVERY_S)
         os._exit(GONE)
 
     Thread(target=watch, daemon=True).start()
