@@ -4,7 +4,7 @@ limits of time and memory.
 A process that is killed cannot end others. So those that it starts look after themselves, and none works on, or holds a
 pipe open, when the one that started it is gone, whatever ended that one: the kernel of Linux is asked to kill them
 (`prctl`), also while they are deep in compiled code; and anywhere a thread waits for the far end of a pipe that closes
-then, which multiprocessing keeps for that, or asks now and then who the process is that started this one.
+then, which multiprocessing keeps for that.
 """
 
 from __future__ import annotations
