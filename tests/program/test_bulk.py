@@ -150,6 +150,7 @@ def test_long_stretches(modal: bool) -> None:
         lines.append(" ".join(["N1", "G1", *(word for word in words if not modal or rng.random() < 0.6), "F100."]))
     program, moves = followed("\n".join(["G90 G21 G94", *lines, "M2\n"]).encode())
     pieces = moved(moves, 3, 0.01)
+    core.use("plain")
     with mock.patch.object(WrittenStretch, "splices", autospec=True, side_effect=WrittenStretch.splices) as written:
         emit(program, moves, pieces, STEPS)
     assert sum(len(call.args[0].block) for call in written.call_args_list) > 1500
