@@ -25,6 +25,8 @@ SHARED = "ncfix.core._memoryviews"
 FLAGS = ["-O3", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-g0"]
 """Every operation as it is written: a fused or reordered one would give other last bits than the source interpreted."""
 WINDOWS_FLAGS = ["/O2", "/fp:precise"]
+SUPPORTED = sys.implementation.name == "cpython" and sys.maxsize > 1 << 32
+"""Elsewhere numpy's indices have 32 bits, and the core takes 64; or Cython's code is slower than numpy's."""
 STABLE: dict[str, Any] = {"py_limited_api": True, "define_macros": [("Py_LIMITED_API", "0x030B0000")]}
 DIRECTIVES = {
     "language_level": 3,
@@ -47,7 +49,7 @@ class CompiledCore(BuildHookInterface):  # type: ignore[type-arg]
         if version == "editable":
             for old in (*core.glob("*.so"), *core.glob("*.pyd"), *core.glob(RECORD)):
                 old.unlink()
-        if wish == "plain" or (not wish and sys.implementation.name != "cpython"):
+        if wish == "plain" or (not wish and not SUPPORTED):
             return
         try:
             found = compiled(Path(self.root), stable=wish == "abi3")

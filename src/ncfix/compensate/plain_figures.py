@@ -105,9 +105,10 @@ def _compiled(
     """As `_by_columns`."""
     from ncfix.core import motions
 
-    moves, machine, sums, places = course.part.moves, course.intent.machine, np.zeros(5), np.full(3, -1)
+    moves, machine, sums = course.part.moves, course.intent.machine, np.zeros(5)
     assert machine.linear_ways is not None
-    places[0], counts, (shown, apart), bending = 0, np.zeros(len(moves), dtype=np.intp), masks, features(machine)
+    places = np.array([0, -1, -1], dtype=np.int64)
+    counts, (shown, apart), bending = np.zeros(len(moves), dtype=np.intp), masks, features(machine)
     if moves.tcp[0]:
         counts, bending = _looks(course, shown, _led_bends(course)), np.full_like(bending, np.inf)
     linear, followed = ~machine.rotary, moves.kind == MotionKind.FEED

@@ -180,7 +180,7 @@ def _compiled_gaps(
     poses, n = behind_each_other(kinds), meant.positions.shape[1]
     hand = hand_of(poses, route.turns(poses), route.terms.given(poses), route, perfect)
     goal = np.empty((3, 0)) if target is None else np.ascontiguousarray(target)
-    sides = np.array([next(k for k, kind in enumerate(kinds) if kind is each) for each in done])
+    sides = np.array([next(k for k, kind in enumerate(kinds) if kind is each) for each in done], dtype=np.int64)
     out, angle = np.empty((len(done), n, 3)), np.empty((len(done), n))
     chain.gaps(perfect.compiled, route.compiled, hand, goal, sides, out, angle)
     return out, angle

@@ -150,10 +150,10 @@ def with_others(source: bytes, blocks: NDArray[np.int64], pointless: bool, same:
     """The scan of a text of which some lines are alike; the others are put together and scanned as any text is."""
     n, m, mark = len(blocks), len(same.columns), bytes([NUMBER_MARK])
     shapes: list[bytes | None] = [same.example.key(mark, bytes([POINTLESS_MARK]) if pointless else mark)]
-    comment, counts, group = np.full(n, -1), np.full(n, m), np.zeros(n, dtype=np.int64)
+    comment, counts, group = (np.full(n, value, dtype=np.int64) for value in (-1, m, 0))
     spans, values = same.line_by_line()
     if len(same.rows) == n:
-        return Scan(shapes, comment, np.arange(0, n * m + 1, m), spans, values, group)
+        return Scan(shapes, comment, np.arange(0, n * m + 1, m, dtype=np.int64), spans, values, group)
     alone = np.ones(n, dtype=np.bool_)
     alone[same.rows] = False
     rows = np.flatnonzero(alone)
@@ -355,7 +355,7 @@ def distinct(keys: bytes) -> tuple[list[bytes | None], NDArray[np.int64]]:
     lengths, lanes = stops - starts, padded.view("<u8")
     compared = range(0, min(int(lengths.max(initial=0)), LONG), EIGHT)
     words = [eight_at(lanes, stops + LONG - EIGHT - k) & OWN.take(lengths - k, mode="clip") for k in compared]
-    group, rows = np.full(len(stops), -1), list[int]()
+    group, rows = np.full(len(stops), -1, dtype=np.int64), list[int]()
     left = np.flatnonzero(lengths <= LONG)
     while len(left) and len(rows) < KINDS:
         same = reduce(np.logical_and, (word.take(left) == word[left[0]] for word in words), np.ones(len(left), bool))

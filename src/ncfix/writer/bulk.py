@@ -267,8 +267,7 @@ def _stops(fit: Mask) -> IntArray:
 def _silenced(moves: Moves) -> Mask:
     """(n - 1,) motions but the first in which an axis must get no word that might have got one in the motion before."""
     wordless = moves.wordless
-    found: Mask = (wordless[1:] & ~wordless[:-1]).any(axis=1)
-    return found
+    return np.asarray((wordless[1:] & ~wordless[:-1]).any(axis=1))
 
 
 def _halves(decimals: IntArray) -> FloatArray:

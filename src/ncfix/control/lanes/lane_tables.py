@@ -63,10 +63,10 @@ class LaneTables:
     def of(cls, lanes: Sequence[Lane | None]) -> LaneTables:
         """The tables of some lanes."""
         n = len(lanes)
-        nowhere, none = np.full((n, N_LETTERS), -1), np.full(n, -1)
+        nowhere, none = np.full((n, N_LETTERS), -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
         turns = np.array([lane is not None and lane.turns for lane in lanes], dtype=np.bool_)
         fixed = np.array([(False,) * 3 if lane is None else lane.fixed for lane in lanes], dtype=np.bool_).reshape(n, 3)
-        mask, centre = np.zeros(n, dtype=np.int64), np.full((n, 3), -1)
+        mask, centre = np.zeros(n, dtype=np.int64), np.full((n, 3), -1, dtype=np.int64)
         tables = cls(nowhere, none, none.copy(), mask, centre, none.copy(), fixed, turns)
         for shape, lane in enumerate(lanes):
             if lane is not None:
