@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +41,15 @@ def test_shipped_machines(name: str, root: Path) -> None:
         state = State(np.linspace(20, 90, n), 1, inputs)
         for plain, compiled in zip(*both(machine, poses(machine, n), state), strict=True):
             assert np.array_equal(plain, compiled)
+
+
+def test_a_machine_goes_to_other_processes_after_it_was_used(root: Path) -> None:
+    core.use("compiled")
+    machine = load(root / "examples" / "machines" / "dmu50.toml")
+    q, state = poses(machine, 7), State(50.0)
+    before = machine.actual_tip(q, state)
+    for other in (pickle.loads(pickle.dumps(machine)), copy.deepcopy(machine)):
+        assert np.array_equal(other.actual_tip(q, state), before)
 
 
 @pytest.mark.parametrize("name", SHIPPED)

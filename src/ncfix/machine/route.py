@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -192,6 +192,10 @@ class Route:
         from ncfix.core import chain
 
         return chain.RouteSteps(*self.arrays[0], *self.arrays[1])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what only this process can use: workers, and copies, make their own."""
+        return {name: value for name, value in self.__dict__.items() if name != "compiled"}
 
     def tips(self, poses: Poses, turns: Turns | None = None) -> tuple[Array, Array]:
         """The tip (3, n), and the largest squared angle of a small motion at each pose (n,); `turns` if known."""
