@@ -57,6 +57,8 @@ class Pen:
     half       (axes,) half output steps
     signed     numbers carry signs
     here       (axes,) where the control stands
+    wanted, now, told  room (axes,): the numbers that a piece shall have, those that lead where the axes are told to go,
+               and whether they are told
     """
 
     def __init__(
