@@ -10,8 +10,6 @@ from pathlib import Path
 ROOTS = ("src", "plugins")
 FACES = frozenset({"__init__.py", "__main__.py", "language.py", "message_codes.py", "version.py"})
 """Modules that may be short: faces of packages, and what entry points and hooks name."""
-SHORT = frozenset({"src/ncfix/core/edits.py"})
-"""Short for a reason: compiled without bounds checks, as it looks at every span first; its neighbours have them."""
 LEAST = 60
 LARGEST = 20
 FOLDERS = {
@@ -40,7 +38,7 @@ def test_modules_are_deep(root: Path) -> None:
     short = {
         path for path, text in modules(root).items() if len(text.splitlines()) < LEAST and Path(path).name not in FACES
     }
-    assert short == SHORT
+    assert short == set()
 
 
 def test_folders_can_be_looked_through(root: Path) -> None:
