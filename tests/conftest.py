@@ -77,6 +77,13 @@ def require_core() -> None:
     core.use("plain")
 
 
+def use_form(compiled: bool) -> None:
+    """Take the compiled form of the core, or skip the test if there is none; or the plain form."""
+    if compiled:
+        require_core()
+    core.use("compiled" if compiled else "plain")
+
+
 def missing(reason: str, variable: str) -> None:
     """Skip the test for want of something, or fail if the environment variable says that it must be here."""
     if os.environ.get(variable, "") not in ("", "0"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import pytest
 from compensate import streaming
 from compensate import test_stream_others as others
 from compensate.test_stream import OPTIONS, streamed
-from conftest import require_core
+from conftest import require_core, use_form
 from ncfix import core
 from ncfix.compensate import FixOptions, driver, plain
 from ncfix.compensate.parts import ProgramPart
@@ -35,12 +35,9 @@ def machine(root: Path) -> Machine:
 
 
 @pytest.fixture(params=[False, True], ids=["plain", "compiled"])
-def compiled(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[bool]:
-    if request.param:
-        require_core()
-        core.use("compiled")
-    yield bool(request.param)
-    core.use("plain")
+def compiled(request: pytest.FixtureRequest) -> bool:
+    use_form(request.param)
+    return bool(request.param)
 
 
 AMONG = (

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from compensate.streaming import run
-from conftest import require_core
+from conftest import require_core, use_form
 from ncfix import core
 from ncfix.compensate import FixOptions, driver
 from ncfix.compensate.driver import fix_program
@@ -156,9 +156,7 @@ def test_a_writer_that_gets_one_digit_wrong_is_caught(
     compiled: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In whatever part: the proof reads what is really written."""
-    if compiled:
-        require_core()
-        core.use("compiled")
+    use_form(compiled)
     source, rng, parts = program(5, 60, 0.0), random.Random(2), 0
 
     def wrong(source: bytes, splices: Splices) -> bytes:

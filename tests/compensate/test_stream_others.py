@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from compensate.streaming import SETUP, compared, streamed, whole
-from conftest import require_core
+from conftest import require_core, use_form
 from ncfix import core
 from ncfix.compensate.following import traced
 from ncfix.control.lanes.lane import take
@@ -166,9 +166,7 @@ def test_blocks_with_vectors_are_followed_at_once_as_one_by_one(
 ) -> None:
     source = program(1, 150, 0.02, siemens=True, vectors=True).replace(b"ORIAXES", orientation.encode())
     source = source.replace(b"\r", b"").replace(b"TRAFOOF", b"X150. A3=0.4 B3=0 C3=1\nX150.5 A3=0 B3=0 C3=1\nTRAFOOF")
-    if compiled:
-        require_core()
-        core.use("compiled")
+    use_form(compiled)
     taken = []
     try:
         monkeypatch.setattr(orienting, "take", lambda *given: (taken.append(given), take(*given)))
@@ -191,9 +189,7 @@ def test_blocks_are_written_in_bulk_as_one_by_one(
 ) -> None:
     sources = [program(seed, 150, 0.02, siemens=True, vectors=seed < 3) for seed in (1, 2, 3, 4)]
     sources += [coarse(source) for source in sources[2:]]
-    if compiled:
-        require_core()
-        core.use("compiled")
+    use_form(compiled)
     found = [whole(source, machine, "siemens", files=S_FILES)[0] for source in sources]
     layouts = [SINUMERIK.bulk(read(each, "p", "siemens"), 15) for each in sources[:2] if SINUMERIK.bulk is not None]
     assert all(layout is not None and layout.led for layout in layouts)

@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-from conftest import require_core
+from conftest import use_form
 from ncfix import core
 from ncfix.text.dialects import get
 from ncfix.text.reader import read, shapes_of
@@ -87,9 +87,7 @@ FRAMES = {"heidenhain": ("0 BEGIN PGM MANY MM", "9 END PGM MANY MM")}
 @pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize("name", list(FAMILIES))
 def test_many_blocks(name: str, compiled: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    if compiled:
-        require_core()
-        core.use("compiled")
+    use_form(compiled)
     random, block = Random(11), FAMILIES[name]
     first, last = FRAMES.get(name, ("", ""))
     try:
