@@ -216,12 +216,15 @@ def _of_values(
     """Measured values of another sign, unit or column."""
     if any(each.kind not in ("tcp", "tcp6", "axis") for each in measurements):
         return
-    names = [name for name in measurements[0].measured if all(name in each.columns for each in measurements)]
+    names = list(dict.fromkeys(name for each in measurements for name in each.measured))
     lengths = [name for name in names if name in ("dx", "dy", "dz", "value")]
+    everywhere = [name for name in lengths if all(name in each.columns for each in measurements)]
 
     def undone(name: str, title: str, columns: dict[str, tuple[str, float]], stretch: float = 1.0) -> Mistake:
         changed = tuple(
-            each.with_columns({to: factor * each.columns[of] for to, (of, factor) in columns.items()})
+            each.with_columns(
+                {to: factor * each.columns[of] for to, (of, factor) in columns.items() if of in each.columns}
+            )
             for each in measurements
         )
         return Mistake(name, title, "", machine, changed, stretch=stretch)
@@ -234,16 +237,17 @@ def _of_values(
             undone(f"sign of {name}", f"wrong sign of the measured values {name}", {name: (name, -1.0)})
             for name in names
         ]
-    for first, second in combinations(lengths, 2):
+    for first, second in combinations(everywhere, 2):
         columns = {first: (second, 1.0), second: (first, 1.0)}
         offered.append(undone(f"swapped {first} {second}", f"the columns {first} and {second} are exchanged", columns))
-    if len(lengths) == 3:
+    if len(everywhere) == 3:
         for order in ((1, 2, 0), (2, 0, 1)):
-            columns = {to: (lengths[k], 1.0) for to, k in zip(lengths, order, strict=True)}
-            listed = ", ".join(lengths[k] for k in order)
+            columns = {to: (everywhere[k], 1.0) for to, k in zip(everywhere, order, strict=True)}
+            listed = ", ".join(everywhere[k] for k in order)
             offered.append(undone("swapped columns", f"the measured columns are in the order {listed}", columns))
+    values = sum(len(each) * len(each.measured) for each in measurements)
+    share = sum(len(each) * sum(name in lengths for name in each.measured) for each in measurements) / max(values, 1)
     for unit, factor in (("um", 1e-3), ("m", 1e3), ("inch", INCH)):
-        share = len(lengths) / len(names)
         columns = {name: (name, factor) for name in lengths}
         title = f"unit of values: the measured values are in {unit}, not in mm"
         offered.append(undone("unit of values", title, columns, factor**share))
