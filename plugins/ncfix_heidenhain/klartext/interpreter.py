@@ -270,12 +270,11 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
                 runtime.append(address)
         return MotionWords(values, frozenset(runtime))
 
-    def tool_of(self, plan: KlartextPlan) -> str | float | None:
-        """The number or name of a tool; a name for a number that is known only at run time."""
+    def tool_of(self, plan: KlartextPlan) -> str | float | Unknown | None:
+        """The number or name of a tool."""
         if plan.tool is None or isinstance(plan.tool, str):
             return plan.tool
-        number = plan.tool(self.control.scope)
-        return number.why if isinstance(number, Unknown) else number
+        return plan.tool(self.control.scope)
 
     def names(self, plan: KlartextPlan, flow: KlartextFlow) -> str:
         """The words of a cycle definition that have no value."""

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable
 
 from ncfix.control.coordinates import LETTERS, Z, mask_of, zeros
-from ncfix.control.expressions import Fault
+from ncfix.control.expressions import Fault, Unknown
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, OpenCall, Operation, ProgramFlow, Repeat, Return
 from ncfix.control.moves import Pass, Passing
 from ncfix.control.setup import Tool
@@ -175,16 +175,24 @@ OTHER_AXIS = "the tool axis is {}: only tools along Z are followed"
 AT_RUN_TIME = "the length of the tool is known only at run time"
 
 
-def define_tool(control: KlartextControl, tool: str | float | None, words: MotionWords, flags: frozenset[str]) -> None:
-    """TOOL DEF: the length of a tool, where the program brings it."""
+def define_tool(
+    control: KlartextControl, tool: str | float | Unknown | None, words: MotionWords, flags: frozenset[str]
+) -> None:
+    """TOOL DEF: the length of a tool, where the program brings it. A number of run time may be that of any tool."""
+    if isinstance(tool, Unknown) and "L" in words.values:
+        control.defined_tools = dict.fromkeys(control.defined_tools, Tool())
     if isinstance(tool, float) and "L" in words.values:
         radius = None if "R" in words.runtime else words.values.get("R")
         length = None if "L" in words.runtime else words.values["L"] * control.modal.unit
         control.defined_tools[int(tool)] = Tool(length, None if radius is None else radius * control.modal.unit)
 
 
-def call_tool(control: KlartextControl, tool: str | float | None, words: MotionWords, flags: frozenset[str]) -> None:
-    """TOOL CALL: without a number only speed, feed or oversizes are new."""
+def call_tool(
+    control: KlartextControl, tool: str | float | Unknown | None, words: MotionWords, flags: frozenset[str]
+) -> None:
+    """TOOL CALL: without a number only speed, feed or oversizes are new; one of run time counts as a name."""
+    if isinstance(tool, Unknown):
+        tool = tool.why
     if "F" in words.values:
         control.auto_feed = words.values["F"] * control.modal.unit
     if tool is None and "DR" in words.values:

@@ -41,6 +41,15 @@ def test_tool_length_and_preset_are_added() -> None:
     assert ends("TOOL DEF 7 L+30 R+4\nTOOL CALL 7 Z\nL Z+3 FMAX", setup=setup) == [[0, 0, 35]]
 
 
+def test_a_tool_of_run_time_may_be_any_tool_that_the_program_has_defined() -> None:
+    ask = "FN 18: SYSREAD Q1 = ID20 NR1\n"
+    with pytest.raises(UsageError, match="length of tool 7 is used and not given"):
+        follow(f"TOOL DEF 7 L+30\n{ask}TOOL DEF Q1 L+40\nTOOL CALL 7 Z\nL Z+3 FMAX", setup=Setup())
+    setup = Setup(work_offsets={"PRESET": {}}, initial=dict.fromkeys("XYZ", 0.0))
+    text = f"{ask}TOOL DEF Q1 L+40\nTOOL DEF 7 L+30\nTOOL CALL 7 Z\nL Z+3 FMAX"
+    assert ends(text, setup=setup) == [[0, 0, 33]]
+
+
 def test_what_is_not_given_is_asked_for() -> None:
     with pytest.raises(UsageError) as error:
         follow("TOOL CALL 4 Z\nL X+1 Y+1 Z+1 FMAX\nCYCL DEF 247 PRESET Q339=+3\nL X+2", setup=Setup())
