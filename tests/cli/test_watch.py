@@ -32,20 +32,22 @@ def watching(request: Any, shop: Any) -> Iterator[subprocess.Popen[str]]:
         pytest.skip("watchfiles is not installed")
     (shop.folder / "in").mkdir()
     command = ["watch", "in", "out", "-m", "machine.toml", "--assume-zero", "--settle-s", "0.4", "--status", "s.html"]
-    running = subprocess.Popen(
-        [sys.executable, "-m", "ncfix", *command, *(["--poll-s", "0.1"] if request.param == "polling" else [])],
-        cwd=shop.folder,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    with (shop.folder / "said.txt").open("w") as said:
+        running = subprocess.Popen(
+            [sys.executable, "-m", "ncfix", *command, *(["--poll-s", "0.1"] if request.param == "polling" else [])],
+            cwd=shop.folder,
+            stderr=said,
+            text=True,
+        )
     yield running
     if running.poll() is None:
         running.kill()
-    running.communicate()
+    running.wait()
 
 
 def test_programs_are_corrected_as_they_come(watching: subprocess.Popen[str], shop: Any) -> None:
     source, output, page = (shop.folder / name for name in ("in/a/part.ngc", "out/a/part.ngc", "s.html"))
+    said = shop.folder / "said.txt"
     until(page.exists)
     assert "no program yet" in page.read_text()
     source.parent.mkdir()
@@ -66,11 +68,10 @@ def test_programs_are_corrected_as_they_come(watching: subprocess.Popen[str], sh
     assert "NCF1" in text
     shop.machine.write_text(shop.machine.read_text().replace("1e-4", "2e-4"))
     until(lambda: b"X119.976" in output.read_bytes())
+    until(lambda: said.read_text().count("in/a/part.ngc -> out/a/part.ngc\n") == 3)
     os.kill(watching.pid, signal.SIGINT)
-    _, said = watching.communicate(timeout=PATIENCE_S)
-    assert watching.returncode == ExitCode.UNREADABLE
-    assert said.count("in/a/part.ngc -> out/a/part.ngc\n") == 3
-    assert said.endswith("stopped\n")
+    assert watching.wait(timeout=PATIENCE_S) == ExitCode.UNREADABLE
+    assert said.read_text().endswith("stopped\n")
 
 
 def test_once(ncfix: Any, shop: Any) -> None:
