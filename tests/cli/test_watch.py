@@ -38,6 +38,7 @@ def watching(request: Any, shop: Any) -> Iterator[subprocess.Popen[str]]:
             cwd=shop.folder,
             stderr=said,
             text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a run in the background ignores it
         )
     yield running
     if running.poll() is None:
