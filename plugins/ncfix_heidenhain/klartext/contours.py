@@ -16,6 +16,7 @@ from ncfix.text.spelling import value_of
 from ncfix_heidenhain.klartext.arcs import IN_PLANE, somewhere
 from ncfix_heidenhain.klartext.control import FREELY, KlartextControl
 from ncfix_heidenhain.klartext.free import ContourElement, Element, solved
+from ncfix_heidenhain.klartext.layout import CORNERS
 from ncfix_heidenhain.klartext.targets import command_of, here, pole_frame
 from ncfix_heidenhain.klartext.units import KlartextUnit
 
@@ -35,7 +36,6 @@ REST = re.compile(
 
 LEFT_OUT = re.compile(r";[^\r\n]*|~(?=[ \t\r]*(?:\n|\Z))")
 OF_LINES, OF_ARCS = frozenset({"X", "Y", "AN", "LEN"}), frozenset({"X", "Y", "CCX", "CCY", "CCA", "R"})
-CORNERS = frozenset({"rnd", "chf"})
 
 
 def solved_element(control: KlartextControl, unit: KlartextUnit, block: int) -> ContourElement | None:

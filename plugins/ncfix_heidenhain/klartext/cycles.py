@@ -66,19 +66,6 @@ FROM_INCREMENT = "an old cycle is called from a height in increments (IZ)"
 
 # -- definition -------------------------------------------------------------------------------------------------------
 
-ON_CIRCLE, ON_LINES = 220, 221
-MOST_HOLES = 100_000
-"""A pattern of more counts as one whose holes are not known."""
-
-KINDS = re.compile(r"(POS|ROW|PAT|FRAME|PITCHCIRC|CIRC)\s*\d*\s*\(([^()]*)\)", re.IGNORECASE)
-WORDS = re.compile(
-    r"(I?[XY]|Z|DX|DY|D|NUMX|NUMY|NUM|ROTX|ROTY|ROT|START|STEP|END)\s*([+-]?)\s*(Q[LR]?\d+|\d+[.,]?\d*|[.,]\d+)",
-    re.IGNORECASE,
-)
-LEFT_OUT = re.compile(r";[^\r\n]*|~(?=[ \t\r]*(?:\n|\Z))")
-
-Values = Mapping[str, float]
-
 
 def define(control: KlartextControl, name: str, words: MotionWords, text: str) -> None:
     """A CYCL DEF block: `name` is `200`, or `7.1`."""
@@ -227,6 +214,19 @@ def own_path(control: KlartextControl, step: Step) -> None:
 
 
 # -- patterns of holes -------------------------------------------------------------------------------------------------
+
+ON_CIRCLE, ON_LINES = 220, 221
+MOST_HOLES = 100_000
+"""A pattern of more counts as one whose holes are not known."""
+
+KINDS = re.compile(r"(POS|ROW|PAT|FRAME|PITCHCIRC|CIRC)\s*\d*\s*\(([^()]*)\)", re.IGNORECASE)
+WORDS = re.compile(
+    r"(I?[XY]|Z|DX|DY|D|NUMX|NUMY|NUM|ROTX|ROTY|ROT|START|STEP|END)\s*([+-]?)\s*(Q[LR]?\d+|\d+[.,]?\d*|[.,]\d+)",
+    re.IGNORECASE,
+)
+LEFT_OUT = re.compile(r";[^\r\n]*|~(?=[ \t\r]*(?:\n|\Z))")
+
+Values = Mapping[str, float]
 
 
 def pattern_of(text: str, parameters: QParameters) -> tuple[HolePosition, ...] | None:

@@ -1,25 +1,38 @@
-"""Heidenhain Klartext as a `WrittenLanguage`."""
+"""Heidenhain Klartext as a `WrittenLanguage`, and which of its motions are written many at a time."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ncfix.control.interpreter import FlatLine
+from ncfix.control.moves import Moves
+from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.reach import whole_text
 from ncfix.text.spelling import Spelling
-from ncfix.text.tree import Opaque
+from ncfix.text.tree import Assignment, Literal, Opaque, OWordLine, Program, Skip
 from ncfix.writer.language import WrittenLanguage
+from ncfix.writer.pieces import Pieces
 from ncfix_heidenhain.klartext.blocks import parse_block, renumbered, scan, split
-from ncfix_heidenhain.klartext.bulk import in_bulk, one_by_one
 from ncfix_heidenhain.klartext.control import KlartextControl
-from ncfix_heidenhain.klartext.flatten import KlartextFlattener
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
-from ncfix_heidenhain.klartext.layout import layout_of, uses_comma
+from ncfix_heidenhain.klartext.layout import TURN_DEGREES, beside_corners, layout_of, uses_comma
 from ncfix_heidenhain.klartext.writing import KlartextWriter, spelling_of
+
+Mask = NDArray[np.bool_]
+
+STRAIGHT = frozenset({"", "l", "ln"})
+ARCS = frozenset({"c", "cr"})
+FEW = 1e-6
+"""Degrees from zero or a full turn at which a corrected angle is looked at by `BlockWriter`."""
 
 
 def unrolled(interpreter: KlartextInterpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """Follow a program and write down its blocks; raises SourceError NCF237 and NCF238."""
+    from ncfix_heidenhain.klartext.flatten import KlartextFlattener
+
     style = Spelling(signed=True, comma=uses_comma(interpreter.main.program.source), point=False)
     flattener = KlartextFlattener(interpreter.control, steps, limit, style)
     interpreter.watcher = flattener
@@ -36,6 +49,54 @@ def unrolled(interpreter: KlartextInterpreter, steps: Mapping[str, float], limit
     head = FlatLine(names[0], program.line(first))
     tail = FlatLine(names[0].upper().replace("BEGIN", "END", 1), program.line(last))
     return [head, *flattener.lines, tail]
+
+
+def in_bulk(program: Program, block: int) -> BulkLayout | None:
+    """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
+    items = program.items_of(block)
+    if any(isinstance(item, Skip | Opaque | OWordLine | Assignment) for item in items):
+        return None
+    layout = layout_of(program, block)
+    if layout is None or layout.polar or layout.vector or len(layout.blank) != 1:
+        return None
+    if not (layout.axes if layout.name in STRAIGHT else layout.name in ARCS and layout.axes.keys() >= {"X", "Y"}):
+        return None
+    slots = {letter: w.value.slot for letter, w in layout.axes.items() if isinstance(w.value, Literal)}
+    if len(slots) < len(layout.axes) or layout.forms:
+        return None
+    return BulkLayout(
+        slots,
+        layout.words_at,
+        layout.blank,
+        lower=False,
+        further=not layout.after,
+        lead=layout.prefix.stop,
+        opening="L",
+        closing=layout.closing and layout.blank + layout.closing,
+        turns_named=True,
+        arc=ArcLayout({}, alone=True) if layout.name in ARCS else None,
+    )
+
+
+def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> Mask:
+    """(n,) motions that `BlockWriter` has to look at.
+
+    Those beside a corner that the control makes; and where rotary axes are corrected, those in which one has no word,
+    or comes to zero or a full turn.
+    """
+    found = beside_corners(program)[moves.block]
+    last = first_piece[1:] - 1
+    end, nominal = pieces.end[last][:, moves.rotary], moves.end[:, moves.rotary]
+    corrected = end != nominal
+    if not corrected.any():
+        return found
+    found |= (corrected & ~moves.programmed[:, moves.rotary]).any(axis=1)
+    found |= corrected.any(axis=1) & (np.diff(first_piece) > 1)
+    offset = np.array([frame.offset for frame in moves.frames])[moves.frame][:, moves.rotary]
+    before, after = np.degrees(nominal - offset), np.degrees(end - offset)
+    found |= (corrected & (before > -FEW) & (after < FEW)).any(axis=1)
+    found |= (corrected & (before < TURN_DEGREES + FEW) & (after > TURN_DEGREES - FEW)).any(axis=1)
+    return found
 
 
 KLARTEXT = WrittenLanguage(

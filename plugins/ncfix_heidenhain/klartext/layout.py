@@ -7,6 +7,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ncfix.text.layout import AXIS_LETTERS, INCREMENT, Layout
 from ncfix.text.tree import (
     START,
@@ -164,6 +167,19 @@ def is_corner(program: Program, block: int, way: int) -> bool:
             return corner
         block += way
     return False
+
+
+def beside_corners(program: Program) -> NDArray[np.bool_]:
+    """(n,) blocks before or behind RND or CHF: as `is_corner` says of each."""
+    found = np.zeros(len(program), dtype=np.bool_)
+    shapes = [_in_path(Shape(template)) for template in program.templates]
+    if any(corner for _, corner in shapes):
+        between, corner = np.array(shapes, dtype=np.bool_).T
+        blocks = np.flatnonzero(~between[program.template])
+        corners = corner[program.template[blocks]]
+        found[blocks[:-1]] |= corners[1:]
+        found[blocks[1:]] |= corners[:-1]
+    return found
 
 
 @lru_cache(maxsize=4096)

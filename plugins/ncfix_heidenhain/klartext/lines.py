@@ -11,7 +11,7 @@ from ncfix.control.frames import unit
 from ncfix.control.moves import Motion, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.posture import WayRules
 from ncfix.control.tcp import led_in_machine, switch
-from ncfix_heidenhain.klartext.arcs import Step
+from ncfix_heidenhain.klartext.arcs import FLAT, Step
 from ncfix_heidenhain.klartext.control import DEPARTED, KlartextControl
 from ncfix_heidenhain.klartext.targets import (
     MotionWords,
@@ -37,7 +37,6 @@ FAR_INCREMENT = "an increment of more than half a turn under M126: whether it go
 OFF = Passing(Pass.LED, "a rapid from where the control itself has led the tool")
 DEPARTURE = Passing(Pass.DEPARTURE, "departure from the contour (DEP)")
 IN_TRAVEL = WayRules(in_travel=True)
-FLAT = 1e-9
 IN_SPACE = 0b111
 """The bits of X, Y and Z."""
 

@@ -60,24 +60,6 @@ NO_PRESET = "the number of the preset is known only at run time"
 
 # -- what is in force -------------------------------------------------------------------------------------------------
 
-BAD_PLANE = "NCF273"
-RETRACTING = "mb max"
-"""The tool is drawn back before the axes turn."""
-
-
-POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
-NOT_NORMAL = "the tool does not stand normal to the tilted plane, by the axis positions of the program"
-TURNED = Passing(Pass.ALIGNMENT, "the control positions the rotary axes (PLANE)")
-WAY = "NCF279"
-WAY_HINT = "say SEQ+ or SEQ- in the program, or state the rotary axes"
-HOME = "PLANE RESET is taken to turn the rotary axes to zero, their basic position"
-RUNTIME = "the tilted plane depends on a Q parameter that is known only at run time"
-NO_KINEMATICS = "the tilted plane is given by the positions of rotary axes (PLANE AXIAL, cycle 19)"
-CALCULATED = ("Q120", "Q121", "Q122")
-"""Where the control leaves the positions of A, B and C that it has worked out."""
-
-Values = Mapping[str, float]
-
 
 def is_plain(control: KlartextControl) -> bool:
     """Neither mirror nor rotation nor scale is active."""
@@ -302,6 +284,23 @@ ACTS: Mapping[int, Callable[[KlartextControl, MotionWords, str], None]] = {
 
 
 # -- PLANE and cycle 19 ------------------------------------------------------------------------------------------------
+
+BAD_PLANE = "NCF273"
+RETRACTING = "mb max"
+"""The tool is drawn back before the axes turn."""
+
+POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
+NOT_NORMAL = "the tool does not stand normal to the tilted plane, by the axis positions of the program"
+TURNED = Passing(Pass.ALIGNMENT, "the control positions the rotary axes (PLANE)")
+WAY = "NCF279"
+WAY_HINT = "say SEQ+ or SEQ- in the program, or state the rotary axes"
+HOME = "PLANE RESET is taken to turn the rotary axes to zero, their basic position"
+RUNTIME = "the tilted plane depends on a Q parameter that is known only at run time"
+NO_KINEMATICS = "the tilted plane is given by the positions of rotary axes (PLANE AXIAL, cycle 19)"
+CALCULATED = ("Q120", "Q121", "Q122")
+"""Where the control leaves the positions of A, B and C that it has worked out."""
+
+Values = Mapping[str, float]
 
 
 def by_vectors(values: Values) -> Rotation | None:

@@ -16,7 +16,7 @@ from ncfix.text.dialects import get
 from ncfix.text.reader import read
 from ncfix.text.tree import Program
 from ncfix.writer import bulk, emit
-from ncfix_heidenhain.klartext.bulk import in_bulk
+from ncfix_heidenhain.klartext.language import in_bulk
 from program.arcs import full_of_klartext_arcs
 from program.klartext.tnc import KNOWN, program
 from program.test_bulk import AXES, ROTARY, STEPS, assert_same, moved
