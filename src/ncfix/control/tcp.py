@@ -68,13 +68,14 @@ def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: Unk
     for index, value in axes.items():
         target[index] = value
         unknown.pop(index, None)
-        if index in unsure:
-            unknown[index] = unsure[index]
+    doubts = {index: unsure[index] for index in axes if index in unsure}
+    unknown |= doubts
     if not control.tcp:
         return LedInMachine(target, unknown)
     end = target[:]
     if not converted(control, target, unknown, MACHINE, tip):
-        return LedInMachine(target, unknown | {index: TURNED for index in (X, Y, Z) if index in control.machine})
+        turned = {index: TURNED for index in (X, Y, Z) if index in control.machine}
+        return LedInMachine(target, unknown | turned | doubts)
     for index in still:
         if abs(target[index] - control.position[index]) < ALIKE:
             target[index] = control.position[index]

@@ -206,3 +206,10 @@ def test_beside_a_contour_no_word_moves_the_tool_in_its_plane() -> None:
     assert not set("XY") & set(down + up.replace("FMAX", ""))
     assert "Y" not in aside
     assert "X-" in away
+
+
+def test_an_axis_that_is_led_nowhere_known_in_machine_coordinates_says_why() -> None:
+    """Under M128 all of X Y Z are unknown then; of Z the program has said more than that the kinematics are."""
+    body = "L X+0 Y+0 Z+50 C+30 FMAX M128\nL Z+5 FMAX M92\nL X+1 Y+1 F100"
+    moves = follow(body, "XYZC").moves
+    assert moves.reasons[moves.reason[-1]].startswith("where the axis Z stands after M92 depends on a datum")
