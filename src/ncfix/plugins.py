@@ -18,7 +18,6 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import cache, lru_cache
 from importlib import import_module
 from types import TracebackType
@@ -133,6 +132,8 @@ def leave(plugin: str, source: str, kind: str, name: str, why: str) -> None:
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint for a name that nobody registered: the one that was meant, perhaps, or all there are."""
+    from difflib import get_close_matches
+
     names = sorted(known)
     close = get_close_matches(name, names, 1)
     return f"did you mean {close[0]}?" if close else f"there are {', '.join(names)}"
@@ -208,6 +209,8 @@ def hooks_of(point: EntryPoint, module: object) -> list[pluggy.HookCaller]:
 
 def hook_hint(manager: pluggy.PluginManager, module: object) -> str:
     """What the author may have meant."""
+    from difflib import get_close_matches
+
     unknown = [hook.name for hook in manager.get_hookcallers(module) or () if not hook.has_spec()]
     close = [match for name in unknown for match in get_close_matches(name, HOOKS, 1)]
     return f"did you mean {close[0]}?" if close else "docs/plugins.md lists the hooks and their arguments"

@@ -10,8 +10,8 @@ FAMILIES = {"ncfix_iso.rs274", "ncfix_fanuc.macro", "ncfix_siemens.sinumerik", "
 ELSEWHERE = {
     "scipy", "rich", "sympy", "multiprocessing", "concurrent.futures", "numpy.ma",
     "ncfix.diagnosis", "ncfix.measure", "ncfix.reports", "ncfix.machine.symbolic",
-    "ncfix_iso.rs274.flatten",
-    "ncfix.control.setup_file",
+    "ncfix.control.flatten",
+    "ncfix.control.setup_file", "ncfix.api.measurements", "ncfix.api.tables",
 }  # fmt: skip
 """What none of the verbs below needs for a program of a page and a machine with a few errors."""
 

@@ -13,7 +13,7 @@ import numpy as np
 from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.expressions import Evaluate, Fault, Unknown
 from ncfix.control.flow import Return
-from ncfix.control.interpreter import NO_END, Interpreter
+from ncfix.control.interpreter import NO_END, RUNTIME, Interpreter
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
@@ -111,7 +111,6 @@ def astray(control: KlartextControl, step: Step, *, called: bool) -> str:
     return ""
 
 
-WRITTEN_AT_RUN_TIME = "NCF237"
 AT_RUN_TIME = "NCF277"
 ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
 SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
@@ -249,7 +248,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         assert plan.test is not None
         value = plan.test(self.control.scope)
         if isinstance(value, Unknown):
-            code = AT_RUN_TIME if self.watcher is None else WRITTEN_AT_RUN_TIME
+            code = AT_RUN_TIME if self.watcher is None else RUNTIME
             lacking = value.why
             text = f"where the program goes on depends on {lacking}, which is known only at run time"
             raise Fault(code, text, f'variables."{lacking}" in the setup file gives it a value')

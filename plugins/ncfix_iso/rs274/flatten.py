@@ -12,8 +12,8 @@ from collections.abc import Mapping
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, mask_of
 from ncfix.control.expressions import Fault, nominal
-from ncfix.control.flatten import RUNTIME, Change, Flattener
-from ncfix.control.interpreter import TextUnit
+from ncfix.control.flatten import Change, Flattener
+from ncfix.control.interpreter import RUNTIME, TextUnit
 from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Literal, NumberedParameter, Opaque, Word
 from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ncfix.control.interpreter import RUNTIME
 from ncfix.diagnostics import SourceError
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
@@ -50,7 +51,6 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 def unroll(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """See `FollowedLanguage`; raises SourceError where no flat program can say what is executed."""
-    from ncfix.control.flatten import RUNTIME
     from ncfix_iso.rs274.flatten import RS274Flattener
 
     flattener = RS274Flattener(interpreter.control, steps, limit)

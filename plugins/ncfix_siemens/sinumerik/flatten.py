@@ -11,8 +11,9 @@ from collections.abc import Mapping
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.expressions import Fault, Unknown, number
-from ncfix.control.flatten import RUNTIME, Change, Flattener
-from ncfix.text.spelling import Spelling, decimals_for
+from ncfix.control.flatten import Change, Flattener
+from ncfix.control.interpreter import RUNTIME
+from ncfix.text.spelling import decimals_for
 from ncfix.text.tree import (
     Assignment,
     Command,
@@ -34,11 +35,7 @@ from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.vocabulary import FORM, FORMS, HARMLESS
-
-BARE = Spelling(point=False)
-
-OTHER_DECIMALS = 5
-"""Of words that are no axes."""
+from ncfix_siemens.sinumerik.writing import BARE, OTHER_DECIMALS, argument
 
 MORE_DECIMALS = 2
 """More than the least increment needs, so that increments do not add up to one."""
@@ -189,13 +186,6 @@ def is_index(value: Expression | None) -> bool:
 def is_head(turn: Turn) -> bool:
     """Whether the block is the first line of a program of an archive, and no PROC."""
     return not turn.plan.steps
-
-
-def argument(value: float | str | None) -> str:
-    """An argument as it is written."""
-    if value is None:
-        return ""
-    return f'"{value}"' if isinstance(value, str) else BARE.short(value, OTHER_DECIMALS)
 
 
 def assigned(value: float | str) -> str:

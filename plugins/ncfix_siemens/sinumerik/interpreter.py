@@ -17,16 +17,14 @@ import numpy as np
 
 from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.expressions import number
-from ncfix.control.flatten import RUNTIME
 from ncfix.control.flow import Call
-from ncfix.control.interpreter import Interpreter
+from ncfix.control.interpreter import RUNTIME, Interpreter
 from ncfix.control.moves import MotionKind, Moves, Pass, Passing, Rule
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.tree import Program
 from ncfix_siemens.sinumerik.destination import destination
-from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
 from ncfix_siemens.sinumerik.motion import is_harmless
@@ -50,8 +48,7 @@ from ncfix_siemens.sinumerik.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from ncfix_siemens.sinumerik.statements import Turn
-
+    from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 
 NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"

@@ -19,7 +19,6 @@ from ncfix.text.tree import Program, Template, Word
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 from ncfix_siemens.sinumerik.blocks import parse_block
-from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
 from ncfix_siemens.sinumerik.interpreter import SinumerikInterpreter
 from ncfix_siemens.sinumerik.plans import fixed_centre
 from ncfix_siemens.sinumerik.scanning import polar_words, renumbered, scan
@@ -40,6 +39,8 @@ def runs_straight_on(template: Template) -> bool:
 
 def unroll(interpreter: SinumerikInterpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """See `FollowedLanguage`."""
+    from ncfix_siemens.sinumerik.flatten import SinumerikFlattener
+
     interpreter.watcher = SinumerikFlattener(interpreter.control, steps, limit)
     interpreter.run()
     return interpreter.watcher.lines

@@ -47,7 +47,6 @@ from ncfix.writer.block import BlockWriter
 from ncfix.writer.target import LINE, TANGENTIAL, Target
 from ncfix_siemens.sinumerik.circles import VIA, circle_through
 from ncfix_siemens.sinumerik.destination import turned
-from ncfix_siemens.sinumerik.flatten import BARE, argument
 from ncfix_siemens.sinumerik.scanning import has_partial
 from ncfix_siemens.sinumerik.vocabulary import (
     ANGLES,
@@ -65,6 +64,9 @@ from ncfix_siemens.sinumerik.vocabulary import (
 FloatArray = NDArray[np.float64]
 
 SPELLING = Spelling(vector=tuple(f"{address}=" for address in VECTOR), vector_digits=7)
+BARE = Spelling(point=False)
+OTHER_DECIMALS = 5
+"""Of words that are no axes."""
 
 CIP = MOTIONS["cip"]
 ARCS = frozenset({20, 30})
@@ -290,6 +292,13 @@ def shifted(call: CycleCall, off: float, decimals: int) -> tuple[list[str] | Non
     for place, sense in call.depths:
         arguments[place] = BARE.short(number_of(call, place) + sense * sunk, decimals)
     return arguments, sunk
+
+
+def argument(value: float | str | None) -> str:
+    """An argument as it is written."""
+    if value is None:
+        return ""
+    return f'"{value}"' if isinstance(value, str) else BARE.short(value, OTHER_DECIMALS)
 
 
 def number_of(call: CycleCall, place: int) -> float:

@@ -11,25 +11,44 @@ sources for one, say, raises TypeError.
 
 from __future__ import annotations
 
-from ncfix.api.given import load_machine, read_program
-from ncfix.api.measurements import Calibrated, calibrate, diagnose, plan
-from ncfix.api.programs import PathErrors, fix, fixed, simulate, verify
-from ncfix.api.tables import emulate, export, report, table_request
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "Calibrated",
-    "PathErrors",
-    "calibrate",
-    "diagnose",
-    "emulate",
-    "export",
-    "fix",
-    "fixed",
-    "load_machine",
-    "plan",
-    "read_program",
-    "report",
-    "simulate",
-    "table_request",
-    "verify",
-]
+if TYPE_CHECKING:
+    from ncfix.api.given import load_machine as load_machine
+    from ncfix.api.given import read_program as read_program
+    from ncfix.api.measurements import Calibrated as Calibrated
+    from ncfix.api.measurements import calibrate as calibrate
+    from ncfix.api.measurements import diagnose as diagnose
+    from ncfix.api.measurements import plan as plan
+    from ncfix.api.programs import PathErrors as PathErrors
+    from ncfix.api.programs import fix as fix
+    from ncfix.api.programs import fixed as fixed
+    from ncfix.api.programs import simulate as simulate
+    from ncfix.api.programs import verify as verify
+    from ncfix.api.tables import emulate as emulate
+    from ncfix.api.tables import export as export
+    from ncfix.api.tables import report as report
+    from ncfix.api.tables import table_request as table_request
+
+TOPICS = {
+    "given": ("load_machine", "read_program"),
+    "measurements": ("Calibrated", "calibrate", "diagnose", "plan"),
+    "programs": ("PathErrors", "fix", "fixed", "simulate", "verify"),
+    "tables": ("emulate", "export", "report", "table_request"),
+}
+"""Module -> its functions and values; it is imported when one of them is asked for."""
+
+HOMES = {name: topic for topic, names in TOPICS.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """A function, or the value that one gives."""
+    if name not in HOMES:
+        raise AttributeError(f"module 'ncfix.api' has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(f"ncfix.api.{HOMES[name]}"), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(HOMES)

@@ -7,7 +7,6 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from difflib import get_close_matches
 from importlib import import_module
 from io import TextIOWrapper
 
@@ -88,6 +87,8 @@ class Verbs(click.Group):
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
+            from difflib import get_close_matches
+
             close = get_close_matches(args[0], self.list_commands(ctx), 1)
             text = f"there is no verb {args[0]!r}" + (f"; did you mean {close[0]!r}?" if close else "")
             raise click.UsageError(text, error.ctx) from error

@@ -55,7 +55,6 @@ from ncfix.compensate.plan.offset import is_offset
 from ncfix.compensate.report import FixReport, Tally, in_lines
 from ncfix.compensate.solve import AcceptedPlan, PrecedingMotion, WrittenPlan, accepted_plan, increments
 from ncfix.compensate.workers import Ground, Read, Share, worker_pool
-from ncfix.control.flatten import flatten
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.trace import NotInPartsError
@@ -297,6 +296,8 @@ def fix_flat(
     steps = np.where(machine.rotary, np.degrees(machine.least_increment[1]), machine.least_increment[0]).tolist()
     names = machine.axis_names
     by_name = dict(zip(names, steps, strict=True))
+    from ncfix.control.flatten import flatten
+
     flat = flatten(program, setup, names, rotary_names(machine), by_name, resolve, kinematics_of(machine))
     again = fix_program(flat.program, machine, setup, options, resolve, seen)
     if {each.line for each in fixed.report.refused} <= {flat.lines[each.line - 1] for each in again.report.refused}:

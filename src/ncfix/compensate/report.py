@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,11 +28,13 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import rounding_along
 from ncfix.compensate.solve import WrittenPlan, increments
-from ncfix.control.flatten import Flat
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
+
+if TYPE_CHECKING:
+    from ncfix.control.flatten import Flat
 
 SEEN_UM = 0.001
 """By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""

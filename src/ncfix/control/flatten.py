@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ncfix.control.expressions import Fault
-from ncfix.control.interpreter import FlatLine, FollowedLanguage
+from ncfix.control.interpreter import RUNTIME, FlatLine, FollowedLanguage
 from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule
 from ncfix.control.setup import Resolve, Run
 from ncfix.control.trace import interpreter_of, trace
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ncfix.control.interpreter import TextUnit
     from ncfix.control.setup import Setup
 
-RUNTIME, TOO_LONG, NOT_FLAT = "NCF237", "NCF238", "NCF239"
+TOO_LONG, NOT_FLAT = "NCF238", "NCF239"
 LINES = 500_000
 """A flat program has no more lines."""
 

@@ -135,6 +135,8 @@ class TextUnit(ABC, Generic[P]):
 
 
 NO_END = "NCF234"
+RUNTIME = "NCF237"
+"""What is executed is known only at run time, so that no flat program can say it."""
 
 U = TypeVar("U", bound=TextUnit[Any])
 
