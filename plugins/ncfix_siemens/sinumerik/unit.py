@@ -14,7 +14,6 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -245,18 +244,6 @@ def units_of(program: Program, external: str = "") -> list[SinumerikUnit]:
 # -- where the vectors A3 B3 C3 of the blocks to come point the tool ---------------------------------------------------
 
 
-class VectorText(Protocol):
-    """A program text whose blocks give vectors."""
-
-    @property
-    def program(self) -> Program:
-        """The program."""
-
-    @property
-    def vectors(self) -> NDArray[np.int64]:
-        """(s, 3) the slots of A3 B3 C3 in the blocks of each shape, -1 for none."""
-
-
 @dataclass(slots=True)
 class Directions:
     """The ways to point the tool in blocks from `begin` on."""
@@ -264,17 +251,17 @@ class Directions:
     begin: int = 0
     ways: list[Ways] = field(default_factory=list)
 
-    def known(self, pointing: Pointing, text: VectorText, block: int, stop: int, least: int) -> list[Ways]:
+    def known(self, pointing: Pointing, unit: SinumerikUnit, block: int, stop: int, least: int) -> list[Ways]:
         """The ways from a block on: of so many blocks at least, unless one of them gives no direction, up to `stop`."""
         if not self.begin <= block <= self.begin + len(self.ways) - least:
-            self.begin, self.ways = block, ways_of(pointing, vectors_of(text, block, stop))
+            self.begin, self.ways = block, ways_of(pointing, vectors_of(unit, block, stop))
         return self.ways[block - self.begin : stop - self.begin]
 
 
-def vectors_of(text: VectorText, start: int, stop: int) -> FloatArray:
+def vectors_of(unit: SinumerikUnit, start: int, stop: int) -> FloatArray:
     """(n, 3) the components of the vectors of blocks; zero where one is not written."""
-    program = text.program
-    slots = text.vectors[program.template[start:stop]]
+    program = unit.program
+    slots = unit.vectors[program.template[start:stop]]
     values = program.numbers[program.first_number[start:stop, None] + np.maximum(slots, 0)]
     found: FloatArray = np.where(slots >= 0, values, 0.0)
     return found

@@ -20,14 +20,12 @@ from difflib import get_close_matches
 from pathlib import PurePath
 from typing import Any
 
+from ncfix.control.coordinates import INCH, LETTERS
 from ncfix.control.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
 from ncfix.inputs import MOST_SAID
 from ncfix.toml_text import Path, decoded, key_lines, parsed, place_of
-
-OFFSET_AXES = "XYZABCUVW"
-"""The order of the numbers of a work offset, and the axis letters."""
 
 NOT_TOML = "NCF381"
 UNKNOWN_KEY = "NCF382"
@@ -212,8 +210,8 @@ class SetupReading:
             self.fault(WRONG_VALUE, key, "expected a table like { X = 0.0, Z = 300.0 }")
             return {}
         for letter in value:
-            if str(letter).upper() not in tuple(OFFSET_AXES):
-                self.fault(UNKNOWN_KEY, f"{key}.{letter}", "no axis letter", f"they are {' '.join(OFFSET_AXES)}")
+            if str(letter).upper() not in tuple(LETTERS):
+                self.fault(UNKNOWN_KEY, f"{key}.{letter}", "no axis letter", f"they are {' '.join(LETTERS)}")
         return {str(letter).upper(): self.number(f"{key}.{letter}", part) for letter, part in value.items()}
 
     def offset(self, key: str, value: Any) -> dict[str, float]:
@@ -222,9 +220,9 @@ class SetupReading:
         if not SYSTEM.fullmatch(name):
             self.fault(UNKNOWN_KEY, key, "no work offset", "they are G54 ... G59.3, and G54.1P1 ...")
         if isinstance(value, list):
-            if not 1 <= len(value) <= len(OFFSET_AXES):
-                self.fault(WRONG_VALUE, key, f"expected 1 to {len(OFFSET_AXES)} numbers, found {len(value)}")
-            return {letter: self.number(key, part) for letter, part in zip(OFFSET_AXES, value, strict=False)}
+            if not 1 <= len(value) <= len(LETTERS):
+                self.fault(WRONG_VALUE, key, f"expected 1 to {len(LETTERS)} numbers, found {len(value)}")
+            return {letter: self.number(key, part) for letter, part in zip(LETTERS, value, strict=False)}
         return self.position(key, value)
 
     def reference(self, key: str, value: Any) -> dict[str, float]:
@@ -369,10 +367,6 @@ BEGIN = re.compile(r"\s*BEGIN\s+\S*TOOL\S*\s*\.T\b\s*(?P<unit>MM|INCH)?", re.IGN
 END = re.compile(r"\s*(\[END\]|END\b)", re.IGNORECASE)
 TOOL_T_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)\Z")
 WANTED = ("L", "R", "DL", "DR")
-INCH = 25.4
-
-ToolTRow = tuple[int, tuple[int, Tool] | str]
-"""Line number, and a tool or what is wrong."""
 
 
 def is_tool_t(text: str) -> bool:
@@ -380,7 +374,7 @@ def is_tool_t(text: str) -> bool:
     return BEGIN.match(text) is not None
 
 
-def tool_t_rows(text: str) -> Iterator[ToolTRow]:
+def tool_t_rows(text: str) -> Iterator[Row]:
     """The rows of the table."""
     lines = text.splitlines()
     head = BEGIN.match(lines[0])

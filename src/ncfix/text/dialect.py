@@ -112,6 +112,10 @@ class CycleTable:
         return mode if self.returns == "mode" else self.returns == "level"
 
 
+FAMILY_CYCLE = CycleTable()
+"""A canned cycle that is the family's own: R is its level, and G98 and G99 say where it ends."""
+
+
 def is_letters(text: object, but: str = "") -> bool:
     """Whether it is a string of capital letters, one at least, none of these."""
     return isinstance(text, str) and re.fullmatch("[A-Z]+", text) is not None and not {*text} & {*but}
@@ -171,8 +175,8 @@ class Dialect:
     language: str = field(kw_only=True)
 
     def cycle_of(self, code: int) -> CycleTable:
-        """The drilling cycle that a code is, in tenths; those of the family are as a table without entries says."""
-        return next((table for name, table in self.cycles if tenths(name) == code), CycleTable())
+        """The drilling cycle that a code is, in tenths."""
+        return next((table for name, table in self.cycles if tenths(name) == code), FAMILY_CYCLE)
 
     def derive(
         self,

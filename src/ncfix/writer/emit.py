@@ -110,11 +110,8 @@ class _Emitter:
         kinematics: Kinematics | None,
         bulk: Bulk | None,
     ) -> None:
-        self.program, self.language, self.kinematics = (
-            program,
-            language_of(program.dialect, WrittenLanguage),
-            kinematics,
-        )
+        self.program, self.kinematics = program, kinematics
+        self.language = language_of(program.dialect, WrittenLanguage)
         self.spelling = self.language.spelling(program)
         self.moves, self.pieces, self.reading = moves, pieces, reading
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
