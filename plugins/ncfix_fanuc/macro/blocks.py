@@ -32,7 +32,7 @@ from ncfix.text.build import (
 )
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, explain
-from ncfix.text.grammar import Squeezed, parse
+from ncfix.text.grammar import parse, squeeze
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
 from ncfix.text.tree import Binary, Expression, Item, Literal, OWordLine, Program, Template, Word
 from ncfix_iso.rs274.blocks import check_repeats
@@ -102,16 +102,9 @@ CALLS = frozenset({650, 660, 661})
 """G65, G66 and G66.1: I, J and K may stand there several times, and E is an argument like any other."""
 
 
-def squeeze(text: str) -> Squeezed:
-    """Take out the blanks outside comments."""
-    kept = [match.span() for match in PIECE.finditer(text)]
-    code = "".join(text[start:stop] for start, stop in kept)
-    return Squeezed(code, [place for span in kept for place in range(*span)])
-
-
 def parse_block(dialect: Dialect, text: str) -> Parsed:
     """One block; raises `BlockError`."""
-    squeezed = squeeze(text)
+    squeezed = squeeze(text, PIECE)
     try:
         parsed = build(parse(dialect, squeezed.code), text, squeezed, MacroBuilder)
     except UnexpectedInput as error:

@@ -35,6 +35,8 @@ REST = re.compile(
 """What may stand in a block besides geometry, and is kept when it is written anew: spindle, coolant, a stop."""
 
 LEFT_OUT = re.compile(r";[^\r\n]*|~(?=[ \t\r]*(?:\n|\Z))")
+"""Of a statement: remarks, and what says that it goes on in the next line."""
+
 OF_LINES, OF_ARCS = frozenset({"X", "Y", "AN", "LEN"}), frozenset({"X", "Y", "CCX", "CCY", "CCA", "R"})
 
 

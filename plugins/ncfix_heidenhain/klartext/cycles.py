@@ -21,7 +21,8 @@ from ncfix.control.expressions import Fault, Value, nominal, numbers, signed
 from ncfix.control.moves import Motion, MotionKind
 from ncfix.text.spelling import value_of
 from ncfix_heidenhain.klartext import transformations
-from ncfix_heidenhain.klartext.arcs import Step
+from ncfix_heidenhain.klartext.arcs import IN_PLANE, Step
+from ncfix_heidenhain.klartext.contours import LEFT_OUT
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, HolePosition, KlartextControl
 from ncfix_heidenhain.klartext.plans import QParameters
 from ncfix_heidenhain.klartext.targets import MotionWords, Where, command_of, led, polar, polar_axes
@@ -60,7 +61,6 @@ OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
 AFTER_HOLE = "where the axis {} stands after a hole of unknown depth is not followed"
 DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
 PATTERN = "a pattern of holes ({}): the control works out where they are; --flatten writes them out"
-IN_PLANE = 1 << X | 1 << Y
 FROM_INCREMENT = "an old cycle is called from a height in increments (IZ)"
 
 
@@ -224,7 +224,6 @@ WORDS = re.compile(
     r"(I?[XY]|Z|DX|DY|D|NUMX|NUMY|NUM|ROTX|ROTY|ROT|START|STEP|END)\s*([+-]?)\s*(Q[LR]?\d+|\d+[.,]?\d*|[.,]\d+)",
     re.IGNORECASE,
 )
-LEFT_OUT = re.compile(r";[^\r\n]*|~(?=[ \t\r]*(?:\n|\Z))")
 
 Values = Mapping[str, float]
 

@@ -19,11 +19,11 @@ from ncfix_heidenhain.klartext.blocks import parse_block, renumbered, scan, spli
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import TURN_DEGREES, beside_corners, layout_of, uses_comma
+from ncfix_heidenhain.klartext.units import STRAIGHT
 from ncfix_heidenhain.klartext.writing import KlartextWriter, spelling_of
 
 Mask = NDArray[np.bool_]
 
-STRAIGHT = frozenset({"", "l", "ln"})
 ARCS = frozenset({"c", "cr"})
 FEW = 1e-6
 """Degrees from zero or a full turn at which a corrected angle is looked at by `BlockWriter`."""

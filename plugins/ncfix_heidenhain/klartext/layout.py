@@ -27,15 +27,13 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix_heidenhain.klartext.arc_text import in_lines
-from ncfix_heidenhain.klartext.plans import opens_block, own_words
+from ncfix_heidenhain.klartext.plans import POLAR, VECTOR, opens_block, own_words
 
 CORNERS = frozenset({"rnd", "chf"})
 """Corners that the control makes of the end of one motion and the beginning of the next."""
 
 TURN_DEGREES = 360.0
 
-POLAR = frozenset({"PR", "PA", "IPR", "IPA"})
-VECTOR = frozenset({"TX", "TY", "TZ"})
 AXIS_WORDS = frozenset({*AXIS_LETTERS, *(f"I{letter}" for letter in AXIS_LETTERS)})
 LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 129})
 """M codes that act at the end of their block: they belong on its last piece."""

@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Callable
 
-from ncfix.control.coordinates import LETTERS, Z, mask_of, zeros
+from ncfix.control.coordinates import LETTERS, TURN, Z, mask_of, zeros
 from ncfix.control.expressions import Fault, Unknown
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, OpenCall, Operation, ProgramFlow, Repeat, Return
 from ncfix.control.moves import Pass, Passing
@@ -92,7 +92,6 @@ CHOSEN = "M138: the control takes only some of the rotary axes into account"
 UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
 RETRACT = Passing(Pass.RETRACTION, "retract along the tool axis (M140)")
 COUNTED = "from where the axis {} counts after M126 depends on a parameter of the machine: it went past a turn"
-FULL_TURN = 2 * math.pi
 COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}
 
 
@@ -132,7 +131,7 @@ def end_of_short_ways(control: KlartextControl, on: bool) -> None:
     tilts = None if pointing is None else control.machine[pointing.columns[1]]
     for index in control.turning if on and control.shortest else ():
         below = control.position[index] < 0 and index != tilts
-        if index not in control.unknown and (below or control.position[index] >= FULL_TURN):
+        if index not in control.unknown and (below or control.position[index] >= TURN):
             control.lose([index], COUNTED)
     control.shortest = not on
 
@@ -150,7 +149,7 @@ def reduce_turns(control: KlartextControl, flags: frozenset[str]) -> None:
     named = flags & set("abc")
     for index in control.turning:
         if not named or LETTERS[index].lower() in named:
-            control.position[index] %= 2 * math.pi
+            control.position[index] %= TURN
 
 
 def tip_control(control: KlartextControl, *, on: bool) -> None:

@@ -22,7 +22,8 @@ from ncfix.writer.block import EXACT, BlockWriter
 from ncfix.writer.target import Target
 from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text, is_relied_on, pole_in_force
 from ncfix_heidenhain.klartext.control import BY_DEPTH, FROM_START
-from ncfix_heidenhain.klartext.layout import TURN_DEGREES, VECTOR, KlartextLayout, poles_move, tilts, uses_comma
+from ncfix_heidenhain.klartext.layout import TURN_DEGREES, KlartextLayout, poles_move, tilts, uses_comma
+from ncfix_heidenhain.klartext.plans import VECTOR
 
 FloatArray = NDArray[np.float64]
 

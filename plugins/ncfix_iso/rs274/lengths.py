@@ -12,11 +12,10 @@ from ncfix.control.state import TOOL_AT_RUN_TIME
 from ncfix.control.tcp import switch
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
+from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS
 from ncfix_iso.rs274.systems import BAD_G10, SYSTEM_NAMES, first_parameter, set_system, stored, words_of
 
 BAD_LENGTH = "NCF224"
-BY_WORDS = (431, 432)
-"""G43.1 and G43.2."""
 
 DIFFERS = "what G10 L{} sets differs from control to control (--dialect says which one it is)"
 
@@ -54,7 +53,7 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     control.tip_control = code in (434, 435)
     on = control.setup.tcp or control.tip_control or control.tilted
     number = number if (on and number) or any(tool) or lacking else None
-    if "H" in block.runtime or (code in BY_WORDS and block.runtime):
+    if "H" in block.runtime or (code in DYNAMIC_OFFSETS and block.runtime):
         control.refusal = control.refusal or "a tool length offset is known only at run time"
     if code == 435:
         control.refusal = control.refusal or "the tool direction is given by I J K (G43.5)"
@@ -71,7 +70,7 @@ def offset_of(control: RS274Control, block: Block, code: int) -> tuple[Vector, i
     """What a code sets: the offset, the number of its tool (None without one), and whether its length is lacking."""
     if code == 490:
         return zeros(), None, False
-    if code in BY_WORDS:
+    if code in DYNAMIC_OFFSETS:
         return *offset_by_words(control, block, added=code == 432), False
     tool, number = zeros(), numbered_tool(control, block)
     tool[Z] = length_of(control, number) * (-1.0 if code == 440 else 1.0)

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 
-from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of
+from ncfix.control.coordinates import INDEX, LETTERS, TURN, Vector, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import UnknownAxes
 from ncfix.control.tcp import led_in_machine
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, TURNING, BlockWordValues, End
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, POLAR, TURNING, BlockWordValues, End
 
 RUNTIME = "where the axis {} stands is known only at run time"
 RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM90)"
-POLAR = "NCF223"
+BAD_POLAR = "NCF223"
 POLAR_DIAMETER = "polar coordinates (AP, RP) while X is a diameter"
 NO_POLE = "polar coordinates (AP, RP) while no pole is known"
 TWICE = "polar coordinates (AP, RP) beside {} in the plane: which of them counts is not sure"
 NO_RADIUS = "a polar radius (RP) of zero: the control takes the distance from the pole instead"
 ASIDE = "an angle (AP) that is left out, or an increment of AP or RP, where the axes have left the last polar position"
-TURN = 2 * math.pi
-POLAR_WORDS = frozenset({"AP", "RP"})
 NEAR_POLE = 1e-6
 """mm"""
 STILL = 1e-9
@@ -41,7 +39,7 @@ def destination(control: Sinumerik, words: BlockWordValues) -> End:
         if letter in words.values:
             place(control, words, letter, program, lost)
             moved |= 1 << INDEX[letter]
-    if POLAR_WORDS & words.values.keys():
+    if POLAR & words.values.keys():
         moved |= polar(control, words, program, lost)
     return End(control.command(program, moved), control.axes_of(lost), lost)
 
@@ -119,7 +117,7 @@ def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector
         return TWICE.format(doubled[0])
     if radius is not None and abs(radius) < NEAR_POLE:
         return NO_RADIUS
-    forms = {address: control.counts_on(words.forms.get(address, "")) for address in POLAR_WORDS & words.values.keys()}
+    forms = {address: control.counts_on(words.forms.get(address, "")) for address in POLAR & words.values.keys()}
     angle, distance = control.modes.polar
     first = angle if forms.get("AP", True) else None
     second = distance if forms.get("RP", False) else None
@@ -168,7 +166,7 @@ def set_pole(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     elif code == 1120:
         base = control.modes.pole or ((0.0, 0.0) if control.modes.in_plane else None)
     steps = [words.values.get(LETTERS[index], 0.0) for index in (plane.first, plane.second)]
-    if POLAR_WORDS & words.values.keys():
+    if POLAR & words.values.keys():
         angle, radius = math.radians(words.get("AP")), words.get("RP")
         steps = [radius * math.cos(angle), radius * math.sin(angle)]
         if words.runtime("AP", "RP"):
@@ -198,8 +196,8 @@ def machine_destination(control: Sinumerik, words: BlockWordValues) -> End:
 
     A swivelled plane is a frame: without it the words are those of the machine's axes. TRAORI keeps them the tip's.
     """
-    if POLAR_WORDS & words.values.keys():
-        raise Fault(POLAR, "polar coordinates do not go with machine coordinates")
+    if POLAR & words.values.keys():
+        raise Fault(BAD_POLAR, "polar coordinates do not go with machine coordinates")
     if control.tcp and not (control.modes.transformed or control.setup.tcp):
         end = led_in_machine(control, *axes_of_machine(control, words))
         return End(end.target, end.unknown, control.along_frame(end.unknown), end.in_machine)

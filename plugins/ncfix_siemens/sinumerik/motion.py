@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 
+from ncfix.control.control import AFTER_THAT
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, mask_of
 from ncfix.control.moves import MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, tangential, through_point
@@ -60,8 +61,6 @@ OTHER_WAYS = UNFOLLOWED_MOTIONS.keys() | {20, 30, CIP, CT}
 
 TAKING = {20: ("G2", OF_ARCS), 30: ("G3", OF_ARCS), CIP: ("CIP", OF_CIP), CT: ("CT", frozenset({"TURN"}))}
 """Motions that take words of arcs; centre words beside a straight motion lead nowhere."""
-
-WHERE_IT_ENDS = "where the axis {{}} stands is not known after this: {}"
 
 
 def moved(control: Sinumerik, words: BlockWordValues, special: frozenset[str]) -> None:
@@ -124,7 +123,7 @@ def as_coded(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     why = "" if code in UNFOLLOWED_MOTIONS else misled(control, words, name, taken)
     if why:
         refused(control, words, code, why)
-        control.lose_axes(GEOMETRY, WHERE_IT_ENDS.format(why))
+        control.lose_axes(GEOMETRY, AFTER_THAT.format(why))
     elif code in (20, 30):
         arc(control, words, code)
     elif code == CIP:

@@ -30,7 +30,7 @@ from ncfix.text.tree import (
 )
 from ncfix_siemens.sinumerik.blocks import BRACKET, STATEMENT
 from ncfix_siemens.sinumerik.expressions import compiled
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, VECTOR
 
 DWELL_WORDS = "FS"
 """With G4: how long."""
@@ -41,7 +41,6 @@ ANY_PARAMETER = "r[]"
 LANE_LETTERS = INDEX.keys() | {"F", "N"}
 RADIUS = "CR"
 ARC_LETTERS = frozenset({*CENTRE_LETTERS, RADIUS})
-DIRECTION = ("A3", "B3", "C3")
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,8 +138,8 @@ def plan_of(template: Template) -> SinumerikPlan:
     plan.opaque = frozenset(item.kind for item in items if isinstance(item, Opaque))
     plan.names = frozenset(step.name for step in plan.steps if isinstance(step, Calling))
     plan.lane = lane_of(plan)
-    if plan.lane is not None and not template.slots.keys().isdisjoint(DIRECTION):
-        plan.vector = tuple(template.slots.get(address, -1) for address in DIRECTION)
+    if plan.lane is not None and not template.slots.keys().isdisjoint(VECTOR):
+        plan.vector = tuple(template.slots.get(address, -1) for address in VECTOR)
     return plan
 
 
@@ -239,9 +238,9 @@ def lane_of(plan: SinumerikPlan) -> Lane | None:
     words, slots = [word for word in template.words if not is_code(word)], {**template.slots, **fixed}
     if len(slots) < len(words) or not all(isinstance(item, Word | Comment) for item in template.items):
         return None
-    pointed = not slots.keys().isdisjoint(DIRECTION)
+    pointed = not slots.keys().isdisjoint(VECTOR)
     round_ = not slots.keys().isdisjoint(ARC_LETTERS)
-    allowed = (LANE_LETTERS - set("ABC")) | set(DIRECTION) if pointed else LANE_LETTERS | ARC_LETTERS
+    allowed = (LANE_LETTERS - set("ABC")) | set(VECTOR) if pointed else LANE_LETTERS | ARC_LETTERS
     if plan.m or plan.g not in (((), (20,), (30,)) if round_ else ((), (0,), (10,))) or not slots.keys() <= allowed:
         return None
     axes = tuple((INDEX[letter], slot) for letter, slot in slots.items() if letter in INDEX)

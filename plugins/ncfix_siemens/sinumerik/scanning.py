@@ -21,7 +21,7 @@ from ncfix.diagnostics import RefusedError
 from ncfix.text.numbers import fill, find_numbers, is_numeric, runs_of, table
 from ncfix.text.shapes import NUMBER_MARK, Scan, block_of, in_slices, matches, odd_blocks, shape_keys
 from ncfix.text.tree import Program, Template
-from ncfix_siemens.sinumerik.vocabulary import POLAR
+from ncfix_siemens.sinumerik.vocabulary import POLAR, POLES
 
 FIXED = table(b"GgMmRr")
 """A number after these is no value but says which code or parameter it is."""
@@ -183,7 +183,6 @@ def targets(code: str) -> list[tuple[tuple[int, int], int]]:
     ]
 
 
-POLES = frozenset({1100, 1110, 1120})
 ALL_OR_NONE = "polar coordinates of which only one is written, where another block with such words has to stay"
 
 

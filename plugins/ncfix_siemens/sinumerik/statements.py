@@ -30,6 +30,7 @@ from ncfix_siemens.sinumerik.vocabulary import (
     MOTIONS,
     PATH_WORDS,
     POLAR,
+    POLES,
     TURNS_OF_THE_TOOL,
     UNFOLLOWED,
     UNFOLLOWED_MOTIONS,
@@ -142,7 +143,6 @@ ANGLE_KINDS = frozenset({"orieuler", "orirpy", "orirpy2", "orivirt1", "orivirt2"
 STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
 
 FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
-POLES = frozenset({1100, 1110, 1120})
 TAKES_WORDS = frozenset({40, 740, 750, 250, 260, 580, 590}) | POLES
 
 

@@ -26,6 +26,9 @@ SETTERS = frozenset(_SETTERS.split())
 POLAR = frozenset({"AP", "RP"})
 """Polar coordinates: angle and radius about the pole."""
 
+POLES = frozenset({1100, 1110, 1120})
+"""Codes, in tenths, that set the pole: G110 and its like."""
+
 VECTOR = ("A3", "B3", "C3")
 ANGLES = ("A2", "B2", "C2")
 NORMALS = frozenset(["A4", "B4", "C4", "A5", "B5", "C5"])

@@ -22,6 +22,7 @@ INDEX = {letter: index for index, letter in enumerate(LETTERS)}
 N_LETTERS = len(LETTERS)
 X, Y, Z = 0, 1, 2
 ROTARY_LETTERS = frozenset("ABC")
+TURN = 2 * math.pi
 DEGREE = math.pi / 180
 INCH = 25.4
 

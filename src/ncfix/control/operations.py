@@ -149,8 +149,8 @@ class Lose(Operation):
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
-        control.lose_in_machine([INDEX[letter] for letter in self.axes], LOST.format(self.after))
-        control.places.lose(mask_of(control.unknown))
+        lost = control.lose_in_machine([INDEX[letter] for letter in self.axes], LOST.format(self.after))
+        control.places.lose(lost)
 
     def __str__(self) -> str:
         axes = "the axes" if self.axes == ALL_AXES else f"the axes {' '.join(self.axes)}"

@@ -20,6 +20,8 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.control.coordinates import TURN
+
 FloatArray = NDArray[np.float64]
 
 Columns = tuple[FloatArray, FloatArray, FloatArray]
@@ -138,8 +140,6 @@ Pair = tuple[float, float]
 SAME = 1e-9
 POLE = 1e-7
 """rad; nearer to the outer axis than that the tool may turn about it at will."""
-
-TURN = 2 * math.pi
 
 
 class Apply(Protocol[Number]):

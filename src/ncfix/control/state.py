@@ -324,10 +324,15 @@ class ControlState(ABC):
             if index in self.machine:
                 self.unknown[index] = reason
 
-    def lose_in_machine(self, indices: Sequence[int], reason: str) -> None:
-        """These axes of the machine stand somewhere that is not known: under TCP so does the tip, in X, Y and Z."""
+    def lose_in_machine(self, indices: Sequence[int], reason: str) -> int:
+        """These axes of the machine stand somewhere that is not known: under TCP so does the tip, in X, Y and Z.
+
+        Returns all that are not known for that reason, as bits.
+        """
         gone = {index for index in indices if index in self.machine}
-        self.lose(sorted(gone | {*XYZ} if gone and self.tcp else gone), reason)
+        lost = sorted(gone | {*XYZ} if gone and self.tcp else gone)
+        self.lose(lost, reason)
+        return mask_of(lost)
 
     def lost_in_frame(self) -> UnknownAxes:
         """What is not known along the axes of the program's frame."""

@@ -51,9 +51,9 @@ class Squeezed:
         return self.places[start], self.places[stop - 1] + 1
 
 
-def squeeze(text: str) -> Squeezed:
-    """Take out the blanks outside comments."""
-    kept = [match.span() for match in PIECE.finditer(text)]
+def squeeze(text: str, piece: re.Pattern[str] = PIECE) -> Squeezed:
+    """Take out the blanks outside comments; `piece`: what is kept."""
+    kept = [match.span() for match in piece.finditer(text)]
     code = "".join(text[start:stop] for start, stop in kept)
     return Squeezed(code, [place for span in kept for place in range(*span)])
 
