@@ -211,7 +211,7 @@ def long_file(blocks: int, folder: Path) -> list[str]:
         path = folder / "long.nc"
         programs.write(path, count, "full")
         teams = {each.name: each for each in contenders(path, folder, count)}
-        run = (teams["ncfix"]).run()
+        run = teams["ncfix"].run()
         times.append(run.cpu)
         rows.append(f"| {spaced(count)} | {run.cpu:.1f} | {run.wall:.1f} | {run.memory:.0f} |")
     return [*rows, "", f"Ratio of the times: {times[1] / times[0]:.2f}.", ""]
@@ -251,10 +251,9 @@ def stages(folder: Path) -> list[str]:
     """Where the time goes, from inside one run."""
     path = folder / "stages.nc"
     programs.write(path, 200_000, "full")
-    command = [sys.executable, str(HERE / "stages.py"), str(path)]
-    found = subprocess.run(
-        command, capture_output=True, text=True, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}
-    )
+    command = [sys.executable, str(HERE / "stages.py"), str(path), "--dialect", "linuxcnc"]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, env=environment)
     said = "Without the start of the process, imports and compiling. `without it`: how much faster the whole would be"
     head = [
         "Share of time of each stage, 200 000 blocks, full words",
