@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import hypothesis
@@ -17,6 +19,8 @@ hypothesis.settings.load_profile("searching" if os.environ.get("NCFIX_SEARCH") e
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES = "figures"
+PATIENCE_S = 60.0
+"""How long something is waited for that takes a second or two, on a computer that does much else."""
 
 
 @pytest.fixture(scope="session")
@@ -66,12 +70,12 @@ def _own_form() -> Iterator[None]:
 
 @pytest.fixture
 def plain_form() -> None:
-    """The plain form of the core, for tests that compare it with the compiled one; they are skipped without that."""
+    """The plain form of the core, for tests that compare it with the compiled one; `missing` without that."""
     require_core()
 
 
 def require_core() -> None:
-    """Skip the test if there is no compiled core, and take the plain form; fails if `NCFIX_CORE=compiled`."""
+    """Take the plain form of the core; `missing` if there is no compiled one to compare it with."""
     if core.fault():
         missing(f"the core is {core.fault()}", "NCFIX_REQUIRE_TOOLS")
     core.use("plain")
@@ -82,6 +86,20 @@ def use_form(compiled: bool) -> None:
     if compiled:
         require_core()
     core.use("compiled" if compiled else "plain")
+
+
+def require_module(name: str) -> None:
+    """`missing` if an optional package is not installed."""
+    if not find_spec(name):
+        missing(f"{name} is not installed", "NCFIX_REQUIRE_TOOLS")
+
+
+def until(condition: Callable[[], object]) -> None:
+    """Wait for something; fails after `PATIENCE_S`."""
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end, "it did not come"
+        time.sleep(0.02)
 
 
 def missing(reason: str, variable: str) -> None:

@@ -7,30 +7,26 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from cli.conftest import LONG_X, THREE_AXIS, ncfix
+from conftest import PATIENCE_S, require_module, until
 from ncfix.batch import cluster as clusters
 from ncfix.batch.journal import JOURNAL, Journal
 from ncfix.batch.work import executor_of, results_in_order
 from ncfix.diagnostics import ExitCode, UsageError
 
-pytest.importorskip("distributed")
 __all__ = ["ncfix"]
-PATIENCE_S = 60.0
 COUNT = 12
 
 
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
+@pytest.fixture(autouse=True)
+def _distributed() -> None:
+    require_module("distributed")
 
 
 class Cluster:
@@ -115,9 +111,7 @@ def test_what_the_work_raises_is_raised(cluster: Cluster) -> None:
         list(results_in_order(int, ["1", "x"], executor_of(cluster.address), 2, lambda task: -1))
 
 
-def test_a_worker_is_killed_and_then_the_scheduler(
-    ncfix: Any, parts: Path, cluster: Cluster, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_is_killed_and_then_the_scheduler(ncfix: Any, parts: Path, cluster: Cluster) -> None:
     ncfix(*COMMAND, "whole")
     running = started("out", "--executor", cluster.address)
     until(lambda: len(list(Path("out").glob("*.ngc"))) >= 2)

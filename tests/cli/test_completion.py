@@ -15,6 +15,7 @@ from typing import Any
 import click
 import pytest
 
+from conftest import missing
 from ncfix.cli.main import VERBS, cli
 
 FILES = re.compile(r"\b(FILE|DIR|TABLEDIR|PROGRAM|MACHINE)\b")
@@ -112,8 +113,7 @@ def test_in_the_shell_itself(shell: str, tmp_path: Path) -> None:
     pty = pytest.importorskip("pty")
     command, load = SHELLS[shell]
     if not shutil.which(shell):
-        assert not os.environ.get("NCFIX_REQUIRE_TOOLS"), f"{shell} is to be here"
-        pytest.skip(f"{shell} is not here")
+        missing(f"{shell} is not installed", "NCFIX_REQUIRE_TOOLS")
     (tmp_path / "particular.ngc").touch()
     run = tmp_path / "bin" / "ncfix"
     run.parent.mkdir()

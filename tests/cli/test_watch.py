@@ -7,31 +7,26 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from importlib.util import find_spec
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from cli.conftest import PROGRAM
+from conftest import PATIENCE_S, require_module, until
 from ncfix.diagnostics import ExitCode
 
-PATIENCE_S = 60.0
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)
+SETTLE_S = 1.5
+"""Much longer than the breaks in which a program is written here, on a loaded computer too."""
 
 
 @pytest.fixture(params=["polling", "told"])
 def watching(request: Any, shop: Any) -> Iterator[subprocess.Popen[str]]:
-    if request.param == "told" and not find_spec("watchfiles"):
-        pytest.skip("watchfiles is not installed")
+    if request.param == "told":
+        require_module("watchfiles")
     (shop.folder / "in").mkdir()
-    command = ["watch", "in", "out", "-m", "machine.toml", "--assume-zero", "--settle-s", "0.4", "--status", "s.html"]
+    command = ["watch", "in", "out", "-m", "machine.toml", "--assume-zero", "--status", "s.html"]
+    command += ["--settle-s", str(SETTLE_S)]
     with (shop.folder / "said.txt").open("w") as said:
         running = subprocess.Popen(
             [sys.executable, "-m", "ncfix", *command, *(["--poll-s", "0.1"] if request.param == "polling" else [])],
@@ -56,7 +51,7 @@ def test_programs_are_corrected_as_they_come(watching: subprocess.Popen[str], sh
         for piece in (PROGRAM[:30], PROGRAM[30:]):
             handle.write(piece)
             handle.flush()
-            time.sleep(0.2)
+            time.sleep(SETTLE_S / 5)
             assert not output.exists()
     until(output.exists)
     assert b"X109.989" in output.read_bytes()
@@ -159,7 +154,7 @@ def test_a_page_that_cannot_be_written_stops_nothing(
 def test_a_setup_that_is_not_there_yet(shop: Any) -> None:
     from ncfix.batch import watching
 
-    pytest.importorskip("watchfiles")
+    require_module("watchfiles")
     (shop.folder / "in").mkdir()
     setup = shop.folder / "later/setup.toml"
     looks = watching.moments(str(shop.folder / "in"), [str(setup)], 0.1, None)
