@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import signal
 import subprocess
 import sys
 import time
@@ -19,6 +18,8 @@ from ncfix.batch.journal import JOURNAL, Journal
 from ncfix.diagnostics import ExitCode
 
 COUNT = 6
+LIMIT_S = 6
+"""Much longer than a program of these takes on a loaded computer."""
 
 
 @pytest.fixture
@@ -98,7 +99,7 @@ def test_a_killed_batch_goes_on_to_the_same_bytes(ncfix: Any, shop: Any, parts: 
             time.sleep(0.001)
         with suppress(subprocess.TimeoutExpired):
             running.wait(chance.random() * 0.8)
-        os.kill(running.pid, signal.SIGKILL)
+        running.kill()
         running.wait()
         changed = chance.choice(sorted(parts.rglob("*.ngc")))
         changed.write_bytes(changed.read_bytes().replace(b"M2", b"G1 X%d\r\nM2" % chance.randrange(100, 200)))
@@ -296,20 +297,20 @@ def test_a_program_that_takes_too_long(
     fixed = FixJob.fixed
 
     def slow(job: FixJob, target: Any, *rest: Any) -> Any:
-        until = time.monotonic() + (60 if target.source.endswith("part2.ngc") else 0)
-        while time.monotonic() < until:
+        end = time.monotonic() + (120 if target.source.endswith("part2.ngc") else 0)
+        while time.monotonic() < end:
             time.sleep(0.01)
         return fixed(job, target, *rest)
 
     monkeypatch.setattr(FixJob, "fixed", slow)
     command = ("fix", parts, "-m", shop.machine, "-o", shop.folder / "out", "--assume-zero", "--json", "--resume")
-    result = ncfix(*command, "--jobs", jobs, "--time-limit-s", "4")
+    result = ncfix(*command, "--jobs", jobs, "--time-limit-s", LIMIT_S)
     assert result.code == ExitCode.FAULT
     failed = [each for each in result.json()["files"] if "errors" in each]
     assert [(Path(each["path"]).name, each["errors"][0]["code"]) for each in failed] == [("part2.ngc", "NCF030")]
-    begun = time.monotonic()
-    assert ncfix(*command, "--time-limit-s", "4").code == ExitCode.FAULT
-    assert time.monotonic() - begun < 4
+    again = ncfix(*command, "--time-limit-s", LIMIT_S)
+    assert again.code == ExitCode.FAULT
+    assert all(each["resumed"] for each in again.json()["files"])
     monkeypatch.undo()
     assert ncfix(*command).code == ExitCode.DONE
 

@@ -132,7 +132,7 @@ def test_what_is_refused_or_wrong(ncfix: Any, examples: Path, shop: Any) -> None
     assert result.json()["files"][0]["errors"]
 
 
-def test_a_folder_and_a_project(ncfix: Any, shop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_and_a_project(ncfix: Any, shop: Any) -> None:
     for name in ("a.ngc", "b.ngc"):
         (shop.folder / "parts").mkdir(exist_ok=True)
         (shop.folder / "parts" / name).write_bytes(shop.program.read_bytes())

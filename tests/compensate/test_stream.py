@@ -136,7 +136,7 @@ def test_a_fault_in_a_part_of_another_process_is_told(machine: Machine) -> None:
             streamed(program(5, 200, 0.0).replace(b"M30", b"G1 X?\nM30"), machine, 900, jobs=jobs)
 
 
-def test_the_compiled_core_gives_the_same_bytes(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_compiled_core_gives_the_same_bytes(machine: Machine) -> None:
     require_core()
     source = program(5, 300, 0.05)
     plain = streamed(source, machine, 4000)[0]

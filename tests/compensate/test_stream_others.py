@@ -241,9 +241,7 @@ def test_two_processes_give_the_same_bytes(siemens: bool, machine: Machine) -> N
 
 
 @pytest.mark.parametrize("siemens", [True, False], ids=["sinumerik", "fanuc"])
-def test_the_compiled_core_gives_the_same_bytes(
-    siemens: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_compiled_core_gives_the_same_bytes(siemens: bool, machine: Machine) -> None:
     require_core()
     dialect = "siemens" if siemens else "fanuc"
     sources = [program(seed, 200, 0.0, siemens=siemens, vectors=siemens and seed == 1) for seed in (0, 1)]

@@ -117,7 +117,7 @@ def test_what_does_not_arrive(here: bool, machine: Machine, monkeypatch: pytest.
         streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
 
 
-def test_messages_of_any_size_that_nobody_hears_yet(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_of_any_size_that_nobody_hears_yet() -> None:
     """Two processes that tell each other more than a line holds do not wait for each other."""
     lines = lines_between(2, multiprocessing.get_context())
     posts = [Post(mine, {1 - mine: lines[mine, 1 - mine]}) for mine in range(2)]

@@ -65,9 +65,10 @@ def test_blocks_like_the_ones_before(line: str, changes: list[tuple[int, int, st
 
 def test_the_corpus(shared: Callable[[str], Path]) -> None:
     texts = [path.read_bytes() for path in sorted(shared("corpus").glob("*/*"))[::3]]
+    texts = [source for source in texts if source.strip() and len(source) < 200_000]
+    assert len(texts) > 100
     for source in texts:
-        if source.strip() and len(source) < 200_000:
-            assert_same(source)
+        assert_same(source)
 
 
 def test_shapes_that_begin_alike_are_told_apart() -> None:

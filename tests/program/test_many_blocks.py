@@ -12,7 +12,6 @@ from random import Random
 import pytest
 
 from conftest import use_form
-from ncfix import core
 from ncfix.text.dialects import get
 from ncfix.text.reader import read, shapes_of
 from ncfix.text.tree import Literal, Template, Word
@@ -86,19 +85,16 @@ FRAMES = {"heidenhain": ("0 BEGIN PGM MANY MM", "9 END PGM MANY MM")}
 
 @pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize("name", list(FAMILIES))
-def test_many_blocks(name: str, compiled: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_blocks(name: str, compiled: bool) -> None:
     use_form(compiled)
     random, block = Random(11), FAMILIES[name]
     first, last = FRAMES.get(name, ("", ""))
-    try:
-        for _ in range(0, MANY, AT_ONCE):
-            body = (block(Random(random.randrange(SHAPES)), random) for _ in range(AT_ONCE))
-            text = "\n".join([first, *body, last, ""])
-            program = read(text.encode(), "many.nc", name)
-            assert_read_right(program)
-            assert len(program.templates) <= AT_ONCE - SHAPES
-    finally:
-        core.use("plain")
+    for _ in range(0, MANY, AT_ONCE):
+        body = (block(Random(random.randrange(SHAPES)), random) for _ in range(AT_ONCE))
+        text = "\n".join([first, *body, last, ""])
+        program = read(text.encode(), "many.nc", name)
+        assert_read_right(program)
+        assert len(program.templates) <= AT_ONCE - SHAPES
 
 
 def test_a_broken_template_is_caught() -> None:

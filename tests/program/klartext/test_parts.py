@@ -92,7 +92,7 @@ def test_several_processes_give_the_same_bytes(jobs: int, machine: Machine) -> N
     assert_alike(streamed(source, machine, "heidenhain", 1500, jobs), one)
 
 
-def test_the_compiled_core_gives_the_same_bytes(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_compiled_core_gives_the_same_bytes(machine: Machine) -> None:
     require_core()
     source = program(4, 100, 0.0)
     plain = streamed(source, machine, "heidenhain", 4000)[0]
