@@ -26,8 +26,8 @@ format:
 accuracy:        ## work out docs/accuracy.md (an hour), or STUDIES="plans ..." of it
 	OMP_NUM_THREADS=1 $(PYTHON) tests/validation/accuracy.py $(STUDIES)
 
-bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md; SIZES="1000000" RUNS=5 LONG=10000000 OTHERS=200000
-	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/run.py $(if $(filter-out undefined,$(origin SIZES)),--sizes $(SIZES)) $(if $(RUNS),--runs $(RUNS)) $(if $(LONG),--long $(LONG)) $(if $(OTHERS),--others $(OTHERS))
+bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md; SIZES="1000000" RUNS=5 LONG=10000000 OTHERS=200000 VERBS="100000 1000000"
+	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/run.py $(if $(filter-out undefined,$(origin SIZES)),--sizes $(SIZES)) $(if $(RUNS),--runs $(RUNS)) $(if $(LONG),--long $(LONG)) $(if $(OTHERS),--others $(OTHERS)) $(if $(filter-out undefined,$(origin VERBS)),--verbs $(VERBS))
 
 batch:           ## time batches, again and on a cluster, into docs/performance.md (minutes); PROGRAMS=2000
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) benchmarks/batch.py $(if $(PROGRAMS),--programs $(PROGRAMS))

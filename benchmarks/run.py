@@ -4,7 +4,8 @@
     make bench SIZES="100000" RUNS=3   other sizes, other numbers of runs
     make bench LONG=10000000           and one run of a long file, for memory and scaling: two minutes more
     make bench OTHERS=1000000          programs of other controls of another length than 200 000 blocks, one run each
-    make bench SIZES="" OTHERS=1000000 only these
+    make bench VERBS="100000"          the other verbs on programs of this length
+    make bench SIZES="" VERBS="" OTHERS=1000000 only programs of other controls
 
 A figure is the median of whole processes: start of Python, imports, reading, following, correcting, proof and writing.
 CPU time is what is compared: it depends less on what else the machine does.
@@ -35,6 +36,7 @@ PAGE = HERE.parent / "docs" / "performance.md"
 MACHINE = HERE / "five_axis.toml"
 MARK = "<!-- figures: written by `make bench` -->"
 OTHER_BEGIN, OTHER_END = "<!-- other controls: written by `make bench` -->", "<!-- end of other controls -->"
+VERBS_BEGIN, VERBS_END = "<!-- other verbs: written by `make bench` -->", "<!-- end of other verbs -->"
 OUTPUT = "out.nc"
 LARK_LINES = 20_000
 """Plain Lark is timed on so many lines, and the time scaled."""
@@ -89,14 +91,13 @@ class Contender:
 
 
 PLAIN, COMPILED = {"NCFIX_CORE": "plain"}, {"NCFIX_CORE": "compiled"}
+NCFIX = shutil.which("ncfix", path=str(Path(sys.executable).parent)) or "ncfix"
+SETUP = ["-m", str(MACHINE), "--dialect", "linuxcnc", "--offset", "G54=0,0,0,0,0", "--tool", "0=0"]
 
 
 def contenders(program: Path, folder: Path, blocks: int) -> list[Contender]:
     """What is timed on a program."""
-    ncfix = shutil.which("ncfix", path=str(Path(sys.executable).parent)) or "ncfix"
-    output = folder / OUTPUT
-    fix = [ncfix, "fix", str(program), "-m", str(MACHINE), "-o", str(output), "--force", "--dialect", "linuxcnc"]
-    fix += ["--offset", "G54=0,0,0,0,0", "--tool", "0=0"]
+    fix = [NCFIX, "fix", str(program), "-o", str(folder / OUTPUT), "--force", *SETUP]
     two, fix = [*fix, "--jobs", "2"], [*fix, "--jobs", "1"]
     found = [
         Contender("ncfix, plain", fix, PLAIN),
@@ -175,9 +176,12 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--long", type=int, default=0)
     parser.add_argument("--others", type=int, default=200_000)
+    parser.add_argument("--verbs", type=int, nargs="*", default=[100_000, 1_000_000])
     given = parser.parse_args()
     if given.others:
         other_controls(given.others)
+    if given.verbs:
+        other_verbs(given.verbs)
     if not given.sizes:
         return
     text = [*conditions(given.runs), "", *HEAD]
@@ -228,15 +232,45 @@ def other_controls(blocks: int) -> None:
                 control.programs.write(path, blocks, style)
                 rows += [row_of(control, style, way, way.run(), blocks) for way in ways_of(control, path)]
                 print(*rows[-2:], sep="\n", flush=True)
-    page = PAGE.read_text()
-    head, rest = page.split(OTHER_BEGIN)
-    PAGE.write_text(f"{head}{OTHER_BEGIN}\n\n" + "\n".join(rows) + f"\n\n{OTHER_END}" + rest.split(OTHER_END)[1])
+    into_page(rows, OTHER_BEGIN, OTHER_END)
+
+
+def into_page(rows: list[str], begin: str, end: str) -> None:
+    """Put lines between two marks of the page."""
+    head, rest = PAGE.read_text().split(begin)
+    PAGE.write_text(f"{head}{begin}\n\n" + "\n".join(rows) + f"\n\n{end}" + rest.split(end)[1])
+
+
+def other_verbs(sizes: list[int]) -> None:
+    """One run each of the verbs that look at programs, with the compiled core, into the page."""
+    rows = [
+        f"Full words, compiled core, {conditions(1)[0]}",
+        "",
+        "| blocks | verb | CPU s | peak MB |",
+        "|---|---|---|---|",
+    ]
+    with tempfile.TemporaryDirectory() as temporary:
+        program, output, listed = (Path(temporary) / name for name in ("full.nc", OUTPUT, "listed.csv"))
+        for blocks in sizes:
+            programs.write(program, blocks, "full")
+            fix = [NCFIX, "fix", str(program), "-o", str(output), "--force", *SETUP]
+            Contender("fix", fix, COMPILED).run()
+            for name, *words in (
+                ("verify", "verify", str(program), str(output)),
+                ("check", "check", str(program)),
+                ("simulate", "simulate", "--program", str(program)),
+                ("simulate -o", "simulate", "--program", str(program), "-o", str(listed), "--force"),
+                ("trace -o", "trace", str(program), "-o", str(listed), "--force"),
+            ):
+                run = Contender(name, [NCFIX, *words, *SETUP], COMPILED).run()
+                rows.append(f"| {spaced(blocks)} | `{name}` | {run.cpu:.1f} | {run.memory:.0f} |")
+                print(rows[-1], flush=True)
+    into_page(rows, VERBS_BEGIN, VERBS_END)
 
 
 def ways_of(control: controls.OtherControl, program: Path) -> list[Contender]:
     """ncfix on a program of another control, plain and compiled."""
-    ncfix = shutil.which("ncfix", path=str(Path(sys.executable).parent)) or "ncfix"
-    fix = [ncfix, "fix", str(program), "-m", str(MACHINE), "-o", str(program.with_name(OUTPUT)), "--force"]
+    fix = [NCFIX, "fix", str(program), "-m", str(MACHINE), "-o", str(program.with_name(OUTPUT)), "--force"]
     fix += ["--dialect", control.dialect, "--assume-zero", "--allow-refused", "--jobs", "1", *control.options]
     return [Contender("plain", fix, PLAIN), Contender("compiled", fix, COMPILED)]
 
