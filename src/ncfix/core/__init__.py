@@ -54,7 +54,7 @@ def has_binary() -> bool:
 def fault() -> str:
     """Why there is no compiled form that may be used; empty if there is one."""
     if not has_binary():
-        return f"not compiled, two to four times slower: {BUILD}"
+        return f"not compiled, so that long programs take up to twice as long: {BUILD}"
     try:
         right = FOLDER.joinpath("compiled.txt").read_text().strip() == digest(FOLDER)
     except OSError:
