@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from ncfix.cli import fix
-from ncfix.cli.fix import AUTO, ON_ONE, PAYS_BYTES, PAYS_PROGRAMS, processes_for
+from ncfix.cli.fix import AUTO, ON_ONE, PAYS_BYTES, PAYS_PROGRAMS, workers_for
 from ncfix.cli.shop.batch import Batch
 from ncfix.cli.targets import STREAM, OutputTarget
 from ncfix.diagnostics import ExitCode
@@ -45,16 +45,16 @@ def programs(folder: Path, count: int, size: int) -> list[OutputTarget]:
     ],
 )
 def test_as_many_as_pay(count: int, size: int, expected: int, tmp_path: Path) -> None:
-    assert processes_for(AUTO, programs(tmp_path, count, size)) == expected
+    assert workers_for(AUTO, programs(tmp_path, count, size), "processes") == expected
 
 
 def test_what_is_asked_for_is_taken(tmp_path: Path) -> None:
-    assert processes_for(3, programs(tmp_path, 1, 10)) == 3
+    assert workers_for(3, programs(tmp_path, 1, 10), "processes") == 3
 
 
 @pytest.mark.parametrize("source", [STREAM, "/no/such/program.nc"])
 def test_what_cannot_be_measured_gets_one(source: str) -> None:
-    assert processes_for(AUTO, [OutputTarget(source, "out.nc")]) == 1
+    assert workers_for(AUTO, [OutputTarget(source, "out.nc")], "processes") == 1
 
 
 @pytest.mark.parametrize("word", ["0", "-1", "many", "1.5"])

@@ -15,8 +15,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ncfix.api.given import load_machine as load_machine
-    from ncfix.api.given import read_program as read_program
+    from ncfix.api.sources import load_machine as load_machine
+    from ncfix.api.sources import read_program as read_program
     from ncfix.api.measurements import Calibrated as Calibrated
     from ncfix.api.measurements import calibrate as calibrate
     from ncfix.api.measurements import diagnose as diagnose
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ncfix.api.tables import table_request as table_request
 
 TOPICS = {
-    "given": ("load_machine", "read_program"),
+    "sources": ("load_machine", "read_program"),
     "measurements": ("Calibrated", "calibrate", "diagnose", "plan"),
     "programs": ("PathErrors", "fix", "fixed", "simulate", "verify"),
     "tables": ("emulate", "export", "report", "table_request"),

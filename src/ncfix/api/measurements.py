@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ncfix.api.given import (
+from ncfix.api.sources import (
     PathName,
     as_machine,
     as_measurements,
@@ -19,7 +19,7 @@ from ncfix.api.given import (
 from ncfix.diagnostics import Message, RefusedError, UsageError
 
 if TYPE_CHECKING:
-    from ncfix.api.given import Measured
+    from ncfix.api.sources import Measured
     from ncfix.diagnosis.diagnosis import Diagnosis
     from ncfix.machine import Machine
     from ncfix.measure.calibrate import Prediction

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, overload
 
-from ncfix.api.given import (
+from ncfix.api.sources import (
     PathName,
     as_machine,
     as_program,

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from ncfix.api.given import PathName, as_machine, check_writable, load_machine, paths_of, sound_machine, write_output
+from ncfix.api.sources import PathName, as_machine, check_writable, load_machine, paths_of, sound_machine, write_output
 from ncfix.diagnostics import UsageError
 from ncfix.files import read_folder, write_folder
 from ncfix.inputs import identities

@@ -33,7 +33,7 @@ OLDEST_PYTHON = (3, 11)
 
 
 @dataclass(frozen=True, slots=True)
-class Looked:
+class HostFinding:
     """Something that was looked at.
 
     what   is looked at
@@ -46,12 +46,14 @@ class Looked:
     wrong: str = ""
 
 
-def findings() -> Iterator[Looked]:
+def findings() -> Iterator[HostFinding]:
     """All that is looked at, in order."""
-    yield Looked("ncfix", f"{__version__}, {Path(__file__).parents[1]}")
+    yield HostFinding("ncfix", f"{__version__}, {Path(__file__).parents[1]}")
     python = f"{platform.python_version()}, {sys.executable}"
-    yield Looked("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "3.11 or later is needed")
-    yield Looked("computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} to be used")
+    yield HostFinding("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "3.11 or later is needed")
+    yield HostFinding(
+        "computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} to be used"
+    )
     yield from _packages()
     yield _core()
     yield from _plugins()
@@ -59,10 +61,10 @@ def findings() -> Iterator[Looked]:
     yield _temporary()
     yield _outputs()
     settings = sorted(name for name in os.environ if name.startswith("NCFIX_"))
-    yield Looked("environment", ", ".join(f"{name}={os.environ[name]}" for name in settings) or "nothing of ncfix")
+    yield HostFinding("environment", ", ".join(f"{name}={os.environ[name]}" for name in settings) or "nothing of ncfix")
 
 
-def _packages() -> Iterator[Looked]:
+def _packages() -> Iterator[HostFinding]:
     """What ncfix needs, and what of its extras is there."""
     least: dict[str, str] = {}
     for line in _requirements():
@@ -72,14 +74,14 @@ def _packages() -> Iterator[Looked]:
     for name, wanted in least.items():
         there = _version(name)
         if there is None:
-            yield Looked(name, "not installed", f"pip install '{name}{f'>={wanted}' if wanted else ''}'")
+            yield HostFinding(name, "not installed", f"pip install '{name}{f'>={wanted}' if wanted else ''}'")
         elif _numbers(there) < _numbers(wanted):
-            yield Looked(name, there, f"{wanted} or later is needed")
+            yield HostFinding(name, there, f"{wanted} or later is needed")
         else:
-            yield Looked(name, there)
+            yield HostFinding(name, there)
     for name, (extra, without) in EXTRAS.items():
         there = _version(name)
-        yield Looked(name, there or f"not installed (extra {extra}): {without}")
+        yield HostFinding(name, there or f"not installed (extra {extra}): {without}")
 
 
 def _requirements() -> list[str]:
@@ -100,22 +102,22 @@ def _numbers(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in re.findall(r"\d+", text)[:3])
 
 
-def _core() -> Looked:
+def _core() -> HostFinding:
     """Whether the compiled core is used; one that is not of these sources is wrong."""
     stale = core.fault() and core.has_binary()
-    return Looked("core", core.status(), core.fault() if stale else "")
+    return HostFinding("core", core.status(), core.fault() if stale else "")
 
 
-def _plugins() -> Iterator[Looked]:
+def _plugins() -> Iterator[HostFinding]:
     found = load_plugins()
     for plugin in found.loaded:
         adds = "; ".join(f"{kind}: {', '.join(things)}" for kind, things in plugin.things.items() if things)
-        yield Looked(f"plugin {plugin.name}", f"{plugin.distribution} {plugin.version}: {adds}".strip())
+        yield HostFinding(f"plugin {plugin.name}", f"{plugin.distribution} {plugin.version}: {adds}".strip())
     for problem in found.problems:
-        yield Looked("plugin", problem.text, f"{problem.code}: {problem.advice}")
+        yield HostFinding("plugin", problem.text, f"{problem.code}: {problem.advice}")
 
 
-def _caches() -> Iterator[Looked]:
+def _caches() -> Iterator[HostFinding]:
     """Where grammars are kept: in the first of these folders that can be written to."""
     writable = False
     for folder in host.cache_folders(str(Path(__file__).parents[1] / "text" / "grammar.py")):
@@ -123,9 +125,9 @@ def _caches() -> Iterator[Looked]:
         writable = writable or can
         size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else 0
         state = "can be written to" if can else "cannot be written to"
-        yield Looked("cache", f"{folder}, {size / 1e6:.1f} MB, {state}")
+        yield HostFinding("cache", f"{folder}, {size / 1e6:.1f} MB, {state}")
     if not writable:
-        yield Looked("caches", "none can be written to", "make one of them; until then each start takes longer")
+        yield HostFinding("caches", "none can be written to", "make one of them; until then each start takes longer")
 
 
 def _writable(folder: Path) -> bool:
@@ -135,13 +137,13 @@ def _writable(folder: Path) -> bool:
     return folder.is_dir() and os.access(folder, os.W_OK)
 
 
-def _temporary() -> Looked:
+def _temporary() -> HostFinding:
     folder = tempfile.gettempdir()
     room = _room(folder)
     wrong = (
         "" if room is None or room > 1 << 30 else "make room, or set TMPDIR: long programs from pipes are kept there"
     )
-    return Looked("temporary files", folder + ("" if room is None else f", {room / 1e9:.1f} GB free"), wrong)
+    return HostFinding("temporary files", folder + ("" if room is None else f", {room / 1e9:.1f} GB free"), wrong)
 
 
 def _room(folder: str) -> int | None:
@@ -152,7 +154,7 @@ def _room(folder: str) -> int | None:
     return found.f_bavail * found.f_frsize
 
 
-def _outputs() -> Looked:
+def _outputs() -> HostFinding:
     """How files are written where this process works."""
     try:
         with tempfile.TemporaryDirectory(prefix=".ncfix-doctor-", dir=os.curdir) as folder:
@@ -163,11 +165,13 @@ def _outputs() -> Looked:
             append(path, b"and more\n")
             unnamed = hasattr(os, "O_TMPFILE") and _has_unnamed(folder)
     except OSError as error:
-        return Looked("working folder", f"cannot be written to: {error.strerror}")
+        return HostFinding("working folder", f"cannot be written to: {error.strerror}")
     except NcfixError as error:
-        return Looked("working folder", f"{visible(os.getcwd())}: {error.messages[0].text}", error.messages[0].advice)
+        return HostFinding(
+            "working folder", f"{visible(os.getcwd())}: {error.messages[0].text}", error.messages[0].advice
+        )
     how = "without a name at first" if unnamed else "under another name at first"
-    return Looked("working folder", f"{visible(os.getcwd())}: outputs are written {how}")
+    return HostFinding("working folder", f"{visible(os.getcwd())}: outputs are written {how}")
 
 
 def _has_unnamed(folder: str) -> bool:

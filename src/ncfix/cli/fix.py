@@ -59,8 +59,15 @@ class Jobs(click.IntRange):
         return number
 
 
-def processes_for(jobs: int, programs: Sequence[OutputTarget]) -> int:
-    """How many processes work on these programs: what was asked for, or as many as pay, at most one a processor."""
+def workers_for(jobs: int, programs: Sequence[OutputTarget], executor: str) -> int:
+    """How many workers these programs get: what was asked for, or as many as pay, at most one a processor.
+
+    For a cluster there are two at least: one alone would be this process.
+    """
+    from ncfix.batch.work import SCHEME
+
+    if executor.startswith(SCHEME):
+        return max(jobs, 2)
     if jobs != AUTO:
         return jobs
     pay = sum(map(_size, programs)) / PAYS_BYTES + (len(programs) - 1) / PAYS_PROGRAMS
@@ -182,9 +189,9 @@ def fix(
     Programs are never changed where they are unless --in-place says so. Exit code 4: motions were refused and nothing
     was written.
     """
-    from ncfix.batch.work import SCHEME, executor_of
+    from ncfix.batch.work import executor_of
     from ncfix.cli.shop.batch import Batch, FixJob, ProgramLimits
-    from ncfix.cli.shop.summary import Loudness
+    from ncfix.cli.shop.summary import Verbosity
 
     if as_json and json_lines:
         raise UsageError.of("NCF001", "--json and --json-lines are two forms of one output", hint="leave one out")
@@ -206,9 +213,9 @@ def fix(
     job = FixJob(machine, given.load(), dialect, options, ProgramLimits(time_limit_s, memory_limit_mb))
     if looks:
         return _changes(context, job, programs, outputs.folder(programs), diff_motions, as_json)
-    loudness = Loudness.ALL if verbose else Loudness.QUIET if quiet else Loudness.USUAL
-    batch = Batch(job, wanted, outputs.folder(programs), resume, retry, loudness)
-    workers = max(processes_for(jobs, wanted), 2 if executor.startswith(SCHEME) else 1)
+    verbosity = Verbosity.of(quiet, verbose)
+    batch = Batch(job, wanted, outputs.folder(programs), resume, retry, verbosity)
+    workers = workers_for(jobs, wanted, executor)
     batches = [*context.meta.get(BATCHES, ()), (batch, workers, executor_of(executor))]
     context.meta[BATCHES] = batches
     if (following := next_group(context)) is not None:
@@ -255,7 +262,7 @@ def _changes(
 
 def _reported(batches: Sequence[tuple[Batch, int, ExecutorMaker]], as_json: bool, json_lines: bool) -> int:
     """Do batches, one after the other, and print what comes of them, in the form asked for; the worst exit code."""
-    from ncfix.cli.shop.summary import Became, Loudness, Summary
+    from ncfix.cli.shop.summary import OutcomeKind, Summary, Verbosity
 
     summary, entries, worst = Summary(), list[Mapping[str, Any]](), 0
     many = sum(len(batch.targets) for batch, _, _ in batches) > 1
@@ -264,10 +271,10 @@ def _reported(batches: Sequence[tuple[Batch, int, ExecutorMaker]], as_json: bool
         summary.add(outcome.entry)
         worst = max(worst, outcome.code)
         if json_lines:
-            console.put(console.json_text(None, outcome=Became.of(outcome.entry), **outcome.entry))
+            console.put(console.json_text(None, outcome=OutcomeKind.of(outcome.entry), **outcome.entry))
         if as_json:
             entries.append(outcome.entry)
-    if many and batches[0][0].loudness != Loudness.QUIET:
+    if many and batches[0][0].verbosity != Verbosity.QUIET:
         from ncfix.cli.listings import all_codes
 
         for line in summary.lines(all_codes()):

@@ -10,12 +10,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ncfix.core.chain import Hand, RouteSteps
+    from ncfix.core.chain import PoseBatch, RouteSteps
 
     Array = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
-HANDFUL = 64
+BATCH = 64
 SHIFT, TURN = 0, 1
 PARTS = 9
 """See `core.chain`."""
@@ -25,7 +25,7 @@ def aim(
     perfect: RouteSteps,
     within: RouteSteps,
     behind: RouteSteps,
-    hand: Hand,
+    batch: PoseBatch,
     axes: Ints,
     target: Array,
     close: float,
@@ -35,7 +35,7 @@ def aim(
 ) -> int:
     """Newton's method for all poses: as `machine.aim.aimed`, by whole steps.
 
-    within, behind  the two of `route.SplitRoute`; the other functions in `hand` are of the second, then of the first
+    within, behind  the two of `route.SplitRoute`; the other functions in `batch` are of the second, then of the first
     axes            the columns of X, Y and Z
     target          (3, n) mm; (3, 0): where a perfect machine has the tip
     close, flat     when a tip has arrived, mm, and which volume of its motions is none
@@ -43,57 +43,57 @@ def aim(
     out             (6, n): positions of the axes, how far off the tip is at the beginning, mm, largest squared angles
                     of small motions, and whether the tip has arrived
     """
-    n, work, tip, point = hand.n, hand.work, hand.tip, hand.spare
-    ahead = hand.values + PARTS * within.steps
-    right = hand.fits(perfect, 0) and hand.fits(behind, 0) and hand.fits(within, behind.given)
-    right = right and hand.tip - hand.values >= PARTS * (within.steps + behind.steps) and perfect.part.shape[0] == 0
-    right = right and hand.tip - hand.values >= PARTS * perfect.steps and target.shape[0] == 3
+    n, work, tip, point = batch.n, batch.work, batch.tip, batch.spare
+    ahead = batch.values + PARTS * within.steps
+    right = batch.fits(perfect, 0) and batch.fits(behind, 0) and batch.fits(within, behind.given)
+    right = right and batch.tip - batch.values >= PARTS * (within.steps + behind.steps) and perfect.part.shape[0] == 0
+    right = right and batch.tip - batch.values >= PARTS * perfect.steps and target.shape[0] == 3
     right = right and target.shape[1] in (0, n) and out.shape[0] == 6 and out.shape[1] == n and axes.shape[0] == 3
     for i in range(axes.shape[0]):
-        right = right and 0 <= axes[i] < hand.q.shape[0]
+        right = right and 0 <= axes[i] < batch.q.shape[0]
     if not right:
         raise IndexError("a route needs more than it is given")
     begin = 0
     while begin < n:
-        count = min(HANDFUL, n - begin)
-        hand.take_up(begin, count)
-        perfect.set_goal(hand, count, target, begin, point)
-        used = behind.work_out(hand, count, 0, ahead)
-        behind.carry(hand, count, point, ahead, behind.steps)
-        left = set_out(within, axes, hand, count, flat)
+        count = min(BATCH, n - begin)
+        batch.take_up(begin, count)
+        perfect.set_goal(batch, count, target, begin, point)
+        used = behind.work_out(batch, count, 0, ahead)
+        behind.carry(batch, count, point, ahead, behind.steps)
+        left = set_out(within, axes, batch, count, flat)
         for k in range(count):
             out[3, begin + k], out[4, begin + k], out[5, begin + k] = 0.0, work[point + 3, k], 0.0
         number = 0
         while left and number < passes:
-            within.work_out(hand, count, used, hand.values)
-            within.set_off(hand, count, tip)
-            within.carry(hand, count, tip, hand.values, within.steps)
-            left -= step_closer(axes, close, number == 0, hand, count, begin, out)
+            within.work_out(batch, count, used, batch.values)
+            within.set_off(batch, count, tip)
+            within.carry(batch, count, tip, batch.values, within.steps)
+            left -= step_closer(axes, close, number == 0, batch, count, begin, out)
             number += 1
         for i in range(3):
             for k in range(count):
                 out[i, begin + k] = work[axes[i], k]
-        begin += HANDFUL
+        begin += BATCH
     return 0
 
 
-def set_out(steps: RouteSteps, axes: Ints, hand: Hand, count: int, flat: float) -> int:
+def set_out(steps: RouteSteps, axes: Ints, batch: PoseBatch, count: int, flat: float) -> int:
     """Put down how the tips follow the axes; how many can be brought to their goals at all.
 
     Of the rows to spare, four are the goals, and the largest squared angle behind them; nine what takes a gap of the
     tip to positions of the axes; and one the size of the gap before, mm, -1 if the axes cannot bring the tip there.
     """
     work, point, back, before, whole, total = (
-        hand.work,
-        hand.spare,
-        hand.spare + 4,
-        hand.spare + 13,
-        hand.tip,
-        hand.tip + 1,
+        batch.work,
+        batch.spare,
+        batch.spare + 4,
+        batch.spare + 13,
+        batch.tip,
+        batch.tip + 1,
     )
     left = 0
     for i in range(3):
-        steps.follow(hand, axes[i], count, back + 3 * i)
+        steps.follow(batch, axes[i], count, back + 3 * i)
     for k in range(count):
         ax, ay, az = work[back, k], work[back + 1, k], work[back + 2, k]
         bx, by, bz = work[back + 3, k], work[back + 4, k], work[back + 5, k]
@@ -108,7 +108,7 @@ def set_out(steps: RouteSteps, axes: Ints, hand: Hand, count: int, flat: float) 
         work[back + 3, k], work[back + 4, k], work[back + 5, k] = qx * share, qy * share, qz * share
         work[back + 6, k], work[back + 7, k], work[back + 8, k] = rx * share, ry * share, rz * share
         work[total, k] = work[point, k] + work[point + 1, k] + work[point + 2, k]
-    for i in range(hand.q.shape[0]):
+    for i in range(batch.q.shape[0]):
         for k in range(count):
             work[total, k] = work[total, k] + work[i, k]
     for k in range(count):
@@ -118,9 +118,9 @@ def set_out(steps: RouteSteps, axes: Ints, hand: Hand, count: int, flat: float) 
     return left
 
 
-def step_closer(axes: Ints, close: float, begins: bool, hand: Hand, count: int, begin: int, out: Array) -> int:
+def step_closer(axes: Ints, close: float, begins: bool, batch: PoseBatch, count: int, begin: int, out: Array) -> int:
     """Move the axes against the gaps of the tips; how many have arrived with that."""
-    work, gap, point, back, last, arrived = hand.work, hand.tip, hand.spare, hand.spare + 4, hand.spare + 13, 0
+    work, gap, point, back, last, arrived = batch.work, batch.tip, batch.spare, batch.spare + 4, batch.spare + 13, 0
     for i in range(3):
         for k in range(count):
             work[gap + i, k] = work[gap + i, k] - work[point + i, k]
@@ -146,18 +146,18 @@ def step_closer(axes: Ints, close: float, begins: bool, hand: Hand, count: int, 
     return arrived
 
 
-def placed(perfect: RouteSteps, hand: Hand, axes: Ints, ways_back: Array, target: Array, out: Array) -> int:
+def placed(perfect: RouteSteps, batch: PoseBatch, axes: Ints, ways_back: Array, target: Array, out: Array) -> int:
     """Where linear axes have to be for all tips to be at `target` (3, n) mm, out (3, n): as `Route.placed`.
 
     axes       the columns of X, Y and Z; no rotary axis stands between them
     ways_back  (3, 3) what takes a way of the tip to one of the axes
     """
-    work, tip, point, n, first = hand.work, hand.tip, hand.spare, hand.n, perfect.steps
-    right = hand.fits(perfect, 0) and axes.shape[0] == 3 and ways_back.shape[0] == ways_back.shape[1] == 3
-    right = right and perfect.part.shape[0] == 0 and hand.tip - hand.values >= PARTS * perfect.steps
+    work, tip, point, n, first = batch.work, batch.tip, batch.spare, batch.n, perfect.steps
+    right = batch.fits(perfect, 0) and axes.shape[0] == 3 and ways_back.shape[0] == ways_back.shape[1] == 3
+    right = right and perfect.part.shape[0] == 0 and batch.tip - batch.values >= PARTS * perfect.steps
     right = right and target.shape[0] == out.shape[0] == 3 and target.shape[1] == out.shape[1] == n
     for i in range(axes.shape[0]):
-        right = right and 0 <= axes[i] < hand.q.shape[0]
+        right = right and 0 <= axes[i] < batch.q.shape[0]
     if not right:
         raise IndexError("a route needs more than it is given")
     for i in range(perfect.steps - 1, -1, -1):
@@ -165,17 +165,17 @@ def placed(perfect: RouteSteps, hand: Hand, axes: Ints, ways_back: Array, target
             first = i
     begin = 0
     while begin < n:
-        count = min(HANDFUL, n - begin)
-        hand.take_up(begin, count)
-        perfect.set_off(hand, count, tip)
-        perfect.carry(hand, count, tip, hand.values, first)
+        count = min(BATCH, n - begin)
+        batch.take_up(begin, count)
+        perfect.set_off(batch, count, tip)
+        perfect.carry(batch, count, tip, batch.values, first)
         for i in range(3):
             for k in range(count):
                 work[point + i, k] = target[i, begin + k]
         for i in range(perfect.steps - 1, first - 1, -1):
             axis, j = perfect.axis[i], 3 * i
             if perfect.kind[i] == TURN:
-                perfect.turn(hand, i, count, point, -1.0)
+                perfect.turn(batch, i, count, point, -1.0)
             elif not is_one_of(axis, axes):
                 dx, dy, dz = perfect.direction[j], perfect.direction[j + 1], perfect.direction[j + 2]
                 for k in range(count):
@@ -192,7 +192,7 @@ def placed(perfect: RouteSteps, hand: Hand, axes: Ints, ways_back: Array, target
                     work[point + 2, k] - work[tip + 2, k],
                 )
                 out[i, begin + k] = a * x + b * y + c * z
-        begin += HANDFUL
+        begin += BATCH
     return 0
 
 

@@ -2,11 +2,11 @@
 """The tool tip carried through a machine, for many poses: as `machine.steps` and `machine.chain` do it by columns.
 
 The operations and their order are the same, and sines come from numpy in both, so that the results are the same to the
-last bit; a test holds them together. Poses are taken by the handful, so that what is worked out for them stays in the
+last bit; a test holds them together. Poses are taken in batches, so that what is worked out for them stays in the
 processor's cache, and so that sums are loops over poses, which a compiler turns into vector instructions.
 
-No index is looked at again inside: `RouteSteps` and `Hand` look at all of them before. Quotients of whole numbers are
-written with points: Cython makes a whole number of `1 / 6`.
+No index is looked at again inside: `RouteSteps` and `PoseBatch` look at all of them before. Quotients of whole numbers
+are written with points: Cython makes a whole number of `1 / 6`.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
-HANDFUL = 64
+BATCH = 64
 SPARE = 14
-"""Rows for those who do more with a handful of poses."""
+"""Rows for those who do more with a batch of poses."""
 SHIFT, TURN, FORTH, BACK = 0, 1, 2, 3
 POWERS, WAVES, GIVEN = 0, 1, 2
 PARTS = 9
@@ -86,11 +86,11 @@ class RouteSteps:
         if not right:
             raise IndexError("these are not the steps of a route")
 
-    # -- what is done to a handful ------------------------------------------------------------------------------------
+    # -- what is done to a batch ------------------------------------------------------------------------------------
 
-    def set_off(self, hand: Hand, count: int, tip: int) -> int:
-        """Where the tips of a handful of poses are before all steps, in rows from `tip` on: as `steps.at_tip`."""
-        work, length = hand.work, hand.length
+    def set_off(self, batch: PoseBatch, count: int, tip: int) -> int:
+        """Where the tips of a batch of poses are before all steps, in rows from `tip` on: as `steps.at_tip`."""
+        work, length = batch.work, batch.length
         x, y, z = self.start[0], self.start[1], self.start[2]
         u, v, w = self.start[3], self.start[4], self.start[5]
         for k in range(count):
@@ -98,12 +98,12 @@ class RouteSteps:
             work[tip + 2, k], work[tip + 3, k] = z + w * work[length, k], 0.0
         return 0
 
-    def carry(self, hand: Hand, count: int, tip: int, values: int, stop: int) -> int:
-        """Where points of a handful of poses go up to a step, rows from `tip` on: as `steps.carried`.
+    def carry(self, batch: PoseBatch, count: int, tip: int, values: int, stop: int) -> int:
+        """Where points of a batch of poses go up to a step, rows from `tip` on: as `steps.carried`.
 
         values  the first row of the numbers of small motions
         """
-        work = hand.work
+        work = batch.work
         for i in range(stop):
             kind, axis, j, at = self.kind[i], self.axis[i], 3 * i, values + PARTS * self.small[i]
             dx, dy, dz = self.direction[j], self.direction[j + 1], self.direction[j + 2]
@@ -114,7 +114,7 @@ class RouteSteps:
                     work[tip + 1, k] = work[tip + 1, k] + dy * way
                     work[tip + 2, k] = work[tip + 2, k] + dz * way
             elif kind == TURN:
-                self.turn(hand, i, count, tip, 1.0)
+                self.turn(batch, i, count, tip, 1.0)
             elif not self.rotates[i]:
                 sign = 1.0 if kind == FORTH else -1.0
                 for k in range(count):
@@ -123,16 +123,16 @@ class RouteSteps:
                     work[tip + 2, k] = work[tip + 2, k] + sign * work[at + 2, k]
             elif axis < 0 and not self.screws[i]:
                 if kind == FORTH:
-                    self.nudge_forth(hand, i, count, tip, at)
+                    self.nudge_forth(batch, i, count, tip, at)
                 else:
-                    self.nudge_back(hand, i, count, tip, at)
+                    self.nudge_back(batch, i, count, tip, at)
             else:
-                self.screw(hand, i, count, tip, at)
+                self.screw(batch, i, count, tip, at)
         return 0
 
-    def turn(self, hand: Hand, i: int, count: int, tip: int, sense: float) -> int:
+    def turn(self, batch: PoseBatch, i: int, count: int, tip: int, sense: float) -> int:
         """Turn points about the axis of step i, back if `sense` is -1: as `steps.turned`."""
-        work, j, sine, versine = hand.work, 3 * i, hand.sine + self.axis[i], hand.versine + self.axis[i]
+        work, j, sine, versine = batch.work, 3 * i, batch.sine + self.axis[i], batch.versine + self.axis[i]
         dx, dy, dz = self.direction[j], self.direction[j + 1], self.direction[j + 2]
         px, py, pz = self.point[j], self.point[j + 1], self.point[j + 2]
         for k in range(count):
@@ -146,9 +146,9 @@ class RouteSteps:
             work[tip + 2, k] = z + (s * oz + c * tz)
         return 0
 
-    def nudge_forth(self, hand: Hand, i: int, count: int, tip: int, at: int) -> int:
+    def nudge_forth(self, batch: PoseBatch, i: int, count: int, tip: int, at: int) -> int:
         """Move points by the small motion of step i about one point: as `steps.moved_forth`."""
-        work, a, b, c = hand.work, self.center[3 * i], self.center[3 * i + 1], self.center[3 * i + 2]
+        work, a, b, c = batch.work, self.center[3 * i], self.center[3 * i + 1], self.center[3 * i + 2]
         for k in range(count):
             u, v, w = work[at + 3, k], work[at + 4, k], work[at + 5, k]
             s = u * u + v * v + w * w
@@ -164,9 +164,9 @@ class RouteSteps:
             work[tip + 2, k] = z + (first * oz + second * tz) + work[at + 2, k]
         return 0
 
-    def nudge_back(self, hand: Hand, i: int, count: int, tip: int, at: int) -> int:
+    def nudge_back(self, batch: PoseBatch, i: int, count: int, tip: int, at: int) -> int:
         """Undo that: as `steps.moved_back`."""
-        work, a, b, c = hand.work, self.center[3 * i], self.center[3 * i + 1], self.center[3 * i + 2]
+        work, a, b, c = batch.work, self.center[3 * i], self.center[3 * i + 1], self.center[3 * i + 2]
         for k in range(count):
             u, v, w = -work[at + 3, k], -work[at + 4, k], -work[at + 5, k]
             s = u * u + v * v + w * w
@@ -182,9 +182,9 @@ class RouteSteps:
             work[tip + 2, k] = z + (first * oz + second * tz)
         return 0
 
-    def screw(self, hand: Hand, i: int, count: int, tip: int, at: int) -> int:
+    def screw(self, batch: PoseBatch, i: int, count: int, tip: int, at: int) -> int:
         """Move points by a small motion with rotations about several points, or about one that is carried."""
-        work, j, axis, forth = hand.work, 3 * i, self.axis[i], self.kind[i] == FORTH
+        work, j, axis, forth = batch.work, 3 * i, self.axis[i], self.kind[i] == FORTH
         dx, dy, dz = self.direction[j], self.direction[j + 1], self.direction[j + 2]
         px, py, pz = self.point[j], self.point[j + 1], self.point[j + 2]
         for k in range(count):
@@ -204,7 +204,7 @@ class RouteSteps:
                 t2 = t2 + (z + (second * oz + third * tz))
             a, b, c = self.center[j], self.center[j + 1], self.center[j + 2]
             if axis >= 0:
-                sine, versine = work[hand.sine + axis, k], work[hand.versine + axis, k]
+                sine, versine = work[batch.sine + axis, k], work[batch.versine + axis, k]
                 ax, ay, az = a - px, b - py, c - pz
                 ox, oy, oz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
                 tx, ty, tz = dy * oz - dz * oy, dz * ox - dx * oz, dx * oy - dy * ox
@@ -221,35 +221,35 @@ class RouteSteps:
             work[tip, k], work[tip + 1, k], work[tip + 2, k] = x, y, z
         return 0
 
-    def set_goal(self, hand: Hand, count: int, target: Array, begin: int, point: int) -> int:
+    def set_goal(self, batch: PoseBatch, count: int, target: Array, begin: int, point: int) -> int:
         """Put down where the tips shall be: at `target` (3, n) mm, or (3, 0) where these steps take them."""
-        work = hand.work
+        work = batch.work
         if target.shape[1]:
             for k in range(count):
                 work[point, k], work[point + 1, k] = target[0, begin + k], target[1, begin + k]
                 work[point + 2, k], work[point + 3, k] = target[2, begin + k], 0.0
         else:
-            self.set_off(hand, count, point)
-            self.carry(hand, count, point, hand.values, self.steps)
+            self.set_off(batch, count, point)
+            self.carry(batch, count, point, batch.values, self.steps)
         return 0
 
-    def work_out(self, hand: Hand, count: int, used: int, values: int) -> int:
+    def work_out(self, batch: PoseBatch, count: int, used: int, values: int) -> int:
         """The numbers of the small motions, rows from `values` on: as `steps.work_out_functions` and `add_up`.
 
         The tips lend their room to it. `used`: how many of the functions from elsewhere are for other routes; those
         after them are added to it.
         """
-        work, found, last = hand.work, hand.found, -1
+        work, found, last = batch.work, batch.found, -1
         for g in range(self.family.shape[0]):
             if self.family[g] == GIVEN:
                 for f in range(self.first[g], self.first[g + 1]):
                     for k in range(count):
-                        work[found + f, k] = work[hand.others + used, k]
+                        work[found + f, k] = work[batch.others + used, k]
                     used += 1
             elif self.family[g] == POWERS:
-                self.powers(hand, g, count)
+                self.powers(batch, g, count)
             else:
-                self.waves(hand, g, count)
+                self.waves(batch, g, count)
         for t in range(self.part.shape[0]):
             part, function, gain = self.part[t], found + self.function[t], self.gain[t]
             if part == last:
@@ -261,16 +261,16 @@ class RouteSteps:
             last = part
         return used
 
-    def powers(self, hand: Hand, g: int, count: int) -> int:
+    def powers(self, batch: PoseBatch, g: int, count: int) -> int:
         """Powers of a position."""
-        work, u, value, axis, at, power = hand.work, hand.tip, hand.tip + 1, self.signal_axis[g], 5 * g, 1
+        work, u, value, axis, at, power = batch.work, batch.tip, batch.tip + 1, self.signal_axis[g], 5 * g, 1
         unit, low, high = self.signal[at], self.signal[at + 1], self.signal[at + 2]
         center, scale = self.signal[at + 3], self.signal[at + 4]
         for k in range(count):
             work[u, k] = (min(max(work[axis, k] / unit, low), high) - center) / scale
             work[value, k] = work[u, k]
         for f in range(self.first[g], self.first[g + 1]):
-            order, row = self.order[f], hand.found + f
+            order, row = self.order[f], batch.found + f
             while power < order:
                 power += 1
                 for k in range(count):
@@ -283,15 +283,15 @@ class RouteSteps:
                     work[row, k] = 1.0
         return 0
 
-    def waves(self, hand: Hand, g: int, count: int) -> int:
+    def waves(self, batch: PoseBatch, g: int, count: int) -> int:
         """Harmonics of an angle."""
-        work, tip, axis, order = hand.work, hand.tip, self.signal_axis[g], 1
-        sine, versine = hand.sine + axis, hand.versine + axis
+        work, tip, axis, order = batch.work, batch.tip, self.signal_axis[g], 1
+        sine, versine = batch.sine + axis, batch.versine + axis
         for k in range(count):
             work[tip, k] = 1 - work[versine, k]
             work[tip + 1, k], work[tip + 2, k] = work[tip, k], work[sine, k]
         for f in range(self.first[g], self.first[g + 1], 2):
-            row = hand.found + f
+            row = batch.found + f
             while order < self.order[f]:
                 order += 1
                 for k in range(count):
@@ -302,9 +302,9 @@ class RouteSteps:
                 work[row, k], work[row + 1, k] = work[tip + 1, k], work[tip + 2, k]
         return 0
 
-    def follow(self, hand: Hand, column: int, count: int, way: int) -> int:
-        """How the tips of a handful follow a linear axis, mm per mm, rows from `way` on: as `steps.follows`."""
-        work, found = hand.work, False
+    def follow(self, batch: PoseBatch, column: int, count: int, way: int) -> int:
+        """How the tips of a batch follow a linear axis, mm per mm, rows from `way` on: as `steps.follows`."""
+        work, found = batch.work, False
         for k in range(count):
             work[way, k], work[way + 1, k], work[way + 2, k] = 0.0, 0.0, 0.0
         for i in range(self.kind.shape[0]):
@@ -315,7 +315,7 @@ class RouteSteps:
                 for k in range(count):
                     work[way, k], work[way + 1, k], work[way + 2, k] = dx, dy, dz
             elif self.kind[i] == TURN and found:
-                sine, versine = hand.sine + axis, hand.versine + axis
+                sine, versine = batch.sine + axis, batch.versine + axis
                 for k in range(count):
                     x, y, z = work[way, k], work[way + 1, k], work[way + 2, k]
                     ox, oy, oz = dy * z - dz * y, dz * x - dx * z, dx * y - dy * x
@@ -326,8 +326,8 @@ class RouteSteps:
         return 0
 
 
-class Hand:
-    """Many poses in columns, and room for what is worked out for a handful of them.
+class PoseBatch:
+    """Many poses in columns, and room for what is worked out for a batch of them.
 
     q              (n_axes, n) positions
     sine, versine  (k, n) of rotary axes; as numbers the first of their rows in `work`
@@ -357,8 +357,8 @@ class Hand:
         self.tip = self.values + PARTS * small
         self.length, self.spare = self.tip + 4, self.tip + 5
         rows = self.spare + SPARE
-        if work.shape[0] < rows or work.shape[1] != HANDFUL or versine.shape[0] != sine.shape[0]:
-            raise IndexError("there is no room for what is worked out for a handful of poses")
+        if work.shape[0] < rows or work.shape[1] != BATCH or versine.shape[0] != sine.shape[0]:
+            raise IndexError("there is no room for what is worked out for a batch of poses")
         if {sine.shape[1], versine.shape[1], others.shape[1]} != {self.n} or length.shape[0] not in (1, self.n):
             raise IndexError("there are not as many of everything as there are poses")
 
@@ -368,7 +368,7 @@ class Hand:
         return bool(rows and route.given <= self.given.shape[0] - given and route.functions <= self.values - self.found)
 
     def take_up(self, begin: int, count: int) -> int:
-        """Put a handful of poses next to each other."""
+        """Put a batch of poses next to each other."""
         for i in range(self.q.shape[0]):
             for k in range(count):
                 self.work[i, k] = self.q[i, begin + k]
@@ -387,7 +387,7 @@ class Hand:
 
 
 def rows_for(axes: int, turns: int, others: int, functions: int, small: int) -> int:
-    """Rows of `HANDFUL` numbers that the room of a `Hand` has.
+    """Rows of `BATCH` numbers that the room of a `PoseBatch` has.
 
     axes, turns, others  rows of `q`, `sine` and `others`
     functions, small     functions of a route, and small motions of all routes; what none of the functions of a route
@@ -396,61 +396,61 @@ def rows_for(axes: int, turns: int, others: int, functions: int, small: int) -> 
     return axes + 2 * turns + others + functions + PARTS * small + 5 + SPARE
 
 
-def tips(route: RouteSteps, hand: Hand, out: Array) -> int:
+def tips(route: RouteSteps, batch: PoseBatch, out: Array) -> int:
     """The tips of all poses: out (4, n) are x, y, z in mm, and the largest squared angle of a small motion."""
     if (
-        not hand.fits(route, 0)
+        not batch.fits(route, 0)
         or out.shape[0] != 4
-        or out.shape[1] != hand.n
-        or hand.tip - hand.values < PARTS * route.steps
+        or out.shape[1] != batch.n
+        or batch.tip - batch.values < PARTS * route.steps
     ):
         raise IndexError("a route needs more than it is given")
     begin = 0
-    while begin < hand.n:
-        count = min(HANDFUL, hand.n - begin)
-        hand.take_up(begin, count)
-        route.work_out(hand, count, 0, hand.values)
-        route.set_off(hand, count, hand.tip)
-        route.carry(hand, count, hand.tip, hand.values, route.steps)
+    while begin < batch.n:
+        count = min(BATCH, batch.n - begin)
+        batch.take_up(begin, count)
+        route.work_out(batch, count, 0, batch.values)
+        route.set_off(batch, count, batch.tip)
+        route.carry(batch, count, batch.tip, batch.values, route.steps)
         for i in range(4):
             for k in range(count):
-                out[i, begin + k] = hand.work[hand.tip + i, k]
-        begin += HANDFUL
+                out[i, begin + k] = batch.work[batch.tip + i, k]
+        begin += BATCH
     return 0
 
 
 def gaps(
-    perfect: RouteSteps, real: RouteSteps, hand: Hand, target: Array, sides: Ints, out: Array, angle: Array
+    perfect: RouteSteps, real: RouteSteps, batch: PoseBatch, target: Array, sides: Ints, out: Array, angle: Array
 ) -> int:
     """How far the tips of all poses are from where they shall be: out (k, n, 3) mm.
 
-    hand    n poses as they are meant, and others behind them, n of each kind
+    batch    n poses as they are meant, and others behind them, n of each kind
     target  (3, n) mm; (3, 0): where a perfect machine has the tip as meant
     sides   (k,) which kind each of the results is of
     angle   (k, n) the largest squared angle of a small motion
     """
-    n, work, tip, point = out.shape[1], hand.work, hand.tip, hand.spare
-    right = hand.fits(perfect, 0) and hand.fits(real, 0) and hand.tip - hand.values >= PARTS * real.steps
+    n, work, tip, point = out.shape[1], batch.work, batch.tip, batch.spare
+    right = batch.fits(perfect, 0) and batch.fits(real, 0) and batch.tip - batch.values >= PARTS * real.steps
     right = right and perfect.part.shape[0] == 0 and out.shape[2] == 3 and target.shape[1] in (0, n)
-    right = right and hand.tip - hand.values >= PARTS * perfect.steps and target.shape[0] == 3
-    right = right and angle.shape[0] == out.shape[0] == sides.shape[0] and angle.shape[1] == n <= hand.n
+    right = right and batch.tip - batch.values >= PARTS * perfect.steps and target.shape[0] == 3
+    right = right and angle.shape[0] == out.shape[0] == sides.shape[0] and angle.shape[1] == n <= batch.n
     for side in range(sides.shape[0]):
-        right = right and sides[side] >= 0 and (sides[side] + 1) * n <= hand.n
+        right = right and sides[side] >= 0 and (sides[side] + 1) * n <= batch.n
     if not right:
         raise IndexError("a route needs more than it is given")
     begin = 0
     while begin < n:
-        count = min(HANDFUL, n - begin)
-        hand.take_up(begin, count)
-        perfect.set_goal(hand, count, target, begin, point)
+        count = min(BATCH, n - begin)
+        batch.take_up(begin, count)
+        perfect.set_goal(batch, count, target, begin, point)
         for side in range(sides.shape[0]):
-            hand.take_up(sides[side] * n + begin, count)
-            real.work_out(hand, count, 0, hand.values)
-            real.set_off(hand, count, tip)
-            real.carry(hand, count, tip, hand.values, real.steps)
+            batch.take_up(sides[side] * n + begin, count)
+            real.work_out(batch, count, 0, batch.values)
+            real.set_off(batch, count, tip)
+            real.carry(batch, count, tip, batch.values, real.steps)
             for k in range(count):
                 angle[side, begin + k] = work[tip + 3, k]
                 for i in range(3):
                     out[side, begin + k, i] = work[tip + i, k] - work[point + i, k]
-        begin += HANDFUL
+        begin += BATCH
     return 0

@@ -45,7 +45,6 @@ class MovedConstant:
     """A constant of the machine file that the data put elsewhere, surely: mm or rad, with its standard deviation.
 
     unit     what these are multiplied with to be in the unit that people use, and its name
-    index    its place among the free constants
     odds     log odds that it is off, the others given; aliases: constants that explain its part as well
     size_um  how far its change moves what was measured, rms beside the set-up
     """
@@ -55,7 +54,6 @@ class MovedConstant:
     data: float
     sigma: float
     unit: Unit
-    index: int = -1
     odds: float = 0.0
     aliases: tuple[str, ...] = ()
     size_um: float = 0.0
@@ -71,7 +69,7 @@ class ConstantsVerdict:
     """What the data say of all constants of the file together.
 
     change    (k,) what is to be added to the file's values, mm or rad; zero for those that stay
-    moved     the constants that change, those that matter most first
+    moved     the constants that change surely, those that matter most first
     odds      log odds that any is off; what they were chosen from is counted
     distance, freedom  chi-square of the file's constants against the data over all that can be told, and of how many
     size_um   how far the changes move what was measured, rms beside the set-up
@@ -265,6 +263,8 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     for place, index in enumerate(chosen):
         size = data.rms(beside(asked.constants[:, index] * change[index]))
         own, alike = (0.0, ()) if whole else _own(asked, chosen, index, offered)
+        if whole and abs(change[index]) <= DOUBT * sigma[place]:
+            continue
         value = float(start[index])
         data_value = value + float(change[index])
         moved.append(
@@ -274,7 +274,6 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
                 data_value,
                 float(sigma[place]),
                 said[index],
-                index,
                 own,
                 tuple(labels[each] for each in alike),
                 size,

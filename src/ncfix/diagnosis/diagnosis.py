@@ -308,7 +308,7 @@ def _likelihood(scale: Comparison, selected: Selected, constants: ConstantsVerdi
     """Of the values about the file with constants, names and alternatives, less what they pay."""
     asked = FileLikelihood(scale.evidence, scale.all(selected.members), share)
     paid = sum(map(scale.price, selected.members)) + entry_price(len(selected.members)) + constants.paid
-    return asked.likelihood([each.index for each in constants.moved]) - paid
+    return asked.likelihood(np.flatnonzero(~constants.stay).tolist()) - paid
 
 
 def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: float) -> tuple[EffectFinding, ...]:
@@ -320,8 +320,7 @@ def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: fl
         return ()
     p_value = min(constants.p_value, float(np.exp(-constants.odds)))
     if constants.whole:
-        count = len(constants.moved)
-        title = f"constants of the machine file: all {count} that can be told are off together"
+        title = f"constants of the machine file: all {constants.freedom} that can be told are off together"
         owner = Candidate("constants of the file", title, "", CONSTANT_FAMILY, (), (), remedy=ANEW)
         return (EffectFinding(owner, constants.odds, p_value, (), constants.size_um, (), constants.shown),)
     effects = dict(zip(names_of(case.data.problem.selection), _owners(case.data, machine), strict=True))

@@ -106,7 +106,7 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
         return None
     names = {plain(name) for name in refused}
     quick = [each for each in _quick(measurements, machine, now) if plain(each[1].name) not in names]
-    quick.sort(key=lambda pair: _weight(pair[0], pair[1], now))
+    quick.sort(key=lambda pair: _weight(pair[0], pair[1].stretch, now))
     offered = [each for _, each in quick[-TRIED:]]
     offered += [each for each in _offered(measurements, machine) if plain(each.name) not in names]
     count = len(offered) + len(quick)
@@ -123,36 +123,33 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     components = len(now.problem.values) / max(sum(map(len, measurements)), 1)
     given = now.left(AS_IT_STANDS_UM) * float(np.sqrt(components))
     near = [each for each in alike if each.odds > simplest.odds - ALIKE and each is not simplest]
-    return replace(
-        simplest, given_um=given, aliases=tuple(dict.fromkeys(each.name for each in near if each.name != simplest.name))
-    )
+    aliases = tuple(dict.fromkeys(each.name for each in near if each.name != simplest.name))
+    return replace(simplest, given_um=given, aliases=aliases, sure=_reaches_noise(simplest, now))
 
 
-def _weight(left: float, mistake: Mistake, now: Misfit) -> float:
-    """Log likelihood of the values as they are in the file, where undoing the mistake leaves so much, um."""
-    fit = -now.count * (float(np.log(max(left, TINY_UM))) - float(np.log(mistake.stretch)))
+def _weight(left: float, stretch: float, now: Misfit) -> float:
+    """Log likelihood of the values as they are in the file, where so much is left of them, um, once stretched."""
+    fit = -now.count * (float(np.log(max(left, TINY_UM))) - float(np.log(stretch)))
     return fit - 0.5 * (float(np.log(max(left, TINY_UM) / PLAUSIBLE_UM)) / DECADE) ** 2
 
 
 def _tried(mistake: Mistake, before: float, now: Misfit, count: int) -> Mistake:
     """The mistake with what undoing it leaves, and its log odds."""
     try:
-        fixed = misfit(mistake.measurements, mistake.machine)
-        left = fixed.left()
+        left = misfit(mistake.measurements, mistake.machine).left()
     except (NcfixError, np.linalg.LinAlgError, ValueError):
         return replace(mistake, odds=-np.inf)
     paid = float(np.log(count)) + SURE + 0.5 * mistake.fitted * float(np.log(now.count)) - TYPED * mistake.likely
-    own = _weight(left, mistake, now) - paid
-    still = _weight(max(left, fixed.left(AS_IT_STANDS_UM)), mistake, now) - paid
+    odds = _weight(left, mistake.stretch, now) - paid - _weight(before, 1.0, now)
+    return replace(mistake, before_um=before, after_um=left, odds=odds, paid=paid)
+
+
+def _reaches_noise(mistake: Mistake, now: Misfit) -> bool:
+    """Whether the file as it stands, its constants not fitted, is at the noise once the mistake is undone."""
+    fixed = misfit(mistake.measurements, mistake.machine)
+    still = _weight(max(mistake.after_um, fixed.left(AS_IT_STANDS_UM)), mistake.stretch, now) - mistake.paid
     floor = float(np.hypot(fixed.noise, A_LITTLE_UM)) / mistake.stretch
-    return replace(
-        mistake,
-        before_um=before,
-        after_um=left,
-        odds=own - _weight(before, replace(mistake, stretch=1.0), now),
-        paid=paid,
-        sure=still >= _weight(floor, replace(mistake, stretch=1.0), now) - NAMES_COST,
-    )
+    return still >= _weight(floor, 1.0, now) - NAMES_COST
 
 
 def _quick(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[tuple[float, Mistake]]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
-from ncfix.machine.route import Route, SplitRoute, Turns, hand_of
+from ncfix.machine.route import Route, SplitRoute, Turns, batch_of
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, behind_each_other, some
 from ncfix.machine.steps import SMALL, dot, has_arrived, volume
@@ -128,11 +128,11 @@ def _compiled(poses: Poses, perfect: Route, split: SplitRoute, turns: Turns, tar
 
     within, behind = split.within, split.behind
     given = within.terms.given(poses)
-    hand = hand_of(poses, turns, [*behind.terms.given(poses), *given], within, behind)
+    batch = batch_of(poses, turns, [*behind.terms.given(poses), *given], within, behind)
     out = np.empty((6, poses.positions.shape[1]))
     goal = np.empty((3, 0)) if target is None else np.ascontiguousarray(target)
     routes, axes = (perfect.compiled, within.compiled, behind.compiled), np.array(split.axes, dtype=np.int64)
-    aim.aim(*routes, hand, axes, goal, CLOSE, FLAT, WHOLE_STEPS, out)
+    aim.aim(*routes, batch, axes, goal, CLOSE, FLAT, WHOLE_STEPS, out)
     return Aim(out[:3], out[5] > 0, out[3]), out[4]
 
 
@@ -178,9 +178,9 @@ def _compiled_gaps(
 
     kinds = [meant, *(each for each in done if each is not meant)]
     poses, n = behind_each_other(kinds), meant.positions.shape[1]
-    hand = hand_of(poses, route.turns(poses), route.terms.given(poses), route, perfect)
+    batch = batch_of(poses, route.turns(poses), route.terms.given(poses), route, perfect)
     goal = np.empty((3, 0)) if target is None else np.ascontiguousarray(target)
     sides = np.array([next(k for k, kind in enumerate(kinds) if kind is each) for each in done], dtype=np.int64)
     out, angle = np.empty((len(done), n, 3)), np.empty((len(done), n))
-    chain.gaps(perfect.compiled, route.compiled, hand, goal, sides, out, angle)
+    chain.gaps(perfect.compiled, route.compiled, batch, goal, sides, out, angle)
     return out, angle

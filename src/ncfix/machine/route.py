@@ -29,11 +29,11 @@ from ncfix.machine.state import Poses, Signal
 from ncfix.machine.steps import BACK, FORTH, GIVEN, PARTS, POWERS, SHIFT, TURN, WAVES, Functions, Number, Steps
 
 if TYPE_CHECKING:
-    from ncfix.core.chain import Hand, RouteSteps
+    from ncfix.core.chain import PoseBatch, RouteSteps
 
 SUMS = (PiecewiseLinear, Spline, PiecewiseConstant)
 """Bases that add up their functions themselves, each sum on its own."""
-HANDFUL = 64
+BATCH = 64
 """Poses that the compiled core takes at a time."""
 CACHE_LINE = 8
 """Numbers in a line of the cache: room that begins with one is gone through faster."""
@@ -204,8 +204,8 @@ class Route:
         if _are_many(n):
             from ncfix.core import chain
 
-            hand, out = hand_of(poses, turns, self.terms.given(poses), self), np.empty((4, n))
-            chain.tips(self.compiled, hand, out)
+            batch, out = batch_of(poses, turns, self.terms.given(poses), self), np.empty((4, n))
+            chain.tips(self.compiled, batch, out)
             return out[:3], out[3]
         return self.carried(poses, turns, steps.at_tip(self.plain[0], poses.tool_length))
 
@@ -235,9 +235,9 @@ class Route:
         if _are_many(target.shape[1]):
             from ncfix.core import aim
 
-            hand, out = hand_of(poses, self.turns(poses), [], self), np.empty(target.shape)
+            batch, out = batch_of(poses, self.turns(poses), [], self), np.empty(target.shape)
             goal, columns = np.ascontiguousarray(target), np.array(axes, dtype=np.int64)
-            aim.placed(self.compiled, hand, columns, back, goal, out)
+            aim.placed(self.compiled, batch, columns, back, goal, out)
             return out
         x, y, z = target
         way = steps.brought_back(self.plain[0], axes, x, y, z, poses.tool_length, poses.positions, self.turns(poses))
@@ -270,7 +270,7 @@ class Route:
         return sine, versed
 
 
-def hand_of(poses: Poses, turns: Turns, given: Sequence[Array], *routes: Route) -> Hand:
+def batch_of(poses: Poses, turns: Turns, given: Sequence[Array], *routes: Route) -> PoseBatch:
     """Poses for the compiled core, with room for what routes need; `given` are the functions that come from elsewhere.
 
     Each route has small motions of its own.
@@ -283,10 +283,10 @@ def hand_of(poses: Poses, turns: Turns, given: Sequence[Array], *routes: Route) 
     functions = max(len(route.plain[1].order) for route in routes)
     small = sum(len(route.plain[0].kind) for route in routes)
     rows = chain.rows_for(len(q), len(sine), len(others), functions, small)
-    memory = np.zeros(rows * HANDFUL + CACHE_LINE)
+    memory = np.zeros(rows * BATCH + CACHE_LINE)
     begin = -(memory.ctypes.data // memory.itemsize) % CACHE_LINE
-    work = memory[begin : begin + rows * HANDFUL].reshape(rows, HANDFUL)
-    return chain.Hand(q, sine, versine, others, length, work, functions, small)
+    work = memory[begin : begin + rows * BATCH].reshape(rows, BATCH)
+    return chain.PoseBatch(q, sine, versine, others, length, work, functions, small)
 
 
 def _are_many(n: int) -> bool:

@@ -21,7 +21,7 @@ from ncfix.batch.work import ExecutorMaker, results_in_order
 from ncfix.cli import console
 from ncfix.cli.console import owned
 from ncfix.cli.options import dialect_of
-from ncfix.cli.shop.summary import Loudness, Teller, brief, progress
+from ncfix.cli.shop.summary import OutcomeReporter, Verbosity, brief, progress
 from ncfix.cli.streams import FixedText, Outlet, Source, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
@@ -271,7 +271,7 @@ class Batch:
     folder    where their outputs go together; None: each has its own place
     resume    what an earlier run has done stays, and what failed then is not tried again
     retry     what failed is tried again
-    loudness  how much is said
+    verbosity  how much is said
     many      they are, perhaps together with others, many programs; None: if they are several
     """
 
@@ -280,7 +280,7 @@ class Batch:
     folder: str | None
     resume: bool
     retry: bool = False
-    loudness: Loudness = Loudness.USUAL
+    verbosity: Verbosity = Verbosity.USUAL
     many: bool | None = None
 
     def run(self, jobs: int, make: ExecutorMaker) -> Iterator[FixOutcome]:
@@ -305,14 +305,14 @@ class Batch:
         self, targets: Sequence[OutputTarget], kept: Mapping[OutputTarget, JournalRecord], fresh: Iterator[Finished]
     ) -> Iterator[FixOutcome]:
         """All outcomes in their order, each with what there is to say of it."""
-        teller = Teller(self.loudness, self._many)
+        reporter = OutcomeReporter(self.verbosity, self._many)
         with progress(len(targets)) as step:
             for target in targets:
                 if target in kept:
                     outcome, said = _done_before(target, kept[target])
                 else:
                     outcome, said = next(fresh)
-                teller.tell(outcome.entry, said)
+                reporter.report(outcome.entry, said)
                 step()
                 yield outcome
 
@@ -337,7 +337,7 @@ class Batch:
             yield from results_in_order(job.outcome_and_messages, rest, make, jobs, _lost, note)
             return
         for target in rest:
-            if self._many or self.loudness == Loudness.QUIET:
+            if self._many or self.verbosity == Verbosity.QUIET:
                 finished = job.outcome_and_messages(target, jobs)
             else:
                 finished = job.outcome(target, jobs), []

@@ -23,7 +23,7 @@ from ncfix.outputs import exists_already
 if TYPE_CHECKING:
     from ncfix.project import Project
 
-SAID = frozenset({"force", "in_place", "executor"})
+COMMAND_LINE_ONLY = frozenset({"force", "in_place", "executor"})
 """Options that replace files, or have programs worked on elsewhere: they are said anew each time.
 
 A project file may come with programs from anywhere.
@@ -128,7 +128,7 @@ class ProjectCommand(click.Command):
                 close = get_close_matches(key, others, 1)
                 hint = f"did you mean {close[0]}?" if close else "ncfix fix --help shows the options"
                 raise _wrong(project, key, value, "there is no such option", hint)
-            if key in SAID:
+            if key in COMMAND_LINE_ONLY:
                 text = "is said on the command line, and not in a project file"
                 raise _wrong(project, key, value, text, f"--{key.replace('_', '-')}")
             if (option := own.get(key)) and option.name and (taken := _taken(option, key, value, project)) is not None:

@@ -21,15 +21,20 @@ WIDEST = 60
 """Characters of an example's name in the table."""
 
 
-class Loudness(IntEnum):
+class Verbosity(IntEnum):
     """How much is said of programs."""
 
     QUIET = 0
     USUAL = 1
     ALL = 2
 
+    @classmethod
+    def of(cls, quiet: bool, verbose: bool) -> Verbosity:
+        """What the options `-q` and `-v` ask for."""
+        return cls.ALL if verbose else cls.QUIET if quiet else cls.USUAL
 
-class Became(StrEnum):
+
+class OutcomeKind(StrEnum):
     """What can become of a program, as the table and JSON lines name it."""
 
     WRITTEN = "written"
@@ -39,7 +44,7 @@ class Became(StrEnum):
     FAILED = "failed"
 
     @classmethod
-    def of(cls, entry: Mapping[str, Any]) -> Became:
+    def of(cls, entry: Mapping[str, Any]) -> OutcomeKind:
         """What became of the program of an entry in the JSON object."""
         if "errors" in entry:
             return cls.FAILED
@@ -72,11 +77,11 @@ def brief(entry: Mapping[str, Any]) -> str:
 class Summary:
     """Counts of what became of programs, and why.
 
-    became   how many programs, by outcome and code, "" for none, with the first of them
-    remarks  how many written programs have a remark of a code
+    outcomes  how many programs, by outcome and code, "" for none, with the first of them
+    remarks   how many written programs have a remark of a code
     """
 
-    became: dict[tuple[Became, str], list[Any]] = field(default_factory=dict)
+    outcomes: dict[tuple[OutcomeKind, str], list[Any]] = field(default_factory=dict)
     remarks: Counter[str] = field(default_factory=Counter)
     count: int = 0
     written: int = 0
@@ -86,7 +91,7 @@ class Summary:
         self.count += 1
         self.written += entry["output"] is not None
         code = next((code for code, _ in reasons(entry)), "")
-        found = self.became.setdefault((Became.of(entry), code), [0, entry["path"]])
+        found = self.outcomes.setdefault((OutcomeKind.of(entry), code), [0, entry["path"]])
         found[0] += 1
         if not code:
             self.remarks.update({each["code"] for each in entry["warnings"]})
@@ -108,9 +113,9 @@ class Summary:
         table = [f"{count:>8}  {became:<{wide}}  {reason}".rstrip() for count, became, reason in rows]
         return [*table, f"{self.count} programs: {self.written} written, {self.count - self.written} not"]
 
-    def _rows(self) -> list[tuple[Became, str, int, str]]:
-        found = [(became, code, count, first) for (became, code), (count, first) in self.became.items()]
-        return sorted(found, key=lambda row: (list(Became).index(row[0]), -row[2], row[1]))
+    def _rows(self) -> list[tuple[OutcomeKind, str, int, str]]:
+        found = [(became, code, count, first) for (became, code), (count, first) in self.outcomes.items()]
+        return sorted(found, key=lambda row: (list(OutcomeKind).index(row[0]), -row[2], row[1]))
 
 
 def _title(titles: Mapping[str, Code], code: str) -> str:
@@ -144,22 +149,22 @@ def progress(total: int) -> Iterator[Advance]:
 
 
 @dataclass(slots=True)
-class Teller:
+class OutcomeReporter:
     """Says what there is to say of programs that are done.
 
     many  they are many: of each of which nothing was written there is a line, at most `console.MOST` for each reason;
           all that there is to say of it where tracebacks are asked for
     """
 
-    loudness: Loudness
+    verbosity: Verbosity
     many: bool
     seen: Counter[str] = field(default_factory=Counter)
 
-    def tell(self, entry: Mapping[str, Any], said: list[str]) -> None:
+    def report(self, entry: Mapping[str, Any], said: list[str]) -> None:
         """Say what there is to say of one of them; `said`: all of it."""
         wrong = reasons(entry)
-        everything = self.loudness == Loudness.ALL or (bool(wrong) and console.is_debugging())
-        if everything or (not self.many and (self.loudness == Loudness.USUAL or wrong)):
+        everything = self.verbosity == Verbosity.ALL or (bool(wrong) and console.is_debugging())
+        if everything or (not self.many and (self.verbosity == Verbosity.USUAL or wrong)):
             for line in said:
                 console.say(line)
         elif self.many and wrong:

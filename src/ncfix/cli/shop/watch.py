@@ -15,11 +15,11 @@ import click
 from ncfix import files
 from ncfix.batch.watching import WatchedFolder, moments, state_of
 from ncfix.cli import console
-from ncfix.cli.fix import fix, processes_for
+from ncfix.cli.fix import fix, workers_for
 from ncfix.cli.options import FOLDER, PATH, Positive, load_machine, sound
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import ProgramGroup, ProjectCommand, tell_of
-from ncfix.cli.shop.summary import Became, Loudness, reasons
+from ncfix.cli.shop.summary import OutcomeKind, Verbosity, reasons
 from ncfix.cli.targets import STREAM, Outputs, targets
 from ncfix.diagnostics import ExitCode, NcfixError, Place, UsageError, visible
 from ncfix.inputs import identities
@@ -92,7 +92,7 @@ class StatusPage:
 
     def add(self, entry: Mapping[str, Any]) -> None:
         """Take in what became of a program."""
-        self.counts[Became.of(entry)] += 1
+        self.counts[OutcomeKind.of(entry)] += 1
         self.last = [(time.time(), entry), *self.last[: LAST - 1]]
 
     def write(self) -> None:
@@ -121,7 +121,7 @@ class StatusPage:
 """
 
     def _row(self, at: float, entry: Mapping[str, Any]) -> str:
-        became, why = Became.of(entry), reasons(entry)
+        became, why = OutcomeKind.of(entry), reasons(entry)
         said = f"{why[0][0]}: {why[0][1]}" if why else _correction(entry)
         cells = (_clock(at), visible(entry["path"]), f'<span class="{became}">{became}</span>', visible(said))
         return "<tr>" + "".join(f"<td>{cell if '<span' in cell else escape(cell)}" for cell in cells) + "</tr>"
@@ -189,9 +189,9 @@ def watch(
         raise UsageError.of("NCF005", "is the folder of the programs, too", Place(output), "name another folder OUT")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     inputs = [path for path in (machine_path, *given.files) if path]
-    loudness = Loudness.ALL if verbose else Loudness.QUIET if quiet else Loudness.USUAL
+    verbosity = Verbosity.of(quiet, verbose)
     page = StatusPage(status)
-    watched, watching = WatchedFolder(folder, output, settle_s), _Watching(folder, output, given, options, loudness)
+    watched, watching = WatchedFolder(folder, output, settle_s), _Watching(folder, output, given, options, verbosity)
     known, worst = None, 0
     page.check(inputs)
     page.write()
@@ -230,24 +230,24 @@ class _Watching:
     output: str
     given: SetupOptions
     options: Mapping[str, Any]
-    loudness: Loudness
+    verbosity: Verbosity
 
     def corrected(self, machine_path: str, inputs: Iterable[str], ready: list[str], page: StatusPage) -> int:
         """Correct programs, and say what became of them; the worst exit code."""
-        from ncfix.batch.work import SCHEME, executor_of
+        from ncfix.batch.work import executor_of
         from ncfix.cli.shop.batch import Batch
 
         outputs = Outputs(os.path.join(self.output, ""), resume=True)
         wanted = targets([self.folder], outputs, [*inputs], folders=True, only=frozenset(ready))
         if not wanted:
             return 0
-        batch = Batch(self._job(machine_path), wanted, self.output, True, False, self.loudness, many=True)
+        batch = Batch(self._job(machine_path), wanted, self.output, True, False, self.verbosity, many=True)
         worst = 0
         executor = self.options["executor"]
-        workers = max(processes_for(self.options["jobs"], wanted), 2 if executor.startswith(SCHEME) else 1)
+        workers = workers_for(self.options["jobs"], wanted, executor)
         for outcome in batch.run(workers, executor_of(executor)):
             entry = outcome.entry
-            if entry["output"] is not None and not entry.get("resumed") and self.loudness == Loudness.USUAL:
+            if entry["output"] is not None and not entry.get("resumed") and self.verbosity == Verbosity.USUAL:
                 console.say(f"{visible(entry['path'])} -> {visible(entry['output'])}")
             page.add(entry)
             worst = max(worst, outcome.code)
