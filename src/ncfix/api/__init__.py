@@ -15,8 +15,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ncfix.api.sources import load_machine as load_machine
-    from ncfix.api.sources import read_program as read_program
     from ncfix.api.measurements import Calibrated as Calibrated
     from ncfix.api.measurements import calibrate as calibrate
     from ncfix.api.measurements import diagnose as diagnose
@@ -26,6 +24,8 @@ if TYPE_CHECKING:
     from ncfix.api.programs import fixed as fixed
     from ncfix.api.programs import simulate as simulate
     from ncfix.api.programs import verify as verify
+    from ncfix.api.sources import load_machine as load_machine
+    from ncfix.api.sources import read_program as read_program
     from ncfix.api.tables import emulate as emulate
     from ncfix.api.tables import export as export
     from ncfix.api.tables import report as report
