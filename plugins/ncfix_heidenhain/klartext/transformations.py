@@ -449,17 +449,12 @@ def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
         switch(control, control.tools.vector, False, control.tools.offset)
         control.refresh()
     if way is None:
-        control.pass_here(TURNED, POSITIONED, rotary_letters(control))
+        control.pass_here(TURNED, POSITIONED, "".join(LETTERS[index] for index in control.turning))
         return
     target, unknown = control.position[:], {k: why for k, why in control.unknown.items() if k not in way}
     for index, angle in way.items():
         target[index] = angle
     control.make(Motion(MotionKind.RAPID, 0, target, unknown, 0, passing=TURNED))
-
-
-def rotary_letters(control: KlartextControl) -> str:
-    """The machine's rotary axes."""
-    return "".join(LETTERS[index] for index in control.turning)
 
 
 def cycle_19(control: KlartextControl, words: MotionWords) -> None:

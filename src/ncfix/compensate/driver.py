@@ -335,15 +335,15 @@ class PartCorrector(Corrector):
         """Correct a part, hand on what the next one has to know, and prove it; `foreign`: the one before was not."""
         if unit.head is not None and is_offset(unit.head.moves).any():
             raise NotInPartsError("the control offsets a contour from one part into the next")
-        course = None if self.planner is None else self.planner.plan(unit)
-        accepted = None if course is not None else self._accepted_plan(unit)
+        plan = None if self.planner is None else self.planner.plan(unit)
+        accepted = None if plan is not None else self._accepted_plan(unit)
         before = share.before(number)
         if before is not None and foreign:
             self.parts_proof.follower.stand(before.position)
-        if course is not None and before is not None and not before.kept:
-            plain = written(self.language, course, before.position, increments(self.machine))
+        if plan is not None and before is not None and not before.kept:
+            plain = written(self.language, plan, before.position, increments(self.machine))
             if plain is not None:
-                return self._plainly(course, plain, number, share)
+                return self._plainly(plan, plain, number, share)
         accepted, moves = accepted or self._accepted_plan(unit), unit.together.moves
         if before is not None:
             before, (first, *_) = replace(before, direction=unit.direction), before.rounds
@@ -351,20 +351,20 @@ class PartCorrector(Corrector):
                 accepted = None  # the motion before was left as it was, or an axis goes on standing off its place
         return self.correct(unit, [moves], accepted, before, partial(share.leave, number))
 
-    def _plainly(self, course: PlainPlan, plain: Emission, number: int, share: Share) -> ProvedPart:
+    def _plainly(self, plan: PlainPlan, plain: Emission, number: int, share: Share) -> ProvedPart:
         """Finish a part of plain motions."""
-        part, moves = course.part, course.part.moves
+        part, moves = plan.part, plan.part.moves
         text = spliced(part.program.source, plain.splices)
         if not part.last:
-            shift = course.real.start[-1] - moves.start[-1]
+            shift = plan.real.start[-1] - moves.start[-1]
             left = PrecedingMotion.steady(shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy())
             share.leave(number, left, len(text))
-        solution = course.written_plan(plain)
+        solution = plan.written_plan(plain)
         self.parts_proof.check(part, solution, text, plain.splices)
         tally = Tally(self.machine.least_increment[0])
-        tally.add_plain(part.program, solution, largest_shift(course, plain), course.intent)
+        tally.add_plain(part.program, solution, largest_shift(plan, plain), plan.intent)
         if self.task.options.verify:
-            self.note(tally, part.program, (moves, figures(course, plain, self.task.options.split_rapids)))
+            self.note(tally, part.program, (moves, figures(plan, plain, self.task.options.split_rapids)))
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _accepted_plan(self, unit: ProgramPart) -> AcceptedPlan:

@@ -290,7 +290,7 @@ def load_tool_table(path: str) -> dict[int, Tool]:
     """
     text = read_bytes(path, MOST_SAID).decode("utf-8-sig", "replace")
     reader = csv_rows if PurePath(path).suffix.lower() == ".csv" else linuxcnc_rows
-    if is_tool_t(text):
+    if TOOL_T_BEGIN.match(text):
         reader = tool_t_rows
     faults: list[Message] = []
     tools: dict[int, Tool] = {}
@@ -363,21 +363,16 @@ def csv_tool(names: list[str], row: list[str]) -> tuple[int, Tool] | str:
     return int(values["tool"]), Tool(values["length"], None if math.isnan(radius) else radius)
 
 
-BEGIN = re.compile(r"\s*BEGIN\s+\S*TOOL\S*\s*\.T\b\s*(?P<unit>MM|INCH)?", re.IGNORECASE)
-END = re.compile(r"\s*(\[END\]|END\b)", re.IGNORECASE)
+TOOL_T_BEGIN = re.compile(r"\s*BEGIN\s+\S*TOOL\S*\s*\.T\b\s*(?P<unit>MM|INCH)?", re.IGNORECASE)
+TOOL_T_END = re.compile(r"\s*(\[END\]|END\b)", re.IGNORECASE)
 TOOL_T_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)\Z")
 WANTED = ("L", "R", "DL", "DR")
 
 
-def is_tool_t(text: str) -> bool:
-    """Whether a text is such a table."""
-    return BEGIN.match(text) is not None
-
-
 def tool_t_rows(text: str) -> Iterator[Row]:
-    """The rows of the table."""
+    """The rows of a TOOL.T."""
     lines = text.splitlines()
-    head = BEGIN.match(lines[0])
+    head = TOOL_T_BEGIN.match(lines[0])
     names = [(name[0].upper(), name.start()) for name in re.finditer(r"\S+", lines[1])] if len(lines) > 1 else []
     if head is None or not {"T", "L"} <= {name for name, _ in names}:
         yield 2, "the second line names no columns T and L"
@@ -385,7 +380,7 @@ def tool_t_rows(text: str) -> Iterator[Row]:
     scale = INCH if (head["unit"] or "").upper() == "INCH" else 1.0
     stops = [start for _, start in names[1:]] + [None]
     for number, line in enumerate(lines[2:], 3):
-        if END.match(line):
+        if TOOL_T_END.match(line):
             return
         cells = {name: line[start:stop].strip() for (name, start), stop in zip(names, stops, strict=True)}
         if cells["T"].isdigit() and cells["L"]:
