@@ -138,13 +138,19 @@ def overlong(source: bytes, blocks: NDArray[np.int64], splices: Splices, limit: 
     """Blocks (n, 2) of which edits make a line of more than `limit` characters, and how many; 0 is no limit."""
     if not limit or not len(splices):
         return {}
-    grown = np.zeros(len(blocks), dtype=np.int64)
-    own = np.searchsorted(blocks[:, 0], splices.start, side="right") - 1
-    np.add.at(grown, own, np.maximum(splices.length - (splices.stop - splices.start), 0))
-    found = {}
-    for block in np.flatnonzero((grown > 0) & (blocks[:, 1] - blocks[:, 0] + grown > limit)).tolist():
+    grown = np.zeros(len(splices) + 1, dtype=np.int64)
+    np.cumsum(np.maximum(splices.length - (splices.stop - splices.start), 0), out=grown[1:])
+    first = np.searchsorted(splices.start, np.append(blocks[:, 0], len(source) + 1))
+    more = np.diff(grown.take(first))
+    suspects = np.flatnonzero((more > 0) & (blocks[:, 1] - blocks[:, 0] + more > limit)).tolist()
+    ends, found = np.cumsum(splices.length) if suspects else grown, {}
+    for block in suspects:
         start, stop = blocks[block].tolist()
-        edits = splices.rows(np.flatnonzero(own == block)).moved(-start)
+        own = slice(first[block], first[block + 1])
+        begin, end = int(ends[own][0] - splices.length[own][0]), int(ends[own][-1])
+        edits = Splices(
+            splices.start[own] - start, splices.stop[own] - start, splices.length[own], splices.data[begin:end]
+        )
         longest = max(map(len, apply(source[start:stop], tuple(edits.edits())).splitlines()))
         if longest > limit:
             found[block] = longest
