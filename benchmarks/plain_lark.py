@@ -3,7 +3,7 @@
 import sys
 from itertools import islice
 
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 from ncfix.text.grammar import parse, squeeze
 
 dialect = get("linuxcnc")

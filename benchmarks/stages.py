@@ -25,8 +25,7 @@ from ncfix.control import trace
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
 from ncfix.text import reader
-from ncfix.text.dialect import Dialect
-from ncfix.text.dialects import detect, get
+from ncfix.text.dialect import Dialect, detect, get
 
 SETUP = Setup(work_offsets={"G54": dict.fromkeys("XYZBC", 0.0)}, assume_zero=True)
 MACHINE = Path(__file__).with_name("five_axis.toml")

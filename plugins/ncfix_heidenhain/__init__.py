@@ -64,7 +64,7 @@ def register_dialects(register: Register[Dialect]) -> None:
 
 def klartext_codes() -> Mapping[str, Code]:
     """What the messages about Klartext programs mean."""
-    from ncfix_heidenhain.klartext.message_codes import KLARTEXT_CODES
+    from ncfix_heidenhain.codes import KLARTEXT_CODES
 
     return KLARTEXT_CODES
 

@@ -66,7 +66,7 @@ def register_dialects(register: Register[Dialect]) -> None:
 
 def sinumerik_codes() -> Mapping[str, Code]:
     """What the messages about SINUMERIK programs mean."""
-    from ncfix_siemens.sinumerik.message_codes import SINUMERIK_CODES
+    from ncfix_siemens.codes import SINUMERIK_CODES
 
     return SINUMERIK_CODES
 

@@ -20,7 +20,7 @@ from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.text.dialects import detect
+from ncfix.text.dialect import detect
 from ncfix.text.reader import read
 
 FAMILIES = {

@@ -17,7 +17,7 @@ from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine
 from ncfix.testing import judging
 from ncfix.testing.judging import OPTIONS, SETUP, SHIFT, STEP
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 from ncfix.text.reader import read
 
 

@@ -12,7 +12,7 @@ from ncfix.compensate.following import follow
 from ncfix.control.moves import MotionKind
 from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import load
-from ncfix.text.dialects import detect
+from ncfix.text.dialect import detect
 from ncfix.text.reader import read
 
 PROGRAMS = ("fanuc_tcp.nc", "fanuc_tilted.nc")

@@ -15,7 +15,7 @@ from ncfix.compensate.plan.kinematics import joints_from_commands
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import State, load
-from ncfix.text.dialects import detect
+from ncfix.text.dialect import detect
 from ncfix.text.reader import read
 
 PROGRAMS = ("klartext_tcp.h", "klartext_tilted.h")

@@ -13,7 +13,7 @@ from ncfix.compensate.following import follow
 from ncfix.control.moves import MotionKind
 from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import load
-from ncfix.text.dialects import detect
+from ncfix.text.dialect import detect
 from ncfix.text.reader import read
 
 PROGRAMS = ("siemens_traori.mpf", "siemens_swivel.mpf")

@@ -16,7 +16,7 @@ from ncfix.compensate.workers import Ground
 from ncfix.control.setup import Setup
 from ncfix.control.trace import NotInPartsError
 from ncfix.machine import Machine
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 from ncfix.text.reader import read
 
 OPTIONS = FixOptions(tolerance_um=5.0, allow_refused=True)

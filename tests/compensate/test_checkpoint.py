@@ -19,7 +19,7 @@ from ncfix.control.moves import Moves
 from ncfix.control.trace import TABLES
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 
 SIZE = 1200
 

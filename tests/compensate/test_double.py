@@ -16,7 +16,7 @@ from ncfix.compensate.following import Task
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, load
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, initial={"X": 0.0, "Y": 0.0, "Z": 100.0})

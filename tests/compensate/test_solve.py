@@ -14,7 +14,7 @@ from ncfix.control.moves import MotionKind
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
 from ncfix.text.reader import read
-from ncfix.writer.pinning import LED, PINNED
+from ncfix.writer.pieces import LED, PINNED
 
 ZERO = dict.fromkeys("XYZ", 0.0)
 SETUP = Setup(work_offsets={"G54": ZERO}, initial=ZERO, assume_zero=True)

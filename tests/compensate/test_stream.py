@@ -23,7 +23,7 @@ from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import Backlash
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 from ncfix.text.reader import read
 from ncfix.text.writer import Splices, spliced
 

@@ -22,7 +22,7 @@ from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, State, loads
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 from ncfix.text.reader import read
 
 MACHINE = Path(__file__).parents[2] / "examples/machines/wCBXFZYSt.toml"

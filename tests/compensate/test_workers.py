@@ -28,7 +28,7 @@ from ncfix.compensate.workers import GoneError, Post, lines_between
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError, UsageError
 from ncfix.machine import Machine, load
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 from ncfix.text.reader import read
 
 SECONDS = 20

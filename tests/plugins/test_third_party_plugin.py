@@ -14,7 +14,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
 from ncfix.machine import load
-from ncfix.text.dialects import signature_rank
+from ncfix.text.dialect import signature_rank
 from ncfix.text.reader import read
 
 PROGRAM = b"""O100

@@ -17,9 +17,8 @@ from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError
 from ncfix.text.language import language_of
-from ncfix.text.number_text import in_style, is_plain, laid_out, rounded, styles_of
 from ncfix.text.reader import read
-from ncfix.text.spelling import NumberStyle
+from ncfix.text.spelling import NumberStyle, in_style, is_plain, laid_out, rounded, styles_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Edit, Splices, apply, spliced
 from ncfix.writer import bulk

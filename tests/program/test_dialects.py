@@ -14,7 +14,7 @@ from ncfix.compensate.following import follow
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import load
-from ncfix.text.dialects import check_content, detect, get, names
+from ncfix.text.dialect import check_content, detect, get, names
 from ncfix.text.grammar import find_grammar, parser
 from ncfix.text.reader import read
 from ncfix.text.tree import Word

@@ -19,7 +19,7 @@ from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError, UsageError
 from ncfix.machine import State, load, loads
-from ncfix.text.dialects import detect
+from ncfix.text.dialect import detect
 from ncfix.text.reader import read
 from ncfix.text.tree import Opaque, Word
 from program.lanes import assert_read_right

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.lark import from_lark
 
 from ncfix.diagnostics import SourceError
-from ncfix.text.dialect import Dialect
-from ncfix.text.dialects import check_content, get
+from ncfix.text.dialect import Dialect, check_content, get
 from ncfix.text.faults import BlockError
 from ncfix.text.grammar import parser_of
 from ncfix.text.reader import parse_block, read

@@ -12,7 +12,7 @@ from random import Random
 import pytest
 
 from conftest import use_form
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 from ncfix.text.reader import read, shapes_of
 from ncfix.text.tree import Literal, Template, Word
 from program.lanes import assert_read_right

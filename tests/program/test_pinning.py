@@ -11,7 +11,7 @@ from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.text.reader import read
-from ncfix.writer.pinning import closure_of_refusals
+from ncfix.writer.pieces import closure_of_refusals
 
 HEAD = "G21 G90 G94 G17 F100\nG0 X0 Y0 Z0\n"
 

@@ -35,8 +35,8 @@ from ncfix.text.faults import BlockError, explain
 from ncfix.text.grammar import parse, squeeze
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
 from ncfix.text.tree import Binary, Expression, Item, Literal, OWordLine, Program, Template, Word
-from ncfix_iso.rs274.blocks import check_repeats
 from ncfix_iso.rs274.groups import NON_MODAL, ROTATION
+from ncfix_iso.rs274.language import check_repeats
 from ncfix_iso.rs274.order import DWELL
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from ncfix.control.coordinates import Z, mask_of
 from ncfix.text.tree import Comment, Tape, Word
 from ncfix_fanuc.macro.data import CHANGED
 from ncfix_fanuc.macro.vectors import INCLINED
-from ncfix_iso.rs274 import lengths
+from ncfix_iso.rs274 import settings
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.groups import LENGTH
 
@@ -59,7 +59,7 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
         take_number(control, block)
         if code in TIP_CONTROL:
             note_turned(control)
-    lengths.tool_offset(control, block, SAME.get(code, code))
+    settings.tool_offset(control, block, SAME.get(code, code))
     if control.tools.vector[Z] != before and "Z" not in block.values and not z_is_named_first(control):
         control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
 

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.arcs import CLOCKWISE
-from ncfix.text.number_text import ROUNDED
-from ncfix.text.spelling import Spelling, value_of
+from ncfix.text.spelling import ROUNDED, Spelling, value_of
 from ncfix.text.tree import Literal, Program, Word
 from ncfix.writer.block import EXACT, BlockWriter
 from ncfix.writer.target import Target

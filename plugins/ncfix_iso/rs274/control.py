@@ -11,8 +11,7 @@ from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
 from ncfix.control.setup import Run
 from ncfix.control.state import Saved
 from ncfix.text.dialect import Dialect
-from ncfix_iso.rs274.groups import RULES, Rules
-from ncfix_iso.rs274.own_codes import with_own_codes
+from ncfix_iso.rs274.groups import ARCS, RULES, Rules, with_own_codes
 from ncfix_iso.rs274.parameters import NumberedParameters, Store
 
 RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
@@ -28,7 +27,6 @@ PASSING = frozenset(
 """Of a control: what never changes, what `lasting` looks into or a checkpoint says, and what each block sets anew."""
 
 
-ARCS = (20, 30)
 POLAR = frozenset("@^")
 """Addresses that together stand for X and Y."""
 

@@ -13,8 +13,8 @@ from ncfix.control.expressions import Fault
 from ncfix.control.moves import FeedMode, Motion, MotionKind, UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
+from ncfix_iso.rs274.motion import by_radius_and_angle, unknown_after, unnamed
 from ncfix_iso.rs274.systems import check_system, words_of
-from ncfix_iso.rs274.targets import by_radius_and_angle, unknown_after, unnamed
 
 BAD_CYCLE = "NCF226"
 AFTER_NONE = "where the axis {} stands after a cycle without a hole (K0, L0) differs from control to control"

@@ -1,4 +1,4 @@
-"""Modal groups: which G and M codes exclude one another, and which codes a dialect knows.
+"""Modal groups: which codes exclude one another, which of them a dialect knows, and those that it adds of its own.
 
 Sources: LinuxCNC documentation, "G-code modal groups"; for ISO controls the lists of G codes in the Fanuc 30i, Haas
 and Okuma programming manuals. Codes are in tenths: G38.2 is 382.
@@ -6,15 +6,19 @@ and Okuma programming manuals. Codes are in tenths: G38.2 is 382.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Mapping, Set
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 from ncfix.control.expressions import Evaluate
 from ncfix.control.operations import Like
-from ncfix.text.dialect import CodeOperation, CycleTable
+from ncfix.text.dialect import CodeOperation, CycleTable, tenths
 from ncfix.text.tree import Expression
 from ncfix_iso.rs274.expressions import compiled
+
+if TYPE_CHECKING:
+    from ncfix.text.dialect import Dialect
+
 
 NON_MODAL = "non-modal"
 MOTION = "motion"
@@ -49,6 +53,7 @@ CYCLES = (730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890)
 DYNAMIC_OFFSETS = (431, 432)
 """G43.1 and G43.2, which take the axis words of blocks without a motion code."""
 
+ARCS = (20, 30)
 PROBES = (382, 383, 384, 385)
 SPLINES = (50, 51, 52)
 THREADS = (330, 331, 760)
@@ -106,6 +111,53 @@ TOOL_CHANGE = 60
 """M6. Of two tools that Mazak names with it, the first is changed, and the second only brought for the next change."""
 
 
+DRILLING = tuple(code for code in CYCLES if code >= 810)
+
+
+@dataclass(frozen=True, slots=True)
+class Uses:
+    """Which codes use an address: motion codes, other G codes of the block, M codes of the block; in tenths."""
+
+    motions: frozenset[int] = frozenset()
+    g_codes: frozenset[int] = frozenset()
+    m_codes: frozenset[int] = frozenset()
+
+
+def uses(motions: tuple[int, ...] = (), g: tuple[int, ...] = (), m: tuple[int, ...] = ()) -> Uses:
+    """`Uses` from tuples; the cycles of turning use every address."""
+    return Uses(frozenset((*motions, *TURNING_CYCLES)), frozenset(g), frozenset(m))
+
+
+USER_M = tuple(range(1000, 2000, 10))
+CUTTER_WORDS = (410, 411, 420, 421)
+
+USED_BY: dict[str, Uses] = {
+    "D": uses(g=(*CUTTER_WORDS, 960)),
+    "E": uses((760,), m=(660, 670, 680)),
+    "H": uses((760,), g=(430, 432)),
+    "I": uses((*ARCS, 50, 51, 331, 760, 870), g=(100,)),
+    "J": uses((*ARCS, 50, 51, 760, 870), g=(100,)),
+    "K": uses((*ARCS, 330, 331, 760, 870)),
+    "L": uses((52, 730, 760, *DRILLING), g=(100, *CUTTER_WORDS), m=(660, 980)),
+    "P": uses(
+        (*ARCS, 50, 52, 740, 760, 820, 840, 860, 880, 890),
+        g=(40, 100, 640),
+        m=(190, 500, 510, 520, 530, 620, 630, 640, 650, 660, 980, *USER_M),
+    ),
+    "Q": uses((50, 730, 760, 830), g=(100, 640), m=(190, 610, 660, 670, 680, *USER_M)),
+    "R": uses((*ARCS, 730, 740, 760, *DRILLING), g=(100, 411, 421), m=(190,)),
+}
+
+
+def unused_word(letters: Set[str], motion: int | None, g_codes: Set[int], m_codes: Set[int]) -> str | None:
+    """The first address that no code of the block uses."""
+    for letter, users in USED_BY.items():
+        used = motion in users.motions or g_codes & users.g_codes or m_codes & users.m_codes
+        if letter in letters and not used:
+            return letter
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class Rules:
     """What a dialect makes of codes.
@@ -152,3 +204,49 @@ LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")
 ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40}))
 RULES = {"iso": ISO, "linuxcnc": LINUXCNC}
 """By `Dialect.semantics`."""
+
+
+def with_own_codes(rules: Rules, dialect: Dialect) -> Rules:
+    """The rules of a dialect: those of its family, and what it adds."""
+    for name, operations in dialect.codes:
+        letter, code = name[0], tenths(name)
+        if len(operations) == 1 and isinstance(operations[0], Like):
+            rules = replace(rules, aliases={**rules.aliases, (letter, code): operations[0]})
+        elif letter == "M":
+            rules = with_m_code(rules, code, operations)
+        else:
+            rules = with_g_code(rules, code, operations)
+    for name, table in dialect.cycles:
+        rules = with_cycle(rules, tenths(name), table)
+    return rules
+
+
+def with_m_code(rules: Rules, code: int, operations: tuple[CodeOperation, ...]) -> Rules:
+    """An M code that is a few operations, or none."""
+    m_groups = {**rules.m_groups, code: f"{OWN}M{code}"}
+    return replace(rules, m_groups=m_groups, operations={**rules.operations, ("M", code): operations})
+
+
+def with_g_code(rules: Rules, code: int, operations: tuple[CodeOperation, ...]) -> Rules:
+    """A G code that is a few operations; one with none is passed over."""
+    known = {known: group for known, group in rules.g_groups.items() if known != code}
+    takes = {code} if any(operation.takes for operation in operations) else set[int]()
+    return replace(
+        rules,
+        g_groups=known | ({code: f"{OWN}G{code}"} if operations else {}),
+        harmless_g=rules.harmless_g - {code} if operations else rules.harmless_g | {code},
+        operations={**rules.operations, ("G", code): operations},
+        takes=(rules.takes - {code}) | takes,
+    )
+
+
+def with_cycle(rules: Rules, code: int, table: CycleTable) -> Rules:
+    """A drilling cycle."""
+    return replace(
+        rules,
+        g_groups={**rules.g_groups, code: MOTION},
+        harmless_g=rules.harmless_g - {code},
+        cycles=rules.cycles | {code},
+        takes=rules.takes - {code},
+        tables={**rules.tables, code: table},
+    )

@@ -14,15 +14,14 @@ from ncfix.control.setup import Run
 from ncfix.control.state import NO_MOTION
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
-from ncfix_iso.rs274.blocks import check_words
-from ncfix_iso.rs274.control import ARCS, POLAR, RUNTIME_BRANCH, Block, RS274Control
+from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE
 from ncfix_iso.rs274.expressions import number_of, whole
 from ncfix_iso.rs274.flow import OWords
-from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS, LENGTH, NON_MODAL, TURNING_CYCLES
+from ncfix_iso.rs274.groups import ARCS, DYNAMIC_OFFSETS, LENGTH, NON_MODAL, TURNING_CYCLES
 from ncfix_iso.rs274.motion import BAD_MOTION, NO_CODE, in_machine_coordinates
 from ncfix_iso.rs274.order import DWELL, MACHINE, MOTIONS
-from ncfix_iso.rs274.plans import Codes, RS274Plan, RS274Unit, grouped_codes, has_words
+from ncfix_iso.rs274.plans import Codes, RS274Plan, RS274Unit, check_words, grouped_codes, has_words
 from ncfix_iso.rs274.settings import unknown_code
 
 if TYPE_CHECKING:
@@ -219,7 +218,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         motion = self.motion_of(plan, codes)
         if codes.takes or (motion is None and codes.g.get(LENGTH) in DYNAMIC_OFFSETS):
             control.claim_words(DWELL_TIME if codes.g.get(NON_MODAL) == DWELL else None)
-        check_words(control, plan, codes, motion)
+        check_words(plan, codes, motion, control.rules)
         if plan.command is not None:
             self.command(plan.command)
         self.note_foreign(plan)

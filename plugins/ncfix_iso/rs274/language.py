@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from lark import UnexpectedInput
+
 from ncfix.control.interpreter import RUNTIME
 from ncfix.diagnostics import SourceError
+from ncfix.text.build import Parsed, TooDeepError, build, check_exponents, check_numbers, start_of
+from ncfix.text.dialect import Dialect
+from ncfix.text.faults import BlockError, bare_expression, explain
+from ncfix.text.grammar import Squeezed, parse, squeeze
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
 from ncfix.text.reach import tape_end
@@ -16,13 +23,52 @@ from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Program, Word
 from ncfix.writer.block import BlockWriter
 from ncfix.writer.language import WrittenLanguage
-from ncfix_iso.rs274.blocks import parse_block
 from ncfix_iso.rs274.control import RS274Control
-from ncfix_iso.rs274.groups import RULES
+from ncfix_iso.rs274.groups import RULES, TOOL_CHANGE
 from ncfix_iso.rs274.interpreter import RS274Interpreter
 
 if TYPE_CHECKING:
     from ncfix.control.interpreter import FlatLine
+
+
+MAY_REPEAT = frozenset("GM")
+"""The addresses that may stand several times in a block."""
+
+PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
+"""A parameter, and behind it outside brackets what a check number looks like."""
+
+
+def parse_block(dialect: Dialect, text: str) -> Parsed:
+    """One block, by the grammar and the rules that a grammar cannot say; raises `BlockError`."""
+    squeezed = squeeze(text)
+    try:
+        parsed = build(parse(dialect, squeezed.code), text, squeezed)
+    except UnexpectedInput as error:
+        raise explain(error, text, squeezed) from None
+    except TooDeepError as error:
+        place = squeezed.places[error.position]
+        raise BlockError("NCF118", "the expression is nested too deep, or too long", place) from None
+    check_products(squeezed)
+    check_numbers(parsed)
+    check_exponents(parsed, text)
+    check_repeats(parsed, standby=dialect.semantics != "linuxcnc")
+    return parsed
+
+
+def check_products(squeezed: Squeezed) -> None:
+    """Refuse `X#1*2`: it would be read as X#1 and a check number, which no program with parameters has."""
+    if found := PRODUCT.search(squeezed.code):
+        raise bare_expression(squeezed.places[found.start("operator")])
+
+
+def check_repeats(parsed: Parsed, standby: bool = True) -> None:
+    """Refuse a word that stands twice; with `standby` not the tool that M6 has brought besides the one it changes."""
+    seen: set[str] = set()
+    may = MAY_REPEAT | {"T"} if standby and TOOL_CHANGE in parsed.template.m_codes else MAY_REPEAT
+    for word in parsed.template.words:
+        if word.address in seen and word.address not in may:
+            raise BlockError("NCF117", f"the word {word.address} stands twice", start_of(word, parsed))
+        seen.add(word.address)
 
 
 def writable(program: Program, block: int) -> Layout | None:

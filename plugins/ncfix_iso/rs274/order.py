@@ -14,11 +14,11 @@ from ncfix_iso.rs274.arc_motion import arc
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.cycles import cycle
 from ncfix_iso.rs274.groups import Rules
-from ncfix_iso.rs274.lengths import change_tool, select_tool, set_data, tool_offset
 from ncfix_iso.rs274.motion import (
     NO_CODE,
     at_power_on,
     cancel,
+    destination,
     dwell,
     end_spline,
     feed,
@@ -34,17 +34,20 @@ from ncfix_iso.rs274.motion import (
 )
 from ncfix_iso.rs274.settings import (
     arc_distance,
+    change_tool,
     compensation,
     diameter,
     distance,
     plane,
     retract,
     select_radius,
+    select_tool,
+    set_data,
     spindle_or_state,
+    tool_offset,
     units,
 )
 from ncfix_iso.rs274.systems import rotate_system, select_system, shift_system, unfollowed
-from ncfix_iso.rs274.targets import destination
 
 Step = Callable[[RS274Control, Block, int], None]
 

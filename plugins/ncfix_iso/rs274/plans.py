@@ -50,6 +50,7 @@ LANE_LETTERS = frozenset("FN") | INDEX.keys()
 ARC_LETTERS = frozenset("IJKR")
 PLACES = ARC_LETTERS | INDEX.keys()
 CONFLICT = "NCF208"
+UNUSED = "NCF209"
 UNKNOWN_M = "NCF229"
 MAX_M_CODES = 4
 
@@ -299,6 +300,17 @@ def has_own(g: Mapping[str, int], m: Mapping[str, int], rules: Rules) -> bool:
     """Whether a block has codes of the dialect's own, which may have a use for any word."""
     written = {*(("G", code) for code in g.values()), *(("M", code) for code in m.values())}
     return not rules.operations.keys().isdisjoint(written) or not rules.tables.keys().isdisjoint(g.values())
+
+
+def check_words(plan: RS274Plan, codes: Codes, motion: int | None, rules: Rules) -> None:
+    """Raise `Fault` for a word that no code of a block uses, where the control does."""
+    if not rules.strict or motion in plan.checked or motion in rules.tables or has_own(codes.g, codes.m, rules):
+        return
+    letter = groups.unused_word(plan.letters, motion, frozenset(codes.g.values()), frozenset(codes.m.values()))
+    if letter is not None:
+        raise Fault(UNUSED, f"no code of the block uses the word {letter}", span=plan.span_of(letter))
+    if plan.codes is not None:
+        plan.checked.add(motion)
 
 
 def takes_axes(code: int, rules: Rules) -> bool:

@@ -51,7 +51,7 @@ def read_program(
 
     Raises `SourceError` NCF1xx for what cannot be read.
     """
-    from ncfix.text.dialects import detect, encoded
+    from ncfix.text.dialect import detect, encoded
     from ncfix.text.reader import read
 
     if source is not None and text is None:

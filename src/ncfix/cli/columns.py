@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.cli import console
-from ncfix.text.number_text import MINUS, ZERO, without_zeros
+from ncfix.text.spelling import MINUS, ZERO, without_zeros
 
 DIGITS = 9
 """Decimals that are kept: what is below has no meaning on any machine."""

@@ -46,7 +46,7 @@ def dialects(name: str | None, as_json: bool) -> None:
     if name is None:
         found: dict[str, Dialect] = registry("dialects")
     else:
-        from ncfix.text.dialects import get
+        from ncfix.text.dialect import get
 
         found = {name: get(name)}
     if as_json:

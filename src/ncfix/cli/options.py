@@ -232,7 +232,7 @@ def read_program(
 
 def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None) -> Dialect:
     """The dialect of that name, else what the beginning of a program shows, else that of the machine's control."""
-    from ncfix.text.dialects import detect, get
+    from ncfix.text.dialect import detect, get
 
     if name is not None:
         return get(name)

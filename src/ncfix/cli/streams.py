@@ -104,7 +104,7 @@ class Source:
         named  its dialect was said: of a pipe no more than a part is waited for; else, and of a file, there are enough
                of them to tell what the text is, whatever the size of a part
         """
-        from ncfix.text.dialects import PROBE_BYTES
+        from ncfix.text.dialect import PROBE_BYTES
 
         many = part_bytes()
         self.head = self._read(many if named and self.kept is not None else max(many, PROBE_BYTES))

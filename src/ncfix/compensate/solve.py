@@ -38,8 +38,7 @@ from ncfix.text.language import language_of
 from ncfix.text.tree import Program
 from ncfix.writer.emit import Emission, emit
 from ncfix.writer.language import WrittenLanguage
-from ncfix.writer.pieces import SecondReading
-from ncfix.writer.pinning import LED, PINNED, closure_of_refusals
+from ncfix.writer.pieces import LED, PINNED, SecondReading, closure_of_refusals
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,7 @@ from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Run, Setup
 from ncfix.diagnostics import Message, SourceError, UsageError
 from ncfix.text import stamp
-from ncfix.text.dialect import Dialect
-from ncfix.text.dialects import check_content, check_zeros, header_length
+from ncfix.text.dialect import Dialect, check_content, check_zeros, header_length
 from ncfix.text.language import Language, language_of
 from ncfix.text.layout import AXIS_LETTERS
 from ncfix.text.reader import ProgramReading

@@ -17,8 +17,7 @@ from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine
 from ncfix.testing.judging import OPTIONS, SETUP, Judged, judged, shifted_machine
-from ncfix.text.dialect import Dialect
-from ncfix.text.dialects import get
+from ncfix.text.dialect import Dialect, get
 from ncfix.text.reader import read
 
 NUMBERS: dict[str, float] = {

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.build import Parsed
-from ncfix.text.dialect import Dialect
-from ncfix.text.dialects import check_content, detect, get, header_length
+from ncfix.text.dialect import Dialect, check_content, detect, get, header_length
 from ncfix.text.faults import BlockError
 from ncfix.text.language import Language, language_of
 from ncfix.text.reach import UNREAD, Reach

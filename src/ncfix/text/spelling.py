@@ -2,13 +2,25 @@
 
 One rule for all output: a value is printed with a fixed number of decimals, correctly rounded from the double
 (an exact half goes to the even digit, as the C library does), and minus zero is zero where a number is rewritten.
-`number_text` writes many numbers as columns by the same rule.
+
+Many numbers are written as columns, byte for byte the same. A value that lies so close to the middle between two
+outputs that a product of doubles cannot tell which of them is nearer is marked, and written by itself.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
+
+if TYPE_CHECKING:
+    from ncfix.core.words import NumberRules
 
 
 def value_of(text: str) -> float:
@@ -122,3 +134,210 @@ class Spelling:
     @staticmethod
     def _marked(text: str, *, comma: bool) -> str:
         return text.replace(".", ",") if comma else text
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+MOST_DECIMALS = 9
+"""Decimals that are written in bulk; a number with more goes one by one."""
+LONGEST = 2 * EIGHT
+"""Bytes, but for its sign, of the longest number that is rewritten in bulk."""
+LARGEST = 1e9
+"""Values of that many output steps go one by one: their products with powers of ten are not exact enough."""
+TIE = 1e-14
+"""So close to the middle between two outputs, as a share of it, a value counts as on it; a hundred times the rounding
+of a product of doubles."""
+ROUNDED = 1.01
+"""Half output steps by which an axis may stand off its place for nothing but rounding."""
+
+ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
+
+
+@cache
+def rules() -> NumberRules:
+    """These numbers, as the compiled core takes them."""
+    from ncfix.core import words
+
+    return words.NumberRules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
+
+
+@dataclass(frozen=True, slots=True)
+class Styles:
+    """The manner of m numbers, as in `spelling.NumberStyle`; `clear` (m,): nothing but a sign, digits and a point."""
+
+    decimals: IntArray
+    point: Mask
+    plus: Mask
+    leading_zero: Mask
+    width: IntArray
+    clear: Mask
+
+    def rows(self, rows: IntArray) -> Styles:
+        """Some of them."""
+        return Styles(*(getattr(self, name).take(rows) for name in self.__dataclass_fields__))
+
+
+def styles_of(text: NDArray[np.uint8], spans: IntArray, *, signed: bool = False) -> Styles:
+    """The styles of the numbers at `spans` (m, 2); `signed`: what had a sign keeps one, whichever."""
+    low, high = (int(spans[:, 0].min()), int(spans[:, 1].max())) if len(spans) else (0, 0)
+    text, spans = text[low:high], spans - low
+    starts, stops = spans[:, 0], spans[:, 1]
+    signs = text.take(starts)
+    first = starts + SIGN.take(signs)
+    found = digits_of(text, first, stops, valued=False)
+    decimals = found.tail - found.pointed
+    whole = stops - first - found.tail
+    return Styles(
+        decimals=decimals,
+        point=found.pointed,
+        plus=(signs == PLUS) | (signs == MINUS) if signed else signs == PLUS,
+        leading_zero=whole > 0,
+        width=np.where((whole > 1) & (text.take(first) == ZERO), whole, 0),
+        clear=found.pure & ~found.several & (stops - first <= LONGEST) & (decimals <= MOST_DECIMALS),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class NumberColumns:
+    """How m numbers are to be written, columns.
+
+    heads     four bytes that stand before each, as one number; a zero byte for none
+    sign      a character, 0 for none
+    steps     its size in units of 10^-decimals
+    decimals  digits behind the point
+    least     digits before the point that there are at least
+    point     a point is written
+    """
+
+    heads: NDArray[np.uint32]
+    sign: NDArray[np.uint8]
+    steps: NDArray[np.uint32]
+    decimals: IntArray
+    least: IntArray
+    point: Mask
+
+    def and_then(self, other: NumberColumns, order: IntArray) -> NumberColumns:
+        """These numbers and others behind them, all put in an order."""
+        names = self.__dataclass_fields__
+        return NumberColumns(*(np.concatenate((getattr(self, k), getattr(other, k))).take(order) for k in names))
+
+
+@dataclass(frozen=True, slots=True)
+class Texts:
+    """Numbers as text: their bytes, one number after the other, and how many each of them takes, (m,)."""
+
+    data: bytes
+    length: IntArray
+
+
+def is_plain(values: FloatArray, decimals: IntArray) -> Mask:
+    """Which of values (n,) can be written in bulk with `decimals` (n,): not too large, clearly nearer to one output."""
+    with np.errstate(invalid="ignore"):
+        steps = np.abs(values) * POWERS.take(decimals)
+        off = np.abs(steps - np.floor(steps) - 0.5)
+        plain: Mask = (steps < LARGEST) & (off > TIE * steps)
+    return plain
+
+
+def rounded(values: FloatArray, decimals: IntArray | int) -> FloatArray:
+    """What a reader makes of values (n,) written with so many decimals (for those that are `is_plain`)."""
+    scale = POWERS.take(decimals)
+    result: FloatArray = np.rint(values * scale) / scale + 0.0
+    return result
+
+
+def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> NumberColumns:
+    """Values in the styles of written numbers, as `NumberStyle.write` does it; all `is_plain`, all `clear`."""
+    kept = np.maximum(decimals, styles.decimals)
+    steps = _steps(values, kept)
+    rows = np.flatnonzero(kept > styles.decimals)
+    while len(rows):
+        rows = rows[(steps[rows] % 10 == 0) & (kept[rows] > styles.decimals[rows])]
+        steps[rows] //= 10
+        kept[rows] -= 1
+    sign = styles.plus * np.uint8(PLUS)
+    sign[(values < 0) & (steps != 0)] = MINUS
+    least = np.maximum(styles.width, styles.leading_zero | (kept == 0))
+    return NumberColumns(np.zeros(len(steps), np.uint32), sign, steps, kept, least, styles.point | (kept > 0))
+
+
+def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8], *, signed: bool = False) -> NumberColumns:
+    """Values with exactly so many decimals, as `f"{value:.{decimals}f}"` does it; all `is_plain`.
+
+    heads   (m, 4) bytes to put before each, 0 for none
+    signed  with a plus sign, too, which zero has as well
+    """
+    steps = _steps(values, decimals)
+    negative = (values < 0) & (steps != 0) if signed else np.signbit(values)
+    sign = np.where(negative, MINUS, PLUS if signed else 0).astype(np.uint8)
+    return NumberColumns(
+        heads.view(np.uint32)[:, 0], sign, steps, decimals, np.ones(len(steps), np.int64), decimals > 0
+    )
+
+
+def _steps(values: FloatArray, decimals: IntArray) -> NDArray[np.uint32]:
+    """How many output steps values are, the sign left out; all less than `LARGEST`."""
+    steps: NDArray[np.uint32] = np.rint(np.abs(values) * POWERS.take(decimals)).astype(np.uint32)
+    return steps
+
+
+def laid_out(numbers: NumberColumns) -> Texts:
+    """Numbers as text: what stands before, sign, digits, point and decimals in columns, and zero where nothing is."""
+    decimals, most = numbers.decimals, int(numbers.decimals.max(initial=0))
+    if int(decimals.min(initial=most)) == most:
+        decimals = np.array(most)  # numpy divides by one number much faster than by many
+    steps: NDArray[Any] = numbers.steps if most <= 2 * QUAD else numbers.steps.astype(np.int64)
+    power: NDArray[Any] = TENS.take(decimals).astype(steps.dtype)
+    whole = steps // power
+    fraction = (steps - whole * power) * TENS.take(-most % QUAD + most - decimals).astype(steps.dtype)
+    digits = np.maximum(numbers.least, _digits(whole))
+    before, behind = _in_quads(whole, int(digits.max(initial=0))), _in_quads(fraction, most)
+    for place, quad in enumerate(reversed(before)):
+        quad &= LAST.take(digits - QUAD * place, mode="clip")
+    for place, quad in enumerate(behind):
+        quad &= FIRST.take(decimals - QUAD * place, mode="clip")
+    length = digits + decimals + numbers.point + (numbers.sign != 0)
+    heads = [numbers.heads] if numbers.heads.any() else []
+    for k in range(QUAD * len(heads)):
+        length += heads[0] & np.uint32(0xFF << 8 * k) != 0
+    point = numbers.point * np.uint8(POINT)
+    return Texts(without_zeros([*heads, numbers.sign, *before, point, *behind]), length)
+
+
+def _digits(values: NDArray[Any]) -> IntArray:
+    """How many digits whole numbers have; 0 has none."""
+    found = np.zeros(len(values), dtype=np.int64)
+    for place in range(len(str(int(values.max(initial=0))))):
+        found += values >= TENS[place]
+    return found
+
+
+TENS = 10 ** np.arange(19)
+QUAD = 4
+QUADS = (np.arange(10_000)[:, None] // (1000, 100, 10, 1) % 10 + ZERO).astype(np.uint8).view(np.uint32).ravel()
+"""The numbers of four digits as text, each as one number."""
+FIRST = (np.tri(QUAD + 1, QUAD, -1) * 0xFF).astype(np.uint8).view(np.uint32).ravel()
+LAST = (np.tri(QUAD + 1, QUAD, -1) * 0xFF).astype(np.uint8)[:, ::-1].copy().view(np.uint32).ravel()
+"""What leaves of four characters the first so many, or the last so many."""
+
+
+def _in_quads(values: NDArray[Any], digits: int) -> list[NDArray[np.uint32]]:
+    """Whole numbers of up to so many digits as text, four characters each."""
+    quads: list[NDArray[np.uint32]] = []
+    for _ in range(-(-digits // QUAD)):
+        above = values // 10_000
+        quads.insert(0, QUADS.take(values - above * 10_000))
+        values = above
+    return quads
+
+
+def without_zeros(columns: list[NDArray[Any]]) -> bytes:
+    """The bytes of columns, row by row, but for zeros."""
+    cells = np.empty((len(columns[0]), sum(column.itemsize for column in columns)), dtype=np.uint8)
+    at = 0
+    for column in columns:
+        cells[:, at : at + column.itemsize].view(column.dtype)[:, 0] = column
+        at += column.itemsize
+    return cells.tobytes().translate(None, b"\0")

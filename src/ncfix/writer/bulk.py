@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ncfix import core
 from ncfix.control.moves import Frame, MotionKind, Moves
-from ncfix.text.number_text import (
+from ncfix.text.spelling import (
     ROUNDED,
     NumberColumns,
     Styles,
@@ -34,9 +34,9 @@ from ncfix.text.writer import Splices
 from ncfix.writer.bulk_arcs import CentreWords, OutputSteps, whole_arcs
 from ncfix.writer.bulk_fit import qualified, sound, with_dwells
 from ncfix.writer.bulk_layouts import CLOSING, NONE, OPENING, Layouts, lines_of, with_lines
-from ncfix.writer.frames import FrameMap
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
+from ncfix.writer.target import FrameMap
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

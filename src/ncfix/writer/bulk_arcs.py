@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import MotionKind, Moves
-from ncfix.text.number_text import Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
+from ncfix.text.spelling import Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
 from ncfix.writer.bulk_layouts import NONE, Layouts, places_of
-from ncfix.writer.frames import FrameMap
 from ncfix.writer.pieces import Pieces
+from ncfix.writer.target import FrameMap
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

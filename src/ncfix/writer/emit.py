@@ -22,11 +22,9 @@ from ncfix.text.tree import Program, view
 from ncfix.text.writer import Edit, Splices, overlong
 from ncfix.writer.block import STRAIGHT_AND_ARCS
 from ncfix.writer.bulk import Bulk, write_alone
-from ncfix.writer.frames import FrameMap
 from ncfix.writer.language import WrittenLanguage
-from ncfix.writer.levels import LevelBook
 from ncfix.writer.pieces import Pieces, SecondReading
-from ncfix.writer.target import TANGENTIAL, Rendered, Target, plane_across
+from ncfix.writer.target import TANGENTIAL, FrameMap, LevelBook, Rendered, Target, plane_across
 
 FloatArray = NDArray[np.float64]
 

@@ -2,18 +2,24 @@
 
 In inverse time LinuxCNC moves linear axes no slower than `LEAST_PACE`. A turn that this would hurry gets the F of its
 little linear motion too, in feed per minute (G94), and G93 again behind it.
+
+`FrameMap` goes from commands to the numbers of a program and back. `LevelBook` knows the level R of canned cycles: what
+it shall be in a block, what is in force, and where the control stands then.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.moves import CycleCall
+from ncfix.control.moves import CycleCall, Frame, Moves
 from ncfix.control.pointing import Pointing
+from ncfix.text.spelling import decimals_for
+from ncfix.writer.pieces import Pieces
 
 FloatArray = NDArray[np.float64]
 
@@ -230,3 +236,148 @@ def feed_way(letters: tuple[str, ...], begin: FloatArray, end: FloatArray, diame
 def feed_number(value: float) -> str:
     """The number after F."""
     return f"{value:.{max(3, DIGITS - 1 - int(np.floor(np.log10(value))))}f}"
+
+
+class FrameMap:
+    """One frame of a program for a given set of axes, with the maps both ways. Positions have shape (..., n_axes)."""
+
+    def __init__(self, frame: Frame, axes: tuple[str, ...], rotary: NDArray[np.bool_]) -> None:
+        self.frame = frame
+        self.scale = np.where(rotary, np.pi / 180, frame.unit)
+        if frame.diameter and "X" in axes:
+            self.scale[axes.index("X")] /= 2
+        self.spatial = [axes.index(letter) for letter in "XYZ" if letter in axes]
+        self.axes = ["XYZ".index(letter) for letter in "XYZ" if letter in axes]
+        self.rotation = frame.rotation[np.ix_(self.axes, self.axes)]
+        self.rotated = not np.array_equal(frame.rotation, np.eye(3))
+        self.unit = frame.unit
+        self.origin = np.array([frame.offset[axes.index(letter)] if letter in axes else 0.0 for letter in "XYZ"])
+
+    def program(self, command: FloatArray) -> FloatArray:
+        """Program numbers of a command (..., n_axes), mm and rad: in units of the program, in its frame."""
+        values = command - self.frame.offset
+        if self.rotated:
+            values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation)
+        return values / self.scale
+
+    def decimals(self, steps: FloatArray) -> NDArray[np.int64]:
+        """(n_axes,) digits behind the point that numbers need for what the control can resolve, mm and rad."""
+        return np.array([decimals_for(step) for step in steps / self.scale], dtype=np.int64)
+
+    def still(self, unmoved: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Axes that stand exactly where they stood, free of the rounding of these maps.
+
+        unmoved  (n_axes,) those that the program did not tell to move; in a rotated frame one of X Y Z moves them all
+        """
+        if not self.rotated or unmoved[self.spatial].all():
+            return unmoved
+        result = unmoved.copy()
+        result[self.spatial] = False
+        return result
+
+    def command(self, program: FloatArray) -> FloatArray:
+        """The inverse of `program`."""
+        values = program * self.scale
+        if self.rotated:
+            values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation.T)
+        return values + self.frame.offset
+
+    def program_point(self, point: FloatArray) -> FloatArray:
+        """A point X Y Z (mm, command coordinates) in program numbers; diameters do not apply to centres."""
+        return np.asarray((point - self.origin) @ self.frame.rotation / self.unit)
+
+    def point_of(self, program: FloatArray) -> FloatArray:
+        """X Y Z (3,) of a position (n_axes,) in the numbers in which centres are given: no diameters."""
+        point = np.zeros(3)
+        point[self.axes] = program[self.spatial]
+        if self.frame.diameter:
+            point[0] /= 2
+        return point
+
+    def command_point(self, point: FloatArray) -> FloatArray:
+        """The inverse of `program_point`, (..., 3)."""
+        return np.asarray((point * self.unit) @ self.frame.rotation.T + self.origin)
+
+
+def _turned(points: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Points (..., k) times a rotation; what is not known (NaN) stays with the coordinates that are made of it."""
+    lost = np.isnan(points)
+    if not lost.any():
+        return np.asarray(points @ rotation)
+    result: FloatArray = np.where(lost, 0.0, points) @ rotation
+    result[(lost.astype(float) @ (rotation != 0.0)) > 0] = np.nan
+    return result
+
+
+class LevelBook:
+    """The book that the control keeps of R.
+
+    Where a control stands at R and is to come back to where the series of holes began (G98), LinuxCNC goes up there
+    before it goes to the hole, but not from any higher than R: so R must not sink below where it stands.
+
+    in_force  the frame in whose numbers R was written, and R; None where that is not known
+    approach  (n_axes,) the command over the last hole at that level
+    """
+
+    def __init__(self, moves: Moves, pieces: Pieces) -> None:
+        self.moves = moves
+        self.pieces = pieces
+        self.in_force: tuple[int, float] | None = None
+        self.approach: FloatArray | None = None
+
+    def forget(self) -> None:
+        """Something else than a corrected cycle: R is not known any more."""
+        self.in_force = self.approach = None
+
+    def wanted(
+        self,
+        row: int,
+        piece: int,
+        number: int,
+        frame: FrameMap,
+        as_programmed: FrameMap,
+        here: FloatArray,
+        address: str,
+    ) -> Level | None:
+        """What R shall be in the numbers of `frame` (its `number`), while the axes stand `here`; None of no cycle.
+
+        address  what stands for R
+        """
+        moves, approach = self.moves, self.pieces.approach
+        if approach is None or moves.approach is None or not np.isfinite(approach[piece]).all():
+            return None
+        nominal = as_programmed.program(moves.approach[row].copy())
+        across = int(np.argmax(np.abs(nominal - as_programmed.program(moves.end[row].copy()))))
+        in_frame, level = self.in_force or (-1, math.nan)
+        stands = bool(as_programmed.program(moves.start[row].copy())[across] == nominal[across])
+        return Level(
+            across,
+            wanted=float(frame.program(approach[piece].copy())[across]),
+            nominal=float(nominal[across]),
+            before=level if in_frame == number else math.nan,
+            least=float(frame.program(here.copy())[across]) if stands and not self.comes_back(row) else math.nan,
+            address=address,
+        )
+
+    def comes_back(self, row: int) -> bool:
+        """Whether the control ends at R (G99) behind a cycle, and not where it began."""
+        moves = self.moves
+        if moves.approach is None or row + 1 == len(moves):
+            return False
+        on = moves.start[row + 1] == moves.approach[row]
+        return bool(on[moves.end[row] != moves.approach[row]].all())
+
+    def note(self, number: int, frame: FrameMap, target: Target, rendered: Rendered) -> None:
+        """Note what was written."""
+        self.forget()
+        if rendered.level is not None and target.level is not None:
+            over = rendered.ends[-1].copy()
+            over[target.level.across] = rendered.level
+            self.in_force, self.approach = (number, rendered.level), frame.command(over)
+
+    def returns(self, row: int) -> NDArray[np.bool_]:
+        """(n_axes,) axes that stand at that level where the motion behind a cycle begins."""
+        if self.approach is None or self.moves.approach is None:
+            return np.zeros(len(self.moves.axes), dtype=bool)
+        level = self.moves.approach[row]
+        return np.asarray((self.moves.start[row + 1] == level) & (self.moves.end[row] != level))

@@ -12,7 +12,7 @@ import pytest
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
-from ncfix.text.dialects import get
+from ncfix.text.dialect import get
 from ncfix.text.reader import read
 from ncfix.text.tree import Program
 from ncfix.writer import bulk, emit

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.text.dialects import detect
+from ncfix.text.dialect import detect
 from ncfix.text.reach import UNREAD
 from ncfix.text.reader import read
 from ncfix.text.tree import Assignment, Command, Opaque, OWordLine, Program, Word

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.text.dialects import detect
+from ncfix.text.dialect import detect
 from ncfix.text.reader import read
 from ncfix.text.tree import Assignment, Command, FunctionCall, Literal, NamedParameter, Opaque, OWordLine, Program, Word
 from program.lanes import assert_read_right

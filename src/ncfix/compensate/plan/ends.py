@@ -31,7 +31,7 @@ from ncfix.compensate.plan.kinematics import Correction, commands_from_joints, r
 from ncfix.compensate.plan.strategies import PoseSequence, Strategy
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
-from ncfix.writer.frames import FrameMap
+from ncfix.writer.target import FrameMap
 
 
 @dataclass(frozen=True, slots=True)
