@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint share format accuracy bench batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
+.PHONY: demo test full lint share format accuracy bench batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
 	goldens goldens-update ci clean
 
 demo:            ## fix the shipped five-axis example
@@ -9,6 +9,9 @@ demo:            ## fix the shipped five-axis example
 
 test:            ## set up and run the tests
 	./try test
+
+full:            ## the tests with large grids of cases whole, where a usual run takes a choice (an hour)
+	NCFIX_FULL=1 ./try test
 
 lint:            ## style, types, floors (needs: pip install -e '.[dev]')
 	$(PYTHON) -m ruff check .

@@ -19,6 +19,8 @@ hypothesis.settings.load_profile("searching" if os.environ.get("NCFIX_SEARCH") e
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES = "figures"
+FULL = os.environ.get("NCFIX_FULL", "") not in ("", "0")
+"""Whether grids of cases are taken whole (`make full`): where cases prove one rule, a usual run takes some of them."""
 PATIENCE_S = 60.0
 """How long something is waited for that takes a second or two, on a computer that does much else."""
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conftest import FULL
 from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import Backlash, Polynomial
@@ -319,7 +320,7 @@ def test_what_takes_a_factor_off_again_beside_encoder_tables_is_not_corrected_tw
     assert not made(machine, product_terms="plus_both", positioning="eec").messages
 
 
-@pytest.mark.parametrize("terms", ["plus_multiplier", "plus_base", "plus_both"])
+@pytest.mark.parametrize("terms", ["plus_both", "plus_multiplier", "plus_base"] if FULL else ["plus_both"])
 def test_tables_that_take_off_again_fit_too(root: Path, terms: str) -> None:
     """What the control adds besides products takes tables: there are as many products as leave room for these."""
     machine = load(str(root / "examples" / "machines" / "wCBXFZYSt.toml"))
