@@ -65,6 +65,7 @@ class Scanner:
         values: Floats,
         shapes: Bytes,
         starts: Ints,
+        behind: Ints,
         tree: Rows,
     ) -> int:
         """Scan the n blocks (n, 2) of a text; how many shapes there are, or `UNTOUCHED`, or `CRAMPED`.
@@ -79,9 +80,11 @@ class Scanner:
         spans, values  of the numbers
         shapes         one after the other
         starts         where each begins
+        behind         (n + 1,) the shape that came behind each when it was met last, -1 if none did without a comment
         tree           see `CHARACTER`
         """
-        count, known, end = 0, 0, 0
+        count, known, end, latest = 0, 0, 0, 0
+        behind[0] = NONE
         self.size, starts[0] = 1, 0
         tree[0, CHILD], tree[0, SHAPE] = 0, NONE
         for block in range(blocks.shape[0]):
@@ -89,6 +92,18 @@ class Scanner:
             row, row_at_sign, end_at_sign = 0, 0, end
             if max(count - values.shape[0], self.size - tree.shape[0]) + stop - place > 0:
                 return CRAMPED
+            if known:
+                guess = behind[latest]
+                found = NONE
+                if guess >= 0:
+                    found = self.alike(
+                        text, place, stop, shapes, starts[guess], starts[guess + 1], number_mark, pointless_mark,
+                        count, spans, values,
+                    )  # fmt: skip
+                if found >= 0:
+                    count, latest, group[block] = found, guess, guess
+                    continue
+            commented = False
             while place < stop:
                 character, past = text[place], place + 1
                 kind = self.kinds[character]
@@ -104,6 +119,7 @@ class Scanner:
                         count += 1
                         place, character = past - 1, number_mark if self.pointed else pointless_mark
                 elif kind == COMMENT:
+                    commented = True
                     close = self.comment_end(text, place, stop)
                     if close == BROKEN:
                         return UNTOUCHED
@@ -123,11 +139,56 @@ class Scanner:
                     character = text[place]
             if tree[row, SHAPE] < 0:
                 tree[row, SHAPE] = known
+                behind[known] = NONE
                 known += 1
                 starts[known] = end
             group[block] = tree[row, SHAPE]
+            if not commented:
+                behind[latest] = group[block]
+            latest = group[block]
         first[blocks.shape[0]] = count
         return known
+
+    def alike(
+        self,
+        text: Bytes,
+        begin: int,
+        stop: int,
+        shapes: Bytes,
+        at: int,
+        end: int,
+        number_mark: int,
+        pointless_mark: int,
+        count: int,
+        spans: Ints,
+        values: Floats,
+    ) -> int:
+        """How many numbers there are with those of a block, if it has the shape at `at` to `end`; `NONE` if it may not.
+
+        The shape has no comment. `count`: numbers so far, behind which those of the block are put down.
+        """
+        place = begin
+        while at < end and place < stop:
+            character, mark = text[place], shapes[at]
+            at += 1
+            if mark != number_mark and mark != pointless_mark:
+                if character != mark:
+                    return NONE
+                place += 1
+                continue
+            signed = self.kinds[character] == SIGN
+            digits = place + 1 if signed else place
+            if digits >= stop or self.kinds[text[digits]] != NUMERIC:
+                return NONE
+            if not signed and place > begin and self.kinds[text[place - 1]] == NUMERIC:
+                return NONE
+            if self.number(text, digits, stop) != FREE or self.start != place:
+                return NONE
+            if mark != (number_mark if self.pointed else pointless_mark):
+                return NONE
+            spans[count, 0], spans[count, 1], values[count] = place, self.past, self.value
+            count, place = count + 1, self.past
+        return count if at == end and place == stop else NONE
 
     def number(self, text: Bytes, place: int, stop: int) -> int:
         """What the run of digits and points at a place is: `FREE`, `FIXED` or `BROKEN`.

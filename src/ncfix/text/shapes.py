@@ -262,6 +262,7 @@ def scan_compiled(
             values,
             shapes,
             starts,
+            np.empty(n + 1, np.int64),
             np.empty((rows, 4), np.int32),
         )
         if known != CRAMPED:
