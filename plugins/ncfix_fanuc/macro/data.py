@@ -6,7 +6,7 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable data input
 from __future__ import annotations
 
 from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of
-from ncfix.control.moves import Motion, MotionKind
+from ncfix.control.moves import Motion, MotionEnd, MotionKind
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.systems import (
@@ -67,7 +67,7 @@ def made(control: RS274Control, block: Block, code: int) -> None:
     """A text or a pocket that the control mills by itself, and the way back from a reference point."""
     gone = {index for index in control.machine if block.axes >> index & 1 or index in (X, Y, Z)}
     unknown = control.unknown | dict.fromkeys(sorted(gone), AFTER_MADE)
-    control.make(Motion(MotionKind.FEED, block.axes, control.position[:], unknown, 0, refusal=MADE[code]))
+    control.make(Motion(MotionKind.FEED, block.axes, MotionEnd(control.position[:], unknown), 0, refusal=MADE[code]))
 
 
 def set_data(control: RS274Control, block: Block, code: int) -> None:

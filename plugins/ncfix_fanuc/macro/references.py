@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.control.moves import Motion, MotionKind, Pass, Passing
+from ncfix.control.moves import Motion, MotionEnd, MotionKind, Pass, Passing
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, destination, go_to_reference
@@ -26,8 +26,8 @@ NO_LENGTH = 490
 def check(control: RS274Control, block: Block, code: int) -> None:
     """G27: to the words, which should be a reference point."""
     if block.axes:
-        target, unknown = destination(control, block)
-        control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, control.modal.motion, passing=CHECKED))
+        end = destination(control, block)
+        control.make(Motion(MotionKind.RAPID, block.axes, end, control.modal.motion, passing=CHECKED))
 
 
 def named(control: RS274Control, block: Block, code: int) -> None:
@@ -37,7 +37,8 @@ def named(control: RS274Control, block: Block, code: int) -> None:
         return
     unknown = control.unknown | dict.fromkeys(control.machine, AFTER_ALL)
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format("G28"))
-    control.make(Motion(MotionKind.RAPID, 0, control.position[:], unknown, control.modal.motion, passing=passing))
+    end = MotionEnd(control.position[:], unknown)
+    control.make(Motion(MotionKind.RAPID, 0, end, control.modal.motion, passing=passing))
 
 
 def cancelling(control: MacroControl, block: Block, code: int) -> None:
@@ -54,12 +55,11 @@ def further(control: RS274Control, block: Block, code: int) -> None:
     if number == SECOND:
         go_to_reference(control, block, code)
         return
-    way, unknown = destination(control, block)
+    way = destination(control, block)
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(f"G30 P{number}"))
-    if way != control.position or (block.axes and not control.modal.incremental):
-        control.make(Motion(MotionKind.RAPID, block.axes, way, unknown, control.modal.motion, passing=passing))
+    if way.target != control.position or (block.axes and not control.modal.incremental):
+        control.make(Motion(MotionKind.RAPID, block.axes, way, control.modal.motion, passing=passing))
     taken = [index for index in control.machine if block.axes >> index & 1 or not block.axes]
     unknown = control.unknown | dict.fromkeys(taken, AFTER_REFERENCE)
-    control.make(
-        Motion(MotionKind.RAPID, block.axes, control.position[:], unknown, control.modal.motion, passing=passing)
-    )
+    end = MotionEnd(control.position[:], unknown)
+    control.make(Motion(MotionKind.RAPID, block.axes, end, control.modal.motion, passing=passing))

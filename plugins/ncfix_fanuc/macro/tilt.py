@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from ncfix.control.coordinates import LETTERS, PLANES, Rotation, Vector, X, Y, Z, about, angles_in_words, dot, product
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import WORLD, euler, from_points, from_vectors, shifted, spatial
-from ncfix.control.moves import Motion, MotionKind, Pass, Passing, TcpState
+from ncfix.control.moves import Motion, MotionEnd, MotionKind, Pass, Passing, TcpState
 from ncfix.control.pointing import Triple
 from ncfix.control.posture import normal_of
 from ncfix.control.tcp import switch
@@ -190,7 +190,9 @@ def align(control: MacroControl, block: Block, code: int) -> None:
     if hidden or (code == ABOUT_TIP and is_moved_otherwise(control, block)):
         lost |= {X, Y, Z}
     unknown = control.unknown | dict.fromkeys(lost.intersection(control.machine), NOT_SOLVED)
-    control.make(Motion(MotionKind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENTS[code]))
+    control.make(
+        Motion(MotionKind.RAPID, 0, MotionEnd(target, unknown), control.modal.motion, passing=ALIGNMENTS[code])
+    )
 
 
 def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: bool) -> Vector:

@@ -15,7 +15,7 @@ from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_clo
 from ncfix.control.coordinates import IDENTITY, LETTERS, Plane, Vector, X, Y, dot, rotated
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
-from ncfix.control.moves import Arc, Motion, MotionKind, UnknownAxes
+from ncfix.control.moves import Arc, Motion, MotionEnd, MotionKind
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.targets import (
     BAD_POLE,
@@ -56,15 +56,12 @@ class Step:
         return MotionKind.RAPID if "fmax" in self.flags else MotionKind.FEED
 
 
-def somewhere(control: KlartextControl, axes: int, target: Vector, unknown: UnknownAxes, reason: str) -> None:
+def somewhere(control: KlartextControl, axes: int, end: MotionEnd, reason: str) -> None:
     """A refused curve that ends nobody knows where: the motion before it must still end where it did."""
     normal = control.rotation[0][2], control.rotation[1][2], control.rotation[2][2]
     control.modal.arc_absolute = True
-    control.make(
-        Motion(
-            MotionKind.ARC, axes | IN_PLANE, target, unknown, 10, refusal=reason, arc=Arc((0.0, 0.0, 0.0), normal, 0.0)
-        )
-    )
+    nowhere = Arc((0.0, 0.0, 0.0), normal, 0.0)
+    control.make(Motion(MotionKind.ARC, axes | IN_PLANE, end, 10, refusal=reason, arc=nowhere))
     control.modal.arc_absolute = False
     control.path.tangent = None
 
@@ -182,7 +179,7 @@ def swing(control: KlartextControl, step: Step, where: Where, circle: PlaneArc) 
     """The arc itself."""
     plane = circle.plane
     axes = step.words.axes | 1 << plane.first | 1 << plane.second
-    target, unknown = command_of(control, where, axes)
+    end = command_of(control, where, axes)
     local = [0.0, 0.0, 0.0]
     local[plane.first], local[plane.second] = circle.centre
     outward = rotated(control.rotation, local) if control.is_rotated else local
@@ -194,7 +191,7 @@ def swing(control: KlartextControl, step: Step, where: Where, circle: PlaneArc) 
     control.modal.incremental = relative
     arc = Arc(centre, normal, sweep, fixed=step.name == "c")  # type: ignore[arg-type]
     code, why = CLOCKWISE if circle.sweep < 0 else COUNTER, derived(control, step.words, axes)
-    control.make(Motion(MotionKind.ARC, axes, target, unknown, code, refusal=why, arc=arc))
+    control.make(Motion(MotionKind.ARC, axes, end, code, refusal=why, arc=arc))
     control.modal.incremental = False
     control.path.tangent = direction_at_end(control.position, arc)
 
@@ -254,9 +251,9 @@ def do_without(control: KlartextControl, step: Step, where: Where, reason: str) 
     """An arc that is not followed but for its end: one that the control would not accept either, or one not known."""
     about_pole = step.name in ("cp", "ctp")
     axes = polar_axes(control, step.words) if about_pole else step.words.axes or 3
-    target, unknown = command_of(control, where, axes)
+    end = command_of(control, where, axes)
     if about_pole or (step.words.runtime and not step.words.incremental):
-        somewhere(control, axes, target, unknown, reason)
+        somewhere(control, axes, end, reason)
         return
-    control.make(Motion(MotionKind.FEED, axes, target, unknown, 10, refusal=reason))
+    control.make(Motion(MotionKind.FEED, axes, end, 10, refusal=reason))
     control.path.tangent = None

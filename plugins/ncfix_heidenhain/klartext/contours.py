@@ -59,10 +59,10 @@ def follow_free(control: KlartextControl, unit: KlartextUnit, block: int) -> Non
     where = here(control)
     if element is None:
         where.unknown |= {X: FREELY, Y: FREELY}
-        somewhere(control, 0, *command_of(control, where, IN_PLANE), FREE_CONTOUR)
+        somewhere(control, 0, command_of(control, where, IN_PLANE), FREE_CONTOUR)
         return
     where.inner[X], where.inner[Y] = control.scale[X] * element.end.real, control.scale[Y] * element.end.imag
-    somewhere(control, 0, *command_of(control, where, IN_PLANE), WRITTEN_OUT)
+    somewhere(control, 0, command_of(control, where, IN_PLANE), WRITTEN_OUT)
     x, y, z = rotated(control.rotation, [element.heading.real, element.heading.imag, 0.0])
     control.path.tangent = x, y, z
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from ncfix.control import control as base
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, X, Y, Z, mask_of
 from ncfix.control.frames import shifted
-from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Passing, UnknownAxes, first_reason
+from ncfix.control.moves import AT_START, Motion, MotionEnd, MotionKind, Pass, Passing, UnknownAxes, first_reason
 from ncfix.control.setup import WORK_OFFSET, Run, Setup, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
@@ -198,8 +198,8 @@ class KlartextControl(base.ProgramControl):
         (PATHCTRL VECTOR), which in pieces would be turns of axes, and increments of an axis whose datum is not known,
         which further pieces would have to name.
         """
-        if motion.kind == MotionKind.RAPID and not motion.refusal and AT_START in motion.unknown.values():
-            motion = motion._replace(passing=motion.passing or Passing(Pass.UNSAID, first_reason(motion.unknown)))
+        if motion.kind == MotionKind.RAPID and not motion.refusal and AT_START in motion.end.unknown.values():
+            motion = motion._replace(passing=motion.passing or Passing(Pass.UNSAID, first_reason(motion.end.unknown)))
         whole = self.whole
         self.tilted = self.plane_tilted and not self.m128
         turns = any(motion.axes >> index & 1 for index in self.turning)
@@ -238,7 +238,7 @@ class KlartextControl(base.ProgramControl):
         """A motion of the control's own; these axes are not known afterwards."""
         unknown = dict(self.unknown)
         unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.machine}
-        super().make(Motion(MotionKind.RAPID, 0, self.position[:], unknown, 0, passing=passing))
+        super().make(Motion(MotionKind.RAPID, 0, MotionEnd(self.position[:], unknown), 0, passing=passing))
         self.path.tangent = None
 
 

@@ -164,10 +164,10 @@ def drill(control: KlartextControl, where: Where, axes: int, heights: tuple[floa
     where.inner[Z] = bottom
     if not refusal:
         where.unknown.pop(Z, None)
-    target, unknown = command_of(control, where, axes | 1 << Z)
+    end = command_of(control, where, axes | 1 << Z)
     programmed = axes & ~(1 << Z)
     code = FROM_START if control.cycle.number in OLD_DRILLING else BY_DEPTH
-    control.make(Motion(MotionKind.CYCLE, programmed, target, unknown, code, refusal=refusal))
+    control.make(Motion(MotionKind.CYCLE, programmed, end, code, refusal=refusal))
     over.inner[Z] = clear
     over.unknown.pop(Z, None)
     if refusal == DEPTH_AT_RUN_TIME:
@@ -176,7 +176,8 @@ def drill(control: KlartextControl, where: Where, axes: int, heights: tuple[floa
         over.unknown |= {X: AFTER_CYCLE, Y: AFTER_CYCLE}
         if not refusal:
             control.warn(MOVED_AS_A_WHOLE, AS_A_WHOLE.format(control.cycle.number))
-    control.stand(*command_of(control, over, axes | 1 << Z), over.unknown)
+    above = command_of(control, over, axes | 1 << Z)
+    control.stand(above.target, above.unknown, over.unknown)
     control.path.tangent = None
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from ncfix.control.coordinates import LETTERS, Vector, dot, mask_of
 from ncfix.control.frames import unit
-from ncfix.control.moves import Motion, MotionKind, Pass, Passing, UnknownAxes
+from ncfix.control.moves import Motion, MotionEnd, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.posture import WayRules
 from ncfix.control.tcp import led_in_machine, switch
 from ncfix_heidenhain.klartext.arcs import FLAT, Step
@@ -47,9 +47,9 @@ STILL = 1e-9
 def straight(control: KlartextControl, step: Step) -> None:
     """L, LN, and blocks of words alone."""
     control.use()
-    target, unknown = destination(control, step.words)
+    end = destination(control, step.words)
     if not {"TX", "TY", "TZ"} & step.words.values.keys():
-        run(control, step, target, unknown, step.words.axes)
+        run(control, step, end, step.words.axes)
         return
     way = None if step.words.runtime else pointed(control, step.words)
     if way is None:
@@ -57,9 +57,9 @@ def straight(control: KlartextControl, step: Step) -> None:
         return
     control.points = True
     for index, angle in way.items():
-        target[index] = angle
-        unknown.pop(index, None)
-    run(control, step, target, unknown, step.words.axes | mask_of(way))
+        end.target[index] = angle
+        end.unknown.pop(index, None)
+    run(control, step, end, step.words.axes | mask_of(way))
 
 
 def pointed(control: KlartextControl, words: MotionWords) -> dict[int, float] | None:
@@ -76,8 +76,7 @@ def straight_polar(control: KlartextControl, step: Step) -> None:
     control.use()
     where, _ = polar(control, step.words)
     axes = polar_axes(control, step.words)
-    target, unknown = command_of(control, where, axes)
-    run(control, step, target, unknown, axes, follows=True)
+    run(control, step, command_of(control, where, axes), axes, follows=True)
     name_polar(control, step)
 
 
@@ -87,30 +86,28 @@ def name_polar(control: KlartextControl, step: Step) -> None:
         control.places.place(mask_of((control.path.plane.first, control.path.plane.second)))
 
 
-def run(
-    control: KlartextControl, step: Step, target: Vector, unknown: UnknownAxes, axes: int, *, follows: bool = False
-) -> None:
-    """A straight motion to a command."""
+def run(control: KlartextControl, step: Step, end: MotionEnd, axes: int, *, follows: bool = False) -> None:
+    """A straight motion."""
     turned = [index for index in control.turning if axes >> index & 1]
-    positioning = turned and (not axes & IN_SPACE or turns(control, turned, target, unknown))
+    positioning = turned and (not axes & IN_SPACE or turns(control, turned, end))
     if positioning and control.plane_tilted and not control.m128:
-        turn_under_tilt(control, step, target, unknown, axes)
+        turn_under_tilt(control, step, end, axes)
         return
-    way = take_short_way(control, step, target, axes) if control.shortest else ""
+    way = take_short_way(control, step, end.target, axes) if control.shortest else ""
     before = control.position, control.unknown
-    off = step.kind == MotionKind.RAPID and control.is_led(unknown)
+    off = step.kind == MotionKind.RAPID and control.is_led(end.unknown)
     control.modal.incremental = follows or step.words.incremental
     code = 0 if step.kind == MotionKind.RAPID else 10
     refusal = way or check_normal(control) or derived(control, step.words, axes)
-    control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else None))
+    control.make(Motion(step.kind, axes, end, code, refusal=refusal, passing=OFF if off else None))
     control.modal.incremental = False
     keep_tangent(control, *before)
 
 
-def turns(control: KlartextControl, indices: Sequence[int], target: Vector, unknown: UnknownAxes) -> bool:
+def turns(control: KlartextControl, indices: Sequence[int], end: MotionEnd) -> bool:
     """Whether some of these axes move, or may."""
-    lost = control.unknown.keys() | unknown.keys()
-    return any(index in lost or abs(target[index] - control.position[index]) > STILL for index in indices)
+    lost = control.unknown.keys() | end.unknown.keys()
+    return any(index in lost or abs(end.target[index] - control.position[index]) > STILL for index in indices)
 
 
 def keep_tangent(control: KlartextControl, start: Vector, unknown: UnknownAxes) -> None:
@@ -139,27 +136,24 @@ def take_short_way(control: KlartextControl, step: Step, target: Vector, axes: i
     return ""
 
 
-def turn_under_tilt(control: KlartextControl, step: Step, target: Vector, unknown: UnknownAxes, axes: int) -> None:
+def turn_under_tilt(control: KlartextControl, step: Step, end: MotionEnd, axes: int) -> None:
     """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
+    target, still = end.target, [index for index in control.machine if not control.rotary[index]]
     linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
     switch(control, control.tools.vector, False, control.tools.offset)
     control.refresh()
-    for index in control.machine:
-        if not control.rotary[index]:
-            target[index] = control.position[index]
-            unknown = {**{k: why for k, why in unknown.items() if k != index}, **own(control.unknown, index)}
+    unknown = {index: why for index, why in end.unknown.items() if index not in still}
+    for index in still:
+        target[index] = control.position[index]
+        if index in control.unknown:
+            unknown[index] = control.unknown[index]
     code = 0 if step.kind == MotionKind.RAPID else 10
     refusal, passing = (MIXED_UNDER_TILT, None) if linear else ("", TURNS_UNDER_TILT)
-    control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=passing))
+    control.make(Motion(step.kind, axes, MotionEnd(target, unknown), code, refusal=refusal, passing=passing))
     if linear:
         control.lose(range(3), MIXED_UNDER_TILT + ": where {} stands is not known")
     control.switch_tip()
     control.path.tangent = None
-
-
-def own(unknown: UnknownAxes, index: int) -> UnknownAxes:
-    """The entry of one axis."""
-    return {index: unknown[index]} if index in unknown else {}
 
 
 def at_machine(control: KlartextControl, step: Step) -> None:
@@ -172,8 +166,7 @@ def at_machine(control: KlartextControl, step: Step) -> None:
         axes, unsure = dict.fromkeys(elsewhere, 0.0) | axes, unsure | elsewhere
     end = led_in_machine(control, axes, unsure)
     passing = Passing(Pass.MACHINE_COORDINATES, MACHINE_COORDINATES.format(code))
-    motion = Motion(step.kind, step.words.axes, end.target, end.unknown, 0, passing=passing)
-    control.make(motion._replace(in_machine=end.in_machine))
+    control.make(Motion(step.kind, step.words.axes, end, 0, passing=passing))
     control.path.tangent = None
 
 
@@ -185,10 +178,10 @@ def approach(control: KlartextControl, step: Step) -> None:
     control.use()
     where = polar(control, step.words)[0] if " p" in step.name else led(control, step.words)
     axes = polar_axes(control, step.words) if " p" in step.name else step.words.axes
-    target, unknown = command_of(control, where, axes)
+    end = command_of(control, where, axes)
     control.path.corner = True
     control.modal.incremental = step.words.incremental or " p" in step.name
-    control.make(Motion(MotionKind.FEED, axes, target, unknown, 10, refusal=derived(control, step.words, axes)))
+    control.make(Motion(MotionKind.FEED, axes, end, 10, refusal=derived(control, step.words, axes)))
     control.modal.incremental = False
     if " p" in step.name:
         name_polar(control, step)
@@ -214,4 +207,5 @@ def departure(control: KlartextControl, step: Step) -> None:
         target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]
         lost = {}
     axes = 1 << plane.first | 1 << plane.second
-    control.make(Motion(MotionKind.FEED, axes, target, {**control.unknown, **lost}, 10, passing=DEPARTURE))
+    end = MotionEnd(target, {**control.unknown, **lost})
+    control.make(Motion(MotionKind.FEED, axes, end, 10, passing=DEPARTURE))

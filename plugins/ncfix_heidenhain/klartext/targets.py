@@ -14,7 +14,7 @@ from functools import lru_cache
 from ncfix.control.control import UNPLACED
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z, mask_of
 from ncfix.control.expressions import Fault
-from ncfix.control.moves import AT_START, UnknownAxes
+from ncfix.control.moves import AT_START, MotionEnd, UnknownAxes
 from ncfix_heidenhain.klartext.control import SPATIAL, KlartextControl
 from ncfix_heidenhain.klartext.plans import MOVING
 
@@ -83,8 +83,8 @@ def here(control: KlartextControl) -> Where:
     return Where(control.program_position(), dict(control.lost_in_frame()))
 
 
-def destination(control: KlartextControl, words: MotionWords) -> tuple[Vector, UnknownAxes]:
-    """The command at which the motion of a block ends, and what is not known of it."""
+def destination(control: KlartextControl, words: MotionWords) -> MotionEnd:
+    """Where the motion of a block ends."""
     return command_of(control, led(control, words), words.axes)
 
 
@@ -141,11 +141,9 @@ def use_start_of(control: KlartextControl, words: MotionWords) -> None:
     control.use_start_positions(wanted)
 
 
-def command_of(control: KlartextControl, where: Where, axes: int) -> tuple[Vector, UnknownAxes]:
+def command_of(control: KlartextControl, where: Where, axes: int) -> MotionEnd:
     """A position as a command; axes without a word stay exactly where they are."""
-    found = control.axes_of(where.unknown)
-    control.end_unknown = found, where.unknown
-    return control.command(where.inner, axes), found
+    return MotionEnd(control.command(where.inner, axes), control.axes_of(where.unknown), where.unknown)
 
 
 def in_machine(control: KlartextControl, words: MotionWords) -> tuple[dict[int, float], UnknownAxes]:

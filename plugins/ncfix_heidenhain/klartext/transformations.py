@@ -34,7 +34,7 @@ from ncfix.control.frames import (
     spatial,
     turned_in,
 )
-from ncfix.control.moves import AT_START, Motion, MotionKind, Pass, Passing
+from ncfix.control.moves import AT_START, Motion, MotionEnd, MotionKind, Pass, Passing
 from ncfix.control.posture import AT_ZERO, WayRules, normal_of
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import MOVED_ALONG, PRESET, TILTED, KlartextControl
@@ -454,7 +454,7 @@ def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
     target, unknown = control.position[:], {k: why for k, why in control.unknown.items() if k not in way}
     for index, angle in way.items():
         target[index] = angle
-    control.make(Motion(MotionKind.RAPID, 0, target, unknown, 0, passing=TURNED))
+    control.make(Motion(MotionKind.RAPID, 0, MotionEnd(target, unknown), 0, passing=TURNED))
 
 
 def cycle_19(control: KlartextControl, words: MotionWords) -> None:

@@ -25,31 +25,22 @@ def arc(control: RS274Control, block: Block, code: int) -> None:
     plane = control.modal.plane
     check_words(control, block, plane)
     control.use_start_positions(tuple(control.unknown))
-    target, unknown = destination(control, block)
-    step = control.in_frame([b - a for a, b in zip(control.position, target, strict=True)])
-    end = step[plane.first], step[plane.second]
-    doubtful = bool(unknown or control.unknown or block.runtime or control.composed.unknown)
+    end = destination(control, block)
+    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
+    point = step[plane.first], step[plane.second]
+    doubtful = bool(end.unknown or control.unknown or block.runtime or control.composed.unknown)
     clockwise = code == CLOCKWISE
     try:
-        centre = centre_of(control, block, plane, end, clockwise=clockwise)
+        centre = centre_of(control, block, plane, point, clockwise=clockwise)
     except Fault as fault:
         if not doubtful:
-            raise Fault(fault.code, fault.text, supposed(control, block, plane, end) or fault.hint) from None
+            raise Fault(fault.code, fault.text, supposed(control, block, plane, point) or fault.hint) from None
         centre = (1.0, 0.0)
     turns = turns_of(block) if control.rules.strict else 1
-    sweep = control.handedness * sweep_angle(centre, end, turns, clockwise=clockwise)
+    sweep = control.handedness * sweep_angle(centre, point, turns, clockwise=clockwise)
     refusal = refusal_of(block, plane) or ("" if control.rules.strict else spiral(block, plane))
-    control.make(
-        Motion(
-            MotionKind.ARC,
-            block.axes,
-            target,
-            unknown,
-            code,
-            refusal=refusal,
-            arc=circle(control, plane, centre, sweep),
-        )
-    )
+    circle_of_arc = circle(control, plane, centre, sweep)
+    control.make(Motion(MotionKind.ARC, block.axes, end, code, refusal=refusal, arc=circle_of_arc))
 
 
 def turns_of(block: Block) -> int:

@@ -10,7 +10,7 @@ import math
 
 from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, mask_of
 from ncfix.control.expressions import Fault
-from ncfix.control.moves import FeedMode, Motion, MotionKind, UnknownAxes
+from ncfix.control.moves import FeedMode, Motion, MotionEnd, MotionKind, UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.motion import by_radius_and_angle, unknown_after, unnamed
@@ -143,7 +143,7 @@ def drill(
     placed = 0 if control.modal.incremental else moved
     if control.rules.strict:
         control.builder.rests(mask_of(control.turning))
-    control.make(Motion(MotionKind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, placed=placed))
+    control.make(Motion(MotionKind.CYCLE, block.axes, MotionEnd(bottom, unknown), code, refusal=refusal, placed=placed))
     at_level = control.dialect.cycle_of(code).ends_at_level(control.modal.retract_to_r)
     if not at_level:
         control.places.lose(unplaced & 1 << across)

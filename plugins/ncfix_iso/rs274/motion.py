@@ -10,8 +10,8 @@ import math
 
 from ncfix.control.coordinates import INDEX, LETTERS, N_LETTERS, Vector, X, Y, mask_of, rotated
 from ncfix.control.expressions import Fault, nominal
-from ncfix.control.moves import FeedMode, Motion, MotionKind, Pass, Passing, UnknownAxes
-from ncfix.control.tcp import LedInMachine, led_in_machine
+from ncfix.control.moves import FeedMode, Motion, MotionEnd, MotionKind, Pass, Passing, UnknownAxes
+from ncfix.control.tcp import led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import REFERENCES, check_system, is_given, store, stored
 
@@ -20,10 +20,10 @@ RUNTIME = "where the axis {} stands is known only at run time"
 POLAR = "NCF223"
 
 
-def destination(control: RS274Control, block: Block) -> tuple[Vector, UnknownAxes]:
-    """The command at which a motion of this block ends."""
-    target, unknown = words_destination(control, block)
-    return (target, unknown | unnamed(control, block)) if control.unnamed else (target, unknown)
+def destination(control: RS274Control, block: Block) -> MotionEnd:
+    """Where a motion of this block ends."""
+    end = words_destination(control, block)
+    return MotionEnd(end.target, end.unknown | unnamed(control, block)) if control.unnamed else end
 
 
 def unnamed(control: RS274Control, block: Block) -> UnknownAxes:
@@ -41,8 +41,8 @@ def unnamed(control: RS274Control, block: Block) -> UnknownAxes:
     return dict.fromkeys(sorted(doubtful & {*control.machine}), AFTER_ROTATION)
 
 
-def words_destination(control: RS274Control, block: Block) -> tuple[Vector, UnknownAxes]:
-    """The command to which the words of a block lead."""
+def words_destination(control: RS274Control, block: Block) -> MotionEnd:
+    """Where the words of a block lead."""
     incremental = control.modal.incremental
     if not incremental and not control.offset_checked:
         check_system(control)
@@ -58,8 +58,8 @@ def words_destination(control: RS274Control, block: Block) -> tuple[Vector, Unkn
             origin = target[index] if incremental else control.offset[index]
             target[index] = origin + control.scale[index] * value
     if control.frame_unknown is not None:
-        return target, rotated_unknown(control, block, incremental)
-    return target, unknown_after(control, block, incremental, control.unknown)
+        return rotated_end(control, block, incremental, target)
+    return MotionEnd(target, unknown_after(control, block, incremental, control.unknown))
 
 
 def unknown_after(control: RS274Control, block: Block, incremental: bool, before: UnknownAxes) -> UnknownAxes:
@@ -79,22 +79,20 @@ def unknown_after(control: RS274Control, block: Block, incremental: bool, before
     return unknown
 
 
-def rotated_destination(control: RS274Control, block: Block, incremental: bool) -> tuple[Vector, UnknownAxes]:
+def rotated_destination(control: RS274Control, block: Block, incremental: bool) -> MotionEnd:
     """`destination` in a rotated frame, where one word moves several axes."""
     program = control.program_position()
     for letter, value in block.values.items():
         if letter in INDEX:
             index = INDEX[letter]
             program[index] = control.scale[index] * value + (program[index] if incremental else 0.0)
-    return control.command(program, block.axes), rotated_unknown(control, block, incremental)
+    return rotated_end(control, block, incremental, control.command(program, block.axes))
 
 
-def rotated_unknown(control: RS274Control, block: Block, incremental: bool) -> UnknownAxes:
-    """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
+def rotated_end(control: RS274Control, block: Block, incremental: bool, target: Vector) -> MotionEnd:
+    """The end of a motion at `target` in a rotated frame: an axis is known if all that it is made of is."""
     own = unknown_after(control, block, incremental, control.lost_in_frame())
-    unknown = control.axes_of(own)
-    control.end_unknown = unknown, own
-    return unknown
+    return MotionEnd(target, control.axes_of(own), own)
 
 
 def cartesian(control: RS274Control, block: Block) -> Block:
@@ -127,7 +125,7 @@ def by_radius_and_angle(control: RS274Control, block: Block, x: float, y: float)
     return radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle))
 
 
-def machine_destination(control: RS274Control, block: Block) -> LedInMachine:
+def machine_destination(control: RS274Control, block: Block) -> MotionEnd:
     """The command at which a motion in machine coordinates (G53) ends."""
     named = [letter for letter in block.values if letter in INDEX]
     axes = {INDEX[letter]: control.scale[INDEX[letter]] * block.values[letter] for letter in named}
@@ -208,8 +206,7 @@ def straight(control: RS274Control, block: Block, code: int) -> None:
     if computed and control.probes_nominally:
         measured(control, block, computed, kind, code)
         return
-    target, unknown = destination(control, block)
-    control.make(Motion(kind, block.axes, target, unknown, code))
+    control.make(Motion(kind, block.axes, destination(control, block), code))
 
 
 def measured(control: RS274Control, block: Block, computed: frozenset[str], kind: MotionKind, code: int) -> None:
@@ -219,10 +216,10 @@ def measured(control: RS274Control, block: Block, computed: frozenset[str], kind
     a later block: neither is written.
     """
     axes = mask_of(INDEX[letter] for letter in computed)
-    target, unknown = destination(control, Block(block.index, block.values, block.runtime - computed, block.axes))
+    end = destination(control, Block(block.index, block.values, block.runtime - computed, block.axes))
     with control.in_one_piece():
         control.builder.measures(axes)
-        control.make(Motion(kind, block.axes, target, unknown, code))
+        control.make(Motion(kind, block.axes, end, code))
     control.places.lose(axes)
 
 
@@ -241,16 +238,14 @@ def in_machine_coordinates(control: RS274Control, block: Block, code: int) -> No
     control.modal.motion = modal
     if block.axes:
         end, kind = machine_destination(control, block), MotionKind.FEED if code else MotionKind.RAPID
-        motion = Motion(kind, block.axes, end.target, end.unknown, code, passing=MACHINE_COORDINATES)
-        control.make(motion._replace(in_machine=end.in_machine))
+        control.make(Motion(kind, block.axes, end, code, passing=MACHINE_COORDINATES))
         if control.modal.incremental:
             control.lose_in_machine([index for index in range(N_LETTERS) if block.axes >> index & 1], AFTER_G53)
 
 
 def one_way(control: RS274Control, block: Block, code: int) -> None:
     """G60: a rapid to the words from one side (ISO controls)."""
-    target, unknown = destination(control, block)
-    control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
+    control.make(Motion(MotionKind.RAPID, block.axes, destination(control, block), 0))
 
 
 # -- reference points -------------------------------------------------------------------------------------------------
@@ -262,17 +257,16 @@ def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(name))
     modal = control.modal.motion
     checked, control.offset_checked = control.offset_checked, True
-    way, unknown = destination(control, block)
+    way = destination(control, block)
     control.offset_checked = checked
-    if way != control.position or (block.axes and not control.modal.incremental):
-        control.make(Motion(MotionKind.RAPID, block.axes, way, unknown, modal, passing=passing))
+    if way.target != control.position or (block.axes and not control.modal.incremental):
+        control.make(Motion(MotionKind.RAPID, block.axes, way, modal, passing=passing))
     axes = block.axes or mask_of(control.machine)
     end = reference_target(control, name, axes)
-    motion = Motion(MotionKind.RAPID, block.axes, end.target, end.unknown, modal, passing=passing)
-    control.make(motion._replace(in_machine=end.in_machine))
+    control.make(Motion(MotionKind.RAPID, block.axes, end, modal, passing=passing))
 
 
-def reference_target(control: RS274Control, name: str, axes: int) -> LedInMachine:
+def reference_target(control: RS274Control, name: str, axes: int) -> MotionEnd:
     """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
     first = REFERENCES[name]
     place, unsure = along(control, stored(control, first), axes), dict(control.unknown)
@@ -323,29 +317,30 @@ def probe(control: RS274Control, block: Block, code: int) -> None:
             raise Fault(BAD_MOTION, "probing needs a feed per minute (G94)")
     if code != ONE_SHOT_PROBE:
         control.modal.motion = code
-    target, unknown = destination(control, block)
+    end = destination(control, block)
     if control.probes_nominally:
-        probe_nominally(control, block, target, unknown, code)
+        probe_nominally(control, block, end, code)
         return
+    target, unknown = end.target, end.unknown
     moved = [index for index in range(N_LETTERS) if target[index] != control.position[index] or index in unknown]
     if control.rules.strict and code % 2 == 0 and not moved:
         raise Fault(BAD_MOTION, "the probe starts at the end of its motion")
     led = 7 if control.is_rotated and block.axes & 7 else 0
     named = [index for index in moved if (block.axes | led) >> index & 1]
-    ends = unknown | {index: AFTER_PROBING for index in named if index in control.machine}
-    probed(control, Motion(MotionKind.FEED, block.axes, target, ends, code, passing=PROBING), touches=False)
+    touched = MotionEnd(target, unknown | {index: AFTER_PROBING for index in named if index in control.machine})
+    probed(control, Motion(MotionKind.FEED, block.axes, touched, code, passing=PROBING), touches=False)
 
 
-def probe_nominally(control: RS274Control, block: Block, target: Vector, unknown: UnknownAxes, code: int) -> None:
+def probe_nominally(control: RS274Control, block: Block, end: MotionEnd, code: int) -> None:
     """Probing that ends where the setup says; what is computed from it is computed anew at run time."""
     control.knowledge.probing()
     touched = {letter: value for letter, value in (control.setup.probed or {}).items() if letter in block.values}
     if touched:
         values = {letter: value / control.unit_of(INDEX[letter]) for letter, value in touched.items()}
         incremental, control.modal.incremental = control.modal.incremental, False
-        target, unknown = destination(control, Block(block.index, values, frozenset(), block.axes))
+        end = destination(control, Block(block.index, values, frozenset(), block.axes))
         control.modal.incremental = incremental
-    probed(control, Motion(MotionKind.FEED, block.axes, target, unknown, code, passing=PROBING), touches=True)
+    probed(control, Motion(MotionKind.FEED, block.axes, end, code, passing=PROBING), touches=True)
 
 
 def probed(control: RS274Control, motion: Motion, *, touches: bool) -> None:
@@ -370,9 +365,9 @@ def refused(control: RS274Control, block: Block, code: int) -> None:
         check_feed(control, block)
     else:
         control.modal.motion = code
-    target, unknown = destination(control, block)
+    end = destination(control, block)
     before, known = control.position, control.unknown
-    control.make(Motion(MotionKind.FEED, block.axes, target, unknown, code, refusal=REFUSALS[code]))
+    control.make(Motion(MotionKind.FEED, block.axes, end, code, refusal=REFUSALS[code]))
     if code == 331:
         control.stand(before, known)
 
@@ -391,22 +386,23 @@ def turning_cycle(control: RS274Control, block: Block, code: int) -> None:
         if INDEX[letter] in control.machine:
             unknown[INDEX[letter]] = AFTER_CYCLE
     refusal = f"turning cycle (G{code / 10:g})"
-    control.make(Motion(MotionKind.FEED, block.axes, control.position[:], unknown, code, refusal=refusal))
+    control.make(Motion(MotionKind.FEED, block.axes, MotionEnd(control.position[:], unknown), code, refusal=refusal))
 
 
 def at_power_on(control: RS274Control, block: Block, code: int) -> None:
     """Axis words before the first motion code: a setting of ISO controls says whether G0 or G1 is in force then
     (Fanuc: parameter 3402). Both end at the same place; a block put in would have to name one, so none may be."""
-    target, unknown = destination(control, block)
+    end = destination(control, block)
     with control.in_one_piece():
-        control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
+        control.make(Motion(MotionKind.RAPID, block.axes, end, 0))
 
 
 def dwell(control: RS274Control, block: Block, code: int) -> None:
     """G4."""
     if control.rules.strict and block.get("P", -1.0) == -1.0:
         raise Fault(BAD_MOTION, "G4 needs P, the time in seconds")
-    control.make(Motion(MotionKind.DWELL, 0, control.position, control.unknown, control.modal.motion, passing=DWELL))
+    here = MotionEnd(control.position, control.unknown)
+    control.make(Motion(MotionKind.DWELL, 0, here, control.modal.motion, passing=DWELL))
 
 
 def cancel(control: RS274Control, block: Block, code: int) -> None:

@@ -33,7 +33,7 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.expressions import Unknown, Value
 from ncfix.control.frames import WORLD, Affine, FrameStack, shifted
-from ncfix.control.moves import AT_START, Arc, Motion, MotionKind, Pass, Rule, UnknownAxes
+from ncfix.control.moves import AT_START, Arc, Motion, MotionEnd, MotionKind, Pass, Rule, UnknownAxes
 from ncfix.control.setup import Run, Tool
 from ncfix.control.state import Modal
 from ncfix.control.tcp import switch
@@ -303,8 +303,8 @@ class Sinumerik(ProgramControl):
         if follows:
             self.ask_for_length()
         self._head(motion, follows=follows)
-        told = refusal, motion.passing, motion.arc, placed, end.in_machine
-        self.make(Motion(motion.kind, axes, end.target, end.unknown, motion.code, *told))
+        ends = MotionEnd(end.target, end.unknown, in_machine=end.in_machine)
+        self.make(Motion(motion.kind, axes, ends, motion.code, refusal, motion.passing, motion.arc, placed))
         self.whole = False
         self.count_from_here(axes, by_machine=motion.by_machine)
         self.forget_unknown()
@@ -344,7 +344,7 @@ class Sinumerik(ProgramControl):
 
     def _lost_at_end(self, motion: Motion) -> UnknownAxes:
         """As for all controls; the book of turned coordinates is `lost`."""
-        return self.lost if self.is_rotated else motion.unknown
+        return self.lost if self.is_rotated else motion.end.unknown
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """As for all controls; whether it is a rapid, the program has to have said."""

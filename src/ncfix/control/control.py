@@ -26,6 +26,7 @@ from ncfix.control.flow import Budget
 from ncfix.control.moves import (
     AT_START,
     Motion,
+    MotionEnd,
     MotionKind,
     Moves,
     Pass,
@@ -185,7 +186,7 @@ class ProgramControl(ControlState):
     def refuse_here(self, reason: str) -> None:
         """A block of which it is not known where it leads: none of the axes is known afterwards."""
         unknown = dict.fromkeys(self.machine, AFTER_THAT.format(reason))
-        self.make(Motion(MotionKind.FEED, 0, self.position[:], unknown, 10, refusal=reason))
+        self.make(Motion(MotionKind.FEED, 0, MotionEnd(self.position[:], unknown), 10, refusal=reason))
 
     @property
     def frame(self) -> int:
@@ -215,17 +216,17 @@ class ProgramControl(ControlState):
             self.builder.rests(self._resting(fate))
         if fate.kind != MotionKind.DWELL:
             self.block_words = ()
-        start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
-        if fate.in_machine is not None and (begin := in_machine(self)) is not None:
-            start, end, style = begin, fate.in_machine, self._without_tcp(style)
+        start, end = blanked(self.position, self.unknown), blanked(fate.end.target, fate.end.unknown)
+        if fate.end.in_machine is not None and (begin := in_machine(self)) is not None:
+            start, end, style = begin, fate.end.in_machine, self._without_tcp(style)
         self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, unplaced)
         if self.ends is not None:
-            self.ends.append(fate.target[:])
-        self.position, self.unknown = fate.target, fate.unknown
+            self.ends.append(fate.end.target[:])
+        self.position, self.unknown = fate.end.target, fate.end.unknown
 
     def _ask_for_start(self, motion: Motion) -> None:
         """Settle start positions that matter: where the motion ends, and for all but rapids where it begins."""
-        kind, unknown = motion.kind, motion.unknown
+        kind, unknown = motion.kind, motion.end.unknown
         if AT_START in unknown.values() or (kind != MotionKind.RAPID and AT_START in self.unknown.values()):
             everywhere = tuple(self.unknown) if kind != MotionKind.RAPID else tuple(unknown)
             self.use_start_positions(everywhere)
@@ -249,22 +250,20 @@ class ProgramControl(ControlState):
     def _keep_places(self, motion: Motion, placed: int) -> None:
         """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
         if motion.passing and motion.kind != MotionKind.DWELL:
-            target, here = motion.target, self.position
+            target, here = motion.end.target, self.position
             self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
         lost = self._lost_at_end(motion)
-        told = self.end_unknown is not None and self.end_unknown[0] is motion.unknown
         if motion.kind != MotionKind.DWELL:
-            self.frame_unknown = lost if told else None
-        self.end_unknown = None
+            self.frame_unknown = motion.end.in_frame
         self.places.place(placed)
         self.places.lose(mask_of(lost))
         self.places.begun = True
 
     def _lost_at_end(self, motion: Motion) -> UnknownAxes:
         """What is not known at the end of a motion, along the axes of the program's frame."""
-        if self.end_unknown is not None and self.end_unknown[0] is motion.unknown:
-            return self.end_unknown[1]
-        return self.lost_in_frame() if motion.kind == MotionKind.DWELL else self.along_frame(motion.unknown)
+        if motion.end.in_frame is not None:
+            return motion.end.in_frame
+        return self.lost_in_frame() if motion.kind == MotionKind.DWELL else self.along_frame(motion.end.unknown)
 
     def ends_in_hole(self, motion: Motion) -> bool:
         """Whether there is a hole where the motion ends: then it matters where that is, as in a cut."""
@@ -273,12 +272,12 @@ class ProgramControl(ControlState):
     def _fate(self, motion: Motion, unplaced: int) -> Motion:
         """The motion as it will be judged: rapids pass that need words for axes of which nobody has said enough."""
         if motion.passing is None and self._leaves_unknown(motion) and not self.ends_in_hole(motion):
-            return motion._replace(passing=Passing(Pass.UNSAID, first_reason(motion.unknown)))
+            return motion._replace(passing=Passing(Pass.UNSAID, first_reason(motion.end.unknown)))
         return self._dragged(motion, unplaced)
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """Whether a motion is a rapid that passes, see `moves.leaves_unknown`."""
-        if not rapid.unknown or rapid.kind != MotionKind.RAPID or rapid.refusal or self.refusal or self.suspended:
+        if not rapid.end.unknown or rapid.kind != MotionKind.RAPID or rapid.refusal or self.refusal or self.suspended:
             return False
         before = {*self.unknown.values(), *self.lost_in_frame().values()}
         return leaves_unknown(rapid, before, self._lost_at_end(rapid))
@@ -305,9 +304,9 @@ class ProgramControl(ControlState):
         beside = motion.arc is None and bool(self.modal.compensated and motion.axes & plane)
         if not (beside or self.at_corner):
             return 0
-        way = [there - here for there, here in zip(motion.target, self.position, strict=True)]
+        way = [there - here for there, here in zip(motion.end.target, self.position, strict=True)]
         way = rotated(self.inverse, way) if self.is_rotated else way
-        lacking = {*motion.unknown, *self.unknown}
+        lacking = {*motion.end.unknown, *self.unknown}
         still = mask_of(index for index in self.machine if abs(way[index]) <= NO_WAY and index not in lacking)
         across = still & ~plane if self.at_corner else 0
         return across | (plane if beside and plane & ~still == 0 else 0)
@@ -334,9 +333,9 @@ class ProgramControl(ControlState):
     def _dragged(self, motion: Motion, unplaced: int) -> Motion:
         """The motion; if it moves an axis that has no word and must get none, a rapid passes, others are refused."""
         wordless = unplaced & self.places.unplaced & ~motion.axes
-        if not wordless or motion.passing or motion.refusal or motion.unknown:
+        if not wordless or motion.passing or motion.refusal or motion.end.unknown:
             return motion
-        moved = mask_of(i for i in self.machine if motion.target[i] != self.position[i])
+        moved = mask_of(i for i in self.machine if motion.end.target[i] != self.position[i])
         if self.is_rotated and motion.axes & self._turned():
             moved |= self._turned()
         index = next((i for i in self.machine if (wordless & moved) >> i & 1), None)
@@ -378,7 +377,7 @@ class ProgramControl(ControlState):
             style = self._style(motion.kind, Rule.PASS, passing.words, motion.code, passing.rule)
         else:
             wrong = motion.refusal if passing is None else passing.words
-            style = self._judged(motion.kind, motion.unknown, wrong, motion.code)
+            style = self._judged(motion.kind, motion.end.unknown, wrong, motion.code)
         self.whole = whole
         return style
 

@@ -415,28 +415,42 @@ class Arc(NamedTuple):
     fixed: bool = False
 
 
+class MotionEnd(NamedTuple):
+    """Where a motion ends.
+
+    target      the command, of every letter; a nominal value along `unknown`
+    unknown     why an axis of the machine is not known there
+    in_frame    the same along the axes of the program's frame, where its words tell more than the axes of the machine
+                do; None: `unknown` tells all
+    in_machine  under TCP, where words mean places of the machine: the same place in axes of the machine, where all of
+                it, and where the motion starts, is known
+    """
+
+    target: Vector
+    unknown: UnknownAxes
+    in_frame: UnknownAxes | None = None
+    in_machine: Vector | None = None
+
+
 class Motion(NamedTuple):
     """One motion of the control.
 
     axes     axes with a word, as bits
-    target   the command at its end, of every letter; a nominal value along `unknown`
+    end      where it ends
     code     the motion code, in tenths
     refusal  why it is refused; empty if it is not
     passing  why it is passed as it is; None if it is not
     placed  the axes whose words say where they stand afterwards; None: those of absolute words
-    in_machine  where it ends in axes of the machine, if TCP is on and its words mean these, see `LedInMachine`
     """
 
     kind: MotionKind
     axes: int
-    target: Vector
-    unknown: UnknownAxes
+    end: MotionEnd
     code: int
     refusal: str = ""
     passing: Passing | None = None
     arc: Arc | None = None
     placed: int | None = None
-    in_machine: Vector | None = None
 
 
 def blanked(position: Vector, unknown: UnknownAxes) -> Vector:
@@ -458,4 +472,4 @@ def leaves_unknown(rapid: Motion, before: set[str], lost: UnknownAxes) -> bool:
     Where they stand, its correction would depend on. It cuts nothing, and the axes that it names can be corrected as
     soon as the program has named the others: it passes. `before` are the reasons why something was not known.
     """
-    return before.issuperset(rapid.unknown.values()) and not any(rapid.axes >> index & 1 for index in lost)
+    return before.issuperset(rapid.end.unknown.values()) and not any(rapid.axes >> index & 1 for index in lost)

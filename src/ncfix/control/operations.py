@@ -22,8 +22,8 @@ from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from ncfix.control.coordinates import INDEX, LETTERS, Vector, mask_of
-from ncfix.control.moves import Motion, MotionKind, UnknownAxes
+from ncfix.control.coordinates import INDEX, LETTERS, mask_of
+from ncfix.control.moves import Motion, MotionEnd, MotionKind
 from ncfix.text.dialect import NO_WORDS, is_letters
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ NOT_FOLLOWED = "{} is in force, which ncfix does not follow"
 AFTER = "where the axis {{}} stands after {} is not followed"
 
 
-Destination = Callable[[], tuple[Vector, UnknownAxes]]
-"""Gives the command to which the axis words of a block lead, and what of it is not known."""
+Destination = Callable[[], MotionEnd]
+"""Gives the place to which the axis words of a block lead."""
 
 
 class BlockValues(Protocol):
@@ -166,9 +166,9 @@ class Rapid(Operation):
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         if block.axes:
-            target, unknown = destination()
+            end = destination()
             with control.in_one_piece():
-                control.make(Motion(MotionKind.RAPID, block.axes, target, unknown, 0))
+                control.make(Motion(MotionKind.RAPID, block.axes, end, 0))
 
     def __str__(self) -> str:
         return "the axes go to the words of the block in rapid"

@@ -166,7 +166,6 @@ class ControlState(ABC):
     unknown    letter index -> why the position is not known
     frame_unknown  the same along the axes of a turned frame, where its words tell more than the axes of the machine do;
                    None: these tell all
-    end_unknown    what is not known where the words of this block lead: of the axes of the machine, and of the frame
     places     which axes the program itself has brought to where they stand
     knowledge  what was asked of the setup, and what it does not give
     offset_checked  it has been asked for the work offset in force
@@ -202,7 +201,6 @@ class ControlState(ABC):
         self.switches = set[int]()
         self.tcp = run.setup.tcp
         self.frame_unknown: UnknownAxes | None = None
-        self.end_unknown: tuple[UnknownAxes, UnknownAxes] | None = None
         self.locate: Callable[[], Place] = lambda: Place("")
         self.offset_checked = False
         self._frame = -1

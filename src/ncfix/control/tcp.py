@@ -12,13 +12,13 @@ axes that a correction has put beside their places.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import Vector, X, Y, Z
-from ncfix.control.moves import Kinematics, Moves, Rule, TcpState
+from ncfix.control.moves import Kinematics, MotionEnd, Moves, Rule, TcpState
 
 if TYPE_CHECKING:
     from ncfix.control.moves import UnknownAxes
@@ -40,19 +40,7 @@ def rotary_at_zero(control: ControlState, position: Vector, unknown: UnknownAxes
     return all(index not in unknown and abs(position[index]) < 1e-12 for index in control.turning)
 
 
-class LedInMachine(NamedTuple):
-    """Where a motion ends that leads axes to places of the machine.
-
-    target, unknown  the command, and what is not known of it
-    in_machine       under TCP the same in axes of the machine, where all of it, and where they start, is known
-    """
-
-    target: Vector
-    unknown: UnknownAxes
-    in_machine: Vector | None = None
-
-
-def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: UnknownAxes) -> LedInMachine:
+def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: UnknownAxes) -> MotionEnd:
     """Where a motion ends that leads axes to places of the machine, while the others stand still.
 
     axes    letter index -> where that axis of the machine goes, mm or rad
@@ -71,16 +59,16 @@ def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: Unk
     doubts = {index: unsure[index] for index in axes if index in unsure}
     unknown |= doubts
     if not control.tcp:
-        return LedInMachine(target, unknown)
+        return MotionEnd(target, unknown)
     end = target[:]
     if not converted(control, target, unknown, MACHINE, tip):
         turned = {index: TURNED for index in (X, Y, Z) if index in control.machine}
-        return LedInMachine(target, unknown | turned | doubts)
+        return MotionEnd(target, unknown | turned | doubts)
     for index in still:
         if abs(target[index] - control.position[index]) < ALIKE:
             target[index] = control.position[index]
     known = not (control.unknown or unknown) and in_machine(control) is not None
-    return LedInMachine(target, unknown, end if known else None)
+    return MotionEnd(target, unknown, in_machine=end if known else None)
 
 
 def in_machine(control: ControlState) -> Vector | None:
