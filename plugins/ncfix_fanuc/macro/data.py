@@ -6,6 +6,7 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable data input
 from __future__ import annotations
 
 from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of
+from ncfix.control.expressions import Unknown, Value, nominal
 from ncfix.control.moves import Motion, MotionEnd, MotionKind
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.expressions import whole
@@ -52,12 +53,12 @@ HARMLESS = frozenset({3, 12, 13})
 def extended(control: RS274Control, block: Block, code: int) -> None:
     """G154 Pn of Haas, and G110 (P1) to G129 (P20): an additional work offset."""
     number = (code - FIRST_EXTENDED) / 10 + 1 if code < ALL_EXTENDED else block.get("P", 1.0)
-    extended_system(control, Block(block.index, {"P": number}, block.runtime, block.axes))
+    extended_system(control, Block(block.index, {"P": number}, block.unknown, block.axes))
 
 
 def setting_error(control: RS274Control, block: Block, code: int) -> None:
     """G54.2 Pn and G54.4 Pn: offsets that turn with the tables; P0 ends them."""
-    if block.get("P") or block.runtime:
+    if block.get("P") or block.unknown:
         control.suspended[SETTING_ERRORS[code]] = SETTING_ERRORS[code]
     elif control.suspended.pop(SETTING_ERRORS[code], None):
         control.lose(control.machine, AFTER_UNFOLLOWED)
@@ -97,7 +98,7 @@ def set_offset(control: RS274Control, block: Block) -> None:
     for index in words_of(block):
         value = control.scale[index] * block.values[LETTERS[index]]
         value += before[index] if control.modal.incremental else 0.0
-        store(control, first, index, value, LETTERS[index] in block.runtime)
+        store(control, first, index, value, LETTERS[index] in block.unknown)
     if system == control.modal.system:
         moved_while_turned(control, "G10")
         activate(control, system)
@@ -114,7 +115,7 @@ def set_extended(control: RS274Control, block: Block) -> None:
         letter = LETTERS[index]
         value = control.scale[index] * block.values[letter] / (DEGREE if control.rotary[index] else 1.0)
         given[letter] = value + (given.get(letter, 0.0) if control.modal.incremental else 0.0)
-    if block.runtime:
+    if block.unknown:
         control.refusal = control.refusal or f"the work offset {name} is known only at run time"
     control.extended[name] = given
     if control.modal.system == 0 and control.extended_name == name:
@@ -132,13 +133,14 @@ def set_length(control: RS274Control, block: Block) -> None:
     length = control.modal.unit * block.values["R"]
     if control.modal.incremental:
         length += control.tools.lengths.get(number, control.knowledge.tool_length(number))
-    keep_length(control, number, length, runtime="R" in block.runtime)
+    keep_length(control, number, Unknown("R", length) if "R" in block.unknown else length)
 
 
-def keep_length(control: RS274Control, number: int, length: float, *, runtime: bool) -> None:
-    """The program sets the length of a tool, mm; `runtime`: it is known at run time only."""
-    if control.tools.offset == number and (runtime or length != control.tools.vector[Z]):
+def keep_length(control: RS274Control, number: int, length: Value) -> None:
+    """The program sets the length of a tool, mm."""
+    unknown = isinstance(length, Unknown)
+    if control.tools.offset == number and (unknown or length != control.tools.vector[Z]):
         control.suspended[CHANGED] = CHANGED
-    control.tools.lengths[number] = length
-    if runtime:
+    control.tools.lengths[number] = nominal(length)
+    if unknown:
         control.tools.measured.add(number)

@@ -23,7 +23,7 @@ from ncfix.control.expressions import (
     nominal,
     power,
     remainder,
-    signed,
+    scaled,
 )
 from ncfix.text.tree import Expression
 
@@ -140,7 +140,7 @@ class MacroExpressions(Expressions):
         (operand,) = arguments
         if name in "+-":
             sign = -1.0 if name == "-" else 1.0
-            return lambda scope: signed(sign, operand(scope))
+            return lambda scope: scaled(sign, operand(scope))
         if name != "round" or address not in ROUNDED:
             return super().function(name, arguments, address)
 

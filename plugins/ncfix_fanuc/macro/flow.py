@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import mask_of
-from ncfix.control.expressions import Fault, Unknown
+from ncfix.control.expressions import Fault, Unknown, Value
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow, Return
 from ncfix.control.state import NO_MOTION
 from ncfix.control.trace import NotInPartsError
@@ -70,11 +70,11 @@ LENGTHS = frozenset("ABCIJKQRUVWXYZ")
 """Arguments whose numbers count least increments of their address when they have no decimal point."""
 
 
-def local_variables(arguments: Iterable[tuple[str, float, bool]]) -> Store:
-    """The local variables that arguments (address, value, known only at run time) set, in the order written."""
+def local_variables(arguments: Iterable[tuple[str, Value]]) -> Store:
+    """The local variables that arguments (address, value) set, in the order written."""
     store: Store = {}
     count, last = 1, 0
-    for address, value, runtime in arguments:
+    for address, value in arguments:
         if address not in ONCE:
             raise Fault("NCF221", f"{address} cannot be an argument of a macro")
         number = ONCE[address]
@@ -85,7 +85,7 @@ def local_variables(arguments: Iterable[tuple[str, float, bool]]) -> Store:
             number = 3 * count + position
             if count > SETS:
                 raise Fault("NCF221", f"I, J and K may stand {SETS} times in a macro call")
-        store[number] = Unknown(f"#{number}", value) if runtime else value
+        store[number] = Unknown(f"#{number}", value.nominal) if isinstance(value, Unknown) else value
     return store
 
 

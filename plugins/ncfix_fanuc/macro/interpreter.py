@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z, mask_of
-from ncfix.control.expressions import Fault, Unknown, nominal
+from ncfix.control.expressions import Fault, Unknown, Value, nominal
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
@@ -178,7 +178,7 @@ class MacroInterpreter(RS274Interpreter):
         """The values of a block, by the decimal-point rule, polar coordinates made Cartesian."""
         block = super().evaluate(plan, index)
         if plan.assignments:
-            block.runtime |= {letter for letter, _, _ in plan.computed}  # set sooner or later than they are read
+            block.unknown |= {letter for letter, _, _ in plan.computed}  # set sooner or later than they are read
         codes = set() if plan.codes is None else set(plan.codes.g.values())
         self.at_once(codes)
         self.take_points(plan, block)
@@ -187,7 +187,7 @@ class MacroInterpreter(RS274Interpreter):
         if self.control.polar is not None and G15 not in codes and plan.codes is not None and not plan.codes.takes:
             block = polar.cartesian(self.control, block)
         if scaling.ON in codes and "P" in plan.pointless:
-            block.runtime |= {"P"}  # thousandths or hundred-thousandths, as a parameter says
+            block.unknown |= {"P"}  # thousandths or hundred-thousandths, as a parameter says
         return block if plan.codes is None else scaling.scaled(self.control, block, plan.codes)
 
     def take_points(self, plan: RS274Plan, block: Block) -> None:
@@ -230,11 +230,11 @@ class MacroInterpreter(RS274Interpreter):
             which = target(self.control) if callable(target) else float(target)
             number = variable_number(nominal(which))
             parameters.check_writable(number)
-            value, runtime = self.control.value_of(function)
-            runtime |= isinstance(which, Unknown)
-            parameters.assign(number, value, runtime)
+            value = function(self.control)
+            value = Unknown("", nominal(value)) if isinstance(which, Unknown) else value
+            parameters.assign(number, value)
             if is_system(number):
-                system.was_set(self.control, number, value, runtime)
+                system.was_set(self.control, number, value)
 
     def motion_of(self, plan: RS274Plan, codes: Codes) -> int | None:
         """The motion code that a block executes; a direction of the tool (G43.5) is a motion, too."""
@@ -333,8 +333,8 @@ class MacroInterpreter(RS274Interpreter):
             return
         values = {word.address: self.argument(word) for word in plan.template.words if word.address not in "GMN"}
         name = self.named_program()
-        label = name or str(whole(values.get("P", (0.0, False))[0], f"P of G{code // 10}"))
-        times = whole(values.get("L", (1.0, False))[0], "L")
+        label = name or str(whole(nominal(values.get("P", 0.0)), f"P of G{code // 10}"))
+        times = whole(nominal(values.get("L", 1.0)), "L")
         store = local_variables(self.arguments(plan))
         if code == G65:
             self.flow.begin(label, times, store)
@@ -343,20 +343,20 @@ class MacroInterpreter(RS274Interpreter):
             self.control.refusal = self.control.refusal or "a macro is called by every block (G66.1)"
         self.modal_calls.append(ModalCall(label, times, store, len(self.flow.calls)))
 
-    def arguments(self, plan: RS274Plan) -> Iterator[tuple[str, float, bool]]:
+    def arguments(self, plan: RS274Plan) -> Iterator[tuple[str, Value]]:
         """The arguments of a macro call in the order written; vacant ones are not passed."""
         for word in plan.template.words:
             if word.address not in "GMNPL":
-                value, runtime = self.argument(word)
-                if not math.isnan(value):
-                    yield word.address, value, runtime
+                value = self.argument(word)
+                if not math.isnan(nominal(value)):
+                    yield word.address, value
 
-    def argument(self, word: Word) -> tuple[float, bool]:
-        """The value of a word of a macro call, and whether it is known only at run time."""
-        value, at_runtime = self.control.value_of(self.control.rules.compiled(word.value, word.address))
+    def argument(self, word: Word) -> Value:
+        """The value of a word of a macro call."""
+        value = self.control.rules.compiled(word.value, word.address)(self.control)
         if isinstance(word.value, Literal) and word.value.pointless and word.address in LENGTHS:
-            value = self.control.without_point(word.address, value)
-        return value, at_runtime
+            return self.control.without_point(word.address, nominal(value))
+        return value
 
     def call_modal(self) -> None:
         """After a motion, call the macro that G66 named, unless it is running."""

@@ -49,8 +49,8 @@ def cartesian(control: MacroControl, block: Block) -> Block:
     turn = math.radians(angle)
     block.values[letters[0]], block.values[letters[1]] = radius * math.cos(turn), radius * math.sin(turn)
     block.axes |= 1 << plane.first | 1 << plane.second
-    if control.modal.incremental or block.runtime & set(letters):
-        block.runtime |= set(letters)
+    if control.modal.incremental or block.unknown & set(letters):
+        block.unknown |= set(letters)
     return block
 
 
@@ -66,6 +66,6 @@ def further_round(control: MacroControl, block: Block, letters: tuple[str, str])
     for letter, index, end in zip(letters, (plane.first, plane.second), ends, strict=True):
         block.values[letter] = end - position[index] / control.modal.unit
     block.axes |= 1 << plane.first | 1 << plane.second
-    if letters[1] in block.runtime:
-        block.runtime |= set(letters)
+    if letters[1] in block.unknown:
+        block.unknown |= set(letters)
     return block

@@ -100,7 +100,7 @@ def take_levels(control: RS274Control, block: Block, initial: float, letter: str
     sticky, depth = modal.cycle, LETTERS[across]
     in_force = sticky.initial is not None
     if not in_force:
-        sticky.runtime = False
+        sticky.unknown = False
         if depth not in block.values:
             raise Fault(BAD_CYCLE, f"{depth} is missing: a canned cycle cannot begin without it")
         if letter not in block.values:
@@ -109,7 +109,7 @@ def take_levels(control: RS274Control, block: Block, initial: float, letter: str
         sticky.r = modal.unit * block.values[letter] + (initial if modal.incremental else 0.0)
     if depth in block.values:
         sticky.depth = control.scale[across] * block.values[depth] + (sticky.r if modal.incremental else 0.0)
-    sticky.runtime |= bool(block.runtime & {letter, depth})
+    sticky.unknown |= bool(block.unknown & {letter, depth})
 
 
 FANUC = Rules(

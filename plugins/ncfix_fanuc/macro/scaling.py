@@ -61,7 +61,7 @@ def switch(control: MacroControl, block: Block, code: int) -> None:
 def is_certain(control: MacroControl, block: Block) -> bool:
     """Whether factor and centre are in the block, or where the control stands, and mean one thing only."""
     named = {index for index in (X, Y, Z) if LETTERS[index] in block.values}
-    known = not control.unknown.keys() & ({X, Y, Z} - named) and not block.runtime
+    known = not control.unknown.keys() & ({X, Y, Z} - named) and not block.unknown
     plain = "P" in block.values and block.values["P"] > 0 and block.values.keys().isdisjoint(CENTRE_LETTERS)
     alone = not (control.mirrored or control.is_rotated or control.polar is not None or control.tcp)
     whole = len(named) == len((X, Y, Z)) or not control.rules.scales_named
@@ -101,7 +101,7 @@ def mirror(control: MacroControl, block: Block, code: int) -> None:
         unfollowed(control, block, code)
         for index in named or SPATIAL:
             control.mirrored.pop(index, None)
-    elif elsewhere or block.runtime or not set(named) <= {*SPATIAL}:
+    elif elsewhere or block.unknown or not set(named) <= {*SPATIAL}:
         unfollowed(control, block, code)
         return
     else:

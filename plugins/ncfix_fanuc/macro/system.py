@@ -12,7 +12,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from ncfix.control.expressions import Fault, Unknown, Value, nominal
+from ncfix.control.expressions import Fault, Unknown, Value, nominal, scaled
 from ncfix_fanuc.macro.data import keep_length
 from ncfix_iso.rs274.systems import activate, before_persistent
 
@@ -90,21 +90,16 @@ def modes(control: MacroControl) -> dict[int, Getter]:
     return {base + number: getter for base in (4000, 4200, 4300) for number, getter in state.items()}
 
 
-def was_set(control: MacroControl, number: int, value: float, runtime: bool) -> None:
+def was_set(control: MacroControl, number: int, value: Value) -> None:
     """The program has set a variable of the control."""
     if number == ALARM:
         raise Fault(ALARM_RAISED, "the program raises an alarm here (#3000)", "the control stops")
     system, place = divmod(number - OFFSETS.start, 20)
     if number in OFFSETS and place in SPATIAL:
-        control.parameters.put(control.parameters.numbers, number, control.modal.unit * value, runtime)
+        control.parameters.assign(number, scaled(control.modal.unit, value))
         if control.modal.system == 1 + system:
             activate(control, control.modal.system)
     elif number in LENGTHS:
-        set_length(control, number, value, runtime)
+        keep_length(control, number - LENGTHS.start + 1, scaled(control.modal.unit, value))
     elif not any(number in each for each in HARMLESS):
         control.refusal = control.refusal or f"the program sets #{number}, which ncfix does not follow"
-
-
-def set_length(control: MacroControl, number: int, value: float, runtime: bool) -> None:
-    """A tool length is set."""
-    keep_length(control, number - LENGTHS.start + 1, control.modal.unit * value, runtime=runtime)

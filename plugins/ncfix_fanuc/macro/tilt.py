@@ -66,7 +66,7 @@ def tilt(control: MacroControl, block: Block, code: int) -> None:
     if control.mirrored or code != TILT or not is_followed(block, form):
         unfollowed(control, block, code)
         return
-    if block.runtime:
+    if block.unknown:
         control.refusal = control.refusal or "the tilted plane (G68.2) is known only at run time"
     if form in LAST:
         define(control, block, form)

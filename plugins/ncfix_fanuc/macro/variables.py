@@ -8,7 +8,7 @@ Source: Fanuc 30i operator's manual, "Custom macro", "System variables".
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ncfix.control.expressions import Fault, Unknown, Value, nominal
 from ncfix_fanuc.macro.expressions import VACANT
@@ -35,15 +35,11 @@ class MacroVariables(NumberedParameters):
     """All variables.
 
     scopes    the local variables of each call level, the main program's first
-    setters   what happens when the program sets a variable of the control
-    assigned  called with the number of a variable of the control that was set and that nothing follows
     position  called when the program reads where the machine stands
     unset     called with the number of a common variable, or one that a caller gives, that is read and was never set
     inherits  the program is called by another one: so are its local variables set
     """
 
-    setters: dict[int, Callable[[float, bool], None]] = field(default_factory=dict)
-    assigned: Callable[[int], None] = lambda index: None
     position: Callable[[int], None] = lambda index: None
     unset: Callable[[int], None] = lambda index: None
     inherits: bool = False
@@ -87,16 +83,6 @@ class MacroVariables(NumberedParameters):
             raise Fault(OUT_OF_RANGE, f"there is no variable #{key}")
         if any(key in positions for positions in POSITIONS):
             raise Fault(READ_ONLY_FAULT, f"#{key} cannot be assigned to: it is where the machine stands")
-
-    def assign(self, key: Key, value: float, runtime: bool = False) -> None:
-        """Set a variable."""
-        self.put(self.store_of(key), key, value, runtime)
-        if isinstance(key, int) and is_system(key):
-            setter = self.setters.get(key)
-            if setter is not None:
-                setter(value, runtime)
-            else:
-                self.assigned(key)
 
 
 def is_common(index: int) -> bool:

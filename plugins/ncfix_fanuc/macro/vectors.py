@@ -43,7 +43,7 @@ def directed(control: MacroControl, block: Block, motion: int) -> str:
         return ON_ARC
     if not given:
         return ""
-    if block.runtime & set(COMPONENTS):
+    if block.unknown & set(COMPONENTS):
         return AT_RUNTIME
     if control.posture.pointing is None:
         return NO_KINEMATICS

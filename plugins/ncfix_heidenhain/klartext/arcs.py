@@ -132,7 +132,7 @@ def circular_polar(control: KlartextControl, step: Step) -> None:
     plane, turning = control.path.plane, sense(step)
     control.use()
     where, angle = polar(
-        control, MotionWords({k: v for k, v in step.words.values.items() if k not in ("PR", "IPR")}, step.words.runtime)
+        control, MotionWords({k: v for k, v in step.words.values.items() if k not in ("PR", "IPR")}, step.words.unknown)
     )
     if give_up(control, step, where):
         return
@@ -236,11 +236,11 @@ def points(control: KlartextControl, where: Where, plane: Plane) -> tuple[tuple[
 
 def give_up(control: KlartextControl, step: Step, where: Where) -> bool:
     """Refuse an arc of which an end is not known; True if that is so."""
-    if not starts_unknown(control) and not where.unknown and not step.words.runtime:
+    if not starts_unknown(control) and not where.unknown and not step.words.unknown:
         return False
     reasons = [why.format(LETTERS[i]) for i, why in {**control.unknown, **where.unknown}.items()]
     reason = reasons[0] if reasons else "a word of the arc depends on a Q parameter that is known only at run time"
-    if step.words.runtime:
+    if step.words.unknown:
         axes = step.words.axes or 3
         where.unknown |= {i: reason for i in control.machine if axes >> i & 1}
     do_without(control, step, where, reason)
@@ -252,7 +252,7 @@ def do_without(control: KlartextControl, step: Step, where: Where, reason: str) 
     about_pole = step.name in ("cp", "ctp")
     axes = polar_axes(control, step.words) if about_pole else step.words.axes or 3
     end = command_of(control, where, axes)
-    if about_pole or (step.words.runtime and not step.words.incremental):
+    if about_pole or (step.words.unknown and not step.words.incremental):
         somewhere(control, axes, end, reason)
         return
     control.make(Motion(MotionKind.FEED, axes, end, 10, refusal=reason))

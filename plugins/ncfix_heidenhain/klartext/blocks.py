@@ -16,7 +16,7 @@ from lark import Token, UnexpectedInput
 from numpy.typing import NDArray
 
 from ncfix import core
-from ncfix.control.expressions import Fault
+from ncfix.control.expressions import Fault, Unknown
 from ncfix.text.build import MAX_DEPTH, Branch, Node, Parsed, TooDeepError, TreeBuilder, edges, kind, tokens_of
 from ncfix.text.dialect import Dialect
 from ncfix.text.grammar import Squeezed, parse
@@ -179,7 +179,7 @@ def unread_line(control: KlartextControl, text: str) -> None:
     if FLOW.match(text):
         raise Fault(UNREADABLE, DECIDES, "correct the line")
     for name in PARAMETER.findall(text):
-        control.scope.parameters.assign(name.upper(), 0.0, runtime=True)
+        control.scope.parameters.assign(name.upper(), Unknown())
     if ASSIGNED.match(text):
         return
     control.warn(UNREADABLE, NOT_KLARTEXT, HINT)

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 
 from ncfix.control.coordinates import PLANES, X, Y, dot, rotated
-from ncfix.control.expressions import Unknown, Value, nominal, signed
+from ncfix.control.expressions import Unknown, Value, nominal, scaled
 from ncfix.text.spelling import value_of
 from ncfix_heidenhain.klartext.arcs import IN_PLANE, somewhere
 from ncfix_heidenhain.klartext.control import FREELY, KlartextControl
@@ -156,7 +156,7 @@ def number(control: KlartextControl, text: str) -> Value:
     """The value of a number or a Q parameter."""
     bare = "".join(text.split()).lstrip("+-")
     value = control.scope.parameters.get(bare.upper()) if bare[0] in "Qq" else value_of(bare)
-    return signed(-1.0 if text.startswith("-") else 1.0, value)
+    return scaled(-1.0 if text.startswith("-") else 1.0, value)
 
 
 def in_radians(values: Mapping[str, float], name: str) -> float | None:

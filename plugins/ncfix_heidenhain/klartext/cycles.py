@@ -17,7 +17,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 
 from ncfix.control.coordinates import X, Y, Z, mask_of
-from ncfix.control.expressions import Fault, Value, nominal, numbers, signed
+from ncfix.control.expressions import Fault, Value, nominal, numbers, scaled
 from ncfix.control.moves import Motion, MotionKind
 from ncfix.text.spelling import value_of
 from ncfix_heidenhain.klartext import transformations
@@ -92,7 +92,7 @@ def define(control: KlartextControl, name: str, words: MotionWords, text: str) -
     if part in ("", "0"):
         control.cycle.number, control.cycle.steps = cycle, {}
     words_of_step = {**words.values}
-    if words.runtime:
+    if words.unknown:
         words_of_step["?"] = 1.0
     control.cycle.steps |= {f"{part}:{key}": value for key, value in words_of_step.items()}
 
@@ -258,7 +258,7 @@ def holes(values: Values) -> float:
 def number(sign: str, text: str, parameters: QParameters) -> Value:
     """The value of a number or a Q parameter."""
     value = parameters.get(text.upper()) if text[0] in "Qq" else value_of(text)
-    return signed(-1.0 if sign == "-" else 1.0, value)
+    return scaled(-1.0 if sign == "-" else 1.0, value)
 
 
 # -- forms ------------------------------------------------------------------------------------------------------------

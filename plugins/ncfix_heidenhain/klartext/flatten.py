@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ncfix.control.expressions import nominal
+from ncfix.control.expressions import Unknown, nominal
 from ncfix.control.flatten import Change, Flattener
 from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Constant, Expression, Literal, Span, StringLiteral, Word
@@ -68,7 +68,7 @@ class KlartextFlattener(Flattener):
         parameters = replace(control.scope.parameters, values=dict(control.scope.parameters.values))
         scope = replace(control.scope, parameters=parameters)
         for name, value in plan.assignments:
-            parameters.assign(name, *scope.value_of(value))
+            parameters.assign(name, value(scope))
         places = pattern_of_cycle(int(plan.name.removeprefix("cycl def ")), parameters) or ()
         shared = [name for name, _ in plan.assignments if name in SHARED]
         set_anew = [f"FN 0: {name} = {self.style.short(nominal(parameters.get(name)), OTHERS)}" for name in shared]
@@ -115,8 +115,8 @@ class KlartextFlattener(Flattener):
 
     def number(self, value: Expression, digits: int) -> str | None:
         """The number that a formula comes to; None where it is known only at run time."""
-        found, at_runtime = self.control.scope.value_of(compiled(value))
-        if at_runtime:
+        found = compiled(value)(self.control.scope)
+        if isinstance(found, Unknown):
             return None
         write = self.style.short if digits == OTHERS else self.style.number
-        return write(found, digits)
+        return write(nominal(found), digits)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ncfix.control.coordinates import INDEX, mask_of
-from ncfix.control.expressions import Evaluate, Fault, Unknown
+from ncfix.control.expressions import Evaluate, Fault, Unknown, nominal
 from ncfix.control.flow import Return
 from ncfix.control.interpreter import NO_END, RUNTIME, Interpreter
 from ncfix.control.moves import Moves
@@ -258,16 +258,14 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         """Set Q parameters."""
         scope = self.control.scope
         for name, value in plan.assignments:
-            scope.parameters.assign(name, *scope.value_of(value))
+            scope.parameters.assign(name, value(scope))
 
     def evaluated(self, words: Mapping[str, Evaluate]) -> MotionWords:
         """The words of a block as numbers."""
-        scope, values, runtime = self.control.scope, {}, []
-        for address, value in words.items():
-            values[address], at_runtime = scope.value_of(value)
-            if at_runtime:
-                runtime.append(address)
-        return MotionWords(values, frozenset(runtime))
+        scope = self.control.scope
+        values = {address: value(scope) for address, value in words.items()}
+        unknown = frozenset(address for address, value in values.items() if isinstance(value, Unknown))
+        return MotionWords({address: nominal(value) for address, value in values.items()}, unknown)
 
     def tool_of(self, plan: KlartextPlan) -> str | float | Unknown | None:
         """The number or name of a tool."""
@@ -296,7 +294,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         control.enter_block((*words.values, plan.name))
         self.feed(words, plan)
         values = {address: value for address, value in words.values.items() if address not in NOT_OF_MOTION}
-        step = Step(plan.name, MotionWords(values, words.runtime & values.keys()), plan.flags, codes)
+        step = Step(plan.name, MotionWords(values, words.unknown & values.keys()), plan.flags, codes)
         self.note_foreign(plan, step)
         before_motion(control, step)
         control.path.ahead = self.corner_ahead(flow)
@@ -323,7 +321,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         modal = self.control.modal
         for address, mode in (("F", 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
             if address in words.values:
-                known = address not in words.runtime and address in ("F", "FU")
+                known = address not in words.unknown and address in ("F", "FU")
                 modal.feed = words.values[address] * self.control.modal.unit if known else math.nan
                 modal.feed_mode = mode
         if "fauto" in plan.flags:

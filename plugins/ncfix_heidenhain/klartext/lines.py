@@ -51,7 +51,7 @@ def straight(control: KlartextControl, step: Step) -> None:
     if not {"TX", "TY", "TZ"} & step.words.values.keys():
         run(control, step, end, step.words.axes)
         return
-    way = None if step.words.runtime else pointed(control, step.words)
+    way = None if step.words.unknown else pointed(control, step.words)
     if way is None:
         control.refuse_here(ORIENTED)
         return
@@ -201,7 +201,7 @@ def departure(control: KlartextControl, step: Step) -> None:
     plane = control.path.plane
     lost: UnknownAxes = {i: DEPARTED for i in (plane.first, plane.second) if i in control.machine}
     target = control.position[:]
-    straight_on = step.name == "dep lt" and "LEN" in step.words.values and not (beside or step.words.runtime)
+    straight_on = step.name == "dep lt" and "LEN" in step.words.values and not (beside or step.words.unknown)
     if straight_on and tangent is not None:
         length = control.stretch * step.words.values["LEN"]
         target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]

@@ -203,10 +203,11 @@ class QParameters:
         value = self.values.get(name, Unknown(name))
         return Unknown(name, value.nominal) if isinstance(value, Unknown) else value
 
-    def assign(self, name: str, value: float, runtime: bool = False) -> None:
+    def assign(self, name: str, value: Value) -> None:
         """Set a parameter."""
-        self.changes += name not in self.values or nominal(self.values[name]) != value or runtime
-        self.values[name] = Unknown(name, value) if runtime else value
+        unknown, number = isinstance(value, Unknown), nominal(value)
+        self.changes += name not in self.values or nominal(self.values[name]) != number or unknown
+        self.values[name] = Unknown(name, number) if unknown else number
 
     def enter(self) -> dict[str, Value]:
         """A program is called: it has QL parameters of its own. Returns those of the caller, for `leave`."""
@@ -216,7 +217,7 @@ class QParameters:
         """The called program is over."""
         self.enter()
         for name, value in own.items():
-            self.assign(name, nominal(value), isinstance(value, Unknown))
+            self.assign(name, value)
 
 
 @dataclass(slots=True)
@@ -226,11 +227,6 @@ class FormulaScope:
     numbers: Sequence[float] = ()
     first: int = 0
     parameters: QParameters = field(default_factory=QParameters)
-
-    def value_of(self, function: Evaluate) -> tuple[float, bool]:
-        """The value of a formula, nominal where it is known only at run time, and whether it is; raises `Fault`."""
-        value = function(self)
-        return nominal(value), isinstance(value, Unknown)
 
 
 OPERATORS: dict[str, Callable[[float, float], float]] = {

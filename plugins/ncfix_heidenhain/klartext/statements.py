@@ -181,8 +181,8 @@ def define_tool(
     if isinstance(tool, Unknown) and "L" in words.values:
         control.defined_tools = dict.fromkeys(control.defined_tools, Tool())
     if isinstance(tool, float) and "L" in words.values:
-        radius = None if "R" in words.runtime else words.values.get("R")
-        length = None if "L" in words.runtime else words.values["L"] * control.modal.unit
+        radius = None if "R" in words.unknown else words.values.get("R")
+        length = None if "L" in words.unknown else words.values["L"] * control.modal.unit
         control.defined_tools[int(tool)] = Tool(length, None if radius is None else radius * control.modal.unit)
 
 
@@ -204,7 +204,7 @@ def call_tool(
     axis = next((letter for letter in "xyuvw" if letter in flags), None)
     if axis is not None:
         control.suspended[TOOL] = OTHER_AXIS.format(axis.upper())
-    if "DL" in words.runtime:
+    if "DL" in words.unknown:
         control.suspended[TOOL] = AT_RUN_TIME
     if isinstance(tool, str):
         control.tools.spindle = NAMED
@@ -230,7 +230,8 @@ def tell_radius(control: KlartextControl, oversize: float) -> None:
     radius = control.knowledge.known_tool_radius(number)
     radius = defined.radius if radius is None else radius
     control.tools.cutter = math.nan if radius is None else radius + oversize * control.modal.unit
-    control.scope.parameters.assign("Q108", (radius or 0.0) / control.modal.unit + oversize, runtime=radius is None)
+    told = (radius or 0.0) / control.modal.unit + oversize
+    control.scope.parameters.assign("Q108", Unknown("", told) if radius is None else told)
 
 
 def set_length(control: KlartextControl, length: float) -> None:
@@ -341,7 +342,7 @@ def probe(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) ->
         control.suspended[PRESET] = MEASURED.format(number)
     control.pass_here(PROBING, AFTER_PROBING, "XYZ")
     for each in PROBED:
-        control.scope.parameters.assign(f"Q{each}", 0.0, runtime=True)
+        control.scope.parameters.assign(f"Q{each}", Unknown())
     lose_parameters(control, match[0], IN_A_ROW if number < PROBED[0] else 1)
 
 
@@ -354,7 +355,7 @@ def lose_parameters(control: KlartextControl, text: str, in_a_row: int) -> None:
     """The Q parameters that a text names, and those behind them, are known only at run time."""
     for letters, number in TARGET.findall(text):
         for offset in range(in_a_row):
-            control.scope.parameters.assign(f"{letters.upper()}{int(number) + offset}", 0.0, runtime=True)
+            control.scope.parameters.assign(f"{letters.upper()}{int(number) + offset}", Unknown())
 
 
 # -- coordinates ------------------------------------------------------------------------------------------------------

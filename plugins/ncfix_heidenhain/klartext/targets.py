@@ -31,11 +31,11 @@ class MotionWords:
     """The words of one motion as numbers.
 
     values   address -> value, in program units
-    runtime  addresses whose value is known only at run time
+    unknown  addresses whose value is known only at run time
     """
 
     values: Mapping[str, float]
-    runtime: frozenset[str]
+    unknown: frozenset[str]
 
     @property
     def axes(self) -> int:
@@ -104,7 +104,7 @@ def led(control: KlartextControl, words: MotionWords) -> Where:
             if index in control.composed.unknown:
                 where.unknown[index] = control.composed.unknown[index]
         where.inner[index] += control.scale[index] * value
-        if address in words.runtime:
+        if address in words.unknown:
             where.unknown[index] = RUNTIME
     by_spatial_angles(control, words, where)
     return where
@@ -158,7 +158,7 @@ def in_machine(control: KlartextControl, words: MotionWords) -> tuple[dict[int, 
             axes[index] = value * (DEGREE if control.rotary[index] else control.modal.unit)
             if address[0] == "I":
                 unsure[index] = COUNTED_FROM
-            elif address in words.runtime:
+            elif address in words.unknown:
                 unsure[index] = RUNTIME
     return axes, unsure
 
@@ -234,7 +234,7 @@ def doubt(control: KlartextControl, words: MotionWords, start: Where) -> str:
         for index in (plane.first, plane.second):
             if index in start.unknown:
                 return start.unknown[index]
-    if words.runtime & {"PR", "PA", "IPR", "IPA"}:
+    if words.unknown & {"PR", "PA", "IPR", "IPA"}:
         return RUNTIME
     return "" if control.path.pole_in == pole_frame(control) else POLE_MOVED
 

@@ -223,7 +223,7 @@ def shift(control: KlartextControl, words: MotionWords, text: str) -> None:
         scale = DEGREE if control.rotary[index] else control.modal.unit
         shift_axis(control, letter, scale * value, incremental=address[0] == "I")
         why.pop(index, None)
-        if address in words.runtime:
+        if address in words.unknown:
             why[index] = AT_RUN_TIME
     datum_unknown(control, why)
 
@@ -269,7 +269,7 @@ def preset(control: KlartextControl, words: MotionWords, text: str) -> None:
 def suspend(control: KlartextControl, words: MotionWords, what: str) -> None:
     """Nothing is corrected while a transformation depends on what is known only at run time."""
     control.suspended.pop(what, None)
-    if words.runtime:
+    if words.unknown:
         control.suspended[what] = f"the {what} of the coordinates is known only at run time"
 
 
@@ -348,7 +348,7 @@ def plane(control: KlartextControl, form: str, words: MotionWords, flags: frozen
     if form == "reset":
         tilt_to(control, None, flags)
         return
-    if words.runtime:
+    if words.unknown:
         tilt_to(control, control.frames.plane.rotation, flags, RUNTIME)
     elif form.startswith("relativ"):
         tilt_to(control, product(control.frames.plane.rotation, by_angles(values)), flags)
@@ -371,7 +371,7 @@ def is_idle(control: KlartextControl, flags: frozenset[str]) -> bool:
     idle = asked and not turns and not control.plane_tilted and TILTED not in control.suspended
     if idle:
         for name in CALCULATED:
-            control.scope.parameters.assign(name, 0.0, runtime=True)
+            control.scope.parameters.assign(name, Unknown())
     return idle
 
 
@@ -399,7 +399,7 @@ def tilt_to(control: KlartextControl, tilt: Rotation | None, flags: frozenset[st
     for letter, name in zip("ABC", CALCULATED, strict=True):
         known = way is not None and INDEX[letter] in way
         angle = way[INDEX[letter]] - control.offset[INDEX[letter]] if way is not None and known else 0.0
-        control.scope.parameters.assign(name, angle / DEGREE, runtime=not known)
+        control.scope.parameters.assign(name, angle / DEGREE if known else Unknown("", angle / DEGREE))
     if flags & {"turn", "move"}:
         turn_axes(control, way)
     if flags & {"move", RETRACTING}:
@@ -469,7 +469,7 @@ def cycle_19(control: KlartextControl, words: MotionWords) -> None:
     if not values:
         tilt_to(control, None, frozenset())
         return
-    if words.runtime:
+    if words.unknown:
         tilt_to(control, control.frames.plane.rotation, frozenset(), RUNTIME)
         return
     meant = by_angles({f"SP{letter}": value for letter, value in values.items()})

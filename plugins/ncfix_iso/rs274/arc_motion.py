@@ -28,7 +28,7 @@ def arc(control: RS274Control, block: Block, code: int) -> None:
     end = destination(control, block)
     step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
     point = step[plane.first], step[plane.second]
-    doubtful = bool(end.unknown or control.unknown or block.runtime or control.composed.unknown)
+    doubtful = bool(end.unknown or control.unknown or block.unknown or control.composed.unknown)
     clockwise = code == CLOCKWISE
     try:
         centre = centre_of(control, block, plane, point, clockwise=clockwise)
@@ -54,7 +54,7 @@ def turns_of(block: Block) -> int:
 def refusal_of(block: Block, plane: Plane) -> str:
     """Why an arc is refused: its centre is known only at run time."""
     centre_words = {CENTRE_LETTERS[index] for index in (plane.first, plane.second)} | {"R"}
-    if block.runtime & centre_words:
+    if block.unknown & centre_words:
         return "the centre of the arc is known only at run time"
     return ""
 

@@ -39,20 +39,24 @@ class Block:
 
     index    the block in its program
     values   the values of its words by address, in program units
-    runtime  addresses whose value is known only at run time
+    unknown  addresses whose value is known only at run time: `values` has the nominal one
     axes     bit mask of the axis words, by letter
     turn     of a cycle: the angle by which each hole lies further round the origin of the plane, degrees
     """
 
     index: int
     values: dict[str, float]
-    runtime: frozenset[str]
+    unknown: frozenset[str]
     axes: int
     turn: float | None = None
 
     def get(self, letter: str, default: float = 0.0) -> float:
         """The value of a word."""
         return self.values.get(letter, default)
+
+    def value(self, letter: str) -> Value:
+        """The value of a word that the block has, or that it is not known."""
+        return Unknown(letter, self.values[letter]) if letter in self.unknown else self.values[letter]
 
 
 class RS274Control(shared.ProgramControl):
@@ -137,17 +141,12 @@ class RS274Control(shared.ProgramControl):
             for i in range(len(LETTERS))
         ]
 
-    def value_of(self, function: Evaluate) -> tuple[float, bool]:
-        """The value of an expression, and whether it is known only at run time; raises `Fault`."""
-        value = function(self)
-        return nominal(value), isinstance(value, Unknown)
-
     def deciding(self, function: Evaluate) -> float:
         """A value that decides where to go on; where it is known only at run time nothing after it is certain."""
-        value, at_runtime = self.value_of(function)
-        if at_runtime:
+        value = function(self)
+        if isinstance(value, Unknown):
             self.refusal = self.refusal or RUNTIME_BRANCH
-        return value
+        return nominal(value)
 
     def coordinate(self, index: int) -> Value:
         """Where an axis stands in program units, X not as a diameter; marked where it is known only at run time."""

@@ -69,12 +69,12 @@ def take_words(control: RS274Control, block: Block, code: int, plane: Plane) -> 
         if letter not in block.values and not in_force:
             raise Fault(BAD_CYCLE, f"{letter} is missing: a canned cycle cannot begin without it")
     if not in_force:
-        sticky.runtime = False
+        sticky.unknown = False
     if level_letter in block.values:
         sticky.r = block.values[level_letter]
     if depth_letter in block.values:
         sticky.depth = block.values[depth_letter]
-    sticky.runtime |= bool(block.runtime & {level_letter, depth_letter})
+    sticky.unknown |= bool(block.unknown & {level_letter, depth_letter})
 
 
 def levels(control: RS274Control, initial: float) -> tuple[float, float]:
@@ -133,7 +133,7 @@ def drill(
     across = control.modal.plane.across
     moved = block.axes | 1 << across
     unknown = hole_unknown(control, block)
-    refusal = "a word of the cycle is known only at run time" if control.modal.cycle.runtime else ""
+    refusal = "a word of the cycle is known only at run time" if control.modal.cycle.unknown else ""
     height = control.lost_in_frame().get(across)
     if not control.modal.incremental and not unknown and not control.modal.diameter:
         program[across] = r

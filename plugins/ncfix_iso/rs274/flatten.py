@@ -126,8 +126,8 @@ class RS274Flattener(Flattener):
     def check(self) -> None:
         """Raise `Fault` where the values of a block depend on the machine at run time."""
         block = self.values
-        if block.runtime or self.control.refusal == RUNTIME_BRANCH:
-            what = f"the word {min(block.runtime)}" if block.runtime else "which blocks are executed"
+        if block.unknown or self.control.refusal == RUNTIME_BRANCH:
+            what = f"the word {min(block.unknown)}" if block.unknown else "which blocks are executed"
             raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
 
     # -- items --------------------------------------------------------------------------------------------------------

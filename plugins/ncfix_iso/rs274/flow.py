@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from ncfix.control.expressions import Evaluate, Fault
+from ncfix.control.expressions import Evaluate, Fault, nominal
 from ncfix.control.flow import NO_LABEL, NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.expressions import whole
@@ -108,7 +108,7 @@ class OWords(ProgramFlow[RS274Unit]):
     def computed_label(self, label: Evaluate) -> str:
         """A label given by an expression; where execution skips it may not have a value, and is none then."""
         try:
-            return str(whole(self.control.value_of(label)[0], "a label"))
+            return str(whole(nominal(label(self.control)), "a label"))
         except Fault:
             if self.skipping is None:
                 raise
@@ -212,7 +212,7 @@ class OWords(ProgramFlow[RS274Unit]):
     def call(self, flow: FlowLine, name: str) -> None:
         """`call [..] [..]`: the arguments become #1, #2, ..."""
         parameters = self.control.parameters
-        arguments = [self.control.value_of(argument) for argument in flow.arguments]
+        arguments = [argument(self.control) for argument in flow.arguments]
         saved = parameters.locals()
         self.begin(name, 0, "", lambda: parameters.set_locals(saved))
         parameters.set_locals(arguments)

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS, N_LETTERS, mask_of
-from ncfix.control.expressions import Fault, Unknown
+from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.flow import NEVER_ENDS, WAITS, ProgramFlow
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.control.setup import Run
@@ -244,16 +244,17 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         numbers, first = control.numbers, control.first
         values = {letter: numbers[first + slot] for letter, slot in plan.literals}
         values |= plan.fixed
-        runtime = []
+        unknown = []
         for letter, function, span in plan.computed:
             self.span = span
-            values[letter], at_runtime = control.value_of(function)
-            if at_runtime:
-                runtime.append(letter)
+            value = function(control)
+            values[letter] = nominal(value)
+            if isinstance(value, Unknown):
+                unknown.append(letter)
         if plan.assignments:
             self.assign(plan)
         self.span = None
-        return Block(index, values, frozenset(runtime), plan.axes)
+        return Block(index, values, frozenset(unknown), plan.axes)
 
     def assign(self, plan: RS274Plan) -> None:
         """Set the parameters that a block sets, all at once."""
@@ -264,25 +265,25 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             which = target(self.control) if callable(target) else target
             key = number_of(which) if callable(target) else target
             parameters.check_writable(key)
-            value, runtime = self.control.value_of(function)
-            pending.append((key, value, runtime or isinstance(which, Unknown)))
-        for key, value, runtime in pending:
-            parameters.assign(key, value, runtime)
+            value = function(self.control)
+            pending.append((key, Unknown("", nominal(value)) if isinstance(which, Unknown) else value))
+        for key, value in pending:
+            parameters.assign(key, value)
 
     def computed_codes(self, plan: RS274Plan) -> Codes:
         """The codes of a block in which some are computed."""
-        at_runtime = False
+        unknown = False
         pairs: list[tuple[Word, int]] = []
         for word, function in plan.code_words:
-            value, unknown = self.control.value_of(function)
-            tenths, at_runtime = 10 * value, at_runtime or unknown
+            value = function(self.control)
+            tenths, unknown = 10 * nominal(value), unknown or isinstance(value, Unknown)
             if abs(tenths - round(tenths)) > 0.001:
                 raise Fault(BAD_MOTION, f"{word.address}{tenths / 10:g} is not a code", span=word.span)
             pairs.append((word, round(tenths)))
             like = self.control.rules.aliases.get((word.address, round(tenths)))
             if like is not None and like.words:
                 self.control.refusal = self.control.refusal or COMPUTED_ALIAS.format(f"{word.address}{tenths / 10:g}")
-        if at_runtime:
+        if unknown:
             self.control.refusal = self.control.refusal or "a G or M code is known only at run time"
         return grouped_codes(pairs, plan.letters, self.control.rules)
 

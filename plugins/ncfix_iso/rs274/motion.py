@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from ncfix.control.coordinates import INDEX, LETTERS, N_LETTERS, Vector, X, Y, mask_of, rotated
-from ncfix.control.expressions import Fault, nominal
+from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.moves import FeedMode, Motion, MotionEnd, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.tcp import led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
@@ -64,7 +64,7 @@ def words_destination(control: RS274Control, block: Block) -> MotionEnd:
 
 def unknown_after(control: RS274Control, block: Block, incremental: bool, before: UnknownAxes) -> UnknownAxes:
     """Which axes are not known where the motion ends, of those that were not `before`."""
-    if not (before or control.composed.unknown or block.runtime):
+    if not (before or control.composed.unknown or block.unknown):
         return before
     unknown = dict(before)
     for index, letter in enumerate(LETTERS):
@@ -74,7 +74,7 @@ def unknown_after(control: RS274Control, block: Block, incremental: bool, before
             unknown.pop(index, None)
             if index in control.composed.unknown:
                 unknown[index] = control.composed.unknown[index]
-        if letter in block.runtime:
+        if letter in block.unknown:
             unknown[index] = RUNTIME
     return unknown
 
@@ -105,8 +105,8 @@ def cartesian(control: RS274Control, block: Block) -> Block:
     if control.modal.incremental:
         others |= {letter: value + program[INDEX[letter]] for letter, value in others.items() if letter in INDEX}
     ends = {"X": 2.0 * x if control.modal.diameter else x, "Y": y}
-    runtime = block.runtime | {"X", "Y"} if block.runtime & {"@", "^"} else block.runtime
-    return Block(block.index, others | ends, runtime, block.axes)
+    unknown = block.unknown | {"X", "Y"} if block.unknown & {"@", "^"} else block.unknown
+    return Block(block.index, others | ends, unknown, block.axes)
 
 
 def by_radius_and_angle(control: RS274Control, block: Block, x: float, y: float) -> tuple[float, float]:
@@ -129,7 +129,7 @@ def machine_destination(control: RS274Control, block: Block) -> MotionEnd:
     """The command at which a motion in machine coordinates (G53) ends."""
     named = [letter for letter in block.values if letter in INDEX]
     axes = {INDEX[letter]: control.scale[INDEX[letter]] * block.values[letter] for letter in named}
-    return led_in_machine(control, axes, {INDEX[letter]: RUNTIME for letter in named if letter in block.runtime})
+    return led_in_machine(control, axes, {INDEX[letter]: RUNTIME for letter in named if letter in block.unknown})
 
 
 NO_FEED = "NCF225"
@@ -147,7 +147,7 @@ def feed_mode(control: RS274Control, block: Block, code: int) -> None:
 def feed(control: RS274Control, block: Block, code: int) -> None:
     """F."""
     unit = 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
-    control.modal.feed = math.nan if "F" in block.runtime else unit * block.values["F"]
+    control.modal.feed = math.nan if "F" in block.unknown else unit * block.values["F"]
     control.modal.feed_given = control.modal.feed != 0.0
 
 
@@ -202,7 +202,7 @@ def straight(control: RS274Control, block: Block, code: int) -> None:
     if not block.axes:
         return
     kind = MotionKind.FEED if code else MotionKind.RAPID
-    computed = block.runtime & INDEX.keys()
+    computed = block.unknown & INDEX.keys()
     if computed and control.probes_nominally:
         measured(control, block, computed, kind, code)
         return
@@ -216,7 +216,7 @@ def measured(control: RS274Control, block: Block, computed: frozenset[str], kind
     a later block: neither is written.
     """
     axes = mask_of(INDEX[letter] for letter in computed)
-    end = destination(control, Block(block.index, block.values, block.runtime - computed, block.axes))
+    end = destination(control, Block(block.index, block.values, block.unknown - computed, block.axes))
     with control.in_one_piece():
         control.builder.measures(axes)
         control.make(Motion(kind, block.axes, end, code))
@@ -348,8 +348,8 @@ def probed(control: RS274Control, motion: Motion, *, touches: bool) -> None:
     control.make(motion)
     program = control.program_position()
     for index in range(N_LETTERS):
-        control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
-    control.parameters.assign(5070, 1.0, runtime=not touches)
+        control.parameters.assign(5061 + index, Unknown("", program[index] / control.unit_of(index)))
+    control.parameters.assign(5070, 1.0 if touches else Unknown("", 1.0))
 
 
 # -- followed only as far as their end --------------------------------------------------------------------------------

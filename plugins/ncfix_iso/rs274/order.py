@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
+from ncfix.control.expressions import Unknown
 from ncfix.text.dialect import CodeOperation
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.arc_motion import arc
@@ -64,7 +65,7 @@ INPUTS = 5399
 def read_input(control: RS274Control, block: Block, code: int) -> None:
     """M66 reads an input: the value is known only at run time."""
     if code == 660:
-        control.parameters.assign(INPUTS, 0.0, runtime=True)
+        control.parameters.assign(INPUTS, Unknown())
         control.parameters.inputs = True
 
 

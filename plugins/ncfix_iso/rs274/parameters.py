@@ -105,14 +105,15 @@ class NumberedParameters:
             name = f"#{key}" if isinstance(key, int) else f"#<{key}>"
             raise Fault(READ_ONLY_FAULT, f"{name} cannot be assigned to: the control sets it itself")
 
-    def assign(self, key: Key, value: float, runtime: bool = False) -> None:
-        """Set a parameter, and whether its value is known only at run time."""
-        self.put(self.numbers if isinstance(key, int) else self.scope_of(key), key, value, runtime)
+    def store_of(self, key: Key) -> Store:
+        """Where a parameter is kept."""
+        return self.numbers if isinstance(key, int) else self.scope_of(key)
 
-    def put(self, store: Store, key: Key, value: float, runtime: bool) -> None:
-        """Set a parameter of a scope."""
-        self.changes += key not in store or nominal(store[key]) != value
-        store[key] = Unknown(f"#{key}", value) if runtime else value
+    def assign(self, key: Key, value: Value) -> None:
+        """Set a parameter; what is unknown depends on this parameter from here on."""
+        store, number = self.store_of(key), nominal(value)
+        self.changes += key not in store or nominal(store[key]) != number
+        store[key] = Unknown(f"#{key}", number) if isinstance(value, Unknown) else number
 
     def is_unknown(self, number: int) -> bool:
         """Whether a numbered parameter is known only at run time."""
@@ -120,12 +121,12 @@ class NumberedParameters:
 
     # -- subprograms --------------------------------------------------------------------------------------------------
 
-    def locals(self) -> list[tuple[float, bool]]:
-        """#1 to #30, and whether they are known only at run time."""
-        return [(nominal(self.numbers.get(index, 0.0)), self.is_unknown(index)) for index in LOCAL]
+    def locals(self) -> list[Value]:
+        """#1 to #30."""
+        return [self.numbers.get(index, 0.0) for index in LOCAL]
 
-    def set_locals(self, values: list[tuple[float, bool]]) -> None:
+    def set_locals(self, values: list[Value]) -> None:
         """Set #1 to #30; those without a value become 0."""
-        padded = values + [(0.0, False)] * (len(LOCAL) - len(values))
-        for index, (value, runtime) in zip(LOCAL, padded, strict=True):
-            self.assign(index, value, runtime)
+        padded = values + [0.0] * (len(LOCAL) - len(values))
+        for index, value in zip(LOCAL, padded, strict=True):
+            self.assign(index, value)

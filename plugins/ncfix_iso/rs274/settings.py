@@ -85,7 +85,7 @@ def compensation(control: RS274Control, block: Block, code: int) -> None:
 def select_radius(control: RS274Control, block: Block, code: int) -> None:
     """D, by which ISO controls know the radius of the cutter from there on; LinuxCNC takes it beside G41 only."""
     if not control.rules.strict:
-        control.tools.register = NO_REGISTER if "D" in block.runtime else round(block.values["D"])
+        control.tools.register = NO_REGISTER if "D" in block.unknown else round(block.values["D"])
 
 
 def unknown_code(control: RS274Control, code: int, *, moving: bool) -> None:
@@ -136,13 +136,13 @@ DIFFERS = "what G10 L{} sets differs from control to control (--dialect says whi
 
 def select_tool(control: RS274Control, block: Block, code: int) -> None:
     """T: the tool that the next M6 puts into the spindle."""
-    control.tools.select(whole(block.values["T"], "T"), unsure="T" in block.runtime)
+    control.tools.select(whole(block.values["T"], "T"), unsure="T" in block.unknown)
 
 
 def change_tool(control: RS274Control, block: Block, code: int) -> None:
     """M6, for which machines go where tools are changed, and M61 Qn, which only says what is in the spindle."""
     if code == 610:
-        control.tools.select(whole(block.get("Q", -1.0), "Q of M61"), unsure="Q" in block.runtime)
+        control.tools.select(whole(block.get("Q", -1.0), "Q of M61"), unsure="Q" in block.unknown)
         if control.tools.selected < 0:
             raise Fault(BAD_LENGTH, "M61 needs Q, the number of the tool")
     else:
@@ -164,7 +164,7 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     control.tip_control = code in (434, 435)
     on = control.setup.tcp or control.tip_control or control.tilted
     number = number if (on and number) or any(tool) or lacking else None
-    if "H" in block.runtime or (code in DYNAMIC_OFFSETS and block.runtime):
+    if "H" in block.unknown or (code in DYNAMIC_OFFSETS and block.unknown):
         control.refusal = control.refusal or "a tool length offset is known only at run time"
     if code == 435:
         control.refusal = control.refusal or "the tool direction is given by I J K (G43.5)"
@@ -240,7 +240,7 @@ def set_data(control: RS274Control, block: Block, code: int) -> None:
     Where controls differ: P0 is the system in force or the external one, and in G91 words are set or added.
     """
     kind = whole(block.get("L", -1.0), "L of G10")
-    if block.runtime & {"L", "P"}:
+    if block.unknown & {"L", "P"}:
         control.refusal = control.refusal or "what G10 sets is known only at run time"
     alike = kind == 2 and "R" not in block.values and block.get("P") != 0.0 and not control.modal.incremental
     if not control.rules.strict and not alike:
@@ -267,5 +267,5 @@ def set_tool(control: RS274Control, block: Block, kind: int) -> None:
         shift = control.frames.additive.shift[Z] + control.frames.local.shift[Z] if kind == 10 else 0.0
         length = control.position[Z] - stored(control, first_parameter(system))[Z] - shift - length
     control.tools.lengths[number] = length
-    if "Z" in block.runtime or (kind != 1 and Z in control.unknown):
+    if "Z" in block.unknown or (kind != 1 and Z in control.unknown):
         control.tools.measured.add(number)

@@ -27,7 +27,7 @@ from ncfix.control.coordinates import (
     rotated,
     transposed,
 )
-from ncfix.control.expressions import Fault, nominal
+from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.frames import WORLD, Affine, turned_about
 from ncfix.control.moves import UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
@@ -96,10 +96,10 @@ def stored(control: RS274Control, first: int) -> Vector:
     return [nominal(values.get(first + index, 0.0)) * scale for index, scale in enumerate(scales)]
 
 
-def store(control: RS274Control, first: int, index: int, value: float, runtime: bool) -> None:
-    """One number of a position, mm or rad, into its parameter."""
+def store(control: RS274Control, first: int, index: int, value: float, unknown: bool) -> None:
+    """One number of a position, mm or rad, into its parameter; nominal if it is unknown."""
     degrees = value / DEGREE if control.rotary[index] else value
-    control.parameters.assign(first + index, degrees, runtime)
+    control.parameters.assign(first + index, Unknown("", degrees) if unknown else degrees)
 
 
 def is_given(control: RS274Control, first: int, index: int) -> bool:
@@ -240,7 +240,7 @@ def set_system(control: RS274Control, block: Block, *, at_position: bool) -> Non
     if "R" in block.values:
         if at_position:
             raise Fault(BAD_G10, "R cannot be given with G10 L20")
-        control.parameters.assign(first + 9, block.values["R"], "R" in block.runtime)
+        control.parameters.assign(first + 9, block.value("R"))
     origin = stored(control, first)
     if at_position:
         origin, doubtful = origin_for_position(control, block, system, origin)
@@ -250,7 +250,7 @@ def set_system(control: RS274Control, block: Block, *, at_position: bool) -> Non
             origin[index] = control.scale[index] * block.values[LETTERS[index]]
     for index, value in enumerate(origin):
         if value != stored(control, first)[index] or block.axes >> index & 1:
-            store(control, first, index, value, index in doubtful or LETTERS[index] in block.runtime)
+            store(control, first, index, value, index in doubtful or LETTERS[index] in block.unknown)
     if system == control.modal.system:
         moved_while_turned(control, "G10")
         activate(control, system)
@@ -296,7 +296,7 @@ def shift_system(control: RS274Control, block: Block, code: int) -> None:
         )
     if code == 921:
         for index in range(N_LETTERS):
-            store(control, SHIFT, index, 0.0, runtime=False)
+            store(control, SHIFT, index, 0.0, unknown=False)
     control.parameters.assign(SHIFT_ACTIVE, float(code in (520, 920, 923)))
     compose(control)
     if code == 920:
@@ -314,8 +314,8 @@ def set_local(control: RS274Control, block: Block, *, cancelled: bool) -> None:
     for index in words_of(block):
         local[index] = 0.0 if cancelled else control.scale[index] * block.values[LETTERS[index]]
         unknown.pop(index, None)
-        runtime = LETTERS[index] in block.runtime and not cancelled and not control.probes_nominally
-        if runtime and index in control.machine:
+        at_run_time = LETTERS[index] in block.unknown and not cancelled and not control.probes_nominally
+        if at_run_time and index in control.machine:
             unknown[index] = RUNTIME_OFFSET
     control.frames = replace(control.frames, local=Affine(tuple(local), unknown=unknown))
     compose(control)
@@ -331,7 +331,7 @@ def set_shift(control: RS274Control, block: Block, *, from_position: bool) -> No
     for index in words_of(block):
         value = control.scale[index] * block.values[LETTERS[index]]
         shift[index] = position[index] + shift[index] - value if from_position else value
-        store(control, SHIFT, index, shift[index], index in doubtful or LETTERS[index] in block.runtime)
+        store(control, SHIFT, index, shift[index], index in doubtful or LETTERS[index] in block.unknown)
     control.frames = replace(control.frames, additive=Affine(tuple(shift)))
 
 
@@ -375,7 +375,7 @@ def turn_about_point(control: RS274Control, block: Block, before: Rotation) -> N
             centre[index] = control.scale[index] * block.values[letter] + step
         else:
             control.use_start_positions((index,))
-    if block.runtime or control.unknown.keys() & {plane.first, plane.second}:
+    if block.unknown or control.unknown.keys() & {plane.first, plane.second}:
         control.refusal = control.refusal or "the centre or angle of a rotation (G68) is known only at run time"
     turned = turned_about(product(before, about(plane, block.get("R"))), centre)
     control.frames = replace(control.frames, rotation=turned)

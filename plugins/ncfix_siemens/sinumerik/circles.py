@@ -55,7 +55,7 @@ def tangent_refusal(words: BlockWordValues) -> str:
     """Why it is refused, whatever its geometry."""
     if {"AP", "RP"} & words.values.keys():
         return POLAR_ARC
-    return TURNS_AT_RUNTIME if words.runtime("TURN") else ""
+    return TURNS_AT_RUNTIME if words.unknown("TURN") else ""
 
 
 CENTRE_AT_RUNTIME = "the centre of the arc is known only at run time"
@@ -100,7 +100,7 @@ def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """An arc, helix or full circle by its centre, radius or opening angle."""
     control.use_all_start_positions()
     end = destination(control, words)
-    doubtful = bool(end.unknown or control.unknown or words.runtime("I", "J", "K", "CR", "AR", "TURN"))
+    doubtful = bool(end.unknown or control.unknown or words.unknown("I", "J", "K", "CR", "AR", "TURN"))
     clockwise, plane = code == CLOCKWISE, control.modal.plane
     refusal = refusal_of(words, plane) or doubtful_diameter(control, words, "I") or doubtful_polar(control, words)
     try:
@@ -125,7 +125,7 @@ def is_fixed(words: BlockWordValues, plane: Plane) -> bool:
 def refusal_of(words: BlockWordValues, plane: Plane) -> str:
     """Why an arc is refused: something of it is known only at run time, or not followed."""
     letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
-    if words.runtime(*letters, "CR", "AR", "TURN"):
+    if words.unknown(*letters, "CR", "AR", "TURN"):
         return CENTRE_AT_RUNTIME
     doubled = {"AP", "RP"} & words.values.keys() and {*letters, "CR", "AR"} & words.values.keys()
     return POLAR_AND_CENTRE if doubled else ""
@@ -226,7 +226,7 @@ def through_point(control: Sinumerik, words: BlockWordValues, code: int) -> None
     """CIP: the circle through the start, the point I1 J1 K1 and the end, in any plane."""
     control.use_all_start_positions()
     end = destination(control, words)
-    why = VIA_AT_RUNTIME if words.runtime(*VIA, "TURN") else doubtful_diameter(control, words, "I1")
+    why = VIA_AT_RUNTIME if words.unknown(*VIA, "TURN") else doubtful_diameter(control, words, "I1")
     if why:
         control.go(ProgrammedMotion(MotionKind.FEED, words, end, code, refusal=why))
         return

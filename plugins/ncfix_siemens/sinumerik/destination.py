@@ -169,7 +169,7 @@ def set_pole(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     if POLAR & words.values.keys():
         angle, radius = math.radians(words.get("AP")), words.get("RP")
         steps = [radius * math.cos(angle), radius * math.sin(angle)]
-        if words.runtime("AP", "RP"):
+        if words.unknown("AP", "RP"):
             base = None
     if base is None or steps[0] is None or steps[1] is None:
         control.modes.pole = None

@@ -237,7 +237,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         if steps:
             if block not in unit.operations:
                 unit.operations[block] = [flow.lowered(step, steps, block) for step in steps]
-            flow.times = None if turn.words.runtime("P") else round(turn.words.get("P", 1.0))
+            flow.times = None if turn.words.unknown("P") else round(turn.words.get("P", 1.0))
         for step, lowered in zip(steps, unit.operations[block] if steps else (), strict=True):
             self.span = step.span
             try:

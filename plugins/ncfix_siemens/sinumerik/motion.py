@@ -138,7 +138,7 @@ def as_coded(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 
 def refusal_of(control: Sinumerik, words: BlockWordValues) -> str:
     """Why a straight motion is refused, though its end is known."""
-    if words.values.keys() & {"RND", "RNDM", "CHF", "CHR", "ANG"} and words.runtime("RND", "RNDM", "CHF", "CHR"):
+    if words.values.keys() & {"RND", "RNDM", "CHF", "CHR", "ANG"} and words.unknown("RND", "RNDM", "CHF", "CHR"):
         return "a rounding or chamfer is known only at run time"
     if "ANG" in words.values:
         return "a contour that is given by an angle (ANG)"

@@ -112,7 +112,7 @@ def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
     """Take A3 B3 C3 or A2 B2 C2; why the motion is refused, if it is."""
     if not control.modes.transformed:
         return NOT_ON
-    if words.runtime(*VECTOR, *ANGLES):
+    if words.unknown(*VECTOR, *ANGLES):
         return AT_RUNTIME
     if control.modes.orientation_in_machine and control.is_rotated:
         return IN_MACHINE

@@ -230,7 +230,7 @@ class BlockWordValues:
         value = self.values.get(address)
         return default if value is None else value
 
-    def runtime(self, *addresses: str) -> bool:
+    def unknown(self, *addresses: str) -> bool:
         """Whether one of these words is there and known only at run time."""
         return any(address in self.values and self.values[address] is None for address in addresses)
 

@@ -317,6 +317,6 @@ def numbers(values: Iterable[Value]) -> list[float] | None:
     return found
 
 
-def signed(sign: float, value: Value) -> Value:
-    """A value times 1 or -1."""
-    return Unknown(value.why, sign * value.nominal) if isinstance(value, Unknown) else sign * nominal(value)
+def scaled(factor: float, value: Value) -> Value:
+    """A value times a number."""
+    return Unknown(value.why, factor * value.nominal) if isinstance(value, Unknown) else factor * nominal(value)

@@ -50,7 +50,7 @@ class BlockValues(Protocol):
         """Address -> value, in program units."""
 
     @property
-    def runtime(self) -> Set[str]:
+    def unknown(self) -> Set[str]:
         """The addresses whose value is known only at run time."""
 
     @property
@@ -122,7 +122,7 @@ class SetTool(Operation):
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         if self.address in block.values:
-            control.tools.select(round(block.values[self.address]), unsure=self.address in block.runtime)
+            control.tools.select(round(block.values[self.address]), unsure=self.address in block.unknown)
         control.tools.change()
         control.places.lose(mask_of(control.machine))
 

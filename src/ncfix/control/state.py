@@ -50,14 +50,14 @@ class Cycle:
     r        the R word, as written
     level    R in the program's frame, mm
     initial  where the series of holes began, across the plane, mm in the program's frame; None while none is in force
-    runtime  one of these is known only at run time
+    unknown  one of these is known only at run time
     """
 
     depth: float = 0.0
     r: float = 0.0
     level: float = 0.0
     initial: float | None = None
-    runtime: bool = False
+    unknown: bool = False
 
 
 @dataclass(slots=True)
