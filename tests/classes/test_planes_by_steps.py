@@ -85,7 +85,7 @@ def machine() -> Machine:
 def check(text: str, name: str, dialect: str, machine: Machine, cuts: tuple[int, int]) -> None:
     program = read(text.encode(), name, dialect)
     moves = follow(program, machine, SETUP).trace.moves
-    assert np.array(moves.rule)[moves.cuts].tolist() == [Rule.CORRECT] * int(moves.cuts.sum())
+    assert np.array(moves.rule)[moves.cutting].tolist() == [Rule.CORRECT] * int(moves.cutting.sum())
     ends = [in_plane(moves, program.line, line) for line in cuts]
     np.testing.assert_allclose(ends, [[10, 5, 0], [20, 5, 0]], atol=1e-9)
     assert not lacking(moves).any(), "both cuts may be corrected along X, Y and Z"
@@ -96,7 +96,7 @@ def check(text: str, name: str, dialect: str, machine: Machine, cuts: tuple[int,
 
 def lacking(moves: Moves) -> NDArray[np.bool_]:
     """Of the motions that cut: which of X, Y and Z must get no word."""
-    return moves.wordless[moves.cuts][:, [moves.axes.index(letter) for letter in "XYZ"]]
+    return moves.wordless[moves.cutting][:, [moves.axes.index(letter) for letter in "XYZ"]]
 
 
 def in_plane(moves: Moves, line: object, wanted: int) -> list[float]:
@@ -191,5 +191,5 @@ def test_a_plane_that_is_turned_about_two_axes_may_be_approached_axis_by_axis(di
     """Then every axis of the machine is made of all of the plane, and none is known before the last of them."""
     program = read(OBLIQUE[dialect].encode(), "o1.nc", dialect)
     moves = follow(program, machine, SETUP).trace.moves
-    assert np.array(moves.rule)[moves.cuts].tolist() == [Rule.CORRECT] * int(moves.cuts.sum())
+    assert np.array(moves.rule)[moves.cutting].tolist() == [Rule.CORRECT] * int(moves.cutting.sum())
     assert not lacking(moves).any()

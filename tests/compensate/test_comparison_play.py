@@ -76,7 +76,7 @@ def made(machine: Machine, moves: Moves) -> Dense:
             close = np.arange(0, min(length, 10 * CLOSE), CLOSE) / max(length, CLOSE)
             share = np.union1d(np.linspace(0, 1, int(length / DENSE) + 20), close)
         places.append(segments.at(np.full(len(share) - 1, row), share[1:]))
-        cut += [bool(moves.cuts[row])] * (len(share) - 1)
+        cut += [bool(moves.cutting[row])] * (len(share) - 1)
     q = np.concatenate(places)
     sides = np.zeros(q.shape)
     for axis, play in PLAY.items():

@@ -260,7 +260,7 @@ def test_with_d0_the_spindle_reference_is_led_and_the_tip_is_corrected(root: Pat
     text = f"G54 G71 T1 D1 M6\nG0 X0 Y0 Z80 A0 C0\n{first}\nD0\nG0 X0 Y0 Z75\nG1 X5 Y5 Z70 F500\nM30\n"
     moves = follow(read(text.encode(), "a.mpf", "siemens"), machine, SETUP).trace.moves
     assert moves.rule[-1] == Rule.CORRECT
-    assert (moves.tcp[-1], moves.tool_length[-1], moves.led_length[-1]) == (True, 100.0, 0.0)
+    assert (moves.tcp[-1], moves.tool_length[-1], moves.length_under_tcp[-1]) == (True, 100.0, 0.0)
 
 
 KEPT = {

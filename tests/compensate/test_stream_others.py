@@ -192,7 +192,7 @@ def test_blocks_are_written_in_bulk_as_one_by_one(
     use_form(compiled)
     found = [whole(source, machine, "siemens", files=S_FILES)[0] for source in sources]
     layouts = [SINUMERIK.bulk(read(each, "p", "siemens"), 15) for each in sources[:2] if SINUMERIK.bulk is not None]
-    assert all(layout is not None and layout.led for layout in layouts)
+    assert all(layout is not None and layout.by_vector for layout in layouts)
     monkeypatch.setattr(emit, "language_of", lambda dialect, part: replace(SINUMERIK, bulk=None))
     assert [whole(source, machine, "siemens", files=S_FILES)[0] for source in sources] == found
 

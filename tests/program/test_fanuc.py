@@ -395,7 +395,7 @@ def test_a_tilted_plane_is_led_by_the_length_in_force(root: Path, length: str, l
     program = read("\n".join(lines).encode(), "part", "fanuc")
     moves = follow_on(program, machine, setup).trace.moves
     assert moves.rule[-1] == Rule.CORRECT
-    assert (moves.tcp[-1], moves.tool_length[-1], moves.led_length[-1]) == (True, 80.0, led)
+    assert (moves.tcp[-1], moves.tool_length[-1], moves.length_under_tcp[-1]) == (True, 80.0, led)
     at = Intent(machine, moves, State()).joints(np.array([len(moves) - 1]), moves.end[-1:])[0]
     z = moves.frames[moves.frame[-1]].rotation[:, 2]
     tip, gauge = machine.tip(at, 80.0), machine.tip(at, 0.0)

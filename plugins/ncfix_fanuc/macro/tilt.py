@@ -200,7 +200,7 @@ def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: boo
     if about_tip:
         return [angles.get(index, value) for index, value in enumerate(control.position)]
     assert control.kinematics is not None, "they have shown how the tool is pointed"
-    on, off = TcpState(True, control.led_length), TcpState(False, 0.0)
+    on, off = TcpState(True, control.length_under_tcp), TcpState(False, 0.0)
     still = control.kinematics([control.position[index] for index in control.machine], on, off)
     command = [angles.get(index, value) for index, value in zip(control.machine, still, strict=True)]
     target = control.position[:]

@@ -20,15 +20,15 @@ from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.targets import (
     BAD_POLE,
     PLANE_OF,
+    FramePosition,
     MotionWords,
-    Where,
     command_of,
     derived,
     here,
-    led,
     polar,
     polar_axes,
     pole_frame,
+    programmed_position,
     starts_unknown,
 )
 
@@ -88,7 +88,7 @@ def circular(control: KlartextControl, step: Step) -> None:
     pole = known_pole(control)
     plane, turning = control.path.plane, sense(step)
     control.use()
-    where = led(control, step.words)
+    where = programmed_position(control, step.words)
     if give_up(control, step, where):
         return
     if control.path.pole_in != pole_frame(control):
@@ -109,7 +109,7 @@ def circular_by_radius(control: KlartextControl, step: Step) -> None:
     """CR."""
     turning = sense(step)
     control.use()
-    where = led(control, step.words)
+    where = programmed_position(control, step.words)
     if "R" not in step.words.values:
         raise Fault(BAD_ARC, "CR needs R, the radius")
     if give_up(control, step, where):
@@ -154,7 +154,7 @@ def circular_polar(control: KlartextControl, step: Step) -> None:
 def tangential(control: KlartextControl, step: Step) -> None:
     """CT and CTP: an arc that goes on in the direction of the element before."""
     control.use()
-    where = polar(control, step.words)[0] if step.name == "ctp" else led(control, step.words)
+    where = polar(control, step.words)[0] if step.name == "ctp" else programmed_position(control, step.words)
     if give_up(control, step, where):
         return
     if control.path.tangent is None:
@@ -175,7 +175,7 @@ def tangential(control: KlartextControl, step: Step) -> None:
     swing(control, step, where, PlaneArc(plane, centre, sweep_angle(centre, away, 1, clockwise=radius < 0)))
 
 
-def swing(control: KlartextControl, step: Step, where: Where, circle: PlaneArc) -> None:
+def swing(control: KlartextControl, step: Step, where: FramePosition, circle: PlaneArc) -> None:
     """The arc itself."""
     plane = circle.plane
     axes = step.words.axes | 1 << plane.first | 1 << plane.second
@@ -228,13 +228,15 @@ def plane_of(control: KlartextControl, words: MotionWords) -> Plane:
     return PLANE_OF.get(named, PLANE_OF[frozenset((0, 1))])
 
 
-def points(control: KlartextControl, where: Where, plane: Plane) -> tuple[tuple[float, float], tuple[float, float]]:
+def points(
+    control: KlartextControl, where: FramePosition, plane: Plane
+) -> tuple[tuple[float, float], tuple[float, float]]:
     """Start and end of a motion along the axes of a plane."""
     start, end = here(control).inner, where.inner
     return (start[plane.first], start[plane.second]), (end[plane.first], end[plane.second])
 
 
-def give_up(control: KlartextControl, step: Step, where: Where) -> bool:
+def give_up(control: KlartextControl, step: Step, where: FramePosition) -> bool:
     """Refuse an arc of which an end is not known; True if that is so."""
     if not starts_unknown(control) and not where.unknown and not step.words.unknown:
         return False
@@ -247,7 +249,7 @@ def give_up(control: KlartextControl, step: Step, where: Where) -> bool:
     return True
 
 
-def do_without(control: KlartextControl, step: Step, where: Where, reason: str) -> None:
+def do_without(control: KlartextControl, step: Step, where: FramePosition, reason: str) -> None:
     """An arc that is not followed but for its end: one that the control would not accept either, or one not known."""
     about_pole = step.name in ("cp", "ctp")
     axes = polar_axes(control, step.words) if about_pole else step.words.axes or 3

@@ -25,7 +25,14 @@ from ncfix_heidenhain.klartext.arcs import IN_PLANE, Step
 from ncfix_heidenhain.klartext.contours import LEFT_OUT
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, HolePosition, KlartextControl
 from ncfix_heidenhain.klartext.plans import QParameters
-from ncfix_heidenhain.klartext.targets import MotionWords, Where, command_of, led, polar, polar_axes
+from ncfix_heidenhain.klartext.targets import (
+    FramePosition,
+    MotionWords,
+    command_of,
+    polar,
+    polar_axes,
+    programmed_position,
+)
 from ncfix_heidenhain.klartext.transformations import cycle_19
 
 NO_CYCLE = "NCF272"
@@ -123,7 +130,7 @@ def call(control: KlartextControl, step: Step) -> None:
         return
     control.use_start_positions(tuple(control.unknown))
     is_polar = step.name == "lp"
-    where = polar(control, step.words)[0] if is_polar else led(control, step.words)
+    where = polar(control, step.words)[0] if is_polar else programmed_position(control, step.words)
     axes = polar_axes(control, step.words) if is_polar else step.words.axes
     height = where.inner[Z]
     bottom, clear, refusal = levels(control, height)
@@ -151,16 +158,16 @@ def pattern(control: KlartextControl, places: tuple[HolePosition, ...] | None, n
     control.use_start_positions(tuple(control.unknown))
     control.budget.spend(len(places))
     for place in places:
-        where = led(control, MotionWords({"X": place.x, "Y": place.y}, frozenset()))
+        where = programmed_position(control, MotionWords({"X": place.x, "Y": place.y}, frozenset()))
         bottom, clear, refusal = levels(control, where.inner[Z])
         height = control.scale[Z] * place.height
         drill(control, where, IN_PLANE, (bottom + height, clear + height, refusal or PATTERN.format(name)))
 
 
-def drill(control: KlartextControl, where: Where, axes: int, heights: tuple[float, float, str]) -> None:
+def drill(control: KlartextControl, where: FramePosition, axes: int, heights: tuple[float, float, str]) -> None:
     """One hole."""
     bottom, clear, refusal = heights
-    over = Where(where.inner[:], dict(where.unknown))
+    over = FramePosition(where.inner[:], dict(where.unknown))
     where.inner[Z] = bottom
     if not refusal:
         where.unknown.pop(Z, None)

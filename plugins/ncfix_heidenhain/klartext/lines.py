@@ -19,9 +19,9 @@ from ncfix_heidenhain.klartext.targets import (
     derived,
     destination,
     in_machine,
-    led,
     polar,
     polar_axes,
+    programmed_position,
 )
 from ncfix_heidenhain.klartext.transformations import check_normal
 
@@ -176,7 +176,7 @@ def at_machine(control: KlartextControl, step: Step) -> None:
 def approach(control: KlartextControl, step: Step) -> None:
     """APPR: to the first point of the contour, which its words give; the control makes the way there."""
     control.use()
-    where = polar(control, step.words)[0] if " p" in step.name else led(control, step.words)
+    where = polar(control, step.words)[0] if " p" in step.name else programmed_position(control, step.words)
     axes = polar_axes(control, step.words) if " p" in step.name else step.words.axes
     end = command_of(control, where, axes)
     control.path.corner = True

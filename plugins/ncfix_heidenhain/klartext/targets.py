@@ -71,24 +71,24 @@ def _letters_of(addresses: tuple[str, ...]) -> tuple[str, ...]:
 
 
 @dataclass(slots=True)
-class Where:
+class FramePosition:
     """A position along the axes of the frame, and why some of it is not known."""
 
     inner: Vector
     unknown: UnknownAxes
 
 
-def here(control: KlartextControl) -> Where:
+def here(control: KlartextControl) -> FramePosition:
     """Where the control stands."""
-    return Where(control.program_position(), dict(control.lost_in_frame()))
+    return FramePosition(control.program_position(), dict(control.lost_in_frame()))
 
 
 def destination(control: KlartextControl, words: MotionWords) -> MotionEnd:
     """Where the motion of a block ends."""
-    return command_of(control, led(control, words), words.axes)
+    return command_of(control, programmed_position(control, words), words.axes)
 
 
-def led(control: KlartextControl, words: MotionWords) -> Where:
+def programmed_position(control: KlartextControl, words: MotionWords) -> FramePosition:
     """The position to which the words of axes lead."""
     if words.incremental:
         use_start_of(control, words)
@@ -127,7 +127,7 @@ def derived(control: KlartextControl, words: MotionWords, axes: int) -> str:
     return "" if index is None else UNPLACED.format(LETTERS[index])
 
 
-def by_spatial_angles(control: KlartextControl, words: MotionWords, where: Where) -> None:
+def by_spatial_angles(control: KlartextControl, words: MotionWords, where: FramePosition) -> None:
     """A B C as spatial angles (FUNCTION TCPM AXIS SPAT): where the rotary axes go the control works out."""
     if control.path.spatial and {"A", "B", "C"} & {address.removeprefix("I") for address in words.values}:
         where.unknown |= dict.fromkeys(control.turning, SPATIAL)
@@ -141,7 +141,7 @@ def use_start_of(control: KlartextControl, words: MotionWords) -> None:
     control.use_start_positions(wanted)
 
 
-def command_of(control: KlartextControl, where: Where, axes: int) -> MotionEnd:
+def command_of(control: KlartextControl, where: FramePosition, axes: int) -> MotionEnd:
     """A position as a command; axes without a word stay exactly where they are."""
     return MotionEnd(control.command(where.inner, axes), control.axes_of(where.unknown), where.unknown)
 
@@ -176,7 +176,7 @@ def set_pole(control: KlartextControl, words: MotionWords) -> None:
     others = words.values.keys() & (MOVING - {f"{sign}{letter}" for sign in ("", "I") for letter in "XYZ"})
     if others or any(index not in (plane.first, plane.second) for index in named) or len(named) > 2:
         raise Fault(BAD_POLE, "CC needs the two axes of one plane")
-    where = led(control, words)
+    where = programmed_position(control, words)
     old = {} if path.pole is None else {path.plane.first: path.pole[0], path.plane.second: path.pole[1]}
     keep = {} if not named else old
     values = [keep.get(i, where.inner[i]) if i not in named else where.inner[i] for i in (plane.first, plane.second)]
@@ -191,7 +191,7 @@ def pole_frame(control: KlartextControl) -> object:
     return control.offset[plane.first], control.offset[plane.second], control.rotation, control.stretch
 
 
-def polar(control: KlartextControl, words: MotionWords) -> tuple[Where, float | None]:
+def polar(control: KlartextControl, words: MotionWords) -> tuple[FramePosition, float | None]:
     """The position that polar words lead to, and by which angle it was reached from the present one (IPA), rad."""
     path = control.path
     if path.pole is None:
@@ -199,7 +199,7 @@ def polar(control: KlartextControl, words: MotionWords) -> tuple[Where, float | 
     plane, (first, second) = path.plane, path.pole
     control.use_start_positions((plane.first, plane.second))
     start = here(control)
-    where = led(control, words)
+    where = programmed_position(control, words)
     away = start.inner[plane.first] - first, start.inner[plane.second] - second
     radius, angle = arm(words.values, away, control.stretch)
     where.inner[plane.first] = first + radius * math.cos(angle)
@@ -227,7 +227,7 @@ def arm(values: Mapping[str, float], away: tuple[float, float], unit: float) -> 
     return radius, angle
 
 
-def doubt(control: KlartextControl, words: MotionWords, start: Where) -> str:
+def doubt(control: KlartextControl, words: MotionWords, start: FramePosition) -> str:
     """Why it is not known where polar words lead from a start; empty if it is."""
     plane = control.path.plane
     if not {"PR", "PA"} <= words.values.keys():

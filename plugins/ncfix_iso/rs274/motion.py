@@ -276,8 +276,8 @@ def reference_target(control: RS274Control, name: str, axes: int) -> MotionEnd:
             given = is_given(control, first, index) and not control.parameters.is_unknown(first + index)
             if not given and not assumed(control, name):
                 unsure[index] = AFTER_REFERENCE
-    led = {i: place[i] for i in range(N_LETTERS) if axes >> i & 1 or place[i] != control.position[i]}
-    return led_in_machine(control, led, unsure)
+    places = {i: place[i] for i in range(N_LETTERS) if axes >> i & 1 or place[i] != control.position[i]}
+    return led_in_machine(control, places, unsure)
 
 
 def along(control: RS274Control, point: Vector, axes: int) -> Vector:
@@ -325,8 +325,8 @@ def probe(control: RS274Control, block: Block, code: int) -> None:
     moved = [index for index in range(N_LETTERS) if target[index] != control.position[index] or index in unknown]
     if control.rules.strict and code % 2 == 0 and not moved:
         raise Fault(BAD_MOTION, "the probe starts at the end of its motion")
-    led = 7 if control.is_rotated and block.axes & 7 else 0
-    named = [index for index in moved if (block.axes | led) >> index & 1]
+    spatial = 7 if control.is_rotated and block.axes & 7 else 0
+    named = [index for index in moved if (block.axes | spatial) >> index & 1]
     touched = MotionEnd(target, unknown | {index: AFTER_PROBING for index in named if index in control.machine})
     probed(control, Motion(MotionKind.FEED, block.axes, touched, code, passing=PROBING), touches=False)
 

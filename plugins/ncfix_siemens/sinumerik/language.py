@@ -56,7 +56,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
         return None
     found = bulk_layout(program, block, layout)
     further = not (layout.after or layout.prefix or layout.points)
-    return found and replace(found, further=further, led=layout.points, arc=arc_in_bulk(program, block, layout))
+    return found and replace(found, further=further, by_vector=layout.points, arc=arc_in_bulk(program, block, layout))
 
 
 def arc_in_bulk(program: Program, block: int, layout: SinumerikLayout) -> ArcLayout | None:

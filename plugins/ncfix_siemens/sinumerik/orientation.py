@@ -225,10 +225,10 @@ def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Seque
     even = even_motions(control, stage.motion.astype(np.int64))
     at_will = True
     for both, is_even in zip(ways, even, strict=True):
-        led = nearest(both, here)
-        if (at_will and pointing.leaves_pole(here, led)) or not (is_even or pointing.stray(here, led[0]) <= FAR):
+        nearer = nearest(both, here)
+        if (at_will and pointing.leaves_pole(here, nearer)) or not (is_even or pointing.stray(here, nearer[0]) <= FAR):
             break
-        outer, inner = led[0]
+        outer, inner = nearer[0]
         here = (
             scale * ((outer - offset) / DEGREE) + offset,
             other_scale * ((inner - other_offset) / DEGREE) + other_offset,

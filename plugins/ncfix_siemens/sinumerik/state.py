@@ -369,7 +369,9 @@ class Sinumerik(ProgramControl):
         if not held and not self.whole:
             return index
         style = self.builder.styles[index]
-        return self.builder.style(style._replace(held=held, compensated=style.compensated or self.whole))
+        return self.builder.style(
+            style._replace(rotary_as_programmed=held, compensated=style.compensated or self.whole)
+        )
 
     def _passes_zero(self, words: BlockWordValues, target: Vector) -> bool:
         """Whether DC, ACP, ACN or IC leads an axis past a full turn: then pieces of the way would count otherwise."""
@@ -428,7 +430,7 @@ class Sinumerik(ProgramControl):
         known = self.given_length(self.tools.spindle)
         return math.nan if known is None else known
 
-    def led_with(self, tool: Vector, number: int | None) -> float:
+    def length_under_tcp_with(self, tool: Vector, number: int | None) -> float:
         """With D0 a transformation leads the point where a tool of no length has its tip."""
         return tool[2]
 

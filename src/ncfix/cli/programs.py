@@ -191,7 +191,7 @@ def _positions(moves: Moves, machine: Machine | None) -> tuple[Any, Any]:
     if machine is None:
         q, tip = moves.end, np.empty((len(moves), 0))
     else:
-        q, reached = reached_joints(machine, moves.end, moves.tcp, moves.led_length)
+        q, reached = reached_joints(machine, moves.end, moves.tcp, moves.length_under_tcp)
         q = np.where(reached[:, None], q, np.nan)
         tip = machine.tip(q, moves.tool_length)
     return np.where(moves.rotary, np.degrees(q), q), tip

@@ -164,7 +164,7 @@ def left_where_they_stand(program: Program, moves: Moves, left: Lacking | None) 
     for column in np.flatnonzero(lacking.any(axis=0)).tolist():
         rows = np.flatnonzero(lacking[:, column])
         axis, turns, most = moves.axes[column], bool(moves.rotary[column]), float(off[rows, column].max())
-        cuts, stretches = int(moves.cuts[rows].sum()), stretches_of(program, moves.block[rows])
+        cuts, stretches = int(moves.cutting[rows].sum()), stretches_of(program, moves.block[rows])
         found[axis] = Left(axis, turns, len(rows), cuts, stretches, most)
     return in_order(found)
 

@@ -61,7 +61,7 @@ class Parts:
     sided   the errors of the machine depend on the way in which its axes move
     rest    what of the text comes after the end of the program
     blocks  lines so far
-    led     the tip is under control (TCP), or may be
+    tcp     the tip is under control (TCP), or may be
     share   which parts this process works on
     found   parts that have been read so far, also those behind which something is lacking
     told    the last one that others have been told of
@@ -75,7 +75,7 @@ class Parts:
     sided: bool = False
     rest: bytes = b""
     blocks: int = 0
-    led: bool = True
+    tcp: bool = True
     share: Share = field(default_factory=Share)
     found: int = 0
     told: int = -1
@@ -89,7 +89,7 @@ class Parts:
             self.blocks += len(program)
             self.follower.watched = self.share.shares(self.found)
             pending.append((program, self.follower.follow(program, last)))
-            self.led = bool(pending[-1][1].tcp.any()) if checkpoint is None else checkpoint.led
+            self.tcp = bool(pending[-1][1].tcp.any()) if checkpoint is None else checkpoint.tcp
             last |= self.follower.ended
             if checkpoint is not None:
                 self.found += 1
@@ -136,7 +136,7 @@ class Parts:
             return None
         begin = int(program.blocks[-1, 0])
         lines = program.lines_ended_before(begin)
-        return PartCheckpoint(len(program.source), begin, lines, len(program) - 1, self.led, control)
+        return PartCheckpoint(len(program.source), begin, lines, len(program) - 1, self.tcp, control)
 
     def _passed(self, checkpoint: PartCheckpoint, text: bytes) -> Program:
         """Pass over a part, which this text begins with, but for its last block."""
@@ -156,7 +156,7 @@ class Parts:
     @property
     def _wanted(self) -> int:
         """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
-        return self.size // 8 if self.led else self.size
+        return self.size // 8 if self.tcp else self.size
 
     def _texts(self) -> Iterator[tuple[Program, bool, PartCheckpoint | None]]:
         """The text in parts that end between two blocks of plain words; True with the last one.

@@ -140,7 +140,7 @@ class WrittenPlan:
 
         Not those to a place that the machine measures itself: what it finds has its error in it.
         """
-        wanted = self.moves.cuts | (self.moves.kind == MotionKind.RAPID) if rapids else self.moves.cuts
+        wanted = self.moves.cutting | (self.moves.kind == MotionKind.RAPID) if rapids else self.moves.cutting
         shown: Mask = wanted & ~self.kept & ~at_measured_places(self.moves)
         return shown
 

@@ -132,7 +132,7 @@ class PartCheckpoint:
     size     bytes of the part
     begin    where its last block begins
     lines    that end before that, and `blocks` that stand there
-    led      the tip was under control (TCP) somewhere in it
+    tcp      the tip was under control (TCP) somewhere in it
     control  what the control was like there
     """
 
@@ -140,7 +140,7 @@ class PartCheckpoint:
     begin: int
     lines: int
     blocks: int
-    led: bool
+    tcp: bool
     control: Checkpoint
 
 

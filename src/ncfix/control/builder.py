@@ -35,11 +35,11 @@ class MotionStyle(NamedTuple):
     tool_length: float
     feed_mode: int
     modal: int
-    held: bool = False
+    rotary_as_programmed: bool = False
     passing: Pass = Pass.NONE
     beside: float = 0.0
     across: int = 2
-    led: float = math.nan
+    tcp_length: float = math.nan
 
 
 DTYPES: dict[str, type[np.generic]] = {
@@ -54,7 +54,7 @@ DTYPES: dict[str, type[np.generic]] = {
     "passing": np.int8,
     "beside": np.float64,
     "across": np.int8,
-    "led": np.float64,
+    "tcp_length": np.float64,
 }
 """The types of the columns of `Moves` that styles hold; the others are flags."""
 
@@ -238,8 +238,8 @@ class MotionBuilder:
             styles["passing"] = None
         if not styles["beside"].any():
             styles["beside"] = styles["across"] = None
-        if np.isnan(styles["led"]).all():
-            styles["led"] = None
+        if np.isnan(styles["tcp_length"]).all():
+            styles["tcp_length"] = None
         programmed = named.take(mask, axis=0, mode="clip")
         counted = self._mask_column(self._counted, styles["incremental"])
         angles = self._keep_whole(styles, programmed, counted, start, end, block)
@@ -313,7 +313,7 @@ class MotionBuilder:
         if self.winding is not None:
             back = self.winding.back(self.rolls, plain, start - offset, end - offset) & free & ~rows
         styles["compensated"] = styles["compensated"] | rows | back
-        styles["held"] = styles["held"] | doubtful(self.rolls, start, end)
+        styles["rotary_as_programmed"] = styles["rotary_as_programmed"] | doubtful(self.rolls, start, end)
         cuts = styles["kind"] != MotionKind.RAPID
         self.overturned = _first(block, rows & cuts, self.overturned)
         self.brought_back = _first(block, back & cuts, self.brought_back)

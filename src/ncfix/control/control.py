@@ -417,13 +417,13 @@ class ProgramControl(ControlState):
                 passing,
                 self._beside(),
                 modal.plane.across if modal.compensated else 2,
-                math.nan if not self.tcp or self.led_length == length else self.led_length,
+                math.nan if not self.tcp or self.length_under_tcp == length else self.length_under_tcp,
             )
         )
 
     def _without_tcp(self, style: int) -> int:
         """A style for a motion whose ends are said in axes of the machine."""
-        return self.builder.style(self.builder.styles[style]._replace(tcp=False, led=math.nan))
+        return self.builder.style(self.builder.styles[style]._replace(tcp=False, tcp_length=math.nan))
 
     def _beside(self) -> float:
         """By how much the control offsets the contour to the left of the way, mm; NaN where it is not known."""

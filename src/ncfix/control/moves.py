@@ -157,7 +157,7 @@ class Moves:
     modal        (n,) of straight moves and arcs: the motion G code in tenths (0, 10, 20, 30) in force
     frames       the frames that occur
     reasons      the reasons that occur
-    held         (n,) rotary axes must stay as programmed: linear axes would not follow them (a swivelled plane without
+    rotary_as_programmed  (n,) rotary axes must stay so: linear axes would not follow them (a swivelled plane without
                  tool-centre-point control); None: nowhere
     pointing     how rotary axes point the tool, where programs give its direction as a vector
     approach     (n, n_axes) of canned cycles: the command over the hole at the level R from which it feeds, and to
@@ -180,7 +180,7 @@ class Moves:
                  None: of none
     calls        the calls that occur
     spelled      (n, n_axes) axes that get a word even if they stand where it would lead them. None: none
-    led          (n,) mm, the length by which the control leads X Y Z under TCP, where that is not the tool's: zero
+    tcp_length   (n,) mm, the length by which the control leads X Y Z under TCP, where that is not the tool's: zero
                  while none is in force, so that it leads the spindle reference, not the tip; else NaN. None: nowhere
     """
 
@@ -208,7 +208,7 @@ class Moves:
     modal: NDArray[np.int16]
     frames: tuple[Frame, ...]
     reasons: tuple[str, ...]
-    held: NDArray[np.bool_] | None = None
+    rotary_as_programmed: NDArray[np.bool_] | None = None
     pointing: Pointing | None = None
     approach: NDArray[np.float64] | None = None
     placed: NDArray[np.bool_] | None = None
@@ -223,20 +223,24 @@ class Moves:
     call: NDArray[np.int32] | None = None
     calls: tuple[CycleCall, ...] = ()
     spelled: NDArray[np.bool_] | None = None
-    led: NDArray[np.float64] | None = None
+    tcp_length: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.block)
 
     @property
-    def led_length(self) -> NDArray[np.float64]:
+    def length_under_tcp(self) -> NDArray[np.float64]:
         """(n,) mm, the length of tool that the control has X Y Z of under TCP."""
-        return self.tool_length if self.led is None else np.where(np.isnan(self.led), self.tool_length, self.led)
+        return (
+            self.tool_length
+            if self.tcp_length is None
+            else np.where(np.isnan(self.tcp_length), self.tool_length, self.tcp_length)
+        )
 
     @property
     def beside_tip(self) -> NDArray[np.bool_]:
         """(n,) X Y Z are those of another point than the tip, though TCP is on."""
-        return np.zeros(len(self), dtype=bool) if self.led is None else self.tcp & ~np.isnan(self.led)
+        return np.zeros(len(self), dtype=bool) if self.tcp_length is None else self.tcp & ~np.isnan(self.tcp_length)
 
     @property
     def wordless(self) -> NDArray[np.bool_]:
@@ -268,12 +272,12 @@ class Moves:
         return None if self.call is None or self.call[row] < 0 else self.calls[self.call[row]]
 
     @property
-    def cuts(self) -> NDArray[np.bool_]:
+    def cutting(self) -> NDArray[np.bool_]:
         """(n,) motions at feed: straight ones, arcs and canned cycles, but for what is passed by rule."""
-        cuts: NDArray[np.bool_] = (
+        cutting: NDArray[np.bool_] = (
             (self.kind != MotionKind.RAPID) & (self.kind != MotionKind.DWELL) & (self.rule != Rule.PASS)
         )
-        return cuts
+        return cutting
 
     @property
     def moved(self) -> NDArray[np.bool_]:

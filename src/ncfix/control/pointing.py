@@ -188,13 +188,13 @@ def nearest(ways: tuple[Pair, Pair], near: Pair) -> tuple[Pair, Pair]:
     """The ways that `solve` found, led to the whole turns nearest to where the axes stand, rad; the nearer first."""
     (outer, inner), (other, another) = ways
     here, there = near
-    one = led(outer, here), led(inner, there)
-    two = led(other, here), led(another, there)
+    one = nearest_turn(outer, here), nearest_turn(inner, there)
+    two = nearest_turn(other, here), nearest_turn(another, there)
     way = abs(one[0] - here) + abs(one[1] - there)
     return (one, two) if way <= abs(two[0] - here) + abs(two[1] - there) else (two, one)
 
 
-def led(angle: float, near: float) -> float:
+def nearest_turn(angle: float, near: float) -> float:
     """An angle, whole turns away if need be, at most half a turn from another, rad; the other itself for NaN.
 
     Just half a turn away it is the lower one.

@@ -393,11 +393,11 @@ class ControlState(ABC):
         return math.nan if known is None else known
 
     @property
-    def led_length(self) -> float:
+    def length_under_tcp(self) -> float:
         """The length of tool that X Y Z are of under TCP, mm."""
-        return self.led_with(self.tools.vector, self.tools.offset)
+        return self.length_under_tcp_with(self.tools.vector, self.tools.offset)
 
-    def led_with(self, tool: Vector, number: int | None) -> float:
+    def length_under_tcp_with(self, tool: Vector, number: int | None) -> float:
         """The same with an offset in force, and the number of its tool (None without one).
 
         Without one the control leads the spindle reference; if the setup says that X Y Z are those of the tip, the tip.

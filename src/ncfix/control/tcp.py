@@ -49,7 +49,7 @@ def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: Unk
     Under TCP the tip moves along other axes, too: the numbers of an axis that stands still change with the rest.
     """
     target, unknown = control.position[:], dict(control.unknown)
-    tip = TcpState(True, control.led_length)
+    tip = TcpState(True, control.length_under_tcp)
     still = [index for index in (X, Y, Z) if index in control.machine and index not in axes]
     if control.tcp and still and not converted(control, target, unknown, tip, MACHINE):
         unknown |= dict.fromkeys(still, TURNED)
@@ -75,7 +75,9 @@ def in_machine(control: ControlState) -> Vector | None:
     """Where the axes of the machine stand under TCP; None if that is not known."""
     position = control.position[:]
     return (
-        position if converted(control, position, control.unknown, TcpState(True, control.led_length), MACHINE) else None
+        position
+        if converted(control, position, control.unknown, TcpState(True, control.length_under_tcp), MACHINE)
+        else None
     )
 
 
@@ -99,8 +101,8 @@ def switch(control: ControlState, tool: Vector, on: bool, number: int | None) ->
     tool whose length it is, None if none is in force from here on.
     """
     lost = {**control.lost_in_frame(), Z: TURNED} if on and control.tcp and control.stands_square() else None
-    before = TcpState(control.tcp, control.led_length)
-    after = TcpState(on, control.led_with(tool, number))
+    before = TcpState(control.tcp, control.length_under_tcp)
+    after = TcpState(on, control.length_under_tcp_with(tool, number))
     if (before.shift != after.shift or control.tcp != on) and not converted(
         control, control.position, control.unknown, before, after
     ):
@@ -150,7 +152,7 @@ def passed_through(moves: Moves, row: int, position: FloatArray, kinematics: Kin
 def _state(moves: Moves, row: int) -> TcpState:
     """Whether tool-centre-point control is on in a motion, and with which length."""
     on = bool(moves.tcp[row])
-    return TcpState(on, float(moves.led_length[row]) if on else 0.0)
+    return TcpState(on, float(moves.length_under_tcp[row]) if on else 0.0)
 
 
 def jumps(moves: Moves) -> NDArray[np.bool_]:
@@ -161,7 +163,7 @@ def jumps(moves: Moves) -> NDArray[np.bool_]:
     """
     found = np.zeros(moves.start.shape, dtype=bool)
     found[1:] = ~(moves.start[1:] == moves.end[:-1]) & ~(np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
-    length = moves.led_length
+    length = moves.length_under_tcp
     longer = moves.tcp[1:] & (length[1:] != length[:-1])
     found[1:] |= (longer | (moves.tcp[1:] != moves.tcp[:-1]))[:, None] & ~moves.rotary
     return found

@@ -166,7 +166,7 @@ def joined_moves(parts: list[Moves], blocks: list[int]) -> Moves:
 
 
 LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
-    "held": lambda moves: np.zeros(len(moves), dtype=np.bool_),
+    "rotary_as_programmed": lambda moves: np.zeros(len(moves), dtype=np.bool_),
     "approach": lambda moves: np.full(moves.end.shape, np.nan),
     "placed": lambda moves: np.ones(moves.end.shape, dtype=np.bool_),
     "spelled": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
@@ -175,7 +175,7 @@ LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
     "passing": lambda moves: np.zeros(len(moves), dtype=np.int8),
     "beside": lambda moves: np.zeros(len(moves)),
     "across": lambda moves: np.full(len(moves), 2, dtype=np.int8),
-    "led": lambda moves: np.full(len(moves), np.nan),
+    "tcp_length": lambda moves: np.full(len(moves), np.nan),
     "fixed_centre": lambda moves: np.zeros(len(moves), dtype=np.bool_),
     "call": lambda moves: np.full(len(moves), -1, dtype=np.int32),
     "counted": lambda moves: np.repeat(moves.incremental[:, None], len(moves.axes), axis=1),

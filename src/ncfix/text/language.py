@@ -64,7 +64,7 @@ class BulkLayout:
     opening   what stands on such lines before the axis words
     closing   what stands on them behind these
     turns_named  a rotary axis that has no word gets none
-    led       rotary axes go where other words of the block lead them, exactly; they have none of their own
+    by_vector  rotary axes go where other words of the block lead them, exactly; they have none of their own
     arc       what there is of arcs; None where these are written one by one
     """
 
@@ -77,7 +77,7 @@ class BulkLayout:
     opening: str = ""
     closing: str = ""
     turns_named: bool = False
-    led: bool = False
+    by_vector: bool = False
     arc: ArcLayout | None = None
 
 

@@ -126,7 +126,7 @@ class Layouts:
         self.heads[shape] = [(blank, ord(letter.lower() if layout.lower else letter)) for letter in axes]
         if layout.turns_named:
             self.heads[shape, moves.rotary & (self.slots[shape] < 0), 1] = 0
-        if layout.led:
+        if layout.by_vector:
             self.slots[shape, moves.rotary], self.heads[shape, moves.rotary, 1] = LED, LED_HEAD
         if layout.lead is not None:
             self.leads[shape] = layout.lead

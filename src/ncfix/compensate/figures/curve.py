@@ -58,7 +58,7 @@ class Stretches:
     def of(cls, intent: Intent) -> Stretches:
         """Of a program."""
         moves = intent.moves
-        known = finite(moves.end) & moves.cuts & ~at_measured_places(moves)
+        known = finite(moves.end) & moves.cutting & ~at_measured_places(moves)
         hole = moves.kind == MotionKind.CYCLE
         along = np.flatnonzero(known & ~hole & finite(moves.start))
         counts, between = with_kinks(intent, intent.segments, along, *_evenly(intent, along), JUMP)

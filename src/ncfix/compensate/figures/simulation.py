@@ -204,7 +204,7 @@ def tip_errors_on(task: Task, read: Read, said: list[Message]) -> Iterator[TipEr
 def samples(intent: Intent, first: int = 0) -> Iterator[tuple[Index, Array]]:
     """Where to look: motions and fractions, ends included, as densely as the error model may bend; some at a time."""
     moves = intent.moves
-    known = np.isfinite(moves.end).all(axis=1) & moves.cuts
+    known = np.isfinite(moves.end).all(axis=1) & moves.cutting
     known[:first] = False
     hole = moves.kind == MotionKind.CYCLE
     rows = np.flatnonzero(known & (hole | np.isfinite(moves.start).all(axis=1)))
@@ -263,7 +263,7 @@ def seems_corrected(machine: Machine, moves: Moves) -> bool:
         corrected = get_strategy(FixOptions().strategy).correct(
             machine, intent.joints_at(some, ends), intent.states(some, ends)
         )
-        commands = commands_from_joints(machine, corrected, moves.tcp[some], moves.led_length[some])
+        commands = commands_from_joints(machine, corrected, moves.tcp[some], moves.length_under_tcp[some])
         shift[some] = commands - moves.end[some]
     step = machine.least_increment[0]
     return looks_corrected(numbers_of(moves, shift, ~kept, step), step)

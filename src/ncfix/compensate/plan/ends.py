@@ -150,7 +150,7 @@ def _restarts(moves: Moves, back: Mask) -> Mask:
 
 def _runs(moves: Moves) -> list[slice]:
     """Stretches over which commands mean the same: no change of tool-centre-point control or of its tool length."""
-    length = np.where(moves.tcp, moves.led_length, 0.0)
+    length = np.where(moves.tcp, moves.length_under_tcp, 0.0)
     changes = np.flatnonzero((np.diff(moves.tcp.astype(np.int8)) != 0) | (np.diff(length) != 0)) + 1
     ends = [*changes.tolist(), len(moves)]
     return [slice(start, stop) for start, stop in zip([0, *changes.tolist()], ends, strict=True) if stop > start]
@@ -163,10 +163,10 @@ def _translated(machine: Machine, moves: Moves, row: int, shift: Array) -> Array
         return shift
     ends = np.concatenate([moves.end[there], moves.end[there] + shift])
     pair = np.repeat(there, 2), np.repeat(here, 2)
-    q, reached = reached_joints(machine, ends, moves.tcp[pair[0]], moves.led_length[pair[0]])
+    q, reached = reached_joints(machine, ends, moves.tcp[pair[0]], moves.length_under_tcp[pair[0]])
     if not reached.all():
         return np.zeros_like(shift)
-    commands = commands_from_joints(machine, q, moves.tcp[pair[1]], moves.led_length[pair[1]])
+    commands = commands_from_joints(machine, q, moves.tcp[pair[1]], moves.length_under_tcp[pair[1]])
     result: Array = commands[1] - commands[0]
     return result
 
@@ -200,7 +200,7 @@ def _steered(intent: Intent, rows: Index, nominal: Array, wanted: Array) -> tupl
     arrived, commands = fit.copy(), nominal.copy()
     target = machine.tip(meant[fit], intent.lengths(good))
     solved, arrived[fit] = steer(machine, q[fit], target, intent.states(good, np.ones(len(good))))
-    commands[fit] = commands_from_joints(machine, solved, moves.tcp[good], moves.led_length[good])
+    commands[fit] = commands_from_joints(machine, solved, moves.tcp[good], moves.length_under_tcp[good])
     return commands, arrived
 
 
@@ -260,8 +260,8 @@ def on_their_side(intent: Intent, move: Index, q: Array, corrected: Array) -> Ar
 def held_axes(intent: Intent, move: Index) -> Mask:
     """(k, n_axes) rotary axes that motions must not turn but as programmed."""
     held = np.zeros((len(move), len(intent.machine.axes)), dtype=bool)
-    if intent.moves.held is not None:
-        held |= intent.moves.held[move][:, None] & intent.machine.rotary
+    if intent.moves.rotary_as_programmed is not None:
+        held |= intent.moves.rotary_as_programmed[move][:, None] & intent.machine.rotary
     if intent.wordless is not None:
         held |= intent.wordless[move] & intent.machine.rotary
     return held
@@ -365,7 +365,7 @@ def as_commands(intent: Intent, rows: Index, programmed: Array, nominal: Array, 
     programmed  (k, n_axes) commands of the program
     nominal     (k, n_axes) axis positions of the program
     """
-    tcp, lengths = intent.moves.tcp[rows], intent.moves.led_length[rows]
+    tcp, lengths = intent.moves.tcp[rows], intent.moves.length_under_tcp[rows]
     if not tcp.any():
         return corrected
     return led_as_commands(intent.machine, programmed, (nominal, corrected), tcp, lengths)

@@ -109,7 +109,7 @@ class Intent:
     def joints(self, rows: Index, commands: Array) -> Array:
         """Axis positions of commands (k, n_axes) of motions `rows` (k,); NaN where they cannot be reached."""
         moves = self.moves
-        q, reached = reached_joints(self.machine, commands, moves.tcp[rows], moves.led_length[rows])
+        q, reached = reached_joints(self.machine, commands, moves.tcp[rows], moves.length_under_tcp[rows])
         return q if reached.all() else np.where(reached[:, None], q, np.nan)
 
     def joints_at(self, rows: Index, fraction: Array) -> Array:
@@ -219,7 +219,7 @@ class Intent:
         moves = self.moves
         begin, target = self.joints(rows, commands), self.tip(rows, fraction)
         q, arrived = steer(self.machine, begin, target, self.states(rows, fraction))
-        return commands_from_joints(self.machine, q, moves.tcp[rows], moves.led_length[rows]), arrived
+        return commands_from_joints(self.machine, q, moves.tcp[rows], moves.length_under_tcp[rows]), arrived
 
     def guessed(self, real: Segments, rows: Index, fraction: Array) -> Array:
         """Nearly the corrected commands at fractions of motions, (k, n_axes), see `improved`."""
@@ -256,7 +256,7 @@ def stays(moves: Moves, kept: Mask, shift: Array, before: Array | None) -> Mask:
 
 def left_in_cuts(moves: Moves) -> dict[str, Index]:
     """Axis letter -> motions that cut and may be corrected, but not along that linear axis."""
-    lacking = moves.wordless & (moves.cuts & (moves.rule == Rule.CORRECT))[:, None]
+    lacking = moves.wordless & (moves.cutting & (moves.rule == Rule.CORRECT))[:, None]
     columns = np.flatnonzero(lacking.any(axis=0) & ~moves.rotary)
     return {moves.axes[column]: np.flatnonzero(lacking[:, column]) for column in columns}
 
