@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ncfix.plugin import FOREIGN, TURNING, Dialect, Register, hookimpl
+from ncfix.plugin import FOREIGN, TURNING, Dialect, Register, hookimpl, made_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -97,30 +97,9 @@ def register_dialects(register: Register[Dialect]) -> None:
         register(dialect)
 
 
-def make_fanuc() -> Control:
-    """The control `fanuc`."""
-    from ncfix_fanuc.control import Fanuc
-
-    return Fanuc()
-
-
-def make_fanuc_rotary() -> Control:
-    """The control `fanuc-rotary`."""
-    from ncfix_fanuc.rotary import FanucRotary
-
-    return FanucRotary()
-
-
-def make_fanuc_pitch() -> Control:
-    """The control `fanuc-pitch`."""
-    from ncfix_fanuc.pitch import FanucPitch
-
-    return FanucPitch()
-
-
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the controls `fanuc` and `fanuc-rotary`, grids in space, and `fanuc-pitch`, stored pitch errors."""
-    register(make_fanuc, name="fanuc")
-    register(make_fanuc_rotary, name="fanuc-rotary")
-    register(make_fanuc_pitch, name="fanuc-pitch")
+    register(made_by("ncfix_fanuc.control:Fanuc"), name="fanuc")
+    register(made_by("ncfix_fanuc.rotary:FanucRotary"), name="fanuc-rotary")
+    register(made_by("ncfix_fanuc.pitch:FanucPitch"), name="fanuc-pitch")

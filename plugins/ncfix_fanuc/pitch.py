@@ -23,6 +23,7 @@ from ncfix.tables.table_files import DEGREE, TURNING, Remarks, check_all, in_ord
 from ncfix_fanuc.parameters import UNITS, is_records, parameter_text, read_records, sense_of, sign_option, units_of
 from ncfix_fanuc.pitch_files import (
     LARGEST_INCREMENT,
+    MOST_PITCH_MAGNIFICATION,
     MOST_POINTS,
     NUMBERS,
     PARAMETERS,
@@ -35,8 +36,6 @@ from ncfix_fanuc.pitch_files import (
 )
 
 FIRST_NUMBER = 1
-MOST_PITCH_MAGNIFICATION = 100
-"""The largest magnification of pitch errors (parameter 3623)."""
 
 
 class FanucPitch(Control):

@@ -26,6 +26,7 @@ HEAD = "no,value"
 POINT = re.compile(r"\s*(\d{1,6})\s*[,;\s]\s*([-+]?\d{1,6})\s*")
 PARAMETERS, SETTINGS = "parameters.txt", "settings.txt"
 MOST_PITCH_MAGNIFICATION = 100
+"""The largest magnification of pitch errors (parameter 3623)."""
 FAR = 1e6
 """mm or degree: no interval is that long."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.plugin import Register, hookimpl
+from ncfix.plugin import Register, hookimpl, made_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -12,14 +12,7 @@ if TYPE_CHECKING:
     from ncfix.plugin import Control
 
 
-def make_gcode() -> Control:
-    """The control `gcode`."""
-    from ncfix_gcode.control import Gcode
-
-    return Gcode()
-
-
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `gcode`: programs that are rewritten."""
-    register(make_gcode, name="gcode")
+    register(made_by("ncfix_gcode.control:Gcode"), name="gcode")

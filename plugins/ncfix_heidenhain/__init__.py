@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.plugin import Dialect, Register, hookimpl
+from ncfix.plugin import Dialect, Register, hookimpl, made_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -69,20 +69,6 @@ def klartext_codes() -> Mapping[str, Code]:
     return KLARTEXT_CODES
 
 
-def make_heidenhain() -> Control:
-    """The control `heidenhain`."""
-    from ncfix_heidenhain.control import Heidenhain
-
-    return Heidenhain()
-
-
-def make_kinematics_comp() -> Control:
-    """The control `heidenhain-kinematics`."""
-    from ncfix_heidenhain.kinematics import KinematicsComp
-
-    return KinematicsComp()
-
-
 @hookimpl
 def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
     """Bring what the messages about Klartext programs mean."""
@@ -92,5 +78,5 @@ def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the controls `heidenhain`, axis tables, and `heidenhain-kinematics`, KinematicsComp."""
-    register(make_heidenhain, name="heidenhain")
-    register(make_kinematics_comp, name="heidenhain-kinematics")
+    register(made_by("ncfix_heidenhain.control:Heidenhain"), name="heidenhain")
+    register(made_by("ncfix_heidenhain.kinematics:KinematicsComp"), name="heidenhain-kinematics")

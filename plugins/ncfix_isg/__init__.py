@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.plugin import Register, hookimpl
+from ncfix.plugin import Register, hookimpl, made_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -12,14 +12,7 @@ if TYPE_CHECKING:
     from ncfix.plugin import Control
 
 
-def make_isg() -> Control:
-    """The control `isg`."""
-    from ncfix_isg.control import Isg
-
-    return Isg()
-
-
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `isg`: VOLCOMP configuration and grid."""
-    register(make_isg, name="isg")
+    register(made_by("ncfix_isg.control:Isg"), name="isg")

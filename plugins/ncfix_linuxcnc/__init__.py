@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.plugin import FOREIGN, Dialect, Register, hookimpl
+from ncfix.plugin import FOREIGN, Dialect, Register, hookimpl, made_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,14 +47,7 @@ def register_dialects(register: Register[Dialect]) -> None:
     register(LINUXCNC)
 
 
-def make_linuxcnc() -> Control:
-    """The control `linuxcnc`."""
-    from ncfix_linuxcnc.control import LinuxCnc
-
-    return LinuxCnc()
-
-
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `linuxcnc`: `.comp` files."""
-    register(make_linuxcnc, name="linuxcnc")
+    register(made_by("ncfix_linuxcnc.control:LinuxCnc"), name="linuxcnc")

@@ -39,7 +39,7 @@ from ncfix.plugin import (
     whole,
     wrong_setting,
 )
-from ncfix.tables.table_files import ALONE, DEGREE, ORDER, TURNING
+from ncfix.tables.table_files import ALONE, DEGREE, NUMBER, ORDER, TURNING
 
 MOST = 256
 """EMCMOT_COMP_SIZE of LinuxCNC."""
@@ -49,7 +49,6 @@ STEEP = 0.01
 """Change of a correction per length from which it looks like a slip: real screws stay below a thousandth."""
 LARGE = 1.0
 """mm, degree: no machine is that wrong."""
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 GAP = r"(?:\s+|(?=[-+]))"
 """What sscanf takes between two numbers."""
 TRIPLE = re.compile(rf"\s*({NUMBER}){GAP}({NUMBER}){GAP}({NUMBER})(.*)")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.plugin import FOREIGN, Dialect, Register, hookimpl
+from ncfix.plugin import FOREIGN, Dialect, Register, hookimpl, made_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -71,13 +71,6 @@ def sinumerik_codes() -> Mapping[str, Code]:
     return SINUMERIK_CODES
 
 
-def make_siemens() -> Control:
-    """The control `siemens`."""
-    from ncfix_siemens.control import Siemens
-
-    return Siemens()
-
-
 @hookimpl
 def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
     """Bring what the messages about SINUMERIK programs mean."""
@@ -87,4 +80,4 @@ def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `siemens`: CEC and EEC tables."""
-    register(make_siemens, name="siemens")
+    register(made_by("ncfix_siemens.control:Siemens"), name="siemens")

@@ -5,7 +5,8 @@
     machine = ncfix.load_machine("machine.toml")
     fixed = ncfix.fix("part.nc", machine, setup="part.setup.toml", output="part.fixed.nc")
 
-docs/api.md goes through the functions; `ncfix.api` has them. Nothing is imported before one of them is asked for.
+docs/api.md goes through the functions; `ncfix.api` says what holds for all of them. Nothing is imported before one of
+them is asked for.
 """
 
 from __future__ import annotations
@@ -16,30 +17,34 @@ TYPE_CHECKING = False  # `typing` takes longer to import than all of this
 if TYPE_CHECKING:
     from typing import Any
 
-    from ncfix.api import calibrate as calibrate
-    from ncfix.api import diagnose as diagnose
-    from ncfix.api import emulate as emulate
-    from ncfix.api import export as export
-    from ncfix.api import fix as fix
-    from ncfix.api import load_machine as load_machine
-    from ncfix.api import plan as plan
-    from ncfix.api import read_program as read_program
-    from ncfix.api import report as report
-    from ncfix.api import simulate as simulate
-    from ncfix.api import verify as verify
+    from ncfix.api.measurements import calibrate as calibrate
+    from ncfix.api.measurements import diagnose as diagnose
+    from ncfix.api.measurements import plan as plan
+    from ncfix.api.programs import fix as fix
+    from ncfix.api.programs import simulate as simulate
+    from ncfix.api.programs import verify as verify
+    from ncfix.api.sources import load_machine as load_machine
+    from ncfix.api.sources import read_program as read_program
+    from ncfix.api.tables import emulate as emulate
+    from ncfix.api.tables import export as export
+    from ncfix.api.tables import report as report
 
-FUNCTIONS = frozenset(
-    ("load_machine", "read_program", "fix", "verify", "simulate", "plan", "calibrate", "diagnose", "export")
-) | {"emulate", "report"}
+FUNCTIONS = {
+    **dict.fromkeys(("load_machine", "read_program"), "sources"),
+    **dict.fromkeys(("fix", "verify", "simulate"), "programs"),
+    **dict.fromkeys(("plan", "calibrate", "diagnose"), "measurements"),
+    **dict.fromkeys(("export", "emulate", "report"), "tables"),
+}
+"""Function -> the module of `ncfix.api` that has it."""
 
 
 def __getattr__(name: str) -> Any:
-    """A function of `ncfix.api`."""
+    """A function."""
     if name not in FUNCTIONS:
         raise AttributeError(f"module 'ncfix' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module("ncfix.api"), name)
+    return getattr(import_module(f"ncfix.api.{FUNCTIONS[name]}"), name)
 
 
 def __dir__() -> list[str]:

@@ -15,6 +15,7 @@ tables in a module of its own. docs/plugins.md goes through it step by step; `nc
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -88,7 +89,7 @@ if TYPE_CHECKING:
     from ncfix.tables.table_files import messages_of as messages_of
     from ncfix.tables.table_files import unit_of as unit_of
 
-HERE = ("FOREIGN", "TURNING", "CycleTable", "Dialect", "Register", "family", "hookimpl")
+HERE = ("FOREIGN", "TURNING", "CycleTable", "Dialect", "Register", "family", "hookimpl", "made_by")
 ELSEWHERE = {
     "ncfix.control.operations": (
         *("ALL_AXES", "Like", "Lose", "Operation", "Rapid", "Refuse", "Resume", "SetTool", "Suspend"),
@@ -116,6 +117,17 @@ ELSEWHERE = {
 """Module -> the names that are imported from it when they are asked for."""
 
 MODULES = {name: module for module, names in ELSEWHERE.items() for name in names}
+
+
+def made_by(name: str) -> Callable[[], Any]:
+    """A function that calls another, or a class, `module:name`, whose module is imported only then."""
+
+    def made() -> Any:
+        from pkgutil import resolve_name
+
+        return resolve_name(name)()
+
+    return made
 
 
 def __dir__() -> list[str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from classes.accounting import FAMILIES, FOREIGN, account
+from conftest import FULL
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import load
 from ncfix.text.reader import read
@@ -32,10 +33,10 @@ def test_few_motions_are_refused(
 
 
 def test_all_folders_are_read(shared: Callable[[str], Path], figures: Callable[[str], None]) -> None:
-    """Each folder with its own dialect: the bytes come back, or a line is named."""
+    """Each folder with its own dialect, every third of its files: the bytes come back, or a line is named."""
     for family, dialect in FAMILIES.items():
         read_, lines, unreadable, unnamed = 0, 0, 0, 0
-        for path in (shared("corpus") / family).iterdir():
+        for path in sorted((shared("corpus") / family).iterdir())[:: 1 if FULL else 3]:
             source = path.read_bytes()
             try:
                 program = read(source, path.name, dialect)

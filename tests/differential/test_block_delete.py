@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conftest import FULL
 from differential import (
     errors,
     fanuc,
@@ -50,7 +51,8 @@ from ncfix.diagnostics import NcfixError
 from ncfix.machine import load
 from ncfix.text.reader import read
 
-CASES = int(os.environ.get("NCFIX_DELETED", "2"))
+CASES = int(os.environ.get("NCFIX_DELETED", "2" if FULL else "0"))
+"""Programs of each kind and strategy; 0: one, another for each strategy."""
 FIRST = int(os.environ.get("NCFIX_SEED", "0"))
 STRATEGIES = ("rotary-then-linear", "position", "full")
 ARC = re.compile(r"(N?\d+ ?)?(G0?[23]\b|C[CRPT]? |CIP|RND|CHF|%|M30|O\d|END|LBL|L .*R[LR0] *M99)")
@@ -141,6 +143,12 @@ class Both:
                 self.wrong.append(f"seed {seed} {name}, switch {('off', 'on')[on]}: {verdict}")
 
 
+def seeds(strategy: str) -> range:
+    """Of the programs by which a strategy is judged."""
+    first = FIRST if CASES else FIRST + STRATEGIES.index(strategy)
+    return range(first, first + max(CASES, 1))
+
+
 @pytest.mark.parametrize("strategy", STRATEGIES)
 @pytest.mark.parametrize("dialect", ["linuxcnc", "iso", "fanuc"])
 def test_both_positions_judged_by_linuxcnc(
@@ -155,7 +163,7 @@ def test_both_positions_judged_by_linuxcnc(
     options = ("--strategy", strategy, "--dialect", dialect, "--no-point", "calculator")
     names = WITHOUT_ROTARY if strategy == "full" else MACHINES
     both = Both(rs274, machine, machine_file, tmp_path, partial(source_of, dialect), options, Counter(), [])
-    for seed in range(FIRST, FIRST + CASES):
+    for seed in seeds(strategy):
         both.one(seed, names[seed % len(names)])
     figures(f"block delete, {dialect}, {strategy}: {dict(both.found)}, {len(both.wrong)} wrong")
     assert not both.wrong, "\n".join(both.wrong[:12])
@@ -298,7 +306,7 @@ def test_both_positions_judged_by_the_second_controls(
     family: Callable[[Path], Family], strategy: str, root: Path, figures: Callable[[str], None]
 ) -> None:
     study = family(root)
-    for seed in range(FIRST, FIRST + CASES):
+    for seed in seeds(strategy):
         study.one(seed, strategy)
     said = f"{dict(study.found)}, worst {study.worst * 1e3:.2f} um, {len(study.wrong)} wrong"
     figures(f"block delete, second control, {study.dialect}, {strategy}: {said}")

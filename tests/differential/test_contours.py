@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
+from conftest import FULL
 from differential.canon import Canon, Controls
 from differential.contours import contour, judged
 from ncfix.compensate import FixOptions
@@ -19,7 +20,7 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Periodic, Polynomial
 from ncfix.text.reader import read
 
-CONTOURS = int(os.environ.get("NCFIX_CONTOURS", "16"))
+CONTOURS = int(os.environ.get("NCFIX_CONTOURS", "16" if FULL else "10"))
 """So many are made; of those that the control accepts, about a third, all are judged."""
 LENGTH = 80.0
 SAMPLED = 0.15
@@ -101,7 +102,7 @@ def test_a_corner_that_would_become_worse_is_refused_and_a_larger_tolerance_take
     found = {}
     for tolerance in (0.2, 100.0):
         worst = 0
-        for seed in range(30):
+        for seed in range(30 if FULL else 15):
             rng = np.random.default_rng(seed)
             x, y = rng.uniform(30, 60), rng.uniform(8, 25)
             text = WAVES.format(f"X{x:.3f}\nX{x - 30:.3f} Y{y:.3f}\n")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from conftest import FULL
 from differential import corpus, locality, product, setups
 from differential.canon import Canon, Controls
 from differential.errors import LETTERS, Machine
@@ -33,8 +34,8 @@ class Variant:
     controls: Controls
 
 
-SPARSER = int(os.environ.get("NCFIX_CORPUS", "3"))
-"""Every third of the files that each strategy is for; `NCFIX_CORPUS=1`: all of them."""
+SPARSER = int(os.environ.get("NCFIX_CORPUS", "3" if FULL else "5"))
+"""Every fifth of the files that each strategy is for; `NCFIX_CORPUS=1`: all of them."""
 VARIANTS = {
     "rotary-then-linear, all offsets zero": Variant("rotary-then-linear", SPARSER, Controls()),
     "position, with work offsets and tools": Variant("position", 4 * SPARSER, SETUP),

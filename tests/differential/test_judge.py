@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from conftest import FULL
 from differential.canon import Canon
 from differential.errors import Machine
 from differential.judge import Terms, Verdict, judge
@@ -61,8 +62,10 @@ def verdict_of(
     return run
 
 
-@pytest.mark.parametrize("source", [PLAIN, ARCS], ids=["plain", "arcs"])
-@pytest.mark.parametrize("decimals", [3, 4, 5])
+CASES = [(PLAIN, 3), (PLAIN, 4), (PLAIN, 5), (ARCS, 4), *([(ARCS, 3), (ARCS, 5)] if FULL else [])]
+
+
+@pytest.mark.parametrize(("source", "decimals"), CASES)
 def test_a_right_fixer_passes(verdict_of: Callable[..., Verdict], source: str, decimals: int) -> None:
     verdict = verdict_of(source, Flaws(decimals=decimals), Terms(tolerance=2e-3, step=10.0**-decimals, rapids=True))
     assert verdict.right, str(verdict)

@@ -11,40 +11,11 @@ import pytest
 
 from stories.story import Step, alike, headlines, run, steps, written_anew
 
-
-@pytest.fixture(scope="module")
-def told(tmp_path_factory: pytest.TempPathFactory, root: Path):
-    """`told("worn_table")`: the folder in which a story was run from its first command to its last, and what each
-    printed.
-    """
-    done: dict[str, tuple[Path, list[tuple[Step, list[str]]]]] = {}
-
-    def tell(name: str) -> tuple[Path, list[tuple[Step, list[str]]]]:
-        if name not in done:
-            folder = tmp_path_factory.mktemp("story") / name
-            shutil.copytree(root / "examples" / "stories" / name, folder)
-            script = list(steps((folder / "README.md").read_text()))
-            done[name] = folder, [(step, run(step.command, folder)) for step in script]
-        return done[name]
-
-    return tell
-
-
 STORIES = ("worn_table", "laspas", "size_conflict")
 
 
 def test_all_stories_are_told(root: Path) -> None:
     assert {path.parent.name for path in (root / "examples" / "stories").glob("*/README.md")} == set(STORIES)
-
-
-@pytest.mark.parametrize("name", STORIES)
-def test_what_is_shown_is_what_is_printed(told, name: str) -> None:
-    """Else: `python -m tests.stories` writes the READMEs anew. Of a diagnosis verdict and names are compared."""
-    for step, printed in told(name)[1]:
-        if step.command.startswith("ncfix diagnose"):
-            assert headlines(printed) == headlines(step.shown)
-        else:
-            assert alike(step.shown, printed), f"{step.command}\n" + "\n".join(printed)
 
 
 def rms_um(script: list[tuple[Step, list[str]]], program: str) -> tuple[float, float]:
@@ -59,22 +30,41 @@ def added(folder: Path) -> str:
     return tomllib.loads((folder / "found.toml").read_text())["provenance"]["added"]
 
 
-def test_the_worn_table_is_named_and_the_part_gets_better(told) -> None:
-    folder, script = told("worn_table")
+def the_worn_table_is_named_and_the_part_gets_better(folder: Path, script: list[tuple[Step, list[str]]]) -> None:
     assert added(folder) == "wobble C"
     (before, spring), (_, autumn) = (rms_um(script, name) for name in ("spring.nc", "autumn.nc"))
     assert spring < before
     assert autumn < 0.25 * spring  # 1.5 um of noise at 180 poses leave some tenths of the tilt's curve unknown
 
 
-def test_the_reversal_of_z_is_named_and_its_step_goes(told) -> None:
-    folder, script = told("laspas")
+def the_reversal_of_z_is_named_and_its_step_goes(folder: Path, script: list[tuple[Step, list[str]]]) -> None:
     assert "backlash Z: backlash of Z: lost motion at reversal" in script[0][1]
     effects = tomllib.loads((folder / "found.toml").read_text())["effect"]
     [size] = [each["coefficients"][0] for each in effects if each.get("basis") == "backlash"]
     assert size == pytest.approx(0.015553, abs=4 * 0.00022)  # four times the sigma that calibrate states
     (_, model), (_, found) = (rms_um(script, name) for name in ("model.nc", "found.nc"))
     assert found < 0.1 * model
+
+
+ENDS = {
+    "worn_table": the_worn_table_is_named_and_the_part_gets_better,
+    "laspas": the_reversal_of_z_is_named_and_its_step_goes,
+    "size_conflict": lambda folder, script: None,
+}
+
+
+@pytest.mark.parametrize("name", STORIES)
+def test_what_is_shown_is_what_is_printed_and_it_ends_as_it_says(name: str, tmp_path: Path, root: Path) -> None:
+    """Else: `python -m tests.stories` writes the READMEs anew. Of a diagnosis verdict and names are compared."""
+    folder = tmp_path / name
+    shutil.copytree(root / "examples" / "stories" / name, folder)
+    script = [(step, run(step.command, folder)) for step in steps((folder / "README.md").read_text())]
+    for step, printed in script:
+        if step.command.startswith("ncfix diagnose"):
+            assert headlines(printed) == headlines(step.shown)
+        else:
+            assert alike(step.shown, printed), f"{step.command}\n" + "\n".join(printed)
+    ENDS[name](folder, script)
 
 
 def test_steps_are_read() -> None:

@@ -6,7 +6,7 @@ tilts the plane by A B C, G177 drills with E as the level from which it feeds, a
 
 from pathlib import Path
 
-from ncfix.plugin import CycleTable, Rapid, SetTool, family, hookimpl, like
+from ncfix.plugin import CycleTable, Rapid, SetTool, family, hookimpl, like, made_by
 
 NAKANO = family("fanuc").derive(
     "nakano",
@@ -23,12 +23,6 @@ NAKANO = family("fanuc").derive(
 )
 
 
-def make_tables():
-    from ncfix_nakano.tables import NakanoPitch
-
-    return NakanoPitch()
-
-
 @hookimpl
 def register_dialects(register):
     register(NAKANO)
@@ -36,4 +30,4 @@ def register_dialects(register):
 
 @hookimpl
 def register_controls(register):
-    register(make_tables, name="nakano-pitch")
+    register(made_by("ncfix_nakano.tables:NakanoPitch"), name="nakano-pitch")

@@ -19,7 +19,7 @@ from ncfix.api.sources import (
     write_output,
 )
 from ncfix.control.setup import Setup
-from ncfix.diagnostics import Message, Place, RefusedError, UsageError
+from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.files import read_bytes
 
 if TYPE_CHECKING:
@@ -71,8 +71,7 @@ def fix(
     read = as_program(program, known)
     found = fixed(read, known, own, options, resolve or subprograms_of(own, read))
     if output is not None and found.report.refused and not allow_refused:
-        refused = [Message(each.code, each.reason, Place(read.path, each.line)) for each in found.report.refused]
-        raise RefusedError.collected(refused)
+        raise RefusedError.collected(found.report.refusals)
     write_output(output, found.text, force)
     return found
 

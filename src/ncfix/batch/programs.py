@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -53,9 +53,11 @@ def suffixes() -> frozenset[str]:
 
 def _below(folder: str, apart: str | None) -> list[ProgramFile]:
     known = suffixes()
-    found = [
-        ProgramFile(path, path[len(folder) :].lstrip(os.sep)) for path in _files(folder, apart) if _is(path, known)
-    ]
+    found = []
+    for path in _files(folder, apart):
+        suffix = os.path.splitext(path)[1].lower()
+        if suffix in known and not os.path.islink(path) and os.path.isfile(path):
+            found.append(ProgramFile(path, path[len(folder) :].lstrip(os.sep)))
     if not found:
         hint = f"programs in folders have one of these suffixes: {' '.join(sorted(known))}; or name the files"
         raise UsageError.of("NCF014", "there is no program in this folder", Place(folder), hint)
@@ -63,21 +65,16 @@ def _below(folder: str, apart: str | None) -> list[ProgramFile]:
 
 
 def _files(folder: str, apart: str | None) -> Iterator[str]:
-    for here, folders, names in os.walk(folder, onerror=_unreadable):
-        folders[:] = sorted(name for name in folders if not name.startswith(".") and not _same(here, name, apart))
+    """The files below a folder that are not hidden, but for those below `apart`."""
+
+    def refuse(error: OSError) -> None:
+        raise files.unreadable(str(error.filename), error) from error
+
+    for here, folders, names in os.walk(folder, onerror=refuse):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        if apart is not None and os.path.isdir(apart):
+            folders[:] = [name for name in folders if not os.path.samefile(os.path.join(here, name), apart)]
         yield from (os.path.join(here, name) for name in sorted(names) if not name.startswith("."))
-
-
-def _unreadable(error: OSError) -> None:
-    raise files.unreadable(str(error.filename), error) from error
-
-
-def _same(here: str, name: str, apart: str | None) -> bool:
-    return apart is not None and os.path.isdir(apart) and os.path.samefile(os.path.join(here, name), apart)
-
-
-def _is(path: str, known: Collection[str]) -> bool:
-    return os.path.splitext(path)[1].lower() in known and not os.path.islink(path) and os.path.isfile(path)
 
 
 @dataclass(frozen=True, slots=True)

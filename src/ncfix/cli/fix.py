@@ -25,7 +25,13 @@ from ncfix.cli.options import (
     tolerance_option,
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.shop.projects import ProjectCommand, base_of, group_of, is_from_file, next_group, project_options
+from ncfix.cli.shop.projects import (
+    ProjectCommand,
+    after_next_groups,
+    group_of,
+    is_from_file,
+    project_options,
+)
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, targets
 from ncfix.diagnostics import UsageError
 from ncfix.host import processors
@@ -218,15 +224,14 @@ def fix(
     workers = workers_for(jobs, wanted, executor)
     batches = [*context.meta.get(BATCHES, ()), (batch, workers, executor_of(executor))]
     context.meta[BATCHES] = batches
-    if (following := next_group(context)) is not None:
-        with following:
-            return int(following.command.invoke(following))
+    if (code := after_next_groups(context)) is not None:
+        return code
     return _reported(batches, as_json, json_lines)
 
 
 def _outputs(context: click.Context, programs: Sequence[str], said: Outputs) -> Outputs:
     """Where outputs are to go; what the project file says does not hold where it cannot."""
-    base = base_of(context, "output")
+    base = group_of(context).folder if is_from_file(context, "output") else None
     output = None if base and (said.in_place or programs == (STREAM,)) else said.output
     outputs = replace(said, output=output, base=base)
     if said.resume and is_from_file(context, "resume") and outputs.folder(programs) is None:
@@ -251,10 +256,9 @@ def _changes(
 
     only, before = group_of(context).programs, context.meta.setdefault(BATCHES, [])
     paths = [each.path for each in program_files(programs, apart) if only is None or each.path in only]
-    before += show_changes(job, paths, motions, as_json)
-    if (following := next_group(context)) is not None:
-        with following:
-            return int(following.command.invoke(following))
+    before += [show_changes(job, path, motions, as_json) for path in paths]
+    if (code := after_next_groups(context)) is not None:
+        return code
     if as_json:
         console.put_json(files=[entry for _, entry in before])
     return max(int(code) for code, _ in before)

@@ -132,7 +132,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _run(arguments: Sequence[str]) -> int:
-    as_json = _json_form(arguments)
+    as_json = next((option for option in ("--json", "--json-lines") if option in arguments), None)
     try:
         if any("\0" in argument for argument in arguments):
             raise UsageError.of("NCF001", "an argument has a NUL character", hint="no name of a file has one")
@@ -147,11 +147,6 @@ def _run(arguments: Sequence[str]) -> int:
         return BROKEN_PIPE
     except Exception as error:
         return failed(owned(error), as_json)
-
-
-def _json_form(arguments: Sequence[str]) -> str | None:
-    """The option that asks for JSON on standard output; None if none does."""
-    return next((option for option in ("--json", "--json-lines") if option in arguments), None)
 
 
 def wrong_use(error: click.ClickException, arguments: Sequence[str], as_json: str | None) -> int:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import ncfix
 from ncfix.arguments import KNOTS, LOSSES, PLANS, POSES, PRUNE, SEED
 from ncfix.cli import console
 from ncfix.cli.options import (
@@ -89,7 +90,6 @@ def calibrate(
     Without --effects those of the machine file are estimated; of a machine without effects, all that can be. Exit
     code 4: the result does not describe the measurements, and nothing was written.
     """
-    from ncfix import api
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
 
@@ -99,7 +99,7 @@ def calibrate(
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]
     with console.busy("calibrating"):
-        found = api.calibrate(
+        found = ncfix.calibrate(
             data,
             machine,
             effects=effects,
@@ -265,7 +265,6 @@ def plan(
     as_json: bool,
 ) -> None:
     """Choose the poses to be measured, and write them as a measurement file to be filled in."""
-    from ncfix import api
     from ncfix.measure.measurement import dumps
     from ncfix.measure.plan import skeleton
     from ncfix.measure.reader import reads
@@ -279,7 +278,7 @@ def plan(
     names = [name.strip() for name in separate.split(",")] if separate else []
     room = _room(ranges, lengths, balls, reaches, inputs)
     with console.busy("choosing poses"):
-        found = api.plan(
+        found = ncfix.plan(
             machine,
             kind=kind,
             count=count,
@@ -375,7 +374,6 @@ def diagnose(
 ) -> int:
     """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
-    from ncfix import api
     from ncfix.diagnosis.diagnosis import NOTHING
     from ncfix.diagnosis.presentation import as_dict, text, with_provenance
     from ncfix.machine import dumps
@@ -396,7 +394,7 @@ def diagnose(
     for each in data:
         console.tell_some(each.remarks)
     with console.busy("diagnosing"):
-        diagnosis = api.diagnose(data, machine, without=without)
+        diagnosis = ncfix.diagnose(data, machine, without=without)
     console.tell(*diagnosis.messages)
     written = None
     if machine_target is not None and diagnosis.machine is not None:

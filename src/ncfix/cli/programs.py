@@ -14,7 +14,7 @@ from ncfix.cli import console
 from ncfix.cli.following import Following, dialect_in, parts_of, task_of, through
 from ncfix.cli.options import PATH, dialect_option, force_option, json_option, optional_machine_option, table_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.shop.projects import ProjectCommand, group_of, next_group, project_options
+from ncfix.cli.shop.projects import ProjectCommand, after_next_groups, group_of, project_options
 from ncfix.cli.streams import Keep, Source, source_of
 from ncfix.cli.targets import Outputs, shown, targets
 from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
@@ -68,9 +68,8 @@ def check(
     only, outcomes = group_of(context).programs, context.meta.setdefault(OUTCOMES, [])
     paths = (program.path for program in program_files(programs))
     outcomes += [_outcome(following, path) for path in paths if only is None or path in only]
-    if (following_group := next_group(context)) is not None:
-        with following_group:
-            return int(following_group.command.invoke(following_group))
+    if (code := after_next_groups(context)) is not None:
+        return code
     if as_json:
         console.put_json(files=[entry for _, entry in outcomes])
     return max(int(code) for code, _ in outcomes)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+import ncfix
 from ncfix.arguments import FAULT, SEED
 from ncfix.cli import console
 from ncfix.cli.following import Following, dialect_in, task_of, tell_of_stamp, through
@@ -170,7 +171,6 @@ def _simulate_plan(
     machine_path: str, plan: str, faults: Faults, seed: int, output: str | None, force: bool, as_json: bool
 ) -> None:
     """Fill in a plan."""
-    from ncfix import api
     from ncfix.measure.measurement import dumps
     from ncfix.measure.reader import reads
 
@@ -179,7 +179,7 @@ def _simulate_plan(
     machine = load_machine(machine_path)
     measurement = reads(read(plan), machine, shown(plan), plan=True)
     console.tell(*measurement.remarks)
-    found = api.simulate(measurement, machine, faults=faults, seed=seed)
+    found = ncfix.simulate(measurement, machine, faults=faults, seed=seed)
     if as_json:
         columns = {name: values for name, values in found.columns.items() if name in found.measured}
         console.put_json(path=shown(plan), rows=len(found), kind=found.kind, measured=columns, output=output)

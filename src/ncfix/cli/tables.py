@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import ncfix
 from ncfix import files
 from ncfix.arguments import TARGET_UM
 from ncfix.batch.programs import subprograms
@@ -94,22 +95,21 @@ def along(
 
 def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
     """The program as `ncfix fix` rewrites it under these settings of the control."""
-    from ncfix import api
+    from ncfix.api.programs import fixed
     from ncfix.compensate import FixOptions
 
     assert following.machine is not None
     options = FixOptions(settings["strategy"], float(settings["tolerance_um"]))
     find = subprograms(following.setup, path)
-    return api.fixed(following.read(path), following.machine, following.setup, options, find)
+    return fixed(following.read(path), following.machine, following.setup, options, find)
 
 
 def rewritten_file(following: Following, settings: Mapping[str, str], path: str) -> dict[str, bytes]:
     """Its file; raises `RefusedError` with what could not be corrected, if anything could not."""
-    fixed = rewritten(following, settings, path)
-    refused = [Message(each.code, each.reason, Place(shown(path), each.line)) for each in fixed.report.refused]
-    if refused:
-        raise RefusedError.collected(refused)
-    return {os.path.basename(path): fixed.text}
+    found = rewritten(following, settings, path)
+    if found.report.refused:
+        raise RefusedError.collected(found.report.refusals)
+    return {os.path.basename(path): found.text}
 
 
 def _followed(following: Following, path: str) -> tuple[Program, Followed]:
@@ -175,8 +175,7 @@ def export(
 
     The figures are those of the files: they are read back and run as the control would, over 20000 random poses.
     """
-
-    from ncfix import api
+    from ncfix.api.tables import table_request
     from ncfix.plugins import called
     from ncfix.tables.control import Written, get_control
     from ncfix.tables.export import export as exported
@@ -190,7 +189,7 @@ def export(
     sound(machine, machine_path, force)
     covered = given_ranges(machine, ranges)
     pairs = dict(_pair(each, "--set NAME=VALUE") for each in settings)
-    request = api.table_request(chosen, machine, tool_length, target_um, covered, pairs, complete=not probe)
+    request = table_request(chosen, machine, tool_length, target_um, covered, pairs, complete=not probe)
     if probe:
         found = called("controls", chosen.name, chosen.probe, request, gives=Written)
         files.write_folder(output, found.files, force, inputs)
@@ -288,8 +287,6 @@ def emulate(
 
     Exit code 1 if there is something to remark on the files.
     """
-
-    from ncfix import api
     from ncfix.tables.control import get_control
     from ncfix.tables.export import SIDE_FILE, read_manifest
 
@@ -301,7 +298,7 @@ def emulate(
     with console.busy("running the tables"):
         try:
             name = folder.rstrip(os.sep)
-            found = api.emulate(chosen, content, following.machine, other_machine=other_machine, name=name)
+            found = ncfix.emulate(chosen, content, following.machine, other_machine=other_machine, name=name)
         except ConfigError as error:
             raise ConfigError.collected(_below(folder, error.messages, content)) from error
         if program is not None:

@@ -24,7 +24,7 @@ from ncfix.compensate.workers import Read, Share
 from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
-from ncfix.diagnostics import Message, Place
+from ncfix.diagnostics import Message
 from ncfix.machine import Machine
 from ncfix.text import stamp
 from ncfix.text.tree import Program
@@ -156,6 +156,5 @@ def _surveyed(parts: Parts, survey: Survey, report: FixReport | None = None) -> 
 
 def _remarks_of(report: FixReport) -> tuple[Message, ...]:
     """What a correction would say and refuse, but for axes that stay where they stand and do not cut."""
-    refusals = (Message(each.code, each.reason, Place(report.path, each.line)) for each in report.refused)
     harmless = {left.message(report.path) for left in report.left if not left.cuts}
-    return (*(each for each in report.warnings if each not in harmless), *refusals)
+    return (*(each for each in report.warnings if each not in harmless), *report.refusals)

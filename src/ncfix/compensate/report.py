@@ -91,6 +91,11 @@ class FixReport:
     passed_by_rule: Mapping[str, int] = field(default_factory=dict)
     no_figure: Mapping[str, int] = field(default_factory=dict)
 
+    @property
+    def refusals(self) -> list[Message]:
+        """What was refused, as messages."""
+        return [Message(each.code, each.reason, Place(self.path, each.line)) for each in self.refused]
+
     def as_dict(self) -> dict[str, object]:
         """The per-file object of `fix --json`."""
         return {

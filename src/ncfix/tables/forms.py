@@ -18,9 +18,8 @@ from ncfix.diagnostics import Message, Place
 from ncfix.plugins import called
 from ncfix.tables.control import Control, Files, controls, get_control
 from ncfix.tables.export import SHEET, SIDE_FILE, linted, read_manifest
-from ncfix.tables.table_files import AGAIN, BYTE_ORDER, Remarks
+from ncfix.tables.table_files import AGAIN, BYTE_ORDER, NUMBER, Remarks
 
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 N = f"({NUMBER})"
 GAP = r"[ \t]+"
 END = re.compile(rb"\r\n|\n")

@@ -18,7 +18,8 @@ from ncfix.machine import Machine
 
 AGAIN = "export again"
 """What helps with a file that ncfix has written."""
-NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+"""The pattern of a decimal number as controls write it."""
 ALONE = re.compile(r"\r(?!\n)")
 BYTE_ORDER = "\u00ef\u00bb\u00bf"
 """The mark at the beginning of some UTF-8 files, taken as Latin-1."""
@@ -30,7 +31,7 @@ DEGREE = np.pi / 180
 
 def as_number(text: str) -> float | None:
     """A decimal number as controls write it, finite; None for anything else."""
-    if not NUMBER.fullmatch(text):
+    if not re.fullmatch(NUMBER, text):
         return None
     found = float(text)
     return found if math.isfinite(found) else None

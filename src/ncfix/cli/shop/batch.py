@@ -147,13 +147,13 @@ class FixJob:
                 yield self._in_parts(source, stream, outlet, find)
 
     def _whole(self, source: Source, text: bytes, find: Find) -> FixedText:
-        from ncfix import api
+        from ncfix.api.programs import fixed
         from ncfix.text.reader import read
 
         path = shown(source.path)
         program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
-        fixed = api.fixed(program, self.machine, self.setup, self.options, find)
-        return FixedText(fixed.text, fixed.changed, fixed.report)
+        found = fixed(program, self.machine, self.setup, self.options, find)
+        return FixedText(found.text, found.changed, found.report)
 
     @contextmanager
     def _outlet(
@@ -191,9 +191,8 @@ class FixJob:
 
     def _written(self, fixed: FixedText, target: OutputTarget) -> FixOutcome:
         entry: dict[str, Any] = fixed.report.as_dict()
-        path, digest = shown(target.source), ""
-        refusals = (Message(each["code"], each["reason"], Place(path, each["line"])) for each in entry["refused"])
-        console.tell_some([*fixed.report.warnings, *refusals], partial(_with_lines, source=target.source))
+        digest = ""
+        console.tell_some([*fixed.report.warnings, *fixed.report.refusals], partial(_with_lines, source=target.source))
         refused = bool(entry["refused"]) and not self.options.allow_refused
         if not refused:
             if self.journal:
@@ -287,7 +286,7 @@ class Batch:
         """What becomes of them, in their order; each is noted as soon as it is done."""
         several = len(self.targets) > 1
         if self.folder is None or not (self.resume or several or os.path.exists(os.path.join(self.folder, JOURNAL))):
-            yield from self._told(self.targets, {}, self._fresh(self.job, self.targets, jobs, make, _forget))
+            yield from self._told(self.targets, {}, self._fresh(self.job, self.targets, jobs, make, lambda *_: None))
             return
         with Journal.opened(self.folder) as journal:
             job = self.job.noted_in(journal.path)
@@ -348,10 +347,6 @@ class Batch:
 Finished = tuple[FixOutcome, list[str]]
 """What became of a program, and what is still to be said of it."""
 Note = Callable[[OutputTarget, Finished], None]
-
-
-def _forget(target: OutputTarget, finished: Finished) -> None:
-    """Where there is no journal."""
 
 
 def _note(journal: Journal, limits: str, target: OutputTarget, finished: Finished) -> None:

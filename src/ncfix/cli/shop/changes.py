@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from ncfix.batch.programs import subprograms
@@ -10,22 +9,17 @@ from ncfix.cli import console
 from ncfix.cli.console import owned
 from ncfix.cli.options import dialect_of
 from ncfix.cli.targets import read, shown
-from ncfix.diagnostics import ExitCode, Message, Place, visible
+from ncfix.diagnostics import ExitCode, visible
 
 if TYPE_CHECKING:
     from ncfix.cli.shop.batch import FixJob
     from ncfix.compensate.changes import Changes, MotionChange
 
 COLUMNS = ("line", "axis", "from", "to", "change", "why")
-Outcome = tuple[int, dict[str, Any]]
 
 
-def show_changes(job: FixJob, paths: Iterable[str], motions: bool, as_json: bool) -> list[Outcome]:
-    """Print what would change in programs; of each the exit code, and its entry in the JSON object."""
-    return [_shown(job, path, motions, as_json) for path in paths]
-
-
-def _shown(job: FixJob, path: str, motions: bool, as_json: bool) -> Outcome:
+def show_changes(job: FixJob, path: str, motions: bool, as_json: bool) -> tuple[int, dict[str, Any]]:
+    """Print what would change in a program; the exit code, and the entry in the JSON object."""
     from ncfix.compensate.changes import Changes, as_plain
     from ncfix.text.reader import read as read_source
 
@@ -43,7 +37,7 @@ def _shown(job: FixJob, path: str, motions: bool, as_json: bool) -> Outcome:
         console.tell(*own.messages)
         return own.exit_code, {**entry, "errors": [message.as_dict() for message in own.messages]}
     report = changes.fixed.report
-    refused = [Message(each.code, each.reason, Place(name, each.line)) for each in report.refused]
+    refused = report.refusals
     console.tell_some([*report.warnings, *refused])
     if refused and not job.options.allow_refused:
         console.say(f"{visible(name)}: {console.counted(len(refused), 'motion')} refused, so nothing would be written")

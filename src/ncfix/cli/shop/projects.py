@@ -194,18 +194,14 @@ def group_of(context: click.Context) -> ProgramGroup:
     return groups.found[groups.at] if groups else ProgramGroup()
 
 
-def next_group(context: click.Context) -> click.Context | None:
-    """A context in which the verb runs for the next group; None after the last one."""
+def after_next_groups(context: click.Context) -> int | None:
+    """Run the verb for the groups behind this one; the exit code of the last, which reports on all. None: no more."""
     groups: _Groups | None = context.meta.get(STATE)
     if groups is None or groups.at + 1 >= len(groups.found):
         return None
     groups.at += 1
-    return context.command.make_context(context.info_name, list(groups.arguments), context.parent)
-
-
-def base_of(context: click.Context, option: str) -> str | None:
-    """The folder of the project file, if it is that file which gives the value of an option."""
-    return group_of(context).folder if is_from_file(context, option) else None
+    with context.command.make_context(context.info_name, list(groups.arguments), context.parent) as following:
+        return int(following.command.invoke(following))
 
 
 def is_from_file(context: click.Context, option: str) -> bool:
