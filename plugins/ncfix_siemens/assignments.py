@@ -193,8 +193,8 @@ class Assigned:
         gone = [name for name in needed if name not in self.fields]
         if gone:
             first = next(iter([*self.values.values(), *self.fields.values()]))
-            text = f"{self.title} has no {', '.join(self.names.format(name) for name in gone)}: {KEEPS}"
-            self.remarks.refuse(first.line, text)
+            names = ", ".join(self.names.replace("{}", name, 1) for name in gone)
+            self.remarks.refuse(first.line, f"{self.title} has no {names}: {KEEPS}")
         return bool(gone)
 
     def number(self, name: str) -> float:
@@ -255,5 +255,6 @@ class Assigned:
             self.remarks.refuse(self.values[number].line, text, "one value too many, or MAX too small")
         gone = [number for number in range(last + 1) if number not in self.values]
         if gone:
-            text = f"{len(gone)} of {last + 1} values of {self.title} are missing, first {self.place.format(gone[0])}"
+            first = self.place.replace("{}", str(gone[0]), 1)
+            text = f"{len(gone)} of {last + 1} values of {self.title} are missing, first {first}"
             self.remarks.refuse(self.fields["STEP"].line, f"{text}: {KEEPS} there")

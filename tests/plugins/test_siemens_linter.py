@@ -45,6 +45,10 @@ WRONG = {
     "too many points": (GOOD.replace(b"most_points=1000", b"most_points=2"), "3 points, and the control has 2"),
     "EEC: one value too many": (EEC.replace(b"MAX[0,AX1]=0.0", b"MAX[0,AX1]=-100.0"), "AX1 has values 0 to 1 by its"),
     "EEC: a value gone": (EEC.replace(b"$AA_ENC_COMP[0,0,AX1]=0.003\n", b""), "1 of 3 values of AX1 are missing"),
+    "EEC: no step, of an odd axis": (
+        EEC.replace(b"$AA_ENC_COMP_STEP[0,AX1]=100.0\n", b"").replace(b"AX1]", b"A{1]"),
+        "has no $AA_ENC_COMP_STEP[0,A{1]",
+    ),
     "EEC: no step": (EEC.replace(b"$AA_ENC_COMP_STEP[0,AX1]=100.0\n", b""), "has no $AA_ENC_COMP_STEP"),
     "EEC: a step that does not fit": (EEC.replace(b"=100.0", b"=130.0"), "not a whole number"),
     "EEC: a decimal comma": (EEC.replace(b"0.012", b"0,012"), "a decimal comma"),
