@@ -98,7 +98,7 @@ def test_in_strict_mode_a_broken_plugin_is_an_error(
     ("source", "hint"),
     [
         (GOOD + "@hookimpl\ndef regster_bases(register): pass\n", "did you mean register_bases"),
-        (GOOD + "@hookimpl\ndef register_bases(registrar): pass\n", "declared in the hookimpl"),
+        (GOOD + "@hookimpl\ndef register_bases(registrar): pass\n", "another argument than `register`"),
         (GOOD.replace("@hookimpl", ""), "hookimpl"),
         (GOOD + "def register_bases(register): pass\n", "hookimpl"),
     ],
@@ -108,6 +108,28 @@ def test_a_hook_that_would_never_be_called_fails_loudly(install: Install, source
     with pytest.warns(PluginWarning, match=hint):
         found = collect([install("bad", source)])
     assert not found.loaded
+
+
+FAULTS = {
+    "a name that is misspelt": ("from ncfix.plugin import CycelTable\n", "cannot import name 'CycelTable'",
+                                "did you mean CycleTable?"),
+    "what derive objects to": ("from ncfix.plugin import family\nfamily('iso').derive('x', title='X', suffix='.x')\n",
+                               r"ValueError: x: .* no suffix: did you mean suffixes\? \(third_party_bad.py:2\)",
+                               "tell its author"),
+    "while it registers": (GOOD + "@hookimpl\ndef register_bases(register): 1 / 0\n",
+                           r"failed in register_bases: ZeroDivisionError: .* \(third_party_bad.py:\d+\)",
+                           "tell its author"),
+}  # fmt: skip
+"""Plugins that are left out, what is said of them, and the hint."""
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_what_is_said_names_the_place_and_what_helps(install: Install, name: str) -> None:
+    source, said, hint = FAULTS[name]
+    with pytest.warns(PluginWarning, match=said) as told:
+        collect([install("bad", source)])
+    (warning,) = [each.message for each in told if isinstance(each.message, PluginWarning)]
+    assert hint in warning.message.hint
 
 
 def test_a_plugin_that_exits_while_it_loads_does_not_end_ncfix(install: Install) -> None:

@@ -13,6 +13,7 @@ faults of what ncfix itself brings, which comes in as plugins do: those are faul
 from __future__ import annotations
 
 import os
+import re
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -99,7 +100,7 @@ def registry(kind: str, builtin: Mapping[str, Any] | None = None) -> dict[str, A
 
 
 NEEDS = {
-    "bases": ("rows", "slopes", "feature", "complaints"),
+    "bases": ("name", "title", "labels", "rows", "slopes", "feature", "complaints"),
     "commands": ("main", "get_short_help_str"),
     "dialects": ("grammar", "suffixes", "signature", "language", "semantics"),
 }
@@ -116,7 +117,8 @@ def lacking(kind: str, thing: Any) -> str:
         return "it is no class"
     if kind not in NEEDS:
         return "" if callable(thing) else "it cannot be called"
-    absent = [name for name in NEEDS[kind] if not hasattr(thing, name)]
+    abstract = getattr(thing, "__abstractmethods__", ()) if kind == "bases" else ()
+    absent = [name for name in NEEDS[kind] if not hasattr(thing, name) or name in abstract]
     if absent:
         return f"it has no {', '.join(absent)}"
     return str(thing.complaint()) if kind == "dialects" and hasattr(thing, "complaint") else ""
@@ -182,8 +184,18 @@ def import_plugin(point: EntryPoint) -> object:
     try:
         return point.load()
     except (Exception, SystemExit) as error:
-        why = f"cannot be imported: {describe(error)}"
-        raise left_out("NCF501", point, why, "reinstall or uninstall it") from error
+        why = f"cannot be imported: {describe(error)}{_where(point.module, error.__traceback__, only=True)}"
+        raise left_out("NCF501", point, why, import_hint(error)) from error
+
+
+def import_hint(error: BaseException) -> str:
+    """What helps with a plugin that cannot be imported: the name that was meant, or to whom to go."""
+    if isinstance(error, ImportError):
+        found = re.match(r"cannot import name '(\w+)'", str(error))
+        if found and error.name is not None and error.name.partition(".")[0] == OWN:
+            return nearest(found[1], dir(import_module(error.name)))
+        return "reinstall or uninstall it"
+    return "tell its author; NCFIX_DISABLE_PLUGINS leaves it out"
 
 
 def hooks_of(point: EntryPoint, module: object) -> list[pluggy.HookCaller]:
@@ -197,13 +209,15 @@ def hooks_of(point: EntryPoint, module: object) -> list[pluggy.HookCaller]:
         manager.register(module, name=point.name)
         manager.check_pending()
     except pluggy.PluginValidationError as error:
-        why = f"has a hook that ncfix does not know: {str(error).splitlines()[-1]}"
+        why = "has a hook that ncfix does not know: " + str(error).splitlines()[-1].partition(" in plugin <")[0]
+        if wrong := re.search(r"definition: (.*)\nArgument", str(error)):
+            why = f"has a hook with another argument than `register`: {wrong[1]}"
         raise left_out("NCF502", point, why, hook_hint(manager, module)) from error
     hooks = manager.get_hookcallers(module) or []
     unmarked = [name for name in HOOKS if hasattr(module, name) and name not in {hook.name for hook in hooks}]
     if unmarked or not hooks:
         why = f"has {unmarked[0]} without @hookimpl" if unmarked else "has no hooks"
-        raise left_out("NCF506", point, why, "mark its functions with @ncfix.hookspecs.hookimpl")
+        raise left_out("NCF506", point, why, "mark its functions with @hookimpl, from ncfix.plugin")
     return hooks
 
 
@@ -227,7 +241,9 @@ def registrations(point: EntryPoint, hooks: Iterable[pluggy.HookCaller]) -> Thin
         except PluginError:
             raise
         except Exception as error:
-            raise left_out("NCF504", point, f"failed in {hook.name}: {describe(error)}", "tell its author") from error
+            place = _where(point.module, error.__traceback__, only=True)
+            why = f"failed in {hook.name}: {describe(error)}{place}"
+            raise left_out("NCF504", point, why, "tell its author") from error
     return things
 
 
@@ -364,17 +380,20 @@ def blamed(error: BaseException) -> PluginError | None:
 
 def _failed(plugin: Plugin, what: str, error: BaseException) -> PluginError:
     text = f"{_said(plugin)} failed{what}: {describe(error)}"
-    return PluginError((Message("NCF507", f"{text}{_where(plugin, error.__traceback__)}", hint=_hint(plugin)),))
+    return PluginError((Message("NCF507", f"{text}{_where(plugin.module, error.__traceback__)}", hint=_hint(plugin)),))
 
 
-def _where(plugin: Plugin, trace: TracebackType | None) -> str:
-    """The last line of the plugin that was at work, and that of ncfix below it, if it called that."""
+def _where(module: str, trace: TracebackType | None, only: bool = False) -> str:
+    """The last line of the plugin's module that was at work, and that of ncfix below it, if it called that.
+
+    only  nothing of ncfix: it objects to what the plugin gave it
+    """
     last: dict[bool, str] = {}
     for frame, line in traceback.walk_tb(trace):
         top = _top(frame.f_globals.get("__name__", ""))
-        if top == _top(plugin.module):
+        if top == _top(module):
             last = {True: f"{os.path.basename(frame.f_code.co_filename)}:{line}"}
-        elif top == OWN and last:
+        elif top == OWN and last and not only:
             last[False] = f"in what it called of ncfix, {os.path.basename(frame.f_code.co_filename)}:{line}"
     return f" ({', '.join(last.values())})" if last else ""
 

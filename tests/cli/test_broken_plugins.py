@@ -123,6 +123,11 @@ CASES = {
                                    ("machine", "show", "{wavy}"), "rows gives shape (3,)"),
     "no basis": Case("bases", "", "register(Wave(), 'wave')", ("machine", "show", "{wavy}"), "it is no class",
                      "NCF508"),
+    "a basis that lacks something": Case("bases", "del Wave.title\n", "register(Wave)", ("effects", "--bases"),
+                                         "'wave' of plugin 'third' of somebodys-tools left out of the bases: "
+                                         "it has no title", "NCF508"),
+    "a basis that is abstract": Case("bases", "class Half(Basis):\n    name = title = 'half'\n", "register(Half)",
+                                     ("effects", "--bases"), "it has no labels, rows, slopes, feature", "NCF508"),
     "effect raises": Case("effects", "Bad.effects = lambda self, machine: machine.nothing\n", "register(Bad(), 'bad')",
                           ("effects", "-m", "{machine}"), "failed as the effect 'bad': AttributeError"),
     "effect returns text": Case("effects", "Bad.effects = lambda self, machine: ['EXX']\n", "register(Bad(), 'bad')",

@@ -130,7 +130,7 @@ def test_a_word_in_the_place_of_a_renamed_one(dmu50: Machine) -> None:
         moves_of("G90 G54 G0 X0. Y0. Z10.\nG168 X1. Y1. I5. A0. B1. C0.\n", dmu50)
 
 
-@pytest.mark.parametrize("code", ["G1", "G90", "H5", "G100.25", "g100"])
+@pytest.mark.parametrize("code", ["G1", "G90", "H5", "G100.25", "g100", "G05", "M06", "G5.0", "G"])
 def test_codes_that_no_dialect_can_have(code: str) -> None:
     with pytest.raises(ValueError, match="cannot be a code of a dialect's own"):
         OWN.derive("x", title="X", codes={code: []})
@@ -144,8 +144,20 @@ def test_codes_in_a_language_that_takes_none() -> None:
 WRONG = {
     "like beside another": ({"codes": {"G150": [SetTool("T"), like("G69")]}}, "G150: like.* stands alone"),
     "no operation": ({"codes": {"G150": ["G69"]}}, "'G69' is no operation"),
+    "an operation that is not called": ({"codes": {"G150": [SetTool]}}, r"G150: SetTool is no .*: write SetTool\("),
+    "an operation outside a list": ({"codes": {"G150": SetTool("T")}}, "G150: .* is no list of operations"),
+    "an M code like a G code": ({"codes": {"M77": [like("G69")]}}, "M77: like.'G69'.: a G code is like"),
+    "a motion by an M code": ({"codes": {"M150": [Rapid()]}}, "'M150' .*: an M code takes no axis words"),
+    "what the families rely on": ({"codes": {"G1": []}}, "'G1' .*: the families rely on"),
+    "a cycle that is no table": ({"cycles": {"G150": {"level": "R"}}}, "G150: .* is no CycleTable"),
+    "a cycle by an M code": ({"cycles": {"M150": CycleTable()}}, "'M150' .*: cycles are G codes"),
+    "a field that is not there": ({"suffix": (".nak",)}, "a dialect has no suffix: did you mean suffixes"),
+    "text for a number": ({"line_limit": "128"}, "'128' cannot be the line_limit"),
+    "another feed": ({"feed_of": "rotary"}, "'rotary' cannot be feed_of"),
+    "a signature that is text": ({"signature": ("G150",)}, "signature is a tuple of bytes"),
+    "a sentence in no tuple": ({"passes": "G150"}, "passes is a tuple of str"),
     "a suffix without its point": ({"suffixes": ("nak",)}, "'nak' cannot be a suffix"),
-    "a suffix that is no tuple": ({"suffixes": ".nak"}, "'.' cannot be a suffix"),
+    "a suffix that is no tuple": ({"suffixes": ".nak"}, "suffixes is a tuple of str, not '.nak'"),
     "capital letters": ({"suffixes": (".NAK",)}, "'.NAK' cannot be a suffix"),
     "a sign of comments": ({"comment": "' {}"}, "no comment can be written"),
     "a comment without its text": ({"comment": "()"}, "no comment can be written"),
@@ -157,6 +169,15 @@ def test_what_no_dialect_can_have(name: str) -> None:
     changes, said = WRONG[name]
     with pytest.raises(ValueError, match=f"x: .*{said}"):
         OWN.derive("x", title="X", **changes)
+
+
+@pytest.mark.parametrize(
+    ("code", "words"), [("g68.2", {}), ("G68.20", {}), ("T", {}), ("G68.2", {"I": "AB"}), ("G68.2", {"Q": "123"}),
+                        ("G68.2", {"i": "A"})],
+)  # fmt: skip
+def test_what_is_like_nothing(code: str, words: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="like"):
+        like(code, **words)
 
 
 @pytest.mark.parametrize("comment", ["({})", "; {}", ";{}", "(NCFIX {})"])

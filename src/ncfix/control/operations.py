@@ -85,6 +85,13 @@ class Like(Operation):
     words: tuple[tuple[str, str | float], ...] = ()
 
     def __post_init__(self) -> None:
+        if not re.fullmatch(r"[GM]\d{1,4}(\.\d)?", self.code):
+            raise ValueError(f"like({self.code!r}): no code of a family: a capital G or M and its number")
+        for known, own in self.words:
+            letters = (known, own) if isinstance(own, str) else (known,)
+            if any(len(each) != 1 or not is_letters(each) for each in letters):
+                text = f"like({self.code!r}): {known}={own!r} cannot be: a letter for a letter, or a number"
+                raise ValueError(text)
         places = {*LETTERS, *"IJKR"}
         if MOTION.fullmatch(self.code) and any(places & {known, own} for known, own in self.words):
             raise ValueError(f"like({self.code!r}): the words of a motion's place are corrected, and stay as they are")

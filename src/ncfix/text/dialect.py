@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import PurePath
 from typing import Any, ClassVar, Literal, Protocol
 
@@ -41,7 +41,7 @@ TURNING: tuple[tuple[str, bytes], ...] = (
 """What shows that a text of the Fanuc family is for a lathe: the spindle's limit (G50 S), turning cycles that name the
 blocks of a contour (P and Q), or constant surface speed (G96) in a text that names no Y."""
 
-CODE = re.compile(r"[GM]\d{1,4}(\.\d)?")
+CODE = re.compile(r"[GM](0|[1-9]\d{0,3})(\.[1-9])?")
 """How a code of a dialect's own is written."""
 FIXED = frozenset({"G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G53", "G80", "G90", "G91"})
 """Codes whose meaning the reader and the writer rely on: no dialect may give them another."""
@@ -203,6 +203,12 @@ class Dialect:
 
         Raises ValueError for what cannot be: see `complaint`, and a sign of comments that the language does not read.
         """
+        if unknown := changes.keys() - {each.name for each in fields(self)}:
+            known = ("codes", "cycles", *(each.name for each in fields(self)))
+            raise ValueError(f"{name}: a dialect has no {min(unknown)}: {nearest(min(unknown), known)}")
+        for code, operations in (codes or {}).items():
+            if not isinstance(operations, list | tuple):
+                raise ValueError(f"{name}: {code}: {operations!r} is no list of operations")
         own = {code: tuple(operations) for code, operations in (codes or {}).items()}
         drills = dict(cycles or {})
         if both := own.keys() & drills.keys():
@@ -224,20 +230,48 @@ class Dialect:
         return made
 
     def complaint(self) -> str:
-        """What is wrong with its suffixes, codes and cycles; empty if nothing is."""
+        """What is wrong with its fields, codes and cycles; empty if nothing is."""
+        if not isinstance(self.line_limit, int) or self.line_limit < 0:
+            return f"{self.line_limit!r} cannot be the line_limit: a number of characters, 0 for none"
+        if self.feed_of not in ("linear", "all", ""):
+            return f'{self.feed_of!r} cannot be feed_of: "linear", "all" or ""'
+        for name in ("suffixes", "signature", "understands", "passes", "refuses"):
+            kind = bytes if name == "signature" else str
+            if not isinstance(told := getattr(self, name), tuple) or not all(isinstance(each, kind) for each in told):
+                return f"{name} is a tuple of {kind.__name__}, not {told!r}"
         for suffix in self.suffixes:
             if not suffix.startswith(".") or suffix != suffix.lower() or len(suffix) < 2:
                 return f"{suffix!r} cannot be a suffix: lower case, with the point"
-        drills = [code for code, _ in self.cycles]
-        for code, operations in (*self.codes, *((code, ()) for code in drills)):
-            if wrong := [each for each in operations if not hasattr(each, "carry_out")]:
-                return f"{code}: {wrong[0]!r} is no operation"
-            cannot = code in drills or any(operation.takes for operation in operations)
-            if not CODE.fullmatch(code) or code in FIXED or (code.startswith("M") and cannot):
-                return f"{code!r} cannot be a code of a dialect's own"
-            if len(operations) > 1 and any(operation.alone for operation in operations):
-                return f"{code}: like(...) stands alone in its list"
+        for code, table in self.cycles:
+            if not isinstance(table, CycleTable):
+                return f"{code}: {table!r} is no CycleTable"
+            if code.startswith("M"):
+                return f"{code!r} cannot be a code of a dialect's own: cycles are G codes"
+        for code, operations in (*self.codes, *((code, ()) for code, _ in self.cycles)):
+            if complaint := complaint_of_code(code, operations):
+                return complaint
         return ""
+
+
+def complaint_of_code(code: str, operations: Sequence[CodeOperation]) -> str:
+    """What is wrong with a code of a dialect's own; empty if nothing is."""
+    for each in operations:
+        if isinstance(each, type) or not hasattr(each, "carry_out"):
+            shown = getattr(each, "__name__", repr(each))
+            return f"{code}: {shown} is no operation" + (f": write {shown}(...)" if isinstance(each, type) else "")
+    cannot = f"{code!r} cannot be a code of a dialect's own"
+    if not CODE.fullmatch(code):
+        return f"{cannot}: a capital G or M and its number, without zeros before it"
+    if code in FIXED:
+        return f"{cannot}: the families rely on what it means"
+    if code.startswith("M") and any(operation.takes for operation in operations):
+        return f"{cannot}: an M code takes no axis words"
+    if len(operations) > 1 and any(operation.alone for operation in operations):
+        return f"{code}: like(...) stands alone in its list"
+    other: str = getattr(operations[0], "code", code) if operations else code
+    if other[0] != code[0]:
+        return f"{code}: like({other!r}): a G code is like a G code, an M code like an M code"
+    return ""
 
 
 DEFAULT = "iso"
