@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, plan
+from ncfix.diagnosis.diagnosis import diagnose
 from ncfix.diagnosis.mistakes import find
+from ncfix.diagnosis.residual_data import is_free
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Polynomial
 from ncfix.measure.instruments import Faults, simulate
@@ -119,6 +121,26 @@ def test_a_mistake_is_found_by_its_odds(kind: str, data: Measurement, known: Mac
     assert wrong.odds > 20
     assert wrong.sure
     assert wrong.after_um < 0.6 * wrong.before_um
+
+
+def test_a_sign_of_values_that_constants_could_explain_as_well(data: Measurement, known: Machine) -> None:
+    """Six constants that all changed their signs over night explain it; one mistake is likelier."""
+    constants = known.replace(effects=tuple(e for e in known.effects if is_free(e)))
+    poses = plan(constants, "tcp", 120, 3)
+    seen = simulate(poses, constants, Faults(1.0), 4)
+    found = diagnose([columns(seen.with_header("noise_um", "1"), -1.0, *VALUES)], constants)
+    assert found.findings[0].candidate.name in ("sign of values", "wrong sign")
+
+
+def test_tools_without_lengths_are_told_by_their_sets(known: Machine) -> None:
+    poses = plan(known, "tcp", 120, 3)
+    poses = replace(poses, labels={"set": tuple(f"{length:g}" for length in poses.columns["tool_length"])})
+    seen = simulate(poses, known, Faults(1.0), 4)
+    none = seen.with_columns({"tool_length": 0.0 * seen.columns["tool_length"]})
+    wrong = find([none], known)
+    assert wrong is not None
+    assert wrong.name == "tool length"
+    assert wrong.after_um < 2.0
 
 
 def test_a_file_that_is_right_has_no_mistake(data: Measurement, known: Machine) -> None:

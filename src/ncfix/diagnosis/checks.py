@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from ncfix.diagnosis.noise import ENOUGH_REPEATS, repeat_scatter
-from ncfix.diagnosis.residual_data import AS_IT_STANDS_UM, ResidualData, misfit
+from ncfix.diagnosis.residual_data import ResidualData, misfit
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.machine.plausible import much
@@ -22,9 +22,6 @@ NEIGHBOURS = 60
 """Rows from which on neighbouring poses tell the noise."""
 STRANGE = 3e3
 """Residuals, rms um, that no machine has, per mm of what is much of where an axis lies (an arm errs more)."""
-WORSE = 1.3
-EXPLAINED = 0.5
-"""Constants are wrong where, set free, they leave less than this share of what a file without errors leaves."""
 CONTRADICTION = 1e-6
 MISSTATED = 2.0
 """Times by which repeats may scatter more or less than the noise that is stated."""
@@ -47,18 +44,12 @@ def _nothing(machine: Machine) -> Selection:
 
 
 def sensible(measurements: Sequence[Measurement], machine: Machine) -> None:
-    """Refuse what no mistake explains. Raises `UsageError` NCF654, NCF655."""
+    """Refuse what no mistake explains. Raises `UsageError` NCF654."""
     now = misfit(measurements, machine)
     free = now.free
     if free > STRANGE * max(much(machine, f"EX0{axis.name}") for axis in machine.axes):
         text = f"{free:.0f} um rms are left after the set-up was fitted"
         raise UsageError.of("NCF654", text, hint="a measurement of another machine, or exchanged columns?")
-    left, bare = now.left(AS_IT_STANDS_UM), misfit(measurements, machine.replace(effects=()))
-    without = bare.left()
-    explained = free < EXPLAINED * without
-    if not machine.is_perfect and left > WORSE * without and without > 2 * bare.noise and not explained:
-        text = f"with its errors the file leaves {left:.1f} um rms, without any {without:.1f} um"
-        raise UsageError.of("NCF655", text, hint="calibrate the machine anew before anything is added")
 
 
 def enough(data: ResidualData) -> None:

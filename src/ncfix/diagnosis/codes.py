@@ -34,12 +34,6 @@ CODES = {
         "unit, sign or axis that ncfix knows explains it.",
         "Is it the measurement of another machine, or are columns exchanged?",
     ),
-    "NCF655": Code(
-        "the machine file is worse than none",
-        "Without any of its errors the machine file would agree better with the data, but not well enough to say that "
-        "a table is active or a sign is wrong.",
-        "Calibrate the machine anew before anything is added to its model.",
-    ),
     "NCF656": Code(
         "the files contradict each other",
         "What one file says of a pose differs from what another says by far more than the noise.",

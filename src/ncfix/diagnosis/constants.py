@@ -213,12 +213,14 @@ class FileLikelihood:
         scale = np.linalg.norm(self.setup, axis=0)
         beside[:, : len(scale)] /= np.where(scale > 0, scale, 1.0)
         still = np.zeros((extra, len(self.data.coefficients)))
+        limits = self.data.problem.limits.copy()
+        limits[list(first)] = np.inf  # what is seen little with all others free may be seen well by itself
         order = np.array([*first, *(k for k in range(still.shape[1]) if k not in set(first))], dtype=np.int64)
         found = solve(
             np.concatenate([self.root @ self.constants, still])[:, order],
             np.concatenate([self.root @ beside, prior]),
             np.concatenate([self.root @ self.from_file, np.zeros(extra)]),
-            self.data.problem.limits[order],
+            limits[order],
         )
         return _renumbered(found, order)
 
@@ -242,6 +244,7 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     explained = _gained(inner, seen, places) / scale
     left, spare = distance - explained, len(kept) - len(chosen)
     whole = spare > 0 and left > spare + DOUBT * np.sqrt(2 * spare) and left > 2 * DOUBT**2
+    whole &= left > explained or len(chosen) == MOST  # else the chosen ones matter, the others are the day's
     if whole:
         chosen, places = [int(each) for each in kept], np.arange(len(kept), dtype=np.int64)
     spread: Array = _inverse(inner[np.ix_(places, places)])

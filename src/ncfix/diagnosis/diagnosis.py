@@ -71,6 +71,8 @@ LACKING = 1e-3
 AS_GOOD = 1.5
 """A file that is refused as it stands is put right by a mistake that leaves no more than this times the noise."""
 CONSTANT_FAMILY = "constant of the file"
+CLEAR = float(np.log(1e6))
+"""Log odds of what has no name from which on it is no play of the noise, whatever the noise is."""
 ANEW = "use the new machine file, or calibrate the machine anew"
 NO_PATTERN = "something that follows no pattern that was looked for"
 
@@ -147,7 +149,7 @@ class Diagnosis:
     machine        with the findings added, or None if there is nothing to add
     before, after  (m,) residuals with the constants alone and with the findings, um; p_lack, p_left by chance
     likelihood     log likelihood of the values about the file with all that was found, less its prices
-    named_odds, unnamed_odds  log odds of all names together, and of what has none beside them
+    named_odds     log odds of all names together
     clustering     how much neighbouring residuals are alike, before and after
     constants      what the data say of the constants of the machine file; the gap before is after that
     findable       name -> um rms from which on an effect would be found in these data; inf: never
@@ -172,7 +174,6 @@ class Diagnosis:
     mistake: Mistake | None = None
     likelihood: float = 0.0
     named_odds: float = 0.0
-    unnamed_odds: float = 0.0
 
     @property
     def data(self) -> ResidualData:
@@ -204,20 +205,25 @@ class Diagnosis:
 class Unexplained:
     """What the names leave.
 
-    pattern_um  of it what rivals without a name explain, rms, and `titles` what those are
+    pattern_um  of it what rivals without a name explain, rms, `titles` what those are, `odds` their log odds
     beyond_um   of it what is beyond the noise, and `p_left` how likely that is by chance, None where it is not known
     """
 
     pattern_um: float
     titles: tuple[str, ...]
+    odds: float
     beyond_um: float
     p_left: float | None
 
     @property
+    def lacking(self) -> bool:
+        """Whether so much is left beyond the noise only by a rare chance."""
+        return self.p_left is not None and self.p_left < LACKING
+
+    @property
     def size_um(self) -> float:
         """How much has no name, rms."""
-        lacking = self.p_left is not None and self.p_left < LACKING and self.beyond_um > EXCESS_UM
-        return max(self.pattern_um, self.beyond_um) if lacking else self.pattern_um
+        return max(self.pattern_um, self.beyond_um) if self.lacking else self.pattern_um
 
     @property
     def kind(self) -> str:
@@ -230,14 +236,14 @@ def verdict_of(
 ) -> str:
     """The verdict, where the names show `told_um`.
 
-    Without repeats a smooth rest may as well be the part's or the instrument's: only a large one decides.
+    Without repeats a smooth rest may as well be the part's or the instrument's: only a large or clear one decides.
     """
     doubtful = floor.source == "neighbours"
-    decides = rest.size_um > (max(EXCESS_UM, noise_um) if doubtful else EXCESS_UM)
+    decides = rest.size_um > (max(EXCESS_UM, noise_um) if doubtful and rest.odds < CLEAR else EXCESS_UM)
     if decides and rest.size_um >= (1.0 if doubtful else MUCH) * told_um * bool(findings):
         return UNKNOWN
     if not findings:
-        return NOTHING
+        return UNKNOWN if rest.lacking and rest.beyond_um > 0 else NOTHING
     return AMBIGUOUS if any(each.aliases for each in findings) else FOUND
 
 
@@ -259,10 +265,10 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
     named = _findings(case, selected, joint, added)
     off = _off(case, constants, machine, max((each.size_um for each in named), default=0.0))
     findings = (*off, *named) if named and off and off[0].size_um > named[0].size_um else (*named, *off)
-    rest = _rest(case, selected, joint, floor, noise_um)
     places = scaled_axes(data)
     sets: list[dict[str, Member]] = [{}, {name: selected.members[name] for name in selected.named}, selected.members]
     weights = [scale.weight(each) for each in sets]
+    rest = _rest(case, selected, joint, floor, noise_um, weights[2] - weights[1])
     return Diagnosis(
         case=case,
         verdict=verdict_of(findings, rest, visible_um(data, joint.together), floor, noise_um),
@@ -285,7 +291,6 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
         proposal=proposed(scale, selected, sigma) if told else None,
         likelihood=_likelihood(scale, selected, constants, share),
         named_odds=weights[1] - weights[0],
-        unnamed_odds=weights[2] - weights[1],
     )
 
 
@@ -343,7 +348,9 @@ def _owners(data: ResidualData, machine: Machine) -> list[Effect]:
     return [replace(effect, covariance=None) for effect in free for _ in range(effect.basis.size)]
 
 
-def _rest(case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, noise_um: float) -> Unexplained:
+def _rest(
+    case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, noise_um: float, odds: float
+) -> Unexplained:
     """What has no name."""
     evidence, keep = case.evidence, case.kept
     every = list(selected.members.values())
@@ -352,6 +359,7 @@ def _rest(case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, no
     return Unexplained(
         unnamed_um(evidence, selected, whole, keep),
         tuple(evidence.groups[selected.members[name].group].owner.title for name in selected.unnamed),
+        odds,
         beyond_noise(floor, noise_um, case.data.rms(joint.after, keep)),
         lack_of_fit(floor, joint.after[keep], parameters),
     )
@@ -399,11 +407,13 @@ def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Seq
         except UsageError:
             if undone.gap.given > AS_GOOD * undone.gap.floor:
                 raise
-            return _with_mistake(undone, wrong)
+            return _with_mistake(undone, wrong, machine)
         stretched = len(undone.data.y) * float(np.log(wrong.stretch))
-        if given.likelihood >= undone.likelihood + stretched - wrong.paid:
+        odds = undone.likelihood + stretched - wrong.paid - given.likelihood
+        if odds <= 0:
             return given
-    return _with_mistake(undone, wrong)
+        wrong = replace(wrong, odds=odds)
+    return _with_mistake(undone, wrong, machine)
 
 
 def _explained(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str]) -> Diagnosis:
@@ -428,11 +438,18 @@ def _selected(scale: Comparison) -> Selected:
     return passing(scale, with_alternatives(scale, with_constants(scale, members)))
 
 
-def _with_mistake(diagnosis: Diagnosis, wrong: Mistake) -> Diagnosis:
-    """The diagnosis with the mistake as its first finding."""
+def _with_mistake(diagnosis: Diagnosis, wrong: Mistake, given: Machine) -> Diagnosis:
+    """The diagnosis with the mistake as its first finding; the machine file that was given is put right."""
     candidate = Candidate(wrong.name, wrong.title, wrong.axis, "mistake", (), (), remedy="correct the mistake")
     size = float(np.sqrt(max(wrong.given_um**2 - diagnosis.gap.given**2, 0.0)))
     p_value = float(np.exp(-max(wrong.odds, 0.0)))
     first = EffectFinding(candidate, wrong.odds, p_value, wrong.aliases, size, (), np.zeros(len(diagnosis.data.y)))
     verdict = (AMBIGUOUS if wrong.aliases else FOUND) if diagnosis.verdict == NOTHING else diagnosis.verdict
-    return replace(diagnosis, verdict=verdict, findings=(first, *diagnosis.findings), mistake=wrong)
+    put_right = wrong.machine if wrong.machine != given else None
+    return replace(
+        diagnosis,
+        verdict=verdict,
+        findings=(first, *diagnosis.findings),
+        mistake=wrong,
+        machine=diagnosis.machine or put_right,
+    )

@@ -53,7 +53,7 @@ def ladder(diagnosis: Diagnosis) -> tuple[Rung, ...]:
         (MISTAKES, gap.given, gap.holdout_given, wrong.odds if wrong else 0.0, mistakes),
         (CONSTANTS, gap.before, gap.holdout_before, max(diagnosis.constants.odds, 0.0), constants),
         (NAMED, gap.after, gap.holdout_after, diagnosis.named_odds, named),
-        (UNNAMED, below, none, diagnosis.unnamed_odds, diagnosis.rest.titles),
+        (UNNAMED, below, none, diagnosis.rest.odds, diagnosis.rest.titles),
     ]
     found, above = [Rung(GIVEN, first, gap.holdout_given if wrong is None else none, 0.0, none)], first
     for name, left, held, odds, those in steps:

@@ -7,9 +7,8 @@ does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -23,6 +22,7 @@ from ncfix.diagnosis.residual_data import (
     Misfit,
     is_free,
     misfit,
+    rows_of,
 )
 from ncfix.diagnosis.stale_tables import shifted_tables
 from ncfix.diagnostics import NcfixError
@@ -31,10 +31,15 @@ from ncfix.machine.axes import Axis
 from ncfix.machine.plausible import much
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Array, Index, Measurement
+from ncfix.measure.selection import Selection
 
 SUSPECT = 1.15
 """Times the noise from which on a mistake is looked for."""
+OTHERWISE = 0.2
+"""Where constants that moved explain the data, a mistake leaves less than this share of the squares they explain."""
+AS_STANDING = 1.5
+"""Times what is left that constants of the file may leave more when they are not moved."""
 AS_SIMPLE = 1.03
 """Of mistakes that leave no more than this times the least, the simplest is taken."""
 TRIED = 8
@@ -60,10 +65,13 @@ INCH = 25.4
 TINY_UM = 1e-6
 ALIKE = 3.0
 """Log odds (20 to 1) within which another mistake explains the data as well."""
-TOOL_STEP_MM, TOOL_LEAST_MM, MOST_TOOLS = 50.0, 1.0, 4
-"""Steps in which a tool's length is tried; the least error; and of how many tools."""
+TOOL_STEP_MM, TOOL_LEAST_MM, MOST_TOOLS, MOST_SETS, TOOL_NUMBERS = 50.0, 1.0, 4, 12, 4
+"""By how much a tool is longer to see what that shows; the least error; of how many tools, and sets of rows; what is
+unknown of a tool that nothing is stated of: its length, and where its tip is."""
 WARM_STEP_K, WARM_LEAST_K, STEEL = 20.0, 8.0, 11.5e-6
 """The same for the temperature of a workpiece, and the growth of steel per kelvin."""
+FIRST_SIGHT = 5.0
+"""Mistakes that are less likely by so much, to first order, are not looked at again."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,6 +99,7 @@ class Mistake:
     aliases: tuple[str, ...] = ()
     stretch: float = 1.0
     fitted: int = 0
+    replaces: bool = False
     given_um: float = 0.0
     odds: float = 0.0
     paid: float = 0.0
@@ -101,30 +110,54 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     """The mistake that explains the data better than the file as it stands, if one does: by log odds."""
     measurements = tuple(measurements)
     now = misfit(measurements, machine)
-    left = now.left()
-    if left < SUSPECT * now.noise and not any(_looks_typed(effect) for effect in machine.effects):
+    left, typed = now.left(), any(_looks_typed(effect) for effect in machine.effects)
+    far, names = left >= SUSPECT * now.noise or typed, {plain(name) for name in refused}
+    deep = [each for each in _offered(measurements, machine) if plain(each.name) not in names] if far else []
+    tried = _judged(measurements, machine, now, TIGHT_UM, deep, names)
+    found = max(tried, key=lambda each: each.odds, default=None)
+    standing = now.left(AS_IT_STANDS_UM)
+    if (found is None or found.odds <= 0) and standing >= SUSPECT * max(left, now.noise):
+        tried = _judged(measurements, machine, now, AS_IT_STANDS_UM, (), names)
+        tried = [each for each in tried if each.after_um**2 - left**2 < OTHERWISE * (standing**2 - left**2)]
+        found = max(tried, key=lambda each: each.odds, default=None)
+    if found is None or found.odds <= 0:
         return None
-    names = {plain(name) for name in refused}
-    quick = [each for each in _quick(measurements, machine, now) if plain(each[1].name) not in names]
-    quick.sort(key=lambda pair: _weight(pair[0], pair[1].stretch, now))
-    offered = [each for _, each in quick[-TRIED:]]
-    offered += [each for each in _offered(measurements, machine) if plain(each.name) not in names]
-    count = len(offered) + len(quick)
-    tried = [_tried(each, left, now, count) for each in offered]
-    tried = [each for each in tried if np.isfinite(each.odds)]
-    if not tried:
-        return None
-    best = max(tried, key=lambda each: each.odds)
     slack = now.count * float(np.log(AS_SIMPLE))
-    alike = [each for each in tried if each.odds > best.odds - slack and each.stretch == best.stretch]
+    alike = [each for each in tried if each.odds > found.odds - slack and each.stretch == found.stretch]
     simplest = min(alike, key=lambda each: (each.fitted, -each.odds))
+    others = [each for each in tried if each.replaces and each.after_um < AS_SIMPLE * found.after_um]
+    if others and not _stands(simplest):
+        simplest = max(others, key=lambda each: each.odds)
     if simplest.odds <= 0:
         return None
     components = len(now.problem.values) / max(sum(map(len, measurements)), 1)
-    given = now.left(AS_IT_STANDS_UM) * float(np.sqrt(components))
     near = [each for each in alike if each.odds > simplest.odds - ALIKE and each is not simplest]
     aliases = tuple(dict.fromkeys(each.name for each in near if each.name != simplest.name))
-    return replace(simplest, given_um=given, aliases=aliases, sure=_reaches_noise(simplest, now))
+    sure = simplest.odds > NAMES_COST and _reaches_noise(simplest, now)
+    return replace(simplest, given_um=standing * float(np.sqrt(components)), aliases=aliases, sure=sure)
+
+
+def _judged(
+    measurements: tuple[Measurement, ...], machine: Machine, now: Misfit, held_um: float,
+    deep: Sequence[Mistake], refused: Collection[str],
+) -> list[Mistake]:  # fmt: skip
+    """Mistakes with their log odds, constants held within so much: the best at first sight, and all of `deep`."""
+    quick = [each for each in _quick(measurements, machine, now, held_um) if plain(each[1].name) not in refused]
+    count, before = len(quick) + len(deep), now.left(held_um)
+    sighted = [(_odds(left, before, each, now, count), each) for left, each in quick]
+    sighted.sort(key=lambda pair: pair[0])
+    near = [each for odds, each in sighted[-TRIED:] if odds > -FIRST_SIGHT]
+    tried = [_tried(each, before, now, count, held_um) for each in (*near, *deep)]
+    return [each for each in tried if np.isfinite(each.odds)]
+
+
+def _odds(left: float, before: float, mistake: Mistake, now: Misfit, count: int) -> float:
+    return _weight(left, mistake.stretch, now) - _paid(mistake, now, count) - _weight(before, 1.0, now)
+
+
+def _paid(mistake: Mistake, now: Misfit, count: int) -> float:
+    fitted = 0.5 * mistake.fitted * float(np.log(now.count))
+    return float(np.log(count)) + SURE + fitted - TYPED * mistake.likely
 
 
 def _weight(left: float, stretch: float, now: Misfit) -> float:
@@ -133,15 +166,20 @@ def _weight(left: float, stretch: float, now: Misfit) -> float:
     return fit - 0.5 * (float(np.log(max(left, TINY_UM) / PLAUSIBLE_UM)) / DECADE) ** 2
 
 
-def _tried(mistake: Mistake, before: float, now: Misfit, count: int) -> Mistake:
-    """The mistake with what undoing it leaves, and its log odds."""
+def _tried(mistake: Mistake, before: float, now: Misfit, count: int, held_um: float) -> Mistake:
+    """The mistake with what undoing it leaves, constants held within so much, and its log odds."""
     try:
-        left = misfit(mistake.measurements, mistake.machine).left()
+        left = misfit(mistake.measurements, mistake.machine).left(held_um)
     except (NcfixError, np.linalg.LinAlgError, ValueError):
         return replace(mistake, odds=-np.inf)
-    paid = float(np.log(count)) + SURE + 0.5 * mistake.fitted * float(np.log(now.count)) - TYPED * mistake.likely
-    odds = _weight(left, mistake.stretch, now) - paid - _weight(before, 1.0, now)
+    paid, odds = _paid(mistake, now, count), _odds(left, before, mistake, now, count)
     return replace(mistake, before_um=before, after_um=left, odds=odds, paid=paid)
+
+
+def _stands(mistake: Mistake) -> bool:
+    """Whether once it is undone the file agrees with the data about as well as with its constants moved a little."""
+    left = misfit(mistake.measurements, mistake.machine).left(AS_IT_STANDS_UM)
+    return left < AS_STANDING * mistake.after_um
 
 
 def _reaches_noise(mistake: Mistake, now: Misfit) -> bool:
@@ -152,9 +190,11 @@ def _reaches_noise(mistake: Mistake, now: Misfit) -> bool:
     return still >= _weight(floor, 1.0, now) - NAMES_COST
 
 
-def _quick(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[tuple[float, Mistake]]:
+def _quick(
+    measurements: tuple[Measurement, ...], machine: Machine, now: Misfit, held_um: float
+) -> Iterator[tuple[float, Mistake]]:
     """Mistakes that change what the file says by a known column, or the values: with what is left to first order."""
-    rest, problem = FirstOrder.of(now), now.problem
+    rest, problem = FirstOrder.of(now, held_um), now.problem
     shown = [UM * (problem_design @ np.asarray(effect.coefficients)) for effect, problem_design in _designs(problem)]
     for factor, parts, name, title, axis in _scalings(machine):
         change = sum((shown[k] for k in parts), np.zeros(len(problem.values)))
@@ -165,6 +205,8 @@ def _quick(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit)
         undone = Mistake(name, title, axis, machine.replace(effects=effects), measurements)
         yield rest.left(rest.y + (1.0 - factor) * change), undone
     yield from _of_values(measurements, machine, rest)
+    yield from _tools(measurements, machine, rest)
+    yield from _warm(measurements, machine, rest)
 
 
 def _designs(problem: Problem) -> list[tuple[Effect, Array]]:
@@ -265,13 +307,13 @@ class FirstOrder:
     basis: Array
 
     @staticmethod
-    def of(now: Misfit) -> FirstOrder:
-        """About the first guess of the set-up."""
+    def of(now: Misfit, held_um: float) -> FirstOrder:
+        """About the first guess of the set-up, constants held within so much."""
         problem = now.problem
         free = UM * problem.nuisance(problem.start) / now.relative[:, None]
         own = UM * problem.design / now.relative[:, None]
         size = np.sqrt((own**2).mean(axis=0))
-        prior = np.diag(now.noise / TIGHT_UM * np.where(size > 0, size, 1.0))
+        prior = np.diag(now.noise / held_um * np.where(size > 0, size, 1.0))
         below = np.concatenate([np.zeros((len(prior), free.shape[1])), prior], axis=1)
         columns = np.concatenate([np.concatenate([free, own], axis=1), below])
         y = UM * problem.residual(problem.selection.start, problem.start)
@@ -289,6 +331,25 @@ class FirstOrder:
         ])  # fmt: skip
         changed: Array = self.y + UM * (values - problem.values)
         return changed
+
+    def of_places(self, measurements: Sequence[Measurement]) -> Array:
+        """(m,) values minus what the file says at other positions, or with other tools, um."""
+        seen = Problem.of(measurements, self.now.problem.machine, self.now.problem.selection)
+        changed: Array = UM * seen.residual(seen.selection.start, seen.start)
+        return changed
+
+    @property
+    def rows(self) -> Index:
+        """(m,) the row of each value among those of all files; the first for what has none."""
+        return np.maximum(rows_of(self.now.problem), 0)
+
+    def amounts(self, columns: Array) -> Array:
+        """(k,) how much of each column (m, k) is to be added to the values so that least is left."""
+        scaled = np.column_stack([self.y, columns]) / self.now.relative[:, None]
+        below = np.zeros((len(self.basis) - len(scaled), scaled.shape[1]))
+        rest = without(self.basis, np.concatenate([scaled, below]))
+        found: Array = np.linalg.lstsq(rest[:, 1:], -rest[:, 0], rcond=None)[0]
+        return found
 
     def left(self, y: Array) -> float:
         """Root mean square of what these values leave, um, without the largest."""
@@ -319,8 +380,8 @@ def _offered(measurements: tuple[Measurement, ...], machine: Machine) -> Iterato
                 machine,
                 _times(measurements, [axis.name], -1.0),
             )
-    yield from _tools(measurements, machine)
-    yield from _warm(measurements, machine)
+    yield from _unstated_tools(measurements, machine)
+    yield from _other_machine(measurements, machine)
     for shifted, title in shifted_tables(measurements, machine):
         axes = sum(not axis.rotary for axis in machine.axes)
         yield Mistake("stale table", title, "", shifted, measurements, fitted=axes)
@@ -340,42 +401,75 @@ def _exchanged_axes(measurements: tuple[Measurement, ...], machine: Machine) -> 
                 yield Mistake(f"swapped {first} {second}", title, "", machine, changed)
 
 
-def _tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+def _tools(
+    measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder
+) -> Iterator[tuple[float, Mistake]]:
     """A tool of another length than was stated, all of another unit, or two of them exchanged."""
     if any("tool_length" not in each.columns for each in measurements):
         return
     lengths = sorted({float(x) for each in measurements for x in each.column("tool_length")})
+    offered = []
     title = "tool length: the lengths of the two tools are exchanged"
     if len(lengths) == 2:
         swapped = _lengths(measurements, lambda length: sum(lengths) - length)
-        yield Mistake("tool length", title, "", machine, swapped)
+        offered.append(Mistake("tool length", title, "", machine, swapped))
     for unit, factor in (("m", 1e3), ("inch", INCH)):
         title = f"tool length: the lengths of the tools are in {unit}, not in mm"
-        yield Mistake("tool length", title, "", machine, _times(measurements, ["tool_length"], factor))
+        offered.append(Mistake("tool length", title, "", machine, _times(measurements, ["tool_length"], factor)))
+    for each in offered if lengths != [0.0] else ():
+        yield rest.left(rest.of_places(each.measurements)), each
+    lever = (rest.of_places(_lengths(measurements, lambda x: x + TOOL_STEP_MM)) - rest.y) / TOOL_STEP_MM
+    own = np.concatenate([each.column("tool_length") for each in measurements])[rest.rows]
     for length in [None, *lengths] if 1 < len(lengths) <= MOST_TOOLS else [None]:
-        off = _vertex(partial(_longer, measurements, length), machine, TOOL_STEP_MM)
+        column = lever * (length is None or own == length)
+        off = float(rest.amounts(column[:, None])[0])
         if abs(off) > TOOL_LEAST_MM:
             which = "the tools" if length is None else f"the tool of {length:g} mm"
             title = f"tool length: {which} {'are' if length is None else 'is'} {off:+.1f} mm longer than stated"
-            yield Mistake("tool length", title, "", machine, _longer(measurements, length, off), fitted=1)
+            changed = _lengths(measurements, lambda x: np.where((length is None) | (x == length), x + off, x))  # noqa: B023
+            yield (
+                rest.left(rest.y + off * column),
+                Mistake("tool length", title, "", machine, changed, fitted=1, likely=lengths == [0.0]),
+            )
+
+
+def _unstated_tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """Tools of which no length is stated: each set of rows with a tool of its own."""
+    names = list(dict.fromkeys(name for each in measurements for name in each.sets))
+    if any(each.column("tool_length").any() for each in measurements) or not 1 < len(names) <= MOST_SETS:
+        return
+
+    def of_sets(lengths: Sequence[float]) -> tuple[Measurement, ...]:
+        own = dict(zip(names, lengths, strict=True))
+        return tuple(each.with_columns({"tool_length": np.array([own[n] for n in each.sets])}) for each in measurements)
+
+    apart = [1.0 + k for k in range(len(names))]
+    rest = FirstOrder.of(misfit(of_sets(apart), machine), TIGHT_UM)
+    ways = np.eye(len(names)) * TOOL_STEP_MM + apart
+    levers = np.stack([rest.of_places(of_sets(way.tolist())) - rest.y for way in ways], axis=1) / TOOL_STEP_MM
+    lengths = apart + rest.amounts(levers)
+    title = "tool length: all are zero in the file, but the sets have tools of different lengths"
+    found = of_sets([round(float(length), 3) for length in lengths])
+    yield Mistake("tool length", title, "", machine, found, fitted=(len(names) - 1) * TOOL_NUMBERS, likely=True)
 
 
 def _lengths(measurements: tuple[Measurement, ...], change: Callable[[Array], Array]) -> tuple[Measurement, ...]:
     return tuple(each.with_columns({"tool_length": change(each.column("tool_length"))}) for each in measurements)
 
 
-def _longer(measurements: tuple[Measurement, ...], length: float | None, by: float) -> tuple[Measurement, ...]:
-    return _lengths(measurements, lambda x: x + by if length is None else np.where(x == length, x + by, x))
-
-
-def _warm(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+def _warm(measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder) -> Iterator[tuple[float, Mistake]]:
     """The workpiece or artefact was warmer than it should be: all it shows grows from a point that the set-up has."""
     if any(each.kind != "tcp" or not set(each.measured) & {"dx", "dy", "dz"} for each in measurements):
         return
-    kelvin = _vertex(lambda by: _grown(measurements, machine, by), machine, WARM_STEP_K)
+    column = (rest.of_values(_grown(measurements, machine, WARM_STEP_K)) - rest.y) / WARM_STEP_K
+    kelvin = float(rest.amounts(column[:, None])[0])
     if abs(kelvin) > WARM_LEAST_K:
         title = f"workpiece {abs(kelvin):.1f} K too {'warm' if kelvin > 0 else 'cold'}, if it is of steel"
-        yield Mistake("workpiece temperature", title, "", machine, _grown(measurements, machine, kelvin), fitted=1)
+        grown = _grown(measurements, machine, kelvin)
+        yield (
+            rest.left(rest.y + kelvin * column),
+            Mistake("workpiece temperature", title, "", machine, grown, fitted=1),
+        )
 
 
 def _grown(measurements: tuple[Measurement, ...], machine: Machine, kelvin: float) -> tuple[Measurement, ...]:
@@ -390,13 +484,6 @@ def _grown(measurements: tuple[Measurement, ...], machine: Machine, kelvin: floa
             )
         )
     return tuple(found)
-
-
-def _vertex(changed: Callable[[float], tuple[Measurement, ...]], machine: Machine, step: float) -> float:
-    """Where the squares of the misfit are least along one number, by a parabola through three places."""
-    low, middle, high = (misfit(changed(by), machine).left() ** 2 for by in (-step, 0.0, step))
-    bent = low + high - 2 * middle
-    return 0.5 * step * (low - high) / bent if bent > 0 else 0.0
 
 
 def _units(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
@@ -458,6 +545,17 @@ def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) 
         return None
     title = f"pivot: the point of {axis.name} is {off:.2f} mm off in the machine file"
     return Mistake(f"pivot {axis.name}", title, axis.name, moved, measurements, fitted=2)
+
+
+def _other_machine(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """The file of another machine with the same axes: nothing of its errors holds; its constants are fitted anew."""
+    constants = [replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects if is_free(e)]
+    if machine.is_perfect or len(constants) == len(machine.effects):
+        return
+    own = misfit(measurements, machine.replace(effects=tuple(constants))).constants
+    fitted = Selection(tuple(constants), (True,) * len(constants)).machine(machine.replace(effects=()), own.tolist())
+    title = "another machine: nothing of the file's tables holds; it is another machine's file, or out of date"
+    yield Mistake("another machine", title, "", fitted, measurements, fitted=len(own), replaces=True)
 
 
 def _with(machine: Machine, axis: Axis) -> Machine:

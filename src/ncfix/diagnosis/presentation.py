@@ -88,6 +88,8 @@ def _table(diagnosis: Diagnosis) -> list[str]:
 
 def verdict(diagnosis: Diagnosis) -> str:
     """What the verdict means."""
+    if diagnosis.verdict == NOTHING and diagnosis.rest.lacking:
+        return f"more than noise is left (p = {diagnosis.p_left:.1g}), but no more than the little that machines have"
     return SAID[diagnosis.verdict]
 
 
@@ -145,7 +147,7 @@ def rest(diagnosis: Diagnosis) -> str:
     said = f"without a name: {diagnosis.unknown_um:.1f} um rms of {diagnosis.rest.kind}"
     if diagnosis.verdict == UNKNOWN:
         return said
-    why = "no more than one value's noise, and without repeats it may be the part's or the instrument's"
+    why = "without repeats it may be the part's or the instrument's"
     return f"{said} ({why if diagnosis.floor.source == 'neighbours' else 'too little to decide'})"
 
 

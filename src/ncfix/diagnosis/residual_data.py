@@ -35,6 +35,8 @@ TIGHT_UM = 4.0
 """How far each constant of a machine file may have moved since, at the tool tip."""
 AS_IT_STANDS_UM = 0.01
 """The same where the file itself is judged."""
+USUAL_UM = 50.0
+"""How far the constants of another machine are from none."""
 FREE_UM = 500.0
 """The same where they are free: no more, or what cannot be told runs away."""
 WIDE_UM = 1e5
@@ -226,7 +228,7 @@ def residual_data(measurements: Sequence[Measurement], machine: Machine) -> Resi
 
     (coefficients, unknowns), _ = gauss_newton(step, (selection.start, problem.start), STEPS, SETTLED_UM)
     residual = problem.residual(coefficients, unknowns)
-    return ResidualData(problem, coefficients, unknowns, UM * residual, base, _rows(problem), relative)
+    return ResidualData(problem, coefficients, unknowns, UM * residual, base, rows_of(problem), relative)
 
 
 def relative_noise(problem: Problem) -> Array:
@@ -260,7 +262,8 @@ def is_free(effect: Effect) -> bool:
     return type(effect.basis) is Polynomial and max(effect.basis.degree) <= 1
 
 
-def _rows(problem: Problem) -> Index:
+def rows_of(problem: Problem) -> Index:
+    """(m,) the row of each value among those of all files; -1 for calibrated distances."""
     rows, first = [], 0
     for each in problem.observations:
         rows.append(np.where(each.rows < 0, -1, each.rows + first))
@@ -296,6 +299,11 @@ class Misfit:
     def free(self) -> float:
         """The same with constants free."""
         return self.left(FREE_UM)
+
+    @property
+    def constants(self) -> Array:
+        """Those of the file where the data have them."""
+        return _fitted(self.problem, self.relative, self.noise, USUAL_UM, self.loose)[1]
 
     @property
     def coefficients(self) -> Array:
