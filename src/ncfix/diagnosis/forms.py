@@ -167,7 +167,7 @@ def without_lacking_constants(data: ResidualData, columns: Array, named: Sequenc
 def _form(data: ResidualData, candidate: Candidate, loading: Array, design: Array) -> EffectForm | None:
     """The form at a size of 1 um, with as few columns as it needs."""
     used = loading.any(axis=1)
-    columns = design[:, used] @ loading[used]
+    columns = design @ loading if used.all() else design[:, used] @ loading[used]
     size = data.rms(np.linalg.norm(columns, axis=1))
     if size < UNSEEN_UM or _lead_squares(candidate, loading, design) < LEAD_SHARE * size**2 * data.count:
         return None
@@ -185,6 +185,8 @@ def _lead_squares(candidate: Candidate, loading: Array, design: Array) -> float:
 
 def principal_rotation(columns: Array) -> Array:
     """The rotation (p, r) to as few columns as carry nearly all of their squares."""
+    if columns.shape[1] == 1:
+        return np.ones((1, 1))
     squares, turned = np.linalg.eigh(columns.T @ columns)
     kept: Array = turned[:, np.cumsum(squares) > NEGLIGIBLE * squares.sum()]
     return kept
@@ -198,9 +200,11 @@ def _smooth_fields(data: ResidualData) -> Iterator[EffectForm | None]:
     """All of them; none where the data do not show the tool tip."""
     tip = data.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in LETTERS]) / 1e3
     if np.abs(tip).max() > 0:
+        rows = np.maximum(data.row, 0)
+        functions = [(owner, kernel_functions(kernel)[rows]) for owner, kernel in _kernels(data)]
         for way in tip_frames(data, tip):
-            for owner, kernel in _kernels(data):
-                yield _at_tip(data, owner, way, kernel)
+            for owner, own in functions:
+                yield combined_form(data, owner, [way[:, [k]] * own for k in range(way.shape[1])])
 
 
 def tip_frames(data: ResidualData, tip: Array) -> tuple[Array, ...]:
@@ -282,12 +286,6 @@ def shape_variations(data: ResidualData) -> Array:
     signals = [*scaled_axes(data).T, *([2 * (time - time.mean()) / np.ptp(time)] if np.ptp(time) > 0 else [])]
     kernel = sum(np.exp(-0.5 * (u[:, None] - u) ** 2 / VARIATION_LENGTH**2) for u in signals) / len(signals)
     return kernel_functions(np.asarray(kernel), VARIATIONS)[np.maximum(data.row, 0)]
-
-
-def _at_tip(data: ResidualData, owner: Candidate, way: Array, kernel: Array) -> EffectForm | None:
-    """Three independent components."""
-    own = kernel_functions(kernel)[np.maximum(data.row, 0)]
-    return combined_form(data, owner, [way[:, [k]] * own for k in range(way.shape[1])])
 
 
 def combined_form(data: ResidualData, owner: Candidate, parts: Sequence[Array]) -> EffectForm | None:
@@ -398,16 +396,22 @@ def _not_in_catalogue(
     data: ResidualData, groups: Sequence[EffectForm], named: Sequence[EffectForm]
 ) -> list[EffectForm]:
     """Without the single errors that a name holds already: those are that name with another shape, or course."""
-    basis = orthonormal(data.base / data.relative[:, None])
+    basis, wanted = orthonormal(data.base / data.relative[:, None]), {key for group in groups for key in _errors(group)}
     own: dict[str, list[Array]] = {}
-    for group in named:
-        left = without(basis, group.columns / data.relative[:, None])
+    held = [group for group in named if _errors(group) & wanted]
+    for group, left in zip(held, _beside(data, basis, held), strict=True):
         span = orthonormal(left)
         for key in _errors(group):
             own.setdefault(key, []).append(span)
-    return [
-        group for group in groups if not _is_held(without(basis, group.columns / data.relative[:, None]), group, own)
-    ]
+    pairs = zip(groups, _beside(data, basis, groups), strict=True)
+    return [group for group, left in pairs if not _is_held(left, group, own)]
+
+
+def _beside(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> list[Array]:
+    """What each form shows beside an orthonormal basis of what is free, in units of each value's noise."""
+    columns = np.concatenate([np.zeros((len(data.y), 0)), *(group.columns for group in groups)], axis=1)
+    ends = np.cumsum([group.columns.shape[1] for group in groups])[:-1]
+    return np.split(without(basis, columns / data.relative[:, None]), ends, axis=1) if groups else []
 
 
 def _errors(group: EffectForm) -> set[str]:

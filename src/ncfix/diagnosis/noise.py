@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,7 +159,7 @@ class DriftLikelihood:
     scale       (m,) standard deviations of the values, um
     y           (m,) the values, um
     everything  (n, n) covariance of a little of everything at 1 um; slow: of the wandering at the size of the noise
-    freedom     of what is known of the noise
+    freedom     of what is known of the noise; factors of the covariances, each computed once
     """
 
     free: Contrasts
@@ -168,49 +168,55 @@ class DriftLikelihood:
     everything: Array
     slow: Array
     freedom: float
+    factors: dict[float, Array] = field(default_factory=dict)
 
     def likelihood(self, size: float) -> float:
         """Log likelihood of the data with a wandering of this size, that of the noise integrated out."""
-        factor = self._factor(size)
-        white = solve_triangular(factor, self._seen([self.y])[:, 0], lower=True, check_finite=False)
-        determinant = 2 * float(np.log(np.diag(factor)).sum())
+        white = self.white(size, self.seen([self.y]))[:, 0]
+        determinant = 2 * float(np.log(np.diag(self._factor(size))).sum())
         return marginal(float(white @ white), determinant, len(white), self.freedom)
 
-    def white(self, size: float, columns: Sequence[Array]) -> Array:
-        """Columns of values, one beside the other, where noise, everything and such a wandering are one, (n, p)."""
-        white: Array = solve_triangular(self._factor(size), self._seen(columns), lower=True, check_finite=False)
+    def white(self, size: float, seen: Array) -> Array:
+        """Contrasts of values (n, p) where noise, everything and such a wandering are one."""
+        white: Array = solve_triangular(self._factor(size), seen, lower=True, check_finite=False)
         return white
 
-    def _seen(self, columns: Sequence[Array]) -> Array:
+    def seen(self, columns: Sequence[Array]) -> Array:
+        """Contrasts of columns of values, one beside the other, in units of each value's noise, (n, p)."""
         return self.free.seen(np.column_stack(columns) / self.scale[:, None])
 
     def _factor(self, size: float) -> Array:
-        covariance = np.eye(len(self.slow)) + EVERYTHING_SHARE**2 * self.everything + size**2 * self.slow
-        factor: Array = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
-        return factor
+        if size not in self.factors:
+            covariance = np.eye(len(self.slow)) + EVERYTHING_SHARE**2 * self.everything + size**2 * self.slow
+            self.factors[size] = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
+        return self.factors[size]
 
 
 def _likeliest_drift(asked: DriftLikelihood, named: Sequence[EffectForm]) -> float:
     """The size that explains most; with names no more of it than without, and no less than what their courses miss."""
     plain = [asked.likelihood(size) for size in DRIFT_SIZES]
     most = int(np.argmax(plain)) + 1
-    beside = [_beside_names(asked, size, named) for size in DRIFT_SIZES[:most] if most > 1] or [(0.0, 0.0)]
+    courses = [group for group in named if group.owner.slow]
+    seen = asked.seen([asked.y, *(group.columns for group in courses)]) if most > 1 else np.zeros((0, 1))
+    whites = (asked.white(size, seen) for size in DRIFT_SIZES[:most] if most > 1)
+    beside = [_beside_names(white, asked.freedom, courses, named) for white in whites] or [(0.0, 0.0)]
     best = int(np.argmax([own + gained for own, (gained, _) in zip(plain, beside, strict=False)]))
     missed = MISSHAPEN * beside[best][1] / float(np.median(asked.scale))
     return max(size for size in DRIFT_SIZES[:most] if size <= max(DRIFT_SIZES[best], missed))
 
 
-def _beside_names(asked: DriftLikelihood, size: float, named: Sequence[EffectForm]) -> tuple[float, float]:
-    """How much log likelihood names that act by time alone add to a wandering of this size, less what they pay; and
-    how much the largest shows, um rms.
+def _beside_names(
+    white: Array, freedom: float, courses: Sequence[EffectForm], named: Sequence[EffectForm]
+) -> tuple[float, float]:
+    """How much log likelihood names that act by time alone add to a wandering, less what they pay; and how much the
+    largest shows, um rms. `white` are the data and the columns of those names, (n, 1 + p).
     """
-    courses = [group for group in named if group.owner.slow]
     forms = Counter(group.owner.name for group in named)
     prices = np.log([len(forms) * forms[group.owner.name] * len(SIZES) for group in courses])
     ends = np.cumsum([1, *(group.columns.shape[1] for group in courses)])
-    white, gained, shown = asked.white(size, [asked.y, *(group.columns for group in courses)]), 0.0, 0.0
+    gained, shown = 0.0, 0.0
     for count in range(1, MOST_COURSES + 1 if courses else 1):
-        odds = _odds(white, ends, asked.freedom) - prices[:, None]
+        odds = _odds(white, ends, freedom) - prices[:, None]
         best, large = np.unravel_index(int(odds.argmax()), odds.shape)
         helped = float(odds[best, large]) - entry_price(count) + entry_price(count - 1)
         if helped <= 0:

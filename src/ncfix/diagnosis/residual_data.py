@@ -166,9 +166,20 @@ class ResidualData:
 
     def rms(self, values: Array, keep: NDArray[np.bool_] | None = None) -> float:
         """Root mean square over rows of the length of what each shows; values (m, ...), um, those in `keep` (m,)."""
-        inside = self.row >= 0 if keep is None else (self.row >= 0) & keep
-        rows = len(np.unique(self.row[inside]))
+        inside = self._inside if keep is None else self._inside & keep
+        rows = self._seen if keep is None else len(np.unique(self.row[inside]))
         return float(np.sqrt((values[inside] ** 2).sum() / max(rows, 1)))
+
+    @cached_property
+    def _inside(self) -> NDArray[np.bool_]:
+        """(m,) whether a value is of a row."""
+        inside: NDArray[np.bool_] = self.row >= 0
+        return inside
+
+    @cached_property
+    def _seen(self) -> int:
+        """How many rows have values."""
+        return len(np.unique(self.row[self._inside]))
 
     @cached_property
     def measured(self) -> MeasuredRange:
