@@ -316,6 +316,8 @@ TURNING = {
 }  # fmt: skip
 
 
+SPREAD = {"warm_workpiece"}
+"""Not seen at single balls: where a ball is, the set-up has to find anyway."""
 PROBED = {"point_300", "pivot"}
 """Seen where the axes go to a ball; in deviations from nominal places the point of an axis hardly counts."""
 
@@ -348,7 +350,8 @@ def _built(kind: Callable[[Case], None], rng: Generator) -> Handed | None:
     case = Case(rng, machine, workshop.draw_model(rng, machine, topology, rich=rich))
     true = case.model
     instrument = "probe" if kind.__name__ in PROBED else "tcp"
-    draft = choose._measured(rng, SPEC, topology, machine, true, instrument)
+    spec = replace(SPEC, layouts=(FREE,)) if kind.__name__ in SPREAD else SPEC
+    draft = choose._measured(rng, spec, topology, machine, true, instrument)
     kind(case)
     s = draft.situation
     if kind in GROSS and instrument == "tcp":
