@@ -348,8 +348,7 @@ class FirstOrder:
         scaled = np.column_stack([self.y, columns]) / self.now.relative[:, None]
         below = np.zeros((len(self.basis) - len(scaled), scaled.shape[1]))
         rest = without(self.basis, np.concatenate([scaled, below]))
-        found: Array = np.linalg.lstsq(rest[:, 1:], -rest[:, 0], rcond=None)[0]
-        return found
+        return np.asarray(np.linalg.lstsq(rest[:, 1:], -rest[:, 0], rcond=None)[0], dtype=np.float64)
 
     def left(self, y: Array) -> float:
         """Root mean square of what these values leave, um, without the largest."""
