@@ -173,7 +173,7 @@ def has_corners(program: Program) -> bool:
 
 def axes_of_corner(program: Program, block: int) -> frozenset[str] | None:
     """The axes that a block at a corner may name, None for other blocks."""
-    own = letters_of(program.templates[int(program.template[block])])
+    own = letters_of(program.template_of(block))
     before = neighbour(program, range(block - 1, -1, -1))
     named = own | before if CORNER & before else frozenset()
     if CORNER & own:
@@ -183,5 +183,5 @@ def axes_of_corner(program: Program, block: int) -> frozenset[str] | None:
 
 def neighbour(program: Program, blocks: Iterable[int]) -> frozenset[str]:
     """The addresses of the first of these blocks that has a motion."""
-    found = (letters_of(program.templates[int(program.template[each])]) for each in blocks)
+    found = (letters_of(program.template_of(each)) for each in blocks)
     return next((letters for letters in found if letters & MOTION), frozenset())

@@ -95,7 +95,7 @@ class MacroInterpreter(RS274Interpreter):
     def coming(self) -> Iterator[Template]:
         """The shapes of the blocks that follow in the text."""
         unit = self.flow.unit
-        yield from (unit.program.templates[unit.template[block]] for block in range(self.flow.block, unit.stop))
+        yield from (unit.program.template_of(block) for block in range(self.flow.block, unit.stop))
         if unit is self.main and not self.last:
             raise NotInPartsError("what follows a tool length is in the next part")
 

@@ -46,7 +46,7 @@ def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What blocks need to be written many at a time; those with a number without a point are not."""
-    words = program.templates[int(program.template[block])].words
+    words = program.template_of(block).words
     if any(isinstance(word.value, Literal) and word.value.pointless for word in words if word.address not in "NFS"):
         return None
     assert RS274.bulk is not None

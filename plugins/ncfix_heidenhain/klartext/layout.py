@@ -69,7 +69,7 @@ class KlartextLayout(Layout):
 
 def layout_of(program: Program, block: int) -> KlartextLayout | None:
     """The layout of a block; None for an angle from a Q parameter, or half a direction of the tool."""
-    shape = Shape(program.templates[int(program.template[block])])
+    shape = Shape(program.template_of(block))
     found = _of_shape(shape)
     if found is None:
         return None
@@ -160,7 +160,7 @@ def is_corner(program: Program, block: int, way: int) -> bool:
     """Whether the next element of the path is RND or CHF; `way`: 1 after this block, -1 before it."""
     block += way
     while 0 <= block < len(program):
-        between, corner = _in_path(Shape(program.templates[int(program.template[block])]))
+        between, corner = _in_path(Shape(program.template_of(block)))
         if not between:
             return corner
         block += way

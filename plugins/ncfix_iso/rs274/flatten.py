@@ -75,7 +75,7 @@ class RS274Flattener(Flattener):
 
     def template_words(self) -> tuple[Word, ...]:
         """The words of the block as they are written."""
-        return self.unit.program.templates[self.unit.template[self.block]].words
+        return self.unit.program.template_of(self.block).words
 
     def words(self, unit: TextUnit[RS274Plan], index: int, plan: RS274Plan, codes: Codes, block: Block) -> None:
         """A block of words that has been executed."""

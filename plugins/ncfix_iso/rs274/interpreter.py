@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from ncfix.control.coordinates import LETTERS, N_LETTERS, mask_of
+from ncfix.control.coordinates import LETTERS, mask_of
 from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.flow import NEVER_ENDS, WAITS, ProgramFlow
 from ncfix.control.interpreter import NO_END, Interpreter
@@ -33,24 +33,6 @@ WITHOUT_AXES = frozenset((0, 10, *ARCS, 52, NO_MOTION, *TURNING_CYCLES))
 """Motion codes that need no axis word."""
 
 
-def motion_of(control: RS274Control, plan: RS274Plan, codes: Codes) -> int | None:
-    """The motion code that a block executes; raises `Fault` where its axis words have no code."""
-    has_axes = plan.axes != 0
-    if codes.motion is not None:
-        return explicit_motion(control, codes, codes.motion, has_axes)
-    if codes.takes or (has_axes and codes.g.get(LENGTH) in DYNAMIC_OFFSETS):
-        return None
-    modal = control.modal.motion
-    if has_axes and modal in (NO_MOTION, -1):
-        return without_code(control)
-    if has_axes:
-        return modal
-    level = control.dialect.cycle_of(modal).level
-    if not control.rules.strict and level in plan.letters and control.modal.cycle.initial is not None:
-        return modal if modal in control.rules.cycles else None
-    return modal if plan.letters & {"I", "J", "K"} and modal in ARCS else None
-
-
 def explicit_motion(control: RS274Control, codes: Codes, motion: int, has_axes: bool) -> int | None:
     """The motion code that a block names, if it is executed."""
     if codes.takes and motion != NO_MOTION:
@@ -71,13 +53,6 @@ def only_modal(control: RS274Control, motion: int, fault: str) -> None:
     control.modal.motion = motion
 
 
-def without_code(control: RS274Control) -> int:
-    """Axis words while no motion code is in force."""
-    if control.rules.strict:
-        raise Fault(BAD_MOTION, "axis words, and no motion code is in force", "G0 or G1 is missing")
-    return NO_CODE
-
-
 CALL, RETURN = 980, 990
 DRILLING = 810
 """G81, as which drilling cycles of a dialect's own are followed."""
@@ -93,11 +68,6 @@ DWELL_TIME = "PUX"
 """The words of G4 on ISO controls."""
 
 INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not followed"
-
-
-def may_increment(control: RS274Control, letter: str) -> bool:
-    """Whether a letter is an axis to some controls of a family, and an increment of another axis to others."""
-    return not control.rules.strict and letter in "UVW"
 
 
 class RS274Interpreter(Interpreter[RS274Unit]):
@@ -191,17 +161,13 @@ class RS274Interpreter(Interpreter[RS274Unit]):
 
     def at_tape(self, unit: RS274Unit, block: int) -> bool:
         """`%`: the first line of a tape, or its end; controls but LinuxCNC pass over comments before it."""
-        if self.first and all(self.may_lead(unit.plan(before)) for before in range(block)):
+        leading = [item for before in range(block) for item in unit.plan(before).template.items]
+        if self.first and all(isinstance(item, Comment) and not self.control.rules.strict for item in leading):
             return False
         fault = self.flow.unfinished()
         if fault is not None:
             raise fault
         return True
-
-    def may_lead(self, plan: RS274Plan) -> bool:
-        """Whether a tape may begin behind a block of this shape."""
-        items = plan.template.items
-        return not items or (not self.control.rules.strict and all(isinstance(item, Comment) for item in items))
 
     def execute_words(self, plan: RS274Plan, index: int) -> bool:
         """Execute a block of words and assignments."""
@@ -230,8 +196,22 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return self.after(codes, block)
 
     def motion_of(self, plan: RS274Plan, codes: Codes) -> int | None:
-        """The motion code that a block executes."""
-        return motion_of(self.control, plan, codes)
+        """The motion code that a block executes; raises `Fault` where its axis words have no code."""
+        control, has_axes, modal = self.control, plan.axes != 0, self.control.modal.motion
+        if codes.motion is not None:
+            return explicit_motion(control, codes, codes.motion, has_axes)
+        if codes.takes or (has_axes and codes.g.get(LENGTH) in DYNAMIC_OFFSETS):
+            return None
+        if has_axes and modal in (NO_MOTION, -1):
+            if control.rules.strict:
+                raise Fault(BAD_MOTION, "axis words, and no motion code is in force", "G0 or G1 is missing")
+            return NO_CODE
+        if has_axes:
+            return modal
+        level = control.dialect.cycle_of(modal).level
+        if not control.rules.strict and level in plan.letters and control.modal.cycle.initial is not None:
+            return modal if modal in control.rules.cycles else None
+        return modal if plan.letters & {"I", "J", "K"} and modal in ARCS else None
 
     def settings(self, codes: Codes, block: Block) -> None:
         """What a block sets before its motion."""
@@ -300,10 +280,11 @@ class RS274Interpreter(Interpreter[RS274Unit]):
     def note_foreign(self, plan: RS274Plan) -> None:
         """Note axes that the program moves and the machine lacks."""
         control = self.control
-        for index in range(N_LETTERS):
-            if plan.axes >> index & 1 and index not in control.machine and LETTERS[index] not in control.foreign:
-                self.span = plan.span_of(LETTERS[index])
-                control.note_foreign(LETTERS[index], INCREMENTS if may_increment(control, LETTERS[index]) else "")
+        for index, letter in enumerate(LETTERS):
+            if plan.axes >> index & 1 and index not in control.machine and letter not in control.foreign:
+                self.span = plan.span_of(letter)
+                lathe = letter in "UVW" and not control.rules.strict
+                control.note_foreign(letter, INCREMENTS if lathe else "")
         self.span = None
 
     def command(self, span: Span) -> None:

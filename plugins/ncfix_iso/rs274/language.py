@@ -20,7 +20,7 @@ from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has
 from ncfix.text.reach import tape_end
 from ncfix.text.shapes import scan, split_blocks
 from ncfix.text.spelling import Spelling
-from ncfix.text.tree import Program, Word
+from ncfix.text.tree import Program
 from ncfix.writer.block import BlockWriter
 from ncfix.writer.language import WrittenLanguage
 from ncfix_iso.rs274.control import RS274Control
@@ -81,14 +81,11 @@ def plain(_program: Program) -> Spelling:
     return Spelling()
 
 
-def words_of(program: Program, block: int) -> tuple[Word, ...]:
-    """The words of a block."""
-    return program.templates[int(program.template[block])].words
-
-
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
-    layout = writable(program, block) if any(w.address in AXIS_LETTERS for w in words_of(program, block)) else None
+    layout = (
+        writable(program, block) if any(w.address in AXIS_LETTERS for w in program.template_of(block).words) else None
+    )
     found = None if layout is None else bulk_layout(program, block, layout)
     if layout is None or found is None:
         return None

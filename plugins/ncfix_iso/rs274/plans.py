@@ -347,7 +347,7 @@ def enter_m(codes: dict[str, int], word: Word, code: int, rules: Rules) -> None:
 def lane_of(plan: RS274Plan) -> Lane | None:
     """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
     codes, slots = plan.codes, dict(plan.literals)
-    if codes is None or not only_moves(codes) or not is_plain(plan):
+    if codes is None or codes.m or codes.unknown or not codes.g.keys() <= {groups.MOTION} or not is_plain(plan):
         return None
     lane = Lane(
         tuple((INDEX[letter], slot) for letter, slot in plan.literals if letter in INDEX),
@@ -368,8 +368,3 @@ def is_plain(plan: RS274Plan) -> bool:
         return False
     points = PLACES.isdisjoint(plan.pointless)
     return points and all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)
-
-
-def only_moves(codes: Codes) -> bool:
-    """Whether the codes of a block are known and say nothing but how it moves."""
-    return not codes.m and not codes.unknown and codes.g.keys() <= {groups.MOTION}

@@ -61,7 +61,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 def arc_in_bulk(program: Program, block: int, layout: SinumerikLayout) -> ArcLayout | None:
     """The same of the words of an arc."""
-    fixed = fixed_centre(program.templates[int(program.template[block])])
+    fixed = fixed_centre(program.template_of(block))
     if layout.via or layout.angle is not None or layout.forms.keys() & set(CENTRE_LETTERS) - fixed.keys():
         return None
     found = arc_layout(program, block, replace(layout, centre=without(layout.centre, fixed)))

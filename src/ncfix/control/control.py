@@ -205,7 +205,8 @@ class ProgramControl(ControlState):
             self.places.lose(mask_of(self.composed.unknown))
         placed = self._placed_by(motion)
         unplaced = self._unplaced(placed) | self.still_beside(motion.axes)
-        self._note_increments(motion, placed)
+        if not motion.passing and placed & motion.axes != (0 if self.modal.incremental else motion.axes):
+            self.builder.counted(motion.axes & ~placed)  # some words count otherwise than the distance mode says
         fate = self._fate(motion, unplaced)
         self._keep_places(motion, placed)
         style = self._style_of(fate)
@@ -218,7 +219,8 @@ class ProgramControl(ControlState):
             self.block_words = ()
         start, end = blanked(self.position, self.unknown), blanked(fate.end.target, fate.end.unknown)
         if fate.end.in_machine is not None and (begin := in_machine(self)) is not None:
-            start, end, style = begin, fate.end.in_machine, self._without_tcp(style)
+            start, end = begin, fate.end.in_machine
+            style = self.builder.style(self.builder.styles[style]._replace(tcp=False, tcp_length=math.nan))
         self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, unplaced)
         if self.ends is not None:
             self.ends.append(fate.end.target[:])
@@ -241,11 +243,6 @@ class ProgramControl(ControlState):
         if motion.placed is not None:
             return motion.placed
         return 0 if motion.passing or self.modal.incremental else motion.axes
-
-    def _note_increments(self, motion: Motion, placed: int) -> None:
-        """Some words of the motion count from where it starts, or do not, against the distance mode in force."""
-        if not motion.passing and placed & motion.axes != (0 if self.modal.incremental else motion.axes):
-            self.builder.counted(motion.axes & ~placed)
 
     def _keep_places(self, motion: Motion, placed: int) -> None:
         """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
@@ -420,10 +417,6 @@ class ProgramControl(ControlState):
                 math.nan if not self.tcp or self.length_under_tcp == length else self.length_under_tcp,
             )
         )
-
-    def _without_tcp(self, style: int) -> int:
-        """A style for a motion whose ends are said in axes of the machine."""
-        return self.builder.style(self.builder.styles[style]._replace(tcp=False, tcp_length=math.nan))
 
     def _beside(self) -> float:
         """By how much the control offsets the contour to the left of the way, mm; NaN where it is not known."""

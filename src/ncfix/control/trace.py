@@ -98,7 +98,7 @@ class PartReader:
         return self.plain[shape]
 
     def _has_plain_shape(self, program: Program, block: int) -> bool:
-        template = program.templates[int(program.template[block])]
+        template = program.template_of(block)
         if self.language.bulk is None or template.m_codes or any(isinstance(item, Skip) for item in template.items):
             return False
         return self.language.bulk(program, block) is not None

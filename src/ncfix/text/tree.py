@@ -294,9 +294,13 @@ class Program:
         start, stop = self.blocks[block]
         return self.source[start:stop].decode("latin-1")
 
+    def template_of(self, block: int) -> Template:
+        """What the shape of a block means."""
+        return self.templates[int(self.template[block])]
+
     def items_of(self, block: int) -> tuple[Item, ...]:
         """The items of a block."""
-        return self.templates[int(self.template[block])].items
+        return self.template_of(block).items
 
     def values_of(self, block: int) -> NDArray[np.float64]:
         """The values of the block's numbers, by slot, (k,), as written."""

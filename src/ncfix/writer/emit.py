@@ -369,7 +369,7 @@ class _Emitter:
         """The time of a turn of rotary axes alone, where the control might give its feed to linear axes."""
         if self.program.dialect.feed_of == "all" or not self.turns[row]:
             return float("nan")
-        own = self.program.templates[int(self.program.template[self.moves.block[row]])].slots
+        own = self.program.template_of(self.moves.block[row]).slots
         return minutes(self.moves, row, own_feed="F" in own)
 
     def _before(self, row: int) -> FloatArray:

@@ -57,7 +57,8 @@ def standing(
     before      (n_axes,) how far off the axes stand at the start of the first motion; not at all if not given
     approaches  (n, n_axes) where canned cycles feed from, and may return to; NaN, or not given: as programmed
     """
-    shift = _or_zero(wanted - moves.end)
+    shift = wanted - moves.end
+    shift[~np.isfinite(shift)] = 0.0
     shift[kept] = 0.0
     decides = ~stays(moves, kept, shift, before)
     if kept.any():
@@ -169,10 +170,6 @@ def _translated(machine: Machine, moves: Moves, row: int, shift: Array) -> Array
     commands = commands_from_joints(machine, q, moves.tcp[pair[1]], moves.length_under_tcp[pair[1]])
     result: Array = commands[1] - commands[0]
     return result
-
-
-def _or_zero(values: Array) -> Array:
-    return np.where(np.isfinite(values), values, 0.0)
 
 
 def corrected_approaches(intent: Intent, wanted: Array, kept: Mask) -> Array | None:

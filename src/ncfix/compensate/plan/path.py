@@ -109,13 +109,6 @@ def assembled(
     return Plan(pieces, real.start, deviation, oriented, findings)
 
 
-def with_approaches(plan: Plan, approaches: Array | None) -> Plan:
-    """The plan with the levels (n, n_axes) from which canned cycles feed."""
-    if approaches is None:
-        return plan
-    return replace(plan, pieces=replace(plan.pieces, approach=approaches[plan.pieces.move]))
-
-
 def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
     """Shares of time: those of the fraction; a piece that only takes up a jump has the share of its way."""
     before = np.zeros(len(pieces))
@@ -250,17 +243,20 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
     deviation[over] = parts.worst
     unseen = _not_far_off(intent, np.flatnonzero(np.isinf(deviation)))
     if unseen.size:
-        also = kept.copy()
-        also[unseen] = True
-        again = _plan(intent, strategy, demands, also)
+        again = _plan(intent, strategy, demands, _with(kept, unseen))
         return replace(again, findings=(*ends.findings, _too_long(unseen), *again.findings))
     findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
     planned = assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
     known = Known(ends.before, ends.wanted, left_beside(intent, real, np.flatnonzero(followed)))
-    return with_approaches(replace(planned, known=known, corners=_digits_at_corners(beside, kept)), approaches)
+    corners = 0.0 if beside is None else float(beside.rounding[~kept[beside.move]].max(initial=0.0))
+    pieces = planned.pieces
+    if approaches is not None:
+        pieces = replace(pieces, approach=approaches[pieces.move])
+    return replace(planned, pieces=pieces, known=known, corners=corners)
 
 
 def _with(kept: Mask, rows: Index) -> Mask:
+    """The motions that are kept, and `rows` (k,) with them."""
     also = kept.copy()
     also[rows] = True
     return also
@@ -285,13 +281,6 @@ def _worse_contours(intent: Intent, beside: OffsetPoints | None, kept: Mask, dem
     np.maximum.at(most, contour[beside.move[worse]], beside.after[worse])
     rows = np.flatnonzero(offset & (most[contour] > 0) & ~kept)
     return Finding("NCF454", rows, most[contour[rows]] * 1e3, text)
-
-
-def _digits_at_corners(beside: OffsetPoints | None, kept: Mask) -> float:
-    """What the control's digits may do at corners of corrected contours, in half steps."""
-    if beside is None:
-        return 0.0
-    return float(beside.rounding[~kept[beside.move]].max(initial=0.0))
 
 
 def _real(
