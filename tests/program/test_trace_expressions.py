@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ncfix.diagnostics import SourceError
-from ncfix_iso.rs274 import expressions
+from ncfix_iso.rs274 import parameters
 from program.tracing import follow, last, reasons
 
 AXIS = "where the axis {} stands is known only at run time"
@@ -87,7 +87,7 @@ def test_products_bind_stronger_than_sums(a: float, b: float, c: float) -> None:
 
 @given(numbers, numbers.filter(lambda value: abs(value) > 0.001))
 def test_modulo_is_never_negative_and_leaves_a_multiple(a: float, b: float) -> None:
-    rest = expressions.modulo(a, b)
+    rest = parameters.modulo(a, b)
     assert 0.0 <= rest <= abs(b)
     turns = (a - rest) / b
     assert turns == pytest.approx(round(turns), abs=1e-6)
@@ -95,9 +95,9 @@ def test_modulo_is_never_negative_and_leaves_a_multiple(a: float, b: float) -> N
 
 @given(st.floats(-360.0, 360.0))
 def test_angles_are_degrees(angle: float) -> None:
-    sine, cosine = expressions.FUNCTIONS["sin"][0](angle), expressions.FUNCTIONS["cos"][0](angle)
+    sine, cosine = parameters.FUNCTIONS["sin"][0](angle), parameters.FUNCTIONS["cos"][0](angle)
     assert sine**2 + cosine**2 == pytest.approx(1.0, abs=1e-12)
-    back = expressions.OPERATORS["atan"](sine, cosine)
+    back = parameters.OPERATORS["atan"](sine, cosine)
     assert math.remainder(back - angle, 360.0) == pytest.approx(0.0, abs=1e-9)
 
 
@@ -115,9 +115,9 @@ def test_a_loop_that_sums_up_to_its_end_runs_once_more_since_2_9_1() -> None:
 @given(st.sampled_from(["eq", "ne", "gt", "ge", "lt", "le"]), numbers, numbers)
 def test_comparisons_are_one_or_zero_and_each_has_its_opposite(operator: str, a: float, b: float) -> None:
     opposite = {"eq": "ne", "ne": "eq", "gt": "le", "ge": "lt", "lt": "ge", "le": "gt"}[operator]
-    one, other = expressions.OPERATORS[operator](a, b), expressions.OPERATORS[opposite](a, b)
+    one, other = parameters.OPERATORS[operator](a, b), parameters.OPERATORS[opposite](a, b)
     assert {one, other} <= {0.0, 1.0}
-    assert one != other or 0.0 < abs(a - b) < expressions.EQUAL
+    assert one != other or 0.0 < abs(a - b) < parameters.EQUAL
 
 
 # -- parameters -------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of
 from ncfix.control.expressions import Unknown, Value, nominal
 from ncfix.control.moves import Motion, MotionEnd, MotionKind
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.expressions import whole
+from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.systems import (
     AFTER_UNFOLLOWED,
     SYSTEM_NAMES,

@@ -23,7 +23,7 @@ from ncfix.control.state import NO_MOTION
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
 from ncfix.text.tree import OWordLine as FlowItem
-from ncfix_fanuc.macro.expressions import number
+from ncfix_fanuc.macro.variables import number
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.parameters import Store
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit, has_words

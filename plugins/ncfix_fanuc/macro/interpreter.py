@@ -15,16 +15,14 @@ from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import polar, scaling, system, tilt, vectors
 from ncfix_fanuc.macro.blocks import CORNER, G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl
-from ncfix_fanuc.macro.expressions import is_vacant, variable_number
 from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
 from ncfix_fanuc.macro.lengths import LENGTH_IN_STEPS, lone_number
 from ncfix_fanuc.macro.rules import MACRO
-from ncfix_fanuc.macro.variables import POSITION_READ, is_system
+from ncfix_fanuc.macro.variables import POSITION_READ, is_system, is_vacant, variable_number
 from ncfix_iso.rs274.control import Block
-from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, RS274Interpreter
 from ncfix_iso.rs274.order import MACHINE
-from ncfix_iso.rs274.parameters import Store
+from ncfix_iso.rs274.parameters import Store, whole
 from ncfix_iso.rs274.plans import Codes, RS274Plan, plan_of
 
 G20, G21, G90, G91 = 200, 210, 900, 910

@@ -12,8 +12,8 @@ from ncfix.text.tree import Comment, Tape, Word
 from ncfix_fanuc.macro.data import CHANGED
 from ncfix_fanuc.macro.vectors import INCLINED
 from ncfix_iso.rs274 import settings
-from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.groups import LENGTH
+from ncfix_iso.rs274.parameters import whole
 
 if TYPE_CHECKING:
     from ncfix_fanuc.macro.control import MacroControl

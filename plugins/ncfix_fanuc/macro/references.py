@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.moves import Motion, MotionEnd, MotionKind, Pass, Passing
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, destination, go_to_reference
+from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.settings import tool_offset
 
 if TYPE_CHECKING:

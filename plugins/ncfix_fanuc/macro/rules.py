@@ -16,8 +16,7 @@ from dataclasses import replace
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.expressions import Fault
 from ncfix_fanuc.macro import data, lengths, polar, references, scaling, tilt
-from ncfix_fanuc.macro.expressions import compiled
-from ncfix_fanuc.macro.variables import is_lasting, is_system
+from ncfix_fanuc.macro.variables import compiled, is_lasting, is_system
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE, drill, place_hole, repeats

@@ -25,7 +25,7 @@ from ncfix.control.pointing import Triple
 from ncfix.control.posture import normal_of
 from ncfix.control.tcp import switch
 from ncfix_iso.rs274.control import Block
-from ncfix_iso.rs274.expressions import whole
+from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.systems import rotate_system, turned_back, unfollowed
 
 if TYPE_CHECKING:

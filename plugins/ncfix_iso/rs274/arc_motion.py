@@ -9,8 +9,8 @@ from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import Arc, Motion, MotionKind
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.motion import check_feed, destination
+from ncfix_iso.rs274.parameters import whole
 
 LATHE_PLANE = 180
 """G18, the plane in which lathes cut: Z, then X."""

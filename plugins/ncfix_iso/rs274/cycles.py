@@ -12,8 +12,8 @@ from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import FeedMode, Motion, MotionEnd, MotionKind, UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.motion import by_radius_and_angle, unknown_after, unnamed
+from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.systems import check_system, words_of
 
 BAD_CYCLE = "NCF226"

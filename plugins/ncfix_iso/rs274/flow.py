@@ -16,7 +16,7 @@ from functools import partial
 from ncfix.control.expressions import Evaluate, Fault, nominal
 from ncfix.control.flow import NO_LABEL, NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow
 from ncfix_iso.rs274.control import RS274Control
-from ncfix_iso.rs274.expressions import whole
+from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit
 from ncfix_iso.rs274.settings import restore
 

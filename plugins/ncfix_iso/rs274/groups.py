@@ -14,7 +14,7 @@ from ncfix.control.expressions import Evaluate
 from ncfix.control.operations import Like
 from ncfix.text.dialect import CodeOperation, CycleTable, tenths
 from ncfix.text.tree import Expression
-from ncfix_iso.rs274.expressions import compiled
+from ncfix_iso.rs274.parameters import compiled
 
 if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect

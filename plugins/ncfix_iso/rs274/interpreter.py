@@ -16,11 +16,11 @@ from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
 from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE
-from ncfix_iso.rs274.expressions import number_of, whole
 from ncfix_iso.rs274.flow import OWords
 from ncfix_iso.rs274.groups import ARCS, DYNAMIC_OFFSETS, LENGTH, NON_MODAL, TURNING_CYCLES
 from ncfix_iso.rs274.motion import BAD_MOTION, NO_CODE, in_machine_coordinates
 from ncfix_iso.rs274.order import DWELL, MACHINE, MOTIONS
+from ncfix_iso.rs274.parameters import number_of, whole
 from ncfix_iso.rs274.plans import Codes, RS274Plan, RS274Unit, check_words, grouped_codes, has_words
 from ncfix_iso.rs274.settings import unknown_code
 

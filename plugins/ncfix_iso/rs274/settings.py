@@ -14,8 +14,8 @@ from ncfix.control.expressions import Fault
 from ncfix.control.state import TOOL_AT_RUN_TIME, Modal, Saved
 from ncfix.control.tcp import switch
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.expressions import whole
 from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS
+from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.systems import BAD_G10, SYSTEM_NAMES, activate, first_parameter, set_system, stored, words_of
 
 BAD_SETTING = "NCF221"

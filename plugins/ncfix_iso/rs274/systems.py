@@ -31,7 +31,7 @@ from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.frames import WORLD, Affine, turned_about
 from ncfix.control.moves import UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.expressions import whole
+from ncfix_iso.rs274.parameters import whole
 
 SYSTEM_NAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 SHIFT = 5211
