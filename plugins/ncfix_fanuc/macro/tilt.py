@@ -211,12 +211,8 @@ def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: boo
 
 def is_moved_otherwise(control: MacroControl, block: Block) -> bool:
     """Whether G53.6 leads the tip elsewhere: along the tool (R), or with no length in force, or with another one."""
-    return bool(block.get("R")) or not control.length_code or is_other_length(control, block)
-
-
-def is_other_length(control: MacroControl, block: Block) -> bool:
-    """Whether H of a block is another length than the one in force."""
-    return "H" in block.values and whole(block.values["H"], "H") != control.tools.offset
+    other = "H" in block.values and whole(block.values["H"], "H") != control.tools.offset
+    return bool(block.get("R")) or not control.length_code or other
 
 
 # -- G254 and G255 of Haas ---------------------------------------------------------------------------------------------

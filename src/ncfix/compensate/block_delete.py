@@ -167,11 +167,6 @@ def messages_of(positions: Sequence[SwitchSetting]) -> tuple[Message, ...]:
     return (Message(BLOCK_DELETE, text, first, "--block-skip on or off looks at one position only"), *rest)
 
 
-def most_moves(positions: Sequence[SwitchSetting]) -> int:
-    """Motions of a program, in the position of block delete in which it has most."""
-    return max(len(each.trace.moves) for each in positions)
-
-
 def worst_findings(every: Sequence[WrittenPlan]) -> list[tuple[Finding, ...]]:
     """The findings in each position, each block's only where its figure is the largest of all of them."""
     if len(every) == 1:
@@ -194,8 +189,6 @@ def worst_findings(every: Sequence[WrittenPlan]) -> list[tuple[Finding, ...]]:
 
 def assumed_of(positions: Sequence[SwitchSetting]) -> tuple[str, ...]:
     """What was taken as zero in any position, in words."""
-    if len(positions) == 1:
-        return positions[0].trace.assumed
     return tuple(dict.fromkeys(name for each in positions for name in each.trace.assumed))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix.compensate import FixOptions
-from ncfix.compensate.block_delete import SwitchSetting, messages_of, most_moves, positions_of
+from ncfix.compensate.block_delete import SwitchSetting, messages_of, positions_of
 from ncfix.compensate.driver import PartCorrector, fix_program
 from ncfix.compensate.following import Resolve, Task, follow, placed, suspected
 from ncfix.compensate.parts import Part, Parts, Units
@@ -139,7 +139,7 @@ def _checked(
     """What is found in a program, in all positions of block delete; what was assumed is no finding."""
     for k, position in enumerate(positions):
         survey.look(Part(program, position.trace.moves, True), k)
-    survey.moves = most_moves(positions)
+    survey.moves = max(len(each.trace.moves) for each in positions)
     if report is not None:
         return survey.checked(len(program), _remarks_of(report))
     assumed = {message for each in positions for message in each.trace.messages[: len(each.trace.assumed)]}

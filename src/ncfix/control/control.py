@@ -25,6 +25,7 @@ from ncfix.control.coordinates import LETTERS, Vector, mask_of, rotated
 from ncfix.control.flow import Budget
 from ncfix.control.moves import (
     AT_START,
+    PASS_RULES,
     Motion,
     MotionEnd,
     MotionKind,
@@ -35,8 +36,6 @@ from ncfix.control.moves import (
     UnknownAxes,
     blanked,
     first_reason,
-    leaves_unknown,
-    may_pass,
 )
 from ncfix.control.setup import Run
 from ncfix.control.state import TOOL_AT_RUN_TIME, ControlState
@@ -267,17 +266,37 @@ class ProgramControl(ControlState):
         return motion.kind == MotionKind.CYCLE
 
     def _fate(self, motion: Motion, unplaced: int) -> Motion:
-        """The motion as it will be judged: rapids pass that need words for axes of which nobody has said enough."""
+        """The motion as it will be judged: rapids pass that need words for axes of which nobody has said enough.
+
+        If it moves an axis that has no word and must get none, a rapid passes, others are refused.
+        """
         if motion.passing is None and self._leaves_unknown(motion) and not self.ends_in_hole(motion):
             return motion._replace(passing=Passing(Pass.UNSAID, first_reason(motion.end.unknown)))
-        return self._dragged(motion, unplaced)
+        wordless = unplaced & self.places.unplaced & ~motion.axes
+        if not wordless or motion.passing or motion.refusal or motion.end.unknown:
+            return motion
+        moved = mask_of(i for i in self.machine if motion.end.target[i] != self.position[i])
+        if self.is_rotated and motion.axes & self._turned():
+            moved |= self._turned()
+        index = next((i for i in self.machine if (wordless & moved) >> i & 1), None)
+        if index is None:
+            return motion
+        why = UNPLACED.format(LETTERS[index])
+        if motion.kind == MotionKind.RAPID and not self.ends_in_hole(motion):
+            return motion._replace(passing=Passing(Pass.UNSAID, why))
+        return motion._replace(refusal=why)
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
-        """Whether a motion is a rapid that passes, see `moves.leaves_unknown`."""
+        """Whether a motion is a rapid that says nothing of axes that are not known at its end, and were not before.
+
+        Where they stand, its correction would depend on. It cuts nothing, and the axes that it names can be corrected
+        as soon as the program has named the others: it passes.
+        """
         if not rapid.end.unknown or rapid.kind != MotionKind.RAPID or rapid.refusal or self.refusal or self.suspended:
             return False
         before = {*self.unknown.values(), *self.lost_in_frame().values()}
-        return leaves_unknown(rapid, before, self._lost_at_end(rapid))
+        named = any(rapid.axes >> index & 1 for index in self._lost_at_end(rapid))
+        return before.issuperset(rapid.end.unknown.values()) and not named
 
     def _unplaced(self, placed: int) -> int:
         """Axes that must get no word in a motion that brings `placed` to their places; turned axes go together."""
@@ -327,22 +346,6 @@ class ProgramControl(ControlState):
         """Axes that are moved by words of others, since the frame is turned."""
         return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < ALONG)
 
-    def _dragged(self, motion: Motion, unplaced: int) -> Motion:
-        """The motion; if it moves an axis that has no word and must get none, a rapid passes, others are refused."""
-        wordless = unplaced & self.places.unplaced & ~motion.axes
-        if not wordless or motion.passing or motion.refusal or motion.end.unknown:
-            return motion
-        moved = mask_of(i for i in self.machine if motion.end.target[i] != self.position[i])
-        if self.is_rotated and motion.axes & self._turned():
-            moved |= self._turned()
-        index = next((i for i in self.machine if (wordless & moved) >> i & 1), None)
-        if index is None:
-            return motion
-        why = UNPLACED.format(LETTERS[index])
-        if motion.kind == MotionKind.RAPID and not self.ends_in_hole(motion):
-            return motion._replace(passing=Passing(Pass.UNSAID, why))
-        return motion._replace(refusal=why)
-
     def _verdict(self, kind: MotionKind, unknown: UnknownAxes, refusal: str) -> str:
         """Why a motion that does not pass is refused; empty if it may be corrected.
 
@@ -370,7 +373,7 @@ class ProgramControl(ControlState):
         """The style of a motion; behind a contour the one that leads off stays whole."""
         passing, whole = motion.passing, self.whole
         self.whole = whole or bool(self.beside & motion.axes)
-        if passing is not None and may_pass(passing, motion.kind):
+        if passing is not None and motion.kind in PASS_RULES[passing.rule].kinds:
             style = self._style(motion.kind, Rule.PASS, passing.words, motion.code, passing.rule)
         else:
             wrong = motion.refusal if passing is None else passing.words

@@ -395,11 +395,6 @@ PASS_RULES: Mapping[Pass, PassRule] = {
 """The list: nothing else may pass."""
 
 
-def may_pass(passing: Passing, kind: MotionKind) -> bool:
-    """Whether a rule may pass a motion of this kind."""
-    return kind in PASS_RULES[passing.rule].kinds
-
-
 AT_START = "where the axis {} stands when the program starts is not given"
 """Why a position is not known at first; asked of the setup when it matters."""
 
@@ -468,12 +463,3 @@ def first_reason(unknown: UnknownAxes) -> str:
     """The reason for the first axis whose position is not known."""
     index = min(unknown)
     return unknown[index].format(LETTERS[index])
-
-
-def leaves_unknown(rapid: Motion, before: set[str], lost: UnknownAxes) -> bool:
-    """Whether a rapid says nothing of the axes of the program's frame that are `lost` at its end, and were `before`.
-
-    Where they stand, its correction would depend on. It cuts nothing, and the axes that it names can be corrected as
-    soon as the program has named the others: it passes. `before` are the reasons why something was not known.
-    """
-    return before.issuperset(rapid.end.unknown.values()) and not any(rapid.axes >> index & 1 for index in lost)

@@ -92,16 +92,12 @@ class PartReader:
         return next((pair[0] for pair in pairs if all(self._is_plain(program, each) for each in pair)), 0)
 
     def _is_plain(self, program: Program, block: int) -> bool:
-        shape = int(program.template[block])
+        shape, bulk = int(program.template[block]), self.language.bulk
         if shape not in self.plain:
-            self.plain[shape] = self._has_plain_shape(program, block)
+            template = program.templates[shape]
+            alone = not (template.m_codes or any(isinstance(item, Skip) for item in template.items))
+            self.plain[shape] = alone and bulk is not None and bulk(program, block) is not None
         return self.plain[shape]
-
-    def _has_plain_shape(self, program: Program, block: int) -> bool:
-        template = program.template_of(block)
-        if self.language.bulk is None or template.m_codes or any(isinstance(item, Skip) for item in template.items):
-            return False
-        return self.language.bulk(program, block) is not None
 
 
 def stretch(program: Program, start: int, stop: int) -> Program:

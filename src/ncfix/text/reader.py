@@ -117,18 +117,6 @@ def read_like(source: bytes, path: str, like: Program, control: str = "") -> Pro
         return read(source, path, detect(source, path, control))
 
 
-def source_error(path: str, block: int, text: str, fault: BlockError) -> SourceError:
-    """A fault of a block as an error with its place."""
-    return SourceError.of(fault.code, fault.text, Place(path, block + 1, fault.place + 1, text), fault.hint)
-
-
-def check_length(dialect: Dialect, length: int) -> None:
-    """Refuse a line that is longer than the control's buffer."""
-    if dialect.line_limit and length > dialect.line_limit:
-        text = f"the line has {length} characters; {dialect.title} takes {dialect.line_limit}"
-        raise BlockError("NCF105", text, dialect.line_limit, "break the line or shorten its comment")
-
-
 class PartColumns(NamedTuple):
     """The columns of a part of a program: the first number of each block, and how many there are; spans and values."""
 
@@ -300,16 +288,19 @@ class ProgramReading:
 
     def parsed(self, block: int, text: bytes) -> Parsed:
         """One block by the grammar; raises SourceError, unless the control may never get there."""
-        known = texts_of(self.dialect).recall(text)
+        known, limit = texts_of(self.dialect).recall(text), self.dialect.line_limit
         if known is not None:
             return known
         try:
-            check_length(self.dialect, len(text))
+            if limit and len(text) > limit:
+                long = f"the line has {len(text)} characters; {self.dialect.title} takes {limit}"
+                raise BlockError("NCF105", long, limit, "break the line or shorten its comment")
             parsed = parse_block(self.dialect, text.decode("latin-1"))
         except BlockError as fault:
             if self.language.lenient and self.in_doubt(block):
                 return NOT_READ
-            raise source_error(self.path, block + self.first_line - 1, text.decode("latin-1"), fault) from None
+            place = Place(self.path, block + self.first_line, fault.place + 1, text.decode("latin-1"))
+            raise SourceError.of(fault.code, fault.text, place, fault.hint) from None
         texts_of(self.dialect).keep(text, parsed)
         return parsed
 

@@ -44,7 +44,7 @@ def insertion(program: Program, text: str) -> Edit:
     for block in program:
         if _is_head(program, block):
             before = block + 1
-        elif not _is_blank(program, block):
+        elif not all(isinstance(item, Comment) for item in program.items_of(block)):
             break
     eol = program.line_end
     line = comment.encode("latin-1", "replace")
@@ -57,25 +57,15 @@ def insertion(program: Program, text: str) -> Edit:
 
 def _is_head(program: Program, block: int) -> bool:
     """A tape mark, program number or program name: what must stay in front."""
-    items = program.items_of(block)
-    head = bool(items) and all(
-        isinstance(item, (Tape, Comment)) or (isinstance(item, Opaque) and "program" in item.kind) or _is_number(item)
-        for item in items
-    )
-    return head and not all(isinstance(item, Comment) or _is_line_number(item) for item in items)
-
-
-def _is_blank(program: Program, block: int) -> bool:
-    return all(isinstance(item, Comment) for item in program.items_of(block))
-
-
-def _is_line_number(item: object) -> bool:
-    return isinstance(item, Word) and item.address == "N"
-
-
-def _is_number(item: object) -> bool:
-    return (
-        _is_line_number(item)
-        or (isinstance(item, Word) and item.address == "O")
-        or (isinstance(item, OWordLine) and item.keyword == "program")
-    )
+    heads = 0
+    for item in program.items_of(block):
+        match item:
+            case Comment() | Word("N"):
+                continue
+            case Tape() | Word("O") | OWordLine(keyword="program"):
+                heads += 1
+            case Opaque(kind) if "program" in kind:
+                heads += 1
+            case _:
+                return False
+    return heads > 0

@@ -294,11 +294,15 @@ class Match:
         self.along.add(part.rows[samples.piece], gap, samples.weight)
 
     @property
+    def looked_at(self) -> float:
+        """The way along its path up to which it has looked."""
+        curve, start = self.path.curve, self.done - self.path.dropped
+        return float(curve.lengths[start]) if start < len(curve) else self.path.reached
+
+    @property
     def first_needed(self) -> float:
         """The way along the other path before which nothing of it will be looked at any more."""
-        curve, start = self.path.curve, self.done - self.path.dropped
-        at = float(curve.lengths[start]) if start < len(curve) else self.path.reached
-        return at + self.ahead - 2 * KEPT
+        return self.looked_at + self.ahead - 2 * KEPT
 
 
 @dataclass(slots=True)
@@ -391,10 +395,5 @@ class SideBySide:
             match.go_on()
         for track in (self.intended, self.unfixed, self.fixed):
             needed = [match.first_needed for match in self.matches if match.other is track]
-            own = [self._looked_at(match) for match in self.matches if match.path is track]
+            own = [match.looked_at for match in self.matches if match.path is track]
             track.drop(min(needed + own))
-
-    def _looked_at(self, match: Match) -> float:
-        """The way along its path up to which a match has looked."""
-        curve, start = match.path.curve, match.done - match.path.dropped
-        return float(curve.lengths[start]) if start < len(curve) else match.path.reached

@@ -398,7 +398,7 @@ def _passed(written: WrittenPieces, which: Index, along: Mask) -> tuple[Index, A
 
 def _errors(written: WrittenPieces, piece: Index, fraction: Array, known: Known | None, tilts: bool) -> PathSamples:
     """The errors at fractions of pieces (k,); those at ends where they are known are taken from there."""
-    move, at = written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
+    move, at = written.pieces.move[piece], written.before[piece] + fraction * written.span[piece]
     before, after = np.empty(len(piece)), np.empty(len(piece))
     unknown = np.ones(len(piece), dtype=bool)
     ends = np.flatnonzero(fraction == 1.0)

@@ -80,11 +80,6 @@ class WrittenPieces:
         )
         return Segments(start, pieces.end, arc, pieces.centre, normal, found, columns)
 
-    def fraction_of_motion(self, piece: Index, fraction: Array) -> Array:
-        """Where on its motion a fraction of a piece is, (k,)."""
-        result: Array = self.before[piece] + fraction * self.span[piece]
-        return result
-
     def joints(self, piece: Index, fraction: Array) -> Array:
         """Axis positions at fractions of pieces, (k, n_axes)."""
         return self.intent.joints(self.pieces.move[piece], self.segments.at(piece, fraction))
