@@ -59,8 +59,8 @@ def extended(control: RS274Control, block: Block, code: int) -> None:
 def setting_error(control: RS274Control, block: Block, code: int) -> None:
     """G54.2 Pn and G54.4 Pn: offsets that turn with the tables; P0 ends them."""
     if block.get("P") or block.unknown:
-        control.suspended[SETTING_ERRORS[code]] = SETTING_ERRORS[code]
-    elif control.suspended.pop(SETTING_ERRORS[code], None):
+        control.suspend(SETTING_ERRORS[code], SETTING_ERRORS[code])
+    elif control.resume(SETTING_ERRORS[code]):
         control.lose(control.machine, AFTER_UNFOLLOWED)
 
 
@@ -82,14 +82,14 @@ def set_data(control: RS274Control, block: Block, code: int) -> None:
         set_length(control, block)
     elif kind not in HARMLESS:
         what = UNFOLLOWED.get(kind, f"data of the control (G10 L{kind})")
-        control.refusal = control.refusal or f"the program sets {what}, which ncfix does not follow"
+        control.refuse_rest(f"the program sets {what}, which ncfix does not follow")
 
 
 def set_offset(control: RS274Control, block: Block) -> None:
     """L2 Pn: the words are the offset of G54 (P1) to G59 (P6), or are added to it in G91."""
     system = whole(block.get("P"), "P of G10")
     if not 1 <= system <= WORK_OFFSETS:
-        control.refusal = control.refusal or "the program sets the external work offset (G10 L2 P0)"
+        control.refuse_rest("the program sets the external work offset (G10 L2 P0)")
         return
     first = first_parameter(system)
     before = stored(control, first)
@@ -116,7 +116,7 @@ def set_extended(control: RS274Control, block: Block) -> None:
         value = control.scale[index] * block.values[letter] / (DEGREE if control.rotary[index] else 1.0)
         given[letter] = value + (given.get(letter, 0.0) if control.modal.incremental else 0.0)
     if block.unknown:
-        control.refusal = control.refusal or f"the work offset {name} is known only at run time"
+        control.refuse_rest(f"the work offset {name} is known only at run time")
     control.extended[name] = given
     if control.modal.system == 0 and control.extended_name == name:
         moved_while_turned(control, "G10")
@@ -128,7 +128,7 @@ def set_length(control: RS274Control, block: Block) -> None:
     """L10 Pn R: the length of tool offset n; in G91 it is added."""
     number = whole(block.get("P"), "P of G10")
     if "R" not in block.values:
-        control.refusal = control.refusal or "a tool is set by other words than R (G10 L10)"
+        control.refuse_rest("a tool is set by other words than R (G10 L10)")
         return
     length = control.modal.unit * block.values["R"]
     if control.modal.incremental:
@@ -140,7 +140,7 @@ def keep_length(control: RS274Control, number: int, length: Value) -> None:
     """The program sets the length of a tool, mm."""
     unknown = isinstance(length, Unknown)
     if control.tools.offset == number and (unknown or length != control.tools.vector[Z]):
-        control.suspended[CHANGED] = CHANGED
+        control.suspend(CHANGED, CHANGED)
     control.tools.lengths[number] = nominal(length)
     if unknown:
         control.tools.measured.add(number)

@@ -246,7 +246,7 @@ class MacroInterpreter(RS274Interpreter):
         """The motion of a block."""
         before = self.control.builder.count
         if tilt.turns_tables(self.control, block):
-            self.control.suspended[tilt.DYNAMIC] = tilt.TABLES_MOVED
+            self.control.suspend(tilt.DYNAMIC, tilt.TABLES_MOVED)
         if self.control.vectors:
             self.by_vector(block, codes, motion)
         else:
@@ -338,7 +338,7 @@ class MacroInterpreter(RS274Interpreter):
             self.flow.begin(label, times, store)
             return
         if code == G66_1:
-            self.control.refusal = self.control.refusal or "a macro is called by every block (G66.1)"
+            self.control.refuse_rest("a macro is called by every block (G66.1)")
         self.modal_calls.append(ModalCall(label, times, store, len(self.flow.calls)))
 
     def arguments(self, plan: RS274Plan) -> Iterator[tuple[str, Value]]:

@@ -50,7 +50,7 @@ MOVING = frozenset("XYABCUVWIJKRP")
 def tool_offset(control: MacroControl, block: Block, code: int) -> None:
     """G43 to G49. Without a Z word the axis moves by the change of the length, or only its coordinate does."""
     before = control.tools.vector[Z]
-    control.suspended.pop(CHANGED, None)
+    control.resume(CHANGED)
     direct(control, block, code)
     if code in CANCEL:
         control.length_code = 0
@@ -66,12 +66,12 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
 
 def direct(control: MacroControl, block: Block, code: int) -> None:
     """G43.5 takes the direction of the tool from I J K; its Q would lean the tool away from them."""
-    control.suspended.pop(INCLINED, None)
+    control.resume(INCLINED)
     control.vectors = code == BY_VECTOR
     if control.vectors:
         control.places.lose(mask_of(control.turning))
         if block.get("Q") != 0.0:
-            control.suspended[INCLINED] = INCLINED
+            control.suspend(INCLINED, INCLINED)
 
 
 def z_is_named_first(control: MacroControl) -> bool:

@@ -21,10 +21,10 @@ ON = 160
 def switch(control: MacroControl, block: Block, code: int) -> None:
     """G16 and G15."""
     if code == ON and control.polar is None:
-        control.suspended["polar"] = REASON
+        control.suspend("polar", REASON)
         control.polar = here(control)
     elif code != ON:
-        control.suspended.pop("polar", None)
+        control.resume("polar")
         control.polar = None
 
 
@@ -48,7 +48,7 @@ def cartesian(control: MacroControl, block: Block) -> Block:
     control.polar = radius, angle
     turn = math.radians(angle)
     block.values[letters[0]], block.values[letters[1]] = radius * math.cos(turn), radius * math.sin(turn)
-    block.axes |= 1 << plane.first | 1 << plane.second
+    block.axes |= plane.axes
     if control.modal.incremental or block.unknown & set(letters):
         block.unknown |= set(letters)
     return block
@@ -65,7 +65,7 @@ def further_round(control: MacroControl, block: Block, letters: tuple[str, str])
     ends = radius * math.cos(turn), radius * math.sin(turn)
     for letter, index, end in zip(letters, (plane.first, plane.second), ends, strict=True):
         block.values[letter] = end - position[index] / control.modal.unit
-    block.axes |= 1 << plane.first | 1 << plane.second
+    block.axes |= plane.axes
     if letters[1] in block.unknown:
         block.unknown |= set(letters)
     return block

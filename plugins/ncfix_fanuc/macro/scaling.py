@@ -39,7 +39,7 @@ def switch(control: MacroControl, block: Block, code: int) -> None:
         moves = bool(block.axes)
         if control.scaling is not None and not moves:
             control.scaling, control.left_out = None, True
-            control.suspended.pop("scaling", None)
+            control.resume("scaling")
             return
         control.scaling = None
         unfollowed(control, block, code)
@@ -54,7 +54,7 @@ def switch(control: MacroControl, block: Block, code: int) -> None:
         if LETTERS[index] in block.values:
             centre[index] = control.scale[index] * block.values[LETTERS[index]]
     control.scaling, control.left_out = Scaling(centre, block.values["P"]), True
-    control.suspended["scaling"] = REASON
+    control.suspend("scaling", REASON)
     control.warn(AXES_SAID, ALIKE, "check which axes the control scales (Fanuc: parameter 5401 SCL)")
 
 
@@ -75,7 +75,7 @@ def scaled(control: MacroControl, block: Block, codes: Codes) -> Block:
         return block
     foreign = [code for group, code in codes.g.items() if group not in AT_PEACE]
     if foreign:
-        control.refusal = control.refusal or TOGETHER.format(f"G{foreign[0] / 10:g}")
+        control.refuse_rest(TOGETHER.format(f"G{foreign[0] / 10:g}"))
         control.unwritten = control.unwritten or TOGETHER.format(f"G{foreign[0] / 10:g}")
         return block
     motion = control.modal.motion if codes.motion is None else codes.motion

@@ -102,4 +102,4 @@ def was_set(control: MacroControl, number: int, value: Value) -> None:
     elif number in LENGTHS:
         keep_length(control, number - LENGTHS.start + 1, scaled(control.modal.unit, value))
     elif not any(number in each for each in HARMLESS):
-        control.refusal = control.refusal or f"the program sets #{number}, which ncfix does not follow"
+        control.refuse_rest(f"the program sets #{number}, which ncfix does not follow")

@@ -67,7 +67,7 @@ def tilt(control: MacroControl, block: Block, code: int) -> None:
         unfollowed(control, block, code)
         return
     if block.unknown:
-        control.refusal = control.refusal or "the tilted plane (G68.2) is known only at run time"
+        control.refuse_rest("the tilted plane (G68.2) is known only at run time")
     if form in LAST:
         define(control, block, form)
         return
@@ -104,10 +104,10 @@ def define(control: MacroControl, block: Block, form: int) -> None:
     control.definition[number] = block
     given = control.definition
     if not {*range(1, LAST[form] + 1)} <= given.keys():
-        control.suspended[DEFINING] = DEFINING
+        control.suspend(DEFINING, DEFINING)
         return
     control.definition = {}
-    control.suspended.pop(DEFINING, None)
+    control.resume(DEFINING)
     if form == POINTS:
         first, second, third = (components(given[number], "XYZ") for number in (1, 2, 3))
         plane = from_points(first, second, third, LEAST)
@@ -146,7 +146,7 @@ def rotate(control: MacroControl, block: Block, code: int) -> None:
         return
     if code == CANCEL:
         control.definition = {}
-        control.suspended.pop(DEFINING, None)
+        control.resume(DEFINING)
         end(control)
     elif block.values.keys() & {"I", "J", "K"}:
         unfollowed(control, block, TILT)
@@ -220,7 +220,7 @@ def is_moved_otherwise(control: MacroControl, block: Block) -> bool:
 
 def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
     """G254 and G255."""
-    control.suspended.pop(DYNAMIC, None)
+    control.resume(DYNAMIC)
     if code == DYNAMIC_OFF:
         control.dynamic = False
         end(control)
@@ -231,7 +231,7 @@ def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
         known = not control.unknown.keys() & {*control.turning}
         machine = control.posture.directions(control.position) if known else None
     if machine is None:
-        control.suspended[DYNAMIC] = OFFSET_NOT_SOLVED
+        control.suspend(DYNAMIC, OFFSET_NOT_SOLVED)
         return
     control.dynamic = True
     begin(control, machine.axes, Block(block.index, {}, frozenset(), 0))

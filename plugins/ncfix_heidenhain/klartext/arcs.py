@@ -178,7 +178,7 @@ def tangential(control: KlartextControl, step: Step) -> None:
 def swing(control: KlartextControl, step: Step, where: FramePosition, circle: PlaneArc) -> None:
     """The arc itself."""
     plane = circle.plane
-    axes = step.words.axes | 1 << plane.first | 1 << plane.second
+    axes = step.words.axes | plane.axes
     end = command_of(control, where, axes)
     local = [0.0, 0.0, 0.0]
     local[plane.first], local[plane.second] = circle.centre

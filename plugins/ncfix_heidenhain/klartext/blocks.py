@@ -184,7 +184,7 @@ def unread_line(control: KlartextControl, text: str) -> None:
         return
     control.warn(UNREADABLE, NOT_KLARTEXT, HINT)
     if FRAME.search(text):
-        control.refusal = control.refusal or NOT_FOLLOWED.format(control.place().line)
+        control.refuse_rest(NOT_FOLLOWED.format(control.place().line))
     control.refuse_here(NOT_KLARTEXT)
 
 

@@ -138,9 +138,9 @@ class KlartextControl(base.ProgramControl):
         """Take frames into force, and what is doubtful of them; to be called after any of them has changed."""
         self.doubt_turned_datum()
         if self.doubtful:
-            self.suspended[DOUBTFUL] = self.doubtful
+            self.suspend(DOUBTFUL, self.doubtful)
         else:
-            self.suspended.pop(DOUBTFUL, None)
+            self.resume(DOUBTFUL)
         self.refresh()
 
     def switch_tip(self) -> None:
@@ -156,11 +156,11 @@ class KlartextControl(base.ProgramControl):
 
     def doubt_turned_datum(self) -> None:
         """Rotary axes with a datum of their own: it may turn the coordinates in which the tip is led."""
-        self.suspended.pop(TURNED_DATUM, None)
+        self.resume(TURNED_DATUM)
         datum = [a + b for a, b in zip(self.frames.datum.shift, self.frames.programmable.shift, strict=True)]
         turned = next((i for i in self.turning if datum[i]), None)
         if turned is not None and (self.m128 or self.plane_tilted):
-            self.suspended[TURNED_DATUM] = WHICH_WAY.format(LETTERS[turned])
+            self.suspend(TURNED_DATUM, WHICH_WAY.format(LETTERS[turned]))
 
     def anchors(self) -> list[Hashable]:
         """As of every control; shift, rotation, mirror and scale are stated by the program in numbers."""

@@ -88,7 +88,7 @@ def define(control: KlartextControl, name: str, words: MotionWords, text: str) -
     if cycle in HARMLESS:
         return
     if cycle in ADJUSTING:
-        control.refusal = control.refusal or ADJUSTED.format(cycle)
+        control.refuse_rest(ADJUSTED.format(cycle))
     if cycle in BUILDERS:
         control.refuse_here(OF_BUILDER.format(cycle))
     if cycle == MEASURING:
@@ -124,7 +124,7 @@ def call(control: KlartextControl, step: Step) -> None:
         raise Fault(NO_CYCLE, "a cycle is called, and none is defined before")
     control.use()
     if cycle.number == CALLING:
-        control.refusal = control.refusal or CALLED
+        control.refuse_rest(CALLED)
     if cycle.number not in DRILLING | MILLING | OLD_DRILLING:
         own_path(control, step)
         return

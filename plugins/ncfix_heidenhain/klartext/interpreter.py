@@ -302,7 +302,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         for code, own in plan.codes:
             after_motion(control, code, self.evaluated(own), plan.flags)
         if codes & {2, 30} and control.external:
-            control.refusal = control.refusal or ENDS_INSIDE
+            control.refuse_rest(ENDS_INSIDE)
         return bool(codes & {2, 30}) and not control.external
 
     def note_foreign(self, plan: KlartextPlan, step: Step) -> None:

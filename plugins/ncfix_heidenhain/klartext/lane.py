@@ -143,7 +143,7 @@ def count_beside(control: KlartextControl, stage: KlartextBlockRows) -> int:
 def take(control: KlartextControl, stage: KlartextBlockRows, unit: KlartextUnit, block: int, circles: Circles) -> None:
     """Add the motions of a stretch, `circles` those of its arcs, and leave the control as they leave it."""
     shapes = unit.program.template[block : block + len(stage.feed)]
-    control.suspended.pop("M130", None)
+    control.resume("M130")
     control.external, control.tilted = unit.external, False
     last = block + len(stage.feed) - 1
     control.row_block = control.row_block if unit.external else last

@@ -83,7 +83,7 @@ def straight_polar(control: KlartextControl, step: Step) -> None:
 def name_polar(control: KlartextControl, step: Step) -> None:
     """PR and PA say where the axes of the plane are as well as their own words."""
     if {"PR", "PA"} <= step.words.values.keys():
-        control.places.place(mask_of((control.path.plane.first, control.path.plane.second)))
+        control.places.place(control.path.plane.axes)
 
 
 def run(control: KlartextControl, step: Step, end: MotionEnd, axes: int, *, follows: bool = False) -> None:
@@ -206,6 +206,6 @@ def departure(control: KlartextControl, step: Step) -> None:
         length = control.stretch * step.words.values["LEN"]
         target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]
         lost = {}
-    axes = 1 << plane.first | 1 << plane.second
+    axes = plane.axes
     end = MotionEnd(target, {**control.unknown, **lost})
     control.make(Motion(MotionKind.FEED, axes, end, 10, passing=DEPARTURE))

@@ -104,12 +104,12 @@ def before_motion(control: KlartextControl, step: Step) -> None:
             control.modal.compensated = side
     for code in step.codes:
         if code in SUSPENDING:
-            control.suspended[f"M{code}"] = SUSPENDING[code]
+            control.suspend(f"M{code}", SUSPENDING[code])
         elif code in ENDING:
-            control.suspended.pop(f"M{ENDING[code]}", None)
-    control.suspended.pop("M130", None)
+            control.resume(f"M{ENDING[code]}")
+    control.resume("M130")
     if 130 in step.codes and control.plane_tilted:
-        control.suspended["M130"] = UNTILTED
+        control.suspend("M130", UNTILTED)
     if step.codes & {126, 127}:
         end_of_short_ways(control, 127 in step.codes)
     if 136 in step.codes or 137 in step.codes:
@@ -138,10 +138,10 @@ def end_of_short_ways(control: KlartextControl, on: bool) -> None:
 
 def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
     """M138: the rotary axes that tilted planes and control of the tip take into account, those of the machine again."""
-    control.suspended.pop("M138", None)
+    control.resume("M138")
     turning = {LETTERS[index].lower() for index in control.turning}
     if flags & set("abc") not in (set(), turning):
-        control.suspended["M138"] = CHOSEN
+        control.suspend("M138", CHOSEN)
 
 
 def reduce_turns(control: KlartextControl, flags: frozenset[str]) -> None:
@@ -198,14 +198,14 @@ def call_tool(
         control.tools.cutter = math.nan
     if tool is None and "DL" not in words.values:
         return
-    control.suspended.pop(TOOL, None)
+    control.resume(TOOL)
     if isinstance(tool, float) and not tool.is_integer():
         tool = f"{tool:g}"
     axis = next((letter for letter in "xyuvw" if letter in flags), None)
     if axis is not None:
-        control.suspended[TOOL] = OTHER_AXIS.format(axis.upper())
+        control.suspend(TOOL, OTHER_AXIS.format(axis.upper()))
     if "DL" in words.unknown:
-        control.suspended[TOOL] = AT_RUN_TIME
+        control.suspend(TOOL, AT_RUN_TIME)
     if isinstance(tool, str):
         control.tools.spindle = NAMED
     if isinstance(tool, float):
@@ -310,7 +310,7 @@ def call_selected(control: KlartextControl, flow: KlartextFlow, match: re.Match[
     if flow.selected:
         flow.call_program(flow.selected)
     else:
-        control.refusal = control.refusal or "the program that is called is chosen at run time"
+        control.refuse_rest("the program that is called is chosen at run time")
 
 
 def error(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
@@ -324,7 +324,7 @@ def error(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) ->
 def not_followed(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """What may change coordinates, or what later blocks do."""
     name = " ".join(match[0].partition(":")[0].split()[:3]).upper()
-    control.refusal = control.refusal or f"{name} may change coordinates in a way that is not followed"
+    control.refuse_rest(f"{name} may change coordinates in a way that is not followed")
 
 
 def free_contour(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
@@ -339,7 +339,7 @@ def probe(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) ->
     """TCH PROBE: the control moves on its own, and leaves results in Q parameters, or sets a datum by them."""
     number = int(match["number"])
     if number in SETTING:
-        control.suspended[PRESET] = MEASURED.format(number)
+        control.suspend(PRESET, MEASURED.format(number))
     control.pass_here(PROBING, AFTER_PROBING, "XYZ")
     for each in PROBED:
         control.scope.parameters.assign(f"Q{each}", Unknown())
@@ -373,23 +373,23 @@ def change_coordinates(control: KlartextControl, flow: KlartextFlow, match: re.M
 
 def select_preset(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some."""
-    control.suspended.pop(PRESET, None)
+    control.resume(PRESET)
     plain = is_plain(control) and not (control.plane_tilted or any(control.frames.programmable.shift))
     if match["rest"].strip() or control.doubtful or not plain:
-        control.suspended[PRESET] = SELECTED
+        control.suspend(PRESET, SELECTED)
         return
     control.load_preset(f"PRESET{int(match['row'])}")
 
 
 def tcpm(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """FUNCTION TCPM and FUNCTION RESET TCPM."""
-    control.suspended.pop("tcpm", None)
+    control.resume("tcpm")
     words = "" if match["reset"] else " ".join(match["rest"].upper().split())
     control.path.by_vector, control.path.spatial = "PATHCTRL VECTOR" in words, "AXIS SPAT" in words
     if control.path.spatial:
-        control.suspended["tcpm"] = SPATIAL_ANGLES
+        control.suspend("tcpm", SPATIAL_ANGLES)
     if "REFPNT" in words and "TIP-TIP" not in words:
-        control.suspended["tcpm"] = OTHER_POINT
+        control.suspend("tcpm", OTHER_POINT)
     tip_control(control, on=not match["reset"])
 
 

@@ -241,7 +241,7 @@ def doubt(control: KlartextControl, words: MotionWords, start: FramePosition) ->
 
 def polar_axes(control: KlartextControl, words: MotionWords) -> int:
     """The axes that a motion in polar coordinates moves."""
-    return words.axes | 1 << control.path.plane.first | 1 << control.path.plane.second
+    return words.axes | control.path.plane.axes
 
 
 def starts_unknown(control: KlartextControl) -> bool:

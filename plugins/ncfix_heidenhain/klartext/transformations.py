@@ -143,9 +143,9 @@ def trans(control: KlartextControl, text: str) -> None:
         from_table(control)
         return
     note_source(control, kind, by_function=True)
-    control.suspended.pop(kind, None)
+    control.resume(kind)
     if not put_in_force(control, kind, rest):
-        control.suspended[kind] = NOT_FOLLOWED.format(kind)
+        control.suspend(kind, NOT_FOLLOWED.format(kind))
     control.recompose()
 
 
@@ -176,7 +176,7 @@ def note_source(control: KlartextControl, kind: str, *, by_function: bool) -> No
         "SCALE": frames.scaling.scale != 1.0,
     }
     if in_force[kind] and by_function != (kind in control.functions):
-        control.suspended["both"] = BOTH.format(kind)
+        control.suspend("both", BOTH.format(kind))
     control.functions = control.functions | {kind} if by_function else control.functions - {kind}
 
 
@@ -245,32 +245,32 @@ def scale(control: KlartextControl, words: MotionWords, text: str) -> None:
     suspend(control, words, "scale")
     factor = words.values.get("SCL", 1.0)
     if factor <= 0.0:
-        control.suspended["scale"] = "a scale that is not above zero (cycle 11)"
+        control.suspend("scale", "a scale that is not above zero (cycle 11)")
     scale_by(control, factor if factor > 0.0 else 1.0)
 
 
 def scale_axes(control: KlartextControl, words: MotionWords, text: str) -> None:
     """Cycle 26: `26.1 X1.4 Y0.6`: nothing is corrected while an axis has a scale of its own."""
-    control.suspended.pop("scales", None)
+    control.resume("scales")
     if any(factor != 1.0 for key, factor in words.values.items() if key in "XYZ"):
-        control.suspended["scales"] = "a scale of single axes (cycle 26)"
+        control.suspend("scales", "a scale of single axes (cycle 26)")
 
 
 def preset(control: KlartextControl, words: MotionWords, text: str) -> None:
     """Cycle 247: the preset of the row Q339."""
     number = control.scope.parameters.get("Q339")
-    control.suspended.pop(PRESET, None)
+    control.resume(PRESET)
     if isinstance(number, Unknown):
-        control.suspended[PRESET] = NO_PRESET
+        control.suspend(PRESET, NO_PRESET)
         return
     control.load_preset(f"PRESET{number:g}")
 
 
 def suspend(control: KlartextControl, words: MotionWords, what: str) -> None:
     """Nothing is corrected while a transformation depends on what is known only at run time."""
-    control.suspended.pop(what, None)
+    control.resume(what)
     if words.unknown:
-        control.suspended[what] = f"the {what} of the coordinates is known only at run time"
+        control.suspend(what, f"the {what} of the coordinates is known only at run time")
 
 
 ACTS: Mapping[int, Callable[[KlartextControl, MotionWords, str], None]] = {
@@ -391,9 +391,9 @@ def by_axes(control: KlartextControl, values: Values, flags: frozenset[str]) -> 
 def tilt_to(control: KlartextControl, tilt: Rotation | None, flags: frozenset[str], refusal: str = "") -> None:
     """Make a tilted plane the frame; None: none."""
     frames, control.plane_tilted = with_plane(control, tilt), tilt is not None
-    control.suspended.pop(TILTED, None)
+    control.resume(TILTED)
     if refusal:
-        control.suspended[TILTED] = refusal
+        control.suspend(TILTED, refusal)
     home = tilt is None and flags & {"turn", "move"}
     way = None if refusal else way_home(control) if home else chosen_way(control, tilt, flags)
     for letter, name in zip("ABC", CALCULATED, strict=True):

@@ -26,7 +26,7 @@ def arc(control: RS274Control, block: Block, code: int) -> None:
     check_words(control, block, plane)
     control.use_start_positions(tuple(control.unknown))
     end = destination(control, block)
-    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
+    step = control.way_to(end.target)
     point = step[plane.first], step[plane.second]
     doubtful = bool(end.unknown or control.unknown or block.unknown or control.composed.unknown)
     clockwise = code == CLOCKWISE
@@ -73,7 +73,7 @@ def check_words(control: RS274Control, block: Block, plane: Plane) -> None:
     if "R" in block.values:
         if centre:
             raise Fault(ARC_FAULT, f"the arc has both R and {centre[0]}")
-        if not block.axes & (1 << plane.first | 1 << plane.second):
+        if not block.axes & plane.axes:
             raise Fault(ARC_FAULT, "an arc given by R needs an end point in its plane")
         return
     if not centre:

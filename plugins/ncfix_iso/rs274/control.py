@@ -145,7 +145,7 @@ class RS274Control(shared.ProgramControl):
         """A value that decides where to go on; where it is known only at run time nothing after it is certain."""
         value = function(self)
         if isinstance(value, Unknown):
-            self.refusal = self.refusal or RUNTIME_BRANCH
+            self.refuse_rest(RUNTIME_BRANCH)
         return nominal(value)
 
     def coordinate(self, index: int) -> Value:

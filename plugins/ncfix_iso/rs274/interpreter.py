@@ -262,9 +262,9 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             pairs.append((word, round(tenths)))
             like = self.control.rules.aliases.get((word.address, round(tenths)))
             if like is not None and like.words:
-                self.control.refusal = self.control.refusal or COMPUTED_ALIAS.format(f"{word.address}{tenths / 10:g}")
+                self.control.refuse_rest(COMPUTED_ALIAS.format(f"{word.address}{tenths / 10:g}"))
         if unknown:
-            self.control.refusal = self.control.refusal or "a G or M code is known only at run time"
+            self.control.refuse_rest("a G or M code is known only at run time")
         return grouped_codes(pairs, plan.letters, self.control.rules)
 
     def unknown_codes(self, plan: RS274Plan, codes: Codes) -> None:
@@ -298,10 +298,10 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         """Motions with @ or ^ are followed; written they can be in X and Y only."""
         polar = bool(block.values.keys() & POLAR)
         if polar:
-            self.control.suspended[POLAR_WORDS] = POLAR_WORDS
+            self.control.suspend(POLAR_WORDS, POLAR_WORDS)
         yield
         if polar:
-            self.control.suspended.pop(POLAR_WORDS)
+            self.control.resume(POLAR_WORDS)
 
     def move(self, block: Block, codes: Codes, motion: int) -> None:
         """The motion of a block."""

@@ -165,9 +165,9 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     on = control.setup.tcp or control.tip_control or control.tilted
     number = number if (on and number) or any(tool) or lacking else None
     if "H" in block.unknown or (code in DYNAMIC_OFFSETS and block.unknown):
-        control.refusal = control.refusal or "a tool length offset is known only at run time"
+        control.refuse_rest("a tool length offset is known only at run time")
     if code == 435:
-        control.refusal = control.refusal or "the tool direction is given by I J K (G43.5)"
+        control.refuse_rest("the tool direction is given by I J K (G43.5)")
     across = (X, Y) if on and not (control.tcp and control.stands_square()) else ()
     if on or control.tcp:
         switch(control, tool, on, number)
@@ -211,7 +211,7 @@ def numbered_tool(control: RS274Control, block: Block) -> int:
     if number is not None and (number or not control.rules.strict):
         return number
     if control.tools.unsure:
-        control.refusal = control.refusal or TOOL_AT_RUN_TIME
+        control.refuse_rest(TOOL_AT_RUN_TIME)
     return control.tools.spindle
 
 
@@ -223,7 +223,7 @@ def is_lacking(control: RS274Control, number: int) -> bool:
 def length_of(control: RS274Control, number: int) -> float:
     """The length of a tool for an offset, mm."""
     if number in control.tools.measured:
-        control.refusal = control.refusal or f"the length of tool {number} is measured at run time"
+        control.refuse_rest(f"the length of tool {number} is measured at run time")
     if number in control.tools.lengths:
         return control.tools.lengths[number]
     if number == 0 and not control.rules.strict:
@@ -241,10 +241,10 @@ def set_data(control: RS274Control, block: Block, code: int) -> None:
     """
     kind = whole(block.get("L", -1.0), "L of G10")
     if block.unknown & {"L", "P"}:
-        control.refusal = control.refusal or "what G10 sets is known only at run time"
+        control.refuse_rest("what G10 sets is known only at run time")
     alike = kind == 2 and "R" not in block.values and block.get("P") != 0.0 and not control.modal.incremental
     if not control.rules.strict and not alike:
-        control.refusal = control.refusal or DIFFERS.format(kind)
+        control.refuse_rest(DIFFERS.format(kind))
     elif kind in (2, 20):
         set_system(control, block, at_position=kind == 20)
     elif kind in (1, 10, 11):

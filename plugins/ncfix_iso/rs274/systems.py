@@ -121,7 +121,7 @@ def moved_while_turned(control: RS274Control, what: str) -> None:
     LinuxCNC knows only turns of the work offset itself, and what they do.
     """
     if not control.rules.strict and (is_turned(control) or control.tilted):
-        control.suspended[TURNED] = MOVED_WHILE_TURNED.format(what)
+        control.suspend(TURNED, MOVED_WHILE_TURNED.format(what))
 
 
 def is_turned(control: RS274Control) -> bool:
@@ -132,7 +132,7 @@ def is_turned(control: RS274Control) -> bool:
 
 def turned_back(control: RS274Control) -> None:
     """Coordinates are no longer turned: where the axes stand after an origin that was moved is not known."""
-    if not (is_turned(control) or control.tilted) and control.suspended.pop(TURNED, ""):
+    if not (is_turned(control) or control.tilted) and control.resume(TURNED):
         control.lose(control.machine, AFTER_TURNED)
 
 
@@ -339,7 +339,7 @@ def rotate_system(control: RS274Control, block: Block, code: int) -> None:
     """G68 X Y R turns the coordinates of the plane about a point, G69 ends it."""
     before = control.frames.rotation.rotation
     if code == 680 and (why := uncertain(control, block)):
-        control.suspended[ENDS[690]] = why
+        control.suspend(ENDS[690], why)
         return
     control.frames = replace(control.frames, rotation=WORLD)
     if code == 680:
@@ -376,7 +376,7 @@ def turn_about_point(control: RS274Control, block: Block, before: Rotation) -> N
         else:
             control.use_start_positions((index,))
     if block.unknown or control.unknown.keys() & {plane.first, plane.second}:
-        control.refusal = control.refusal or "the centre or angle of a rotation (G68) is known only at run time"
+        control.refuse_rest("the centre or angle of a rotation (G68) is known only at run time")
     turned = turned_about(product(before, about(plane, block.get("R"))), centre)
     control.frames = replace(control.frames, rotation=turned)
 
@@ -387,6 +387,6 @@ def unfollowed(control: RS274Control, block: Block, code: int) -> None:
         if code == 510 and not block.axes and not block.values.keys() & {"I", "J", "K", "P"}:
             return
         key, words = UNFOLLOWED[code]
-        control.suspended[key] = f"{words} is in force, which ncfix does not follow"
-    elif control.suspended.pop(ENDS[code], None):
+        control.suspend(key, f"{words} is in force, which ncfix does not follow")
+    elif control.resume(ENDS[code]):
         control.lose(control.machine, AFTER_UNFOLLOWED)

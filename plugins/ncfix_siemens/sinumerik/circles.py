@@ -31,7 +31,7 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     control.use_all_start_positions()
     end, heading, plane = destination(control, words), control.heading, control.modal.plane
     why = tangent_refusal(words)
-    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
+    step = control.way_to(end.target)
     ahead = (0.0, 0.0) if heading is None else (heading[plane.first], heading[plane.second])
     chord = step[plane.first], step[plane.second]
     if why or end.unknown or control.unknown or not math.hypot(*ahead):
@@ -109,7 +109,7 @@ def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
         if not doubtful and not refusal:
             raise
         centre = (1.0, 0.0)
-    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
+    step = control.way_to(end.target)
     finish = step[plane.first], step[plane.second]
     sweep = sweep_angle(centre, finish, 1 + max(round(words.get("TURN")), 0), clockwise=clockwise)
     circle = circle_of(control, plane, centre, sweep)._replace(fixed=is_fixed(words, plane))
@@ -142,7 +142,7 @@ def doubtful_diameter(control: Sinumerik, words: BlockWordValues, address: str) 
 def geometry(control: Sinumerik, words: BlockWordValues, end: End, *, clockwise: bool) -> tuple[Point, End]:
     """The centre relative to the start in the plane, mm, and the end; raises `Fault` if the control refuses the arc."""
     plane = control.modal.plane
-    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
+    step = control.way_to(end.target)
     chord = step[plane.first], step[plane.second]
     letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
     has_centre = any(letter in words.values for letter in letters)
@@ -198,7 +198,7 @@ def ended_by_angle(control: Sinumerik, words: BlockWordValues, end: End, centre:
     step = [0.0, 0.0, 0.0]
     step[plane.first] = centre[0] - centre[0] * cosine + centre[1] * sine
     step[plane.second] = centre[1] - centre[0] * sine - centre[1] * cosine
-    whole = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
+    whole = control.way_to(end.target)
     step[plane.across] = whole[plane.across]
     target = end.target[:]
     target[:3] = [here + dot(row, step) for here, row in zip(control.position, control.rotation, strict=False)]

@@ -92,7 +92,7 @@ def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float,
 def lead_to(control: Sinumerik, block: int, point: tuple[float, float], name: str) -> tuple[BlockWordValues, End, str]:
     """The words that lead to a place, where that is, and why its hole is not corrected."""
     plane, program, lost = control.modal.plane, control.program_position(), dict(control.lost)
-    axes = mask_of((plane.first, plane.second))
+    axes = plane.axes
     for index, value in zip((plane.first, plane.second), point, strict=True):
         program[index] = control.stretch * value
         lost.pop(index, None)
@@ -167,7 +167,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
     name, block = step.name.upper(), words.block
     if step.name not in DRILLING:
         if modal:
-            control.suspended["cycle"] = f"the modal cycle {name} is in force, which ncfix does not follow"
+            control.suspend("cycle", f"the modal cycle {name} is in force, which ncfix does not follow")
             return
         if points := points_of(control, step):
             pattern(control, block, name, points)
@@ -175,7 +175,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
         holes = step.name.startswith(("holes", "cycle80"))
         refuse(control, block, (MADE_HOLES if holes else MADE).format(name))
         if MEASURING.fullmatch(step.name):
-            control.refusal = control.refusal or f"{name} measures, and may set offsets at run time"
+            control.refuse_rest(f"{name} measures, and may set offsets at run time")
         return
     drilling = drilling_of(control, step)
     if modal:

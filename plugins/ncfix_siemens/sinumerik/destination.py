@@ -97,12 +97,12 @@ def polar(control: Sinumerik, words: BlockWordValues, program: Vector, lost: Unk
     control.check_offset()
     if pole is None or angle is None or radius is None or why:
         lost |= dict.fromkeys((plane.first, plane.second), why or (RUNTIME if pole else NO_POLE))
-        return mask_of((plane.first, plane.second))
+        return plane.axes
     program[plane.first] = pole[0] + radius * math.cos(angle)
     program[plane.second] = pole[1] + radius * math.sin(angle)
     for index in (plane.first, plane.second):
         lost.pop(index, None)
-    return mask_of((plane.first, plane.second))
+    return plane.axes
 
 
 def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector, radius: float | None) -> str:

@@ -43,13 +43,13 @@ def programmable(control: Sinumerik, name: str, words: BlockWordValues) -> None:
     """TRANS, ROT, SCALE, MIRROR and, with A before them, what is added to what is in force."""
     kind = name.removeprefix("a") if name.startswith("a") else name
     if any(value is None for value in words.values.values()):
-        control.refusal = control.refusal or FRAME_AT_RUNTIME.format(name.upper())
+        control.refuse_rest(FRAME_AT_RUNTIME.format(name.upper()))
         return
     frame, fault = FRAMES[kind](control, words)
     if fault:
-        control.suspended["frame"] = fault
+        control.suspend("frame", fault)
     elif name == kind:
-        control.suspended.pop("frame", None)
+        control.resume("frame")
     modes = control.modes
     before = control.frames.programmable if name != kind else WORLD
     if name == kind:
@@ -64,7 +64,7 @@ def programmable(control: Sinumerik, name: str, words: BlockWordValues) -> None:
 def over_fine(control: Sinumerik, name: str, words: BlockWordValues) -> None:
     """A frame is programmed anew; whether what G59 has set goes with the one before is told in two ways."""
     if control.modes.fine and axis_values(words):
-        control.suspended["frame"] = FINE_STAYS.format(name.upper())
+        control.suspend("frame", FINE_STAYS.format(name.upper()))
     control.modes.added, control.modes.fine = ZEROS, False
 
 
@@ -124,11 +124,11 @@ def programmed_shift(control: Sinumerik, words: BlockWordValues, code: int) -> N
     """G58 and G59 with axis words replace the absolute and the additive part of the shift."""
     values = {INDEX[letter]: value * unit(control, INDEX[letter]) for letter, value in axis_values(words).items()}
     if any(value is None for value in words.values.values()):
-        control.refusal = control.refusal or FRAME_AT_RUNTIME.format(f"G{code // 10}")
+        control.refuse_rest(FRAME_AT_RUNTIME.format(f"G{code // 10}"))
         return
     frame, added = control.frames.programmable, control.modes.added
     if added is None:
-        control.suspended["frame"] = MIXED_SHIFTS.format(code // 10)
+        control.suspend("frame", MIXED_SHIFTS.format(code // 10))
         return
     if code == 590:
         control.modes.added = Affine(added).shifted_to(values).shift
@@ -180,7 +180,7 @@ def feed_mode(control: Sinumerik, code: int) -> None:
         control.modal.feed, control.modal.feed_given = float("nan"), False
     control.modal.feed_mode = mode
     if code in (960, 9610, 9620) and not control.modes.said:
-        control.suspended["diameter"] = UNSAID
+        control.suspend("diameter", UNSAID)
 
 
 def compensation(control: Sinumerik, code: int) -> None:
@@ -200,7 +200,7 @@ def tool(control: Sinumerik, words: BlockWordValues, change: bool, at_once: bool
     if called and not call_tool(control, words):
         return
     if at_once and control.changed_by_cycle and not change and not edge:
-        control.suspended["tool"] = WHO_CHANGES
+        control.suspend("tool", WHO_CHANGES)
         return
     if change or (at_once and called):
         into_spindle(control)
@@ -216,7 +216,7 @@ def call_tool(control: Sinumerik, words: BlockWordValues) -> bool:
     control.fresh_tool = True
     name, value = words.texts.get("T"), words.values.get("T")
     if name is None and value is None:
-        control.refusal = control.refusal or "the tool (T) is known only at run time"
+        control.refuse_rest("the tool (T) is known only at run time")
         return False
     control.tools.select(control.named.number(name) if name is not None else round(value or 0.0))
     return True
@@ -226,7 +226,7 @@ def choose_edge(control: Sinumerik, words: BlockWordValues) -> bool:
     """D: the cutting edge in force; False where that is not known."""
     value = words.values["D"]
     if value is None:
-        control.refusal = control.refusal or "the cutting edge (D) is known only at run time"
+        control.refuse_rest("the cutting edge (D) is known only at run time")
         return False
     control.edge = round(value)
     return True
@@ -234,7 +234,7 @@ def choose_edge(control: Sinumerik, words: BlockWordValues) -> bool:
 
 def into_spindle(control: Sinumerik) -> None:
     """The tool that is selected comes into the spindle, with its edge D1."""
-    control.suspended.pop("tool", None)
+    control.resume("tool")
     control.tools.change()
     control.edge = 1
     control.places.lose(mask_of(control.machine))
@@ -263,11 +263,11 @@ def set_length(control: Sinumerik) -> None:
     vector: Vector = zeros()
     across = control.modal.plane.across
     constant = control.variables.value(LENGTH_ACROSS)
-    control.suspended.pop("length", None)
+    control.resume("length")
     if across == 2 or constant == 17.0:
         vector[2] = length
     elif length and isinstance(constant, Unknown):
-        control.suspended["length"] = PLANE_LENGTH
+        control.suspend("length", PLANE_LENGTH)
     else:
         vector[across] = length
     control.tools.offset = number if edge and number else None

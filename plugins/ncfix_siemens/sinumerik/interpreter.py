@@ -257,11 +257,11 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         control = self.control
         if is_statement(plan):
             why = f"the block {say(text)} is not understood, and may move axes or change coordinates"
-            control.refusal = control.refusal or why
+            control.refuse_rest(why)
             control.warn(NOT_UNDERSTOOD, control.refusal, "all motions after it are refused")
         if "synchronized" in plan.opaque and not is_harmless(text):
             why = f"the synchronized action {say(text)} may move axes"
-            control.refusal = control.refusal or why
+            control.refuse_rest(why)
             control.warn(SYNCHRONOUS, control.refusal, "all motions after it are refused")
 
     def evaluate(self, plan: SinumerikPlan, index: int) -> BlockWordValues:
@@ -307,7 +307,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
             )
         )
     else:
-        control.refusal = control.refusal or f"{why} is not followed"
+        control.refuse_rest(f"{why} is not followed")
 
 
 def follow_polynomial(control: Sinumerik, turn: Turn, step: Letting, letter: str | None) -> None:
@@ -329,11 +329,11 @@ def note_letting(control: Sinumerik, turn: Turn, step: Letting) -> None:
         return
     if OF_THE_CONTROL.match(step.name):
         why = f"the program sets {step.name.upper()}, which may change coordinates or tool lengths"
-        control.refusal = control.refusal or why
+        control.refuse_rest(why)
     elif step.name in PROBING:
         turn.special.add("meas")
     elif step.name in UNSEEN and step.index:
-        control.refusal = control.refusal or f"{UNSEEN[step.name]} is not followed"
+        control.refuse_rest(f"{UNSEEN[step.name]} is not followed")
 
 
 DECIDED_AT_RUNTIME = "which blocks are executed here is decided at run time"
@@ -344,7 +344,7 @@ MACHINE = frozenset({530, 1530})
 def sweep(flow: SinumerikFlow) -> int | None:
     """Refuse the motions of all that is left; the first block that may be executed again, None for none."""
     control = flow.control
-    control.refusal = control.refusal or DECIDED_AT_RUNTIME
+    control.refuse_rest(DECIDED_AT_RUNTIME)
     control.lose_all(DECIDED_AT_RUNTIME)
     places = [call.back for call in flow.calls] + [(flow.unit, flow.block - 1)]
     again = [found for unit, block in places if not unit.external if (found := earliest(unit, block)) is not None]

@@ -250,9 +250,9 @@ def even_motions(control: Sinumerik, motion: IntArray) -> list[bool]:
 
 def swivel(control: Sinumerik, block: int, step: Calling) -> None:
     """CYCLE800: without arguments it takes the tilt away, with them it tilts the plane."""
-    control.suspended.pop("tilt", None)
+    control.resume("tilt")
     if control.frames.programmable != WORLD:
-        control.suspended["frame"] = OVER_FRAME
+        control.suspend("frame", OVER_FRAME)
     if all(part is None or isinstance(part, StringLiteral) for part in step.written):
         untilted(control)
         return
@@ -263,11 +263,11 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
     values = [number(value(control)) for value in step.arguments]
     written = zip(values, step.written, strict=True)
     if any(value is None and part is not None and not isinstance(part, StringLiteral) for value, part in written):
-        control.refusal = control.refusal or "a tilted plane (CYCLE800) is known only at run time"
+        control.refuse_rest("a tilted plane (CYCLE800) is known only at run time")
         return
     plane = SwivelPlane.of([value or 0.0 for value in values] + [0.0] * 16)
     if plane.fault:
-        control.suspended["tilt"] = UNFOLLOWED.format(plane.fault)
+        control.suspend("tilt", UNFOLLOWED.format(plane.fault))
         control.lose_all(AFTER_SWIVEL)
         return
     if plane.direction:
@@ -360,7 +360,7 @@ def level(control: Sinumerik, plane: SwivelPlane) -> None:
     control.use_start_positions(control.turning)
     whole = plane.within(control.frames.plane)
     if whole.rotation != WORLD.rotation or not rotary_at_zero(control, control.position, control.unknown):
-        control.suspended["tilt"] = UNFOLLOWED.format(STILL)
+        control.suspend("tilt", UNFOLLOWED.format(STILL))
         control.lose_all(AFTER_SWIVEL)
         return
     take_plane(control, whole)

@@ -130,7 +130,7 @@ class Sinumerik(ProgramControl):
         """DIAMON, DIAM90 or DIAMOF, in lower case: X counts in diameters or not."""
         self.modes.diameter = "" if name == "diamof" else name.upper()
         self.modes.said, self.modal.diameter = True, name != "diamof"
-        self.suspended.pop("diameter", None)
+        self.resume("diameter")
         self.refresh()
 
     # -- frames -------------------------------------------------------------------------------------------------------
@@ -340,7 +340,7 @@ class Sinumerik(ProgramControl):
     def _axes_of(self, words: BlockWordValues) -> int:
         """The axes that a block names, as bits: polar coordinates name both axes of the plane."""
         plane = self.modal.plane
-        return words.axes | (1 << plane.first | 1 << plane.second if words.values.keys() & {"AP", "RP"} else 0)
+        return words.axes | (plane.axes if words.values.keys() & {"AP", "RP"} else 0)
 
     def _lost_at_end(self, motion: Motion) -> UnknownAxes:
         """As for all controls; the book of turned coordinates is `lost`."""

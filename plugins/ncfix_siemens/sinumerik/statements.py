@@ -52,7 +52,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
     """A subprogram, or a cycle of the machine's builder."""
     if turn.modal:
         text = f"the modal subprogram {step.name.upper()} is in force, which ncfix does not follow"
-        control.suspended["cycle"] = text
+        control.suspend("cycle", text)
         return
     unit = find(step.name)
     if unit is not None:
@@ -60,9 +60,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
         turn.times = round(turn.words.get("P", 1.0))
         return
     if step.name.startswith(TRANSFORMING):
-        control.suspended[step.name] = (
-            f"the transformation {step.name.upper()} is in force, which ncfix does not follow"
-        )
+        control.suspend(step.name, f"the transformation {step.name.upper()} is in force, which ncfix does not follow")
         return
     ran_elsewhere(control, step.name.upper(), changes_tool=control.fresh_tool)
 
@@ -98,10 +96,10 @@ def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
     if "L" not in turn.words.values:
         return
     if turn.modal:
-        control.suspended["cycle"] = "a modal subprogram (MCALL L) is in force, which ncfix does not follow"
+        control.suspend("cycle", "a modal subprogram (MCALL L) is in force, which ncfix does not follow")
         return
     if value is None:
-        control.refusal = control.refusal or "which subprogram is called (L) is known only at run time"
+        control.refuse_rest("which subprogram is called (L) is known only at run time")
         return
     unit = find(f"L{value:g}")
     if unit is None:
@@ -201,7 +199,7 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     elif name == "cycle832":
         tolerance(control, step)
     elif name in UNFOLLOWED:
-        control.suspended[name] = f"{UNFOLLOWED[name]} is in force, which ncfix does not follow"
+        control.suspend(name, f"{UNFOLLOWED[name]} is in force, which ncfix does not follow")
     elif name in ("orimks", "oriwks"):
         control.modes.orientation_in_machine = name == "orimks"
     elif name in ANGLE_KINDS:
@@ -228,9 +226,9 @@ def supa(control: Sinumerik, turn: Turn, step: Calling) -> None:
 def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """TRAORI."""
     mind_frame(control, step)
-    control.suspended.pop("traori", None)
+    control.resume("traori")
     if len(step.written) > 1:
-        control.suspended["traori"] = "TRAORI with a direction of the tool of its own is in force"
+        control.suspend("traori", "TRAORI with a direction of the tool of its own is in force")
     number_of = number(step.arguments[0](control)) if step.written else None
     if number_of is not None and number_of != 1.0:
         text = f"TRAORI({number_of:g}) is taken as the kinematics of the machine file"
@@ -243,13 +241,13 @@ def tolerance(control: Sinumerik, step: Calling) -> None:
     """CYCLE832: older controls take the third digit of its second argument as that of a transformation."""
     kind = number(step.arguments[1](control)) if len(step.arguments) > 1 else None
     if kind is not None and round(kind) // 100 % 10 and not control.modes.transformed:
-        control.suspended["traori"] = SWITCHED_ON
+        control.suspend("traori", SWITCHED_ON)
 
 
 def mind_frame(control: Sinumerik, step: Calling) -> None:
     """A programmed frame is in force while a transformation goes on or off: machine data say whether it stays."""
     if control.frames.programmable != WORLD and control.variables.value(FRAMES_STAY) != 1.0:
-        control.suspended["frame"] = FRAME_OVER.format(step.name.upper())
+        control.suspend("frame", FRAME_OVER.format(step.name.upper()))
     control.modes.carried = step.name.upper()
 
 
@@ -266,7 +264,7 @@ def end_unfollowed(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """TRAFOOF, TOROTOF, PAROTOF, CP: what they end is not in force any more."""
     over = ENDED_BY[step.name] & control.suspended.keys()
     for name in over:
-        del control.suspended[name]
+        control.resume(name)
     if over:
         control.lose_all(framing.AFTER_UNFOLLOWED)
 
@@ -275,7 +273,7 @@ def modal_call(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """MCALL: what follows it is called after each motion; alone it ends that."""
     turn.modal = True
     control.modes.modal_cycle = None
-    if control.suspended.pop("cycle", None):
+    if control.resume("cycle"):
         control.lose_all(AFTER_CYCLE)
 
 
@@ -336,7 +334,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
     """Codes and words of the block, and its motion."""
     words, plan = turn.words, turn.plan
     if "G" in words.values:
-        control.refusal = control.refusal or "a G code that is computed (G=..) is not followed"
+        control.refuse_rest("a G code that is computed (G=..) is not followed")
     codes(control, turn)
     if turn.frame:
         framing.programmable(control, turn.frame, words)

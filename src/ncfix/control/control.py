@@ -141,6 +141,18 @@ class ProgramControl(ControlState):
         self.refusal = f"{name} is not known, and may move axes or change coordinates"
         self.warn("NCF228", self.refusal, TAKEN if passed else NEITHER.format(name))
 
+    def refuse_rest(self, why: str) -> None:
+        """Every motion from here on is refused; the first reason is the one that is told."""
+        self.refusal = self.refusal or why
+
+    def suspend(self, mode: str, why: str) -> None:
+        """Motions are refused until `resume` of the same mode."""
+        self.suspended[mode] = why
+
+    def resume(self, mode: str) -> bool:
+        """A mode that suspended motions is over; whether it was in force."""
+        return self.suspended.pop(mode, None) is not None
+
     @property
     def remarks(self) -> tuple[Message, ...]:
         """All that there is to say of the program, in the same order whether it was followed in parts or as a whole."""

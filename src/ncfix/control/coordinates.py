@@ -42,6 +42,11 @@ class Plane:
     second: int
     across: int
 
+    @property
+    def axes(self) -> int:
+        """Its two axes as a bit mask."""
+        return 1 << self.first | 1 << self.second
+
 
 PLANES = {
     170: Plane(170, X, Y, Z),

@@ -189,7 +189,7 @@ class Suspend(Operation):
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
-        control.suspended[self.mode] = NOT_FOLLOWED.format(self.mode)
+        control.suspend(self.mode, NOT_FOLLOWED.format(self.mode))
 
     def __str__(self) -> str:
         return f"motions are refused from here: {self.mode}"
@@ -203,7 +203,7 @@ class Resume(Operation):
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
-        if control.suspended.pop(self.mode, None):
+        if control.resume(self.mode):
             control.lose(control.machine, AFTER.format(self.mode))
 
     def __str__(self) -> str:
@@ -218,7 +218,7 @@ class Refuse(Operation):
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
-        control.refusal = control.refusal or self.why
+        control.refuse_rest(self.why)
 
     def __str__(self) -> str:
         return f"motions are refused from here on: {self.why}"

@@ -284,6 +284,10 @@ class ControlState(ABC):
             return step
         return [dot(row, step) for row in self.inverse] + step[3:]
 
+    def way_to(self, target: Vector) -> Vector:
+        """The way from where the control stands to a command, in the axes of the program's frame, mm and rad."""
+        return self.in_frame([b - a for a, b in zip(self.position, target, strict=True)])
+
     def command(self, program: Vector, axes: int) -> Vector:
         """The command of a position in the program's frame; axes that no word of `axes` moves stay where they are.
 
@@ -379,7 +383,7 @@ class ControlState(ABC):
     @property
     def plane_axes(self) -> int:
         """The axes of the plane that the machine has, as bits."""
-        return mask_of((self.modal.plane.first, self.modal.plane.second)) & mask_of(self.machine)
+        return self.modal.plane.axes & mask_of(self.machine)
 
     def tool_length(self) -> tuple[int, float]:
         """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
