@@ -16,6 +16,7 @@ import stat
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import IO
 
@@ -39,6 +40,8 @@ WRITING = {
 """What to do about what the system says."""
 COPIED = 1 << 20
 """Bytes that are copied at once."""
+COMPARED = 1000
+"""So many names of a folder are compared with one that is not there."""
 PERMISSIONS = 0o777
 """Bits of a mode that say who may read, write and run a file."""
 FOLDER = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0)
@@ -92,8 +95,21 @@ def read_folder(folder: str) -> dict[str, bytes]:
 
 def unreadable(path: str, error: OSError) -> SourceError:
     """The error NCF002 for what the system says of an input."""
-    hint = READING.get(error.errno or 0, "give an existing file's path")
-    return SourceError.of("NCF002", f"cannot be read: {error.strerror}", Place(path), hint)
+    return SourceError.of("NCF002", f"cannot be read: {error.strerror}", Place(path), reading_hint(path, error))
+
+
+def reading_hint(path: str, error: OSError) -> str:
+    """What to do about what the system says of an input: for a name that there is not, the nearest in its folder."""
+    if error.errno == errno.ENOENT and path:
+        from difflib import get_close_matches
+
+        folder, name = os.path.split(path.rstrip(os.sep))
+        if folder and not os.path.isdir(folder):
+            return f"there is no folder {folder}"
+        with suppress(OSError), os.scandir(folder or ".") as entries:
+            if close := get_close_matches(name, [entry.name for entry in islice(entries, COMPARED)], 1):
+                return f"did you mean {os.path.join(folder, close[0])}?"
+    return READING.get(error.errno or 0, "give an existing file's path")
 
 
 def unwritable(path: str, error: OSError) -> UsageError:

@@ -132,12 +132,22 @@ def leave(plugin: str, source: str, kind: str, name: str, why: str) -> None:
     report(Message("NCF508", text, hint="tell its author; docs/plugins.md says what each hook registers"))
 
 
+LONG = 7
+"""A word of a title with so many letters is the name of a make or a control: `sinumerik`, `klartext`."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A hint for a name that nobody registered: the one that was meant, perhaps, or all there are."""
+    """A hint for a name that nobody registered: the one that was meant, perhaps, or all there are.
+
+    known  the names; of a mapping to things with a `title` also the long words of these are compared
+    """
     from difflib import get_close_matches
 
-    names = sorted(known)
-    close = get_close_matches(name, names, 1)
+    names, lower = sorted(known), name.lower()
+    close = get_close_matches(lower, names, 1)
+    if not close and isinstance(known, Mapping):
+        titles = {each: str(getattr(known[each], "title", "")).lower() for each in names}
+        close = [each for each in names if any(len(word) >= LONG and word in lower for word in titles[each].split())]
     return f"did you mean {close[0]}?" if close else f"there are {', '.join(names)}"
 
 

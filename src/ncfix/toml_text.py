@@ -23,6 +23,11 @@ DOTTED = rf"{KEY}(?:\s*\.\s*{KEY})*"
 HEADER = re.compile(rf"\s*(\[\[?)\s*({DOTTED})\s*\]")
 ASSIGNMENT = re.compile(rf"\s*({DOTTED})\s*=")
 QUOTES = re.compile(r'"""|\'\'\'')
+OTHERS = {
+    "a measurement": re.compile(r"# *ncfix-measurement"),
+    "an NC program": re.compile(r"\s*(?:[%;(]|[NOG][\d.]++[ \t]*+(?!=)|\d*\s*BEGIN PGM)"),
+}
+"""How files begin that are named where TOML is meant."""
 WIDTH = 120
 """Characters in a line that is written."""
 
@@ -48,7 +53,8 @@ def parsed(text: str, path: str, code: str, hint: str = "") -> dict[str, Any]:
         line, column = (int(found[1]), int(found[2])) if found else (text.count("\n") + 1, 0)
         what = re.sub(r"\s*\(at [^)]*\)$", "", str(error))
         place = Place(path, line, column, _row(text, line))
-        raise ConfigError.of(code, f"not TOML: {what}", place, hint) from error
+        other = next((f"this looks like {kind}" for kind, sign in OTHERS.items() if sign.match(text)), hint)
+        raise ConfigError.of(code, f"not TOML: {what}", place, other) from error
     except ValueError as error:  # Python reads whole numbers of up to 4300 digits
         text = "not TOML that can be read: a number has thousands of digits"
         raise ConfigError.of(code, text, Place(path), hint) from error

@@ -34,6 +34,15 @@ SILLY = [
     (["diagnose", "part.ngc", "./part.ngc", "-m", "machine.toml"], 2, "NCF020: is given twice"),
     (["check", "nothing.ngc"], 3, "nothing.ngc: NCF002: cannot be read: No such file"),
     (["machine", "check", "."], 3, "hint: name a file, not a folder"),
+    (["fix", "prt.ngc", "-m", "machine.toml", "-o", "a"], 3, "hint: did you mean part.ngc?"),
+    (["fix", "parts/part.ngc", "-m", "machine.toml", "-o", "a"], 3, "hint: there is no folder parts"),
+    (["fix", "part.ngc", "-m", "machin.toml", "-o", "a"], 3, "hint: did you mean machine.toml?"),
+    (["fix", "part.ngc", "-o", "a"], 2, "hint: -m FILE; `ncfix init` says it once for a folder"),
+    (["fix", "machine.toml", "-m", "machine.toml", "-o", "a"], 3, "NCF103: this is a machine file, not a program"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--setup", "part.ngc"], 3, "looks like an NC program"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--dialect", "SINUMERIK"], 2, "hint: did you mean siemens?"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--offset", "G54=0,0,0,0,0,9"], 2, "NCF384: work offset G54"),
+    (["export", "klartext", "-m", "machine.toml", "-o", "t"], 2, "hint: did you mean heidenhain?"),
 ]
 
 

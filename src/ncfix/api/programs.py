@@ -67,7 +67,8 @@ def fix(
 
     options = FixOptions(strategy, tolerance_um, allow_refused, force, split_rapids, flatten, block_numbers, figures)
     check_writable(output, force, program, machine, setup)
-    known, own = sound_machine(machine, force), as_setup(setup)
+    known = sound_machine(machine, force)
+    own = as_setup(setup, known)
     read = as_program(program, known)
     found = fixed(read, known, own, options, resolve or subprograms_of(own, read))
     if output is not None and found.report.refused and not allow_refused:
@@ -100,7 +101,8 @@ def verify(
     from ncfix.text.reader import read_like
 
     TOLERANCE_UM.check("tolerance_um", tolerance_um)
-    known, own = as_machine(machine), as_setup(setup)
+    known = as_machine(machine)
+    own = as_setup(setup, known)
     own = replace(own, assume_zero=True) if known.is_perfect else own
     first = as_program(original, known)
     if isinstance(fixed, bytes):
@@ -182,7 +184,7 @@ def simulate(
         from ncfix.measure.instruments import simulate as filled
 
         return filled(subject, known, faults, seed)
-    own = as_setup(setup)
+    own = as_setup(setup, known)
     own = replace(own, assume_zero=True) if known.is_perfect else own
     return _path_errors(as_program(subject, known), known, own)
 

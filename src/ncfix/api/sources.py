@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ncfix.arguments import FINITE, OFFSET_AXES, check_choice
 from ncfix.batch.programs import subprograms
-from ncfix.control.setup import Setup, Tool
+from ncfix.control.setup import Setup, Tool, check_offsets
 from ncfix.diagnostics import UsageError
 from ncfix.files import read_bytes, write_whole
 from ncfix.inputs import each_once, given_twice, identities
@@ -87,19 +87,23 @@ def as_program(program: Program | PathName, machine: Machine) -> Program:
     return read_program(program, machine=machine) if isinstance(program, (str, os.PathLike)) else program
 
 
-def as_setup(setup: Setup | PathName | None) -> Setup:
+def as_setup(setup: Setup | PathName | None, machine: Machine) -> Setup:
     """A set-up, or that of a file; without one nothing is given.
 
-    Raises `UsageError` NCF025 for a value that is not finite and for an axis that there is not.
+    Raises `UsageError` NCF025 for a value that is not finite and for an axis that there is not, NCF384 for a work
+    offset along an axis that the machine lacks.
     """
     if setup is None:
         return Setup()
     if isinstance(setup, Setup):
         _check_values(setup)
-        return setup
-    from ncfix.control.setup_file import load
+        own = setup
+    else:
+        from ncfix.control.setup_file import load
 
-    return load(os.fspath(setup))
+        own = load(os.fspath(setup))
+    check_offsets(own, machine.axis_names)
+    return own
 
 
 def _check_values(setup: Setup) -> None:

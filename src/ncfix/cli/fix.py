@@ -216,7 +216,7 @@ def fix(
         choices["strategy"] = "thesis"
     machine = sound(load_machine(machine_path), machine_path, force)
     options = FixOptions(**choices, force=force)
-    job = FixJob(machine, given.load(), dialect, options, ProgramLimits(time_limit_s, memory_limit_mb))
+    job = FixJob(machine, given.load(machine), dialect, options, ProgramLimits(time_limit_s, memory_limit_mb))
     if looks:
         return _changes(context, job, programs, outputs.folder(programs), diff_motions, as_json)
     verbosity = Verbosity.of(quiet, verbose)

@@ -46,7 +46,7 @@ class Following:
     def of(cls, machine_path: str | None, dialect: str | None, given: SetupOptions) -> Following:
         """Load what the options name."""
         machine = load_machine(machine_path) if machine_path else None
-        setup = given.load()
+        setup = given.load(machine)
         exacting = machine is not None and not machine.is_perfect
         return cls(machine, setup if exacting else replace(setup, assume_zero=True), dialect)
 

@@ -77,7 +77,7 @@ def _remarks(machine: Machine, path: str) -> list[Message]:
     from ncfix.machine.effects import runs_ahead
 
     said = []
-    known = {*registry("dialects"), *registry("controls")}
+    known = registry("controls") | registry("dialects")
     if machine.control and machine.control not in known:
         text = f"control: {machine.control!r} has neither a dialect nor tables here, and is passed over"
         said.append(Message("NCF318", text, Place(path), nearest(machine.control, known)))

@@ -56,6 +56,9 @@ MODULES = {
 }
 """In which module of `ncfix.cli` the command of a verb is, if not in one of its own name."""
 
+PROJECT_VERBS = ("fix", "verify")
+"""Verbs that need a machine, and find it in a project file."""
+
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 + SIGINT."""
 
@@ -158,7 +161,11 @@ def wrong_use(error: click.ClickException, arguments: Sequence[str], as_json: st
     verb = next((argument for argument in arguments if argument in VERBS), "")
     command = context.command_path if context else f"ncfix {verb}".strip()
     text = error.format_message().replace("\n\t", " ")  # names of choices, each on a line
-    return failed(UsageError.of("NCF001", text, hint=f"{command} --help"), as_json)
+    lacks = isinstance(error, click.MissingParameter) and error.param is not None and error.param.name
+    hint = (
+        "-m FILE; `ncfix init` says it once for a folder" if lacks == "machine_path" and verb in PROJECT_VERBS else ""
+    )
+    return failed(UsageError.of("NCF001", text, hint=hint or f"{command} --help"), as_json)
 
 
 def failed(error: NcfixError, as_json: str | None) -> int:

@@ -88,6 +88,7 @@ def _outcome(following: Following, path: str) -> tuple[int, dict[str, Any]]:
     console.tell_some(checked.findings)
     count = len(checked.findings)
     said = console.counted(count, "finding") if count else "nothing found"
+    said += "" if following.machine else ", without a machine"
     size = f"{console.counted(checked.blocks, 'block')}, {console.counted(checked.moves, 'motion')}"
     console.say(f"{visible(shown(path))}: {size}, {dialect}: {said}")
     entry |= {"dialect": dialect, "blocks": checked.blocks, "moves": checked.moves}

@@ -15,6 +15,7 @@ from ncfix.cli.options import PATH
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup
+    from ncfix.machine import Machine
 
 OFFSET_AXES = "XYZABCUVW"
 """The order of the numbers of a work offset."""
@@ -205,9 +206,12 @@ class SetupOptions:
         """The files that are read."""
         return self.setup_file, self.tool_table
 
-    def load(self) -> Setup:
-        """The setup: the file, then the tool table, then the single options, each over the one before."""
-        from ncfix.control.setup import Setup, Tool
+    def load(self, machine: Machine | None = None) -> Setup:
+        """The setup: the file, then the tool table, then the single options, each over the one before.
+
+        Raises what is wrong in the files, and `UsageError` NCF384 for a work offset along an axis that `machine` lacks.
+        """
+        from ncfix.control.setup import Setup, Tool, check_offsets
 
         setup = Setup()
         if self.setup_file is not None:
@@ -223,7 +227,7 @@ class SetupOptions:
         tools |= {int(key): tool for key, tool in given.items() if key.isdecimal()}
         named = {key: tool for key, tool in given.items() if not key.isdecimal()}
         probed = {axis: value for given in self.probed for axis, value in given.items()}
-        return replace(
+        whole = replace(
             setup,
             work_offsets={**setup.work_offsets, **dict(self.offsets)},
             tools=tools,
@@ -236,6 +240,9 @@ class SetupOptions:
             probed={**(setup.probed or {}), **probed} if self.probed else setup.probed,
             block_skip=self._block_skip(setup),
         )
+        if machine is not None:
+            check_offsets(whole, machine.axis_names)
+        return whole
 
     def _block_skip(self, setup: Setup) -> bool | frozenset[int] | None:
         """How the switches of block delete stand; None: in every position."""

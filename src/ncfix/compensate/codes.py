@@ -153,12 +153,12 @@ CODES = {
     ),
     "NCF439": Code(
         "an axis is left where it stands",
-        "The correction needs an axis that the block does not name, and the program has not said where that axis is: "
-        "at the start, after machine coordinates and reference points, a change of tool, of its length offset, of the "
-        "work offset. A word for it would lead it to where the setup says that it is, and if that is wrong, into the "
-        "part. So it gets none, and this part of the correction is made when the program names it. The same holds for "
-        "motions across the plane while cutter radius compensation is on, and after it until the axes are named: there "
-        "the tool stands beside the contour, and the least way in the plane would be offset by the radius.",
+        "The correction needs an axis that the block does not name, and the program has not said where that axis "
+        "stands: at the start, and after machine coordinates, a reference point, a tool change, another length offset "
+        "or another work offset. A word for it would send it to where the setup says that it is; if that is wrong, "
+        "into the part. So it gets none, and the next block that names it gets the whole correction. The same holds "
+        "for X and Y (the axes of the plane) in blocks that only move across it under cutter radius compensation, and "
+        "after it until the program names them: the control would offset even the smallest motion by the radius.",
         "Let the program name X, Y and Z in the first blocks, and again after such a change. At the start `--initial` "
         "with `--offset` and `--tool`, without `--assume-zero`, says it as well.",
     ),

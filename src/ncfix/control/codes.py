@@ -292,6 +292,11 @@ CODES: dict[str, Code] = {
         "A value is not of the kind that its key needs.",
         "docs/formats.md shows a setup file.",
     ),
+    "NCF384": Code(
+        "Work offset along an axis that the machine lacks",
+        "A list of numbers gives X Y Z A B C in this order, so the fifth is B, also on a machine with A and C.",
+        "Name the axes: G54 = { Z = 60, C = 10 }, or --offset G54=Z60,C10.",
+    ),
     "NCF385": Code(
         "Wrong line in a tool table",
         "A line of the tool table cannot be understood, or a tool stands twice.",

@@ -4,11 +4,12 @@ from options; what a program asks for and is not there is collected, once each.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from ncfix.diagnostics import Message, Place
+from ncfix.control.coordinates import LETTERS
+from ncfix.diagnostics import Message, Place, UsageError
 
 if TYPE_CHECKING:
     from ncfix.control.moves import Kinematics
@@ -86,6 +87,16 @@ class Setup:
     named_tools: Mapping[str, Tool] = field(default_factory=dict)
     subprograms: tuple[str, ...] = ()
     probed: Mapping[str, float] | None = None
+
+
+def check_offsets(setup: Setup, axes: Collection[str]) -> None:
+    """Refuse a work offset along an axis that the machine lacks; zero is none. Raises `UsageError` NCF384."""
+    for system, values in setup.work_offsets.items():
+        for letter, value in values.items():
+            if value and letter not in axes:
+                text = f"work offset {system}: {letter} is {value:g}, and the machine has no axis {letter}"
+                hint = f"numbers are {' '.join(LETTERS)} on any machine; or name the axes: {system} = {{ Z = 60 }}"
+                raise UsageError.of("NCF384", text, hint=hint)
 
 
 WORK_OFFSET = "NCF201"

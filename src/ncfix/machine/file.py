@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ncfix.diagnostics import ConfigError, Place
-from ncfix.files import READING
+from ncfix.files import reading_hint
 from ncfix.inputs import MOST_SAID, taken
 from ncfix.machine.axes import (
     BASE_AXES,
@@ -64,15 +64,14 @@ def load(path: str | Path) -> Machine:
         source = taken(os.fspath(path), MOST_SAID)
     except OSError as error:
         text = f"cannot read the machine file: {error.strerror}"
-        hint = READING.get(error.errno or 0, "give an existing file's path")
-        raise ConfigError.of("NCF300", text, Place(str(path)), hint) from error
+        raise ConfigError.of("NCF300", text, Place(str(path)), reading_hint(os.fspath(path), error)) from error
     return loads(source, str(path))
 
 
 def loads(source: str | bytes, path: str = "<machine>") -> Machine:
     """The machine that a text describes. Raises `ConfigError` with every fault found; `path` is for messages."""
     text = source if isinstance(source, str) else decoded(source, path, "NCF301")
-    values = parsed(text, path, "NCF301")
+    values = parsed(text, path, "NCF301", "docs/formats.md shows a machine file")
     if "topology" not in values and SETUP & values.keys():
         raise ConfigError.of("NCF303", "this is a setup file, not a machine file", Place(path), "--setup is for setups")
     report = Report(path, text, key_lines(text), top=set(TOP))

@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 from ncfix.arguments import TARGET_UM, TOOL_LENGTH
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
-from ncfix.plugins import called, registry
+from ncfix.plugins import called, nearest, registry
 from ncfix.tables.compensation import Compensation, Tables, class_of
 from ncfix.tables.grid import Array
 
@@ -275,8 +275,8 @@ def get_control(name: str) -> Control:
     """The control of that name; raises `UsageError` NCF480."""
     found = registry("controls")
     if name not in found:
-        hint = f"one of {', '.join(sorted(found))}"
-        raise UsageError.of("NCF480", f"there are no tables for a control {name!r}", hint=hint)
+        known = found | {each: dialect for each, dialect in registry("dialects").items() if each in found}
+        raise UsageError.of("NCF480", f"there are no tables for a control {name!r}", hint=nearest(name, known))
     return _made(name, found[name])
 
 

@@ -109,7 +109,8 @@ def check_origin(manifest: Manifest, control: str, machine: Machine | None, path
     """Refuse tables of another control, or of another machine if one is given: raises `RefusedError` NCF487."""
     place = Place(path)
     if manifest.control != control:
-        raise RefusedError.of("NCF487", f"these are tables for {manifest.control}, not {control}", place)
+        text, hint = f"these are tables for {manifest.control}, not {control}", f"ncfix emulate {manifest.control}"
+        raise RefusedError.of("NCF487", text, place, hint)
     if machine is not None and manifest.hash != machine.hash:
         text = f"these tables were made for another machine, or for other errors of it: {manifest.machine}"
         raise RefusedError.of("NCF487", text, place, "export them again for this machine file, or say --other-machine")

@@ -18,7 +18,8 @@ CODES: dict[str, Code] = {
     ),
     "NCF103": Code(
         "Another control's language",
-        "The text is written for another family of controls than the dialect with which it was read.",
+        "The text is written for another family of controls than the dialect with which it was read, or is no program "
+        "but another file of ncfix.",
         "`ncfix dialects` lists what can be read.",
     ),
     "NCF104": Code(

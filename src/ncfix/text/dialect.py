@@ -318,6 +318,13 @@ UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 ANOTHER = "--dialect NAME, if it is for another control than the machine's; `ncfix dialects` lists them"
 
+OTHER_FILES = {
+    "machine file": rb"(?m)^[ \t]*topology[ \t]*=[ \t]*[\"']",
+    "setup file": rb"(?m)^[ \t]*\[(?:work_offsets|tools|initial)\]",
+    "measurement file": rb"\A# *ncfix-measurement",
+}
+"""What other files of ncfix show."""
+
 PROBE_BYTES = 1 << 16
 """How much of a text is looked at to find out what it is."""
 
@@ -333,6 +340,8 @@ def check_content(source: bytes, path: str, dialect: Dialect) -> None:
     check_zeros(source, path)
     if not source.removeprefix(UTF8_MARK).strip():
         raise SourceError.of("NCF102", "there is no block in the program", Place(path))
+    if other := next((kind for kind, sign in OTHER_FILES.items() if re.search(sign, source[:PROBE_BYTES])), ""):
+        raise SourceError.of("NCF103", f"this is a {other}, not a program", Place(path), "-m and --setup name others")
     code = beginning_without_comments(source)
     for family, pattern in dialect.foreign:
         if found := re.search(pattern, code):

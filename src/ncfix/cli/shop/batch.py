@@ -201,7 +201,7 @@ class FixJob:
             if fixed.changed or not target.in_place:
                 target.write(fixed.text, files.mode_of(target.source))
             entry["output"] = target.path
-        for line in _summary(entry, refused):
+        for line in _summary(entry, refused, bool(self.machine.effects)):
             console.say(line)
         if refused:
             console.say(f"  {ACCEPT if self.options.flatten else FLATTEN + ACCEPT}")
@@ -230,8 +230,8 @@ def _is_bare(place: Place, path: str) -> bool:
     return place.path == path and place.line > 0 and not place.text
 
 
-def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
-    """What was done, for people."""
+def _summary(entry: dict[str, Any], refused: bool, errors: bool) -> list[str]:
+    """What was done, for people; `errors`: the machine has some."""
     output = "nothing written" if refused else "<stdout>" if entry["output"] == STREAM else entry["output"]
     counts = f"{entry['compensated']} corrected, {entry['passed']} passed by rule, {len(entry['refused'])} refused"
     lines = [
@@ -242,7 +242,7 @@ def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
         rules = sorted(entry["passed_by_rule"].items(), key=lambda item: -item[1])
         lines.append(f"  passed by rule      {', '.join(f'{count} {rule}' for rule, count in rules)}")
     if entry["max_correction_um"] is None:
-        lines.append("  nothing corrected")
+        lines.append("  nothing corrected" + ("" if errors else ": the machine file has no errors"))
     else:
         lines.append(f"  largest correction  {entry['max_correction_um']:.1f} um")
     if entry["error_before_um"] and entry["error_before_um"]["max"] is None:

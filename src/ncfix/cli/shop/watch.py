@@ -263,4 +263,6 @@ class _Watching:
         strategy = "thesis" if self.options["thesis"] else self.options["strategy"]
         machine = sound(load_machine(machine_path), machine_path, force=False)
         limits = ProgramLimits(self.options["time_limit_s"], self.options["memory_limit_mb"])
-        return FixJob(machine, self.given.load(), self.options["dialect"], FixOptions(strategy, **chosen), limits)
+        return FixJob(
+            machine, self.given.load(machine), self.options["dialect"], FixOptions(strategy, **chosen), limits
+        )
