@@ -142,6 +142,12 @@ CASES = {
                                    EXPORT, "returned NoneType as the control 'mine', not Written", "NCF508"),
     "control reads text": Case("controls", "Mine.read = lambda self, files: 'tables'\n", "register(Mine, 'mine')",
                                EXPORT, "returned str as the control 'mine', not Tables", "NCF508"),
+    "control reads another axis": Case(
+        "controls",
+        "def read(self, files):\n    from ncfix.plugin import Compensation, own_terms\n    flat = np.zeros(2)\n"
+        "    return Compensation(own_terms('#X', np.arange(2.0), flat, flat))\n\n\nMine.read = read\n",
+        "register(Mine, 'mine')", EXPORT, "mine reads its own files as tables for axes that the machine does not have",
+        "NCF508"),
     "control is none": Case("controls", "", "register(dict, 'mine')", EXPORT,
                             "returned dict as the control 'mine', not Control", "NCF508"),
     "reporter raises": Case("reporters", "def form(document):\n    raise KeyError('x')\n", "register(form, '.odd')",

@@ -209,6 +209,13 @@ def test_fields_that_no_cycle_has(field: dict[str, Any]) -> None:
 HOME = OWN.derive("home", title="Home", codes={"G110": [SetTool("T"), Lose(ALL_AXES, "the tool change (G110)")]})
 
 
+def test_words_that_a_code_like_another_takes_lead_nowhere() -> None:
+    leads = gcode_statements(OWN).leads
+    assert not leads("G168", ("X10.", "R25."), 0)
+    assert leads("G100", ("X10.",), 0)
+    assert leads("G177", ("X10.",), 0)
+
+
 def test_all_axes_are_lost_until_each_is_named(dmu50: Machine) -> None:
     lines = "F100.\nG110 T3\nG1 X6.\nG0 X1. Y1. Z5.\nB0. C0.\nG1 X7.\nM30\n"
     moves = moves_of(f"G90 G54 G0 X0. Y0. Z10. B0. C0.\n{lines}", dmu50, HOME)

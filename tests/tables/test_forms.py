@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ncfix.tables.forms import BY_NAME, read_form, recognised
+from ncfix.tables.forms import BY_NAME, FileForm, read_form, recognised
 
 SAMPLES = {
     "beckhoff_isg/crosscomp.lis": ("isg-list", 7),
@@ -19,7 +19,7 @@ SAMPLES = {
     "beckhoff_isg/volc_isg_csv_1d.csv": ("isg-csv", 7),
     "beckhoff_isg/volc_isg_csv_grid.csv": ("isg-csv", 5),
     "beckhoff_isg/volcomp_config.lis": ("isg-list", 5),
-    "fanuc/g10_param_input.txt": ("g10", 9),
+    "fanuc/g10_param_input.txt": ("g10", 11),
     "heidenhain/TNC306_example.txt": ("tnc306", 8),
     "linuxcnc/doc_type0_example.comp": ("comp", 9),
     "linuxcnc/doc_type1_example.comp": ("comp", 9),
@@ -101,6 +101,25 @@ def test_numbers_can_be_changed_and_the_rest_stays() -> None:
     assert document.rows("row") == [(0.0, 0.0, 0.002), (10.0, 0.003, 0.005)]
     changed = document.with_numbers(3, Decimal("10.000"), Decimal("-0.001"), Decimal("0.000"))
     assert changed.content() == b"unit = mm\n[X]\n0.000, 0.000, 0.002\n10.000, -0.001, 0.000\n"
+
+
+@pytest.mark.parametrize("row", ["5., .5, 1.", "05, +0.50, 01"])
+def test_numbers_that_are_written_in_another_way_count_and_stay(row: str) -> None:
+    content = f"unit = mm\n[X]\n{row}\n10, 1, 2\n".encode()
+    document = recognised("x", content)
+    assert document is not None
+    assert document.sections("axis") == {"X": [(5.0, 0.5, 1.0), (10.0, 1.0, 2.0)]}
+    assert document.content() == content
+    assert b"\n5.5, " in document.with_numbers(2, *map(Decimal, ("5.5", "1", "2"))).content()
+
+
+def test_a_form_of_a_plugin() -> None:
+    form = FileForm("own", "Own's table", {"axis": r"#AXIS\[[XYZ]\]", "row": r"(\d+) (\d+)"})
+    document, remarks = read_form(form, "x", b"#AXIS[Y]\n1 2\n1;2\n")
+    assert document.sections("axis") == {"Y": [(1.0, 2.0)]}
+    assert [(each.text, each.hint) for each in remarks.wrong] == [
+        ("is no line of Own's table", "a line is one of: axis, row")
+    ]
 
 
 def test_a_sound_elmo_table() -> None:

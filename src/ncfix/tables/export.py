@@ -15,7 +15,7 @@ import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
-from ncfix.plugins import called, handed
+from ncfix.plugins import called, handed, useless
 from ncfix.tables.compensation import Tables
 from ncfix.tables.control import Control, Files, Least, Request, Written
 from ncfix.tables.correction import POSES, Residual, random_poses, ranges_of, residual
@@ -151,6 +151,9 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
         raise RefusedError.of("NCF489", "an error of the machine is not a number", hint="calibrate it again")
     written = called("controls", control.name, control.write, request, gives=Written)
     tables = _read_again(control, written)
+    if odd := tables.axes - set(request.machine.axis_names):
+        why = f"{control.name} reads its own files as tables for axes that the machine does not have: {sorted(odd)}"
+        raise useless("controls", control.name, why, "`read` and `write` of the control must name the same axes")
     messages = linted(control, written.files)
     left = residual(request.machine, tables, request.space, request.tool_length, poses)
     _check_size(request.machine, left, request.target)

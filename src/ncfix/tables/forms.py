@@ -32,15 +32,21 @@ LIST = {"entry": rf"[\w.\[\]]+{GAP}{N}{BLANK}{ASIDE}", "word": rf"[\w.\[\]]+{GAP
 
 @dataclass(frozen=True, slots=True)
 class FileLine:
-    """A line: what it is, its text with a slot for every number, and the numbers with the width of their slots."""
+    """A line: what it is, its text with a slot for every number, and the numbers with the width of their slots.
+
+    verbatim  the line itself where its numbers are written as a `Decimal` does not keep them: `5.`, `.5`, `007`
+    """
 
     kind: str
     text: str
     numbers: tuple[Decimal, ...] = ()
     plus: tuple[bool, ...] = ()
+    verbatim: str = ""
 
     def written(self) -> str:
         """The line."""
+        if self.verbatim:
+            return self.verbatim
         words = (f"{'+' if plus else ''}{number}" for number, plus in zip(self.numbers, self.plus, strict=True))
         return "".join(part for pair in zip(self.text.split("\0"), [*words, ""], strict=True) for part in pair)
 
@@ -70,14 +76,15 @@ class TableFile:
         rows: list[tuple[float, ...]] = []
         for line in self.lines:
             if line.kind == kind:
-                rows = found.setdefault(line.text.strip().strip("[]"), [])
+                name = re.search(r"\[(.*?)\]", line.text)
+                rows = found.setdefault(name[1] if name else line.text.strip(), [])
             elif line.numbers:
                 rows.append(tuple(map(float, line.numbers)))
         return found
 
     def with_numbers(self, index: int, *numbers: Decimal) -> TableFile:
         """With other numbers in one line."""
-        line = replace(self.lines[index], numbers=numbers)
+        line = replace(self.lines[index], numbers=numbers, verbatim="")
         return replace(self, lines=(*self.lines[:index], line, *self.lines[index + 1 :]))
 
 
@@ -120,7 +127,8 @@ def _line(form: FileForm, remarks: Remarks, number: int, row: str) -> FileLine:
         if match:
             return _slotted(kind, row, match)
     comma = re.search(r"\d,\d", row)
-    remarks.refuse(number, "a decimal comma" if comma else f"is no line of {form.title}", "see docs/controllers.md")
+    hint = "see docs/controllers.md" if BY_NAME.get(form.name) is form else f"a line is one of: {', '.join(form.kinds)}"
+    remarks.refuse(number, "a decimal comma" if comma else f"is no line of {form.title}", hint)
     return FileLine("?", row)
 
 
@@ -132,9 +140,9 @@ def _slotted(kind: str, row: str, match: re.Match[str]) -> FileLine:
         at = stop
     words = [row[start:stop] for start, stop in spans]
     numbers = tuple(Decimal(word) for word in words)
-    if any(str(value) != word.lstrip("+") for value, word in zip(numbers, words, strict=True)):
-        return FileLine(kind, row)  # a way of writing that a number does not keep: such a line stays as it is
-    return FileLine(kind, text + row[at:], numbers, tuple(word.startswith("+") for word in words))
+    kept = all(str(value) == word.lstrip("+") for value, word in zip(numbers, words, strict=True))
+    plus = tuple(word.startswith("+") for word in words)
+    return FileLine(kind, text + row[at:], numbers, plus, "" if kept else row)
 
 
 def _ascending(kind: str) -> Check:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from itertools import combinations, product
 
 from ncfix.compensate.driver import fix_program
+from ncfix.control.operations import Like
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine
 from ncfix.testing.judging import OPTIONS, SETUP, Judged, judged, shifted_machine
@@ -92,6 +93,8 @@ class Statements:
 
 TAKES = ("G4", "G92", "G52", "G10 L2 P1", "G43", "G17", "G90", "G40", "M3")
 """What takes the words of its block for itself, or has no use for them."""
+FRAME_CODES = ("G22", "G50.1", "G51", "G51.1", "G68", "G68.2", "G68.3", "G68.4")
+"""What else does so: a code of a dialect's own may be like one of these."""
 REFERENCE = ("G28", "G30")
 
 
@@ -99,7 +102,7 @@ def gcode_leads(head: str, words: Sequence[str], mode: int) -> bool:
     """Axis words lead somewhere unless a code takes them; arcs about a centre need none."""
     if head in REFERENCE:
         return True
-    if head in TAKES:
+    if head in TAKES or head in FRAME_CODES:
         return False
     arc = head in ("G2", "G3") or (mode == 1 and head == "")
     return any(word[0] in "XYZ" for word in words) or (arc and any(word[0] in "IJ" for word in words))
@@ -108,6 +111,7 @@ def gcode_leads(head: str, words: Sequence[str], mode: int) -> bool:
 def gcode_statements(dialect: Dialect) -> Statements:
     """Those of a dialect of G code (RS274, Fanuc and their like), with the codes and cycles of its own."""
     own = tuple(code for code, _ in dialect.codes)
+    alike = {code: each.code for code, operations in dialect.codes for each in operations if isinstance(each, Like)}
     drills = {code: f"{code} X10. Y20. Z-5. {table.level}2." for code, table in dialect.cycles}
     for code, table in dialect.cycles:
         drills[code] += "".join(f" {address}1." for address in table.needs)
@@ -130,7 +134,7 @@ def gcode_statements(dialect: Dialect) -> Statements:
             ("G81 X10. Y20. Z-5. R2.",),
             *((line,) for line in drills.values()),
         ),
-        leads=gcode_leads,
+        leads=lambda head, words, mode: gcode_leads(alike.get(head, head), words, mode),
         motions=("G1 X12. Y13.", "G0 X30. Y31. Z20.", "G2 X40. Y41. R30.", "G1 Z2."),
         number="G1 X{}",
         frames=(Pair(("G52 X3.",), ("G52 X0.",)), Pair(("G55",), ("G54",)), Pair(("G92 X7.",), ("G92.1",))),
@@ -208,7 +212,7 @@ def wrongs(each: Sample, result: Judged) -> Iterator[str]:
     for line, what in result.wrong.items():
         yield f"line {line}, {each.lines[line - 1] if line else ''!r}: {what}\n-- written:\n{result.text}"
     if each.leads and each.statement not in result.lines:
-        yield f"line {each.statement}, {each.lines[each.statement - 1]!r}: leads somewhere, and nothing came of it"
+        yield f"line {each.statement}, {each.lines[each.statement - 1]!r}: its words lead to no motion and no refusal"
 
 
 def told(each: Sample, why: str) -> str:
