@@ -1,4 +1,4 @@
-"""Parts of plain motions come out as by the long way, and what is compiled of it finds what the columns do."""
+"""Parts of plain motions come out as by the long way, and limits and bounds are those of the columns there."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from ncfix import core
 from ncfix.compensate import FixOptions, driver, plain
 from ncfix.compensate.parts import ProgramPart
 from ncfix.compensate.plain import PlainPlan, Planner
+from ncfix.compensate.plan.deviation import straight_bounds
 from ncfix.compensate.solve import SelfCheckError
 from ncfix.control.moves import MotionKind
 from ncfix.control.trace import NotInPartsError
@@ -34,10 +35,9 @@ def machine(root: Path) -> Machine:
     return load(root / "benchmarks" / "five_axis.toml")
 
 
-@pytest.fixture(params=[False, True], ids=["plain", "compiled"])
-def compiled(request: pytest.FixtureRequest) -> bool:
-    use_form(request.param)
-    return bool(request.param)
+@pytest.fixture
+def compiled() -> None:
+    use_form(True)
 
 
 AMONG = (
@@ -219,31 +219,27 @@ def test_a_writer_that_gets_a_character_wrong_is_caught(
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_compiled_as_by_columns(seed: int, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same is said of limits, and bounds agree but for rounding."""
-    require_core()
+@pytest.mark.usefixtures("compiled")
+def test_limits_and_bounds_are_those_of_columns(seed: int, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bounds but for rounding."""
     planner = Planner.of(machine, OPTIONS)
     assert planner is not None
-    rng = np.random.default_rng(seed)
+    assert machine.bow is not None
+    rng, linear = np.random.default_rng(seed), ~machine.rotary
     course = course_of(winding(seed, 300), machine, monkeypatch)
     moves, lengths = course.part.moves, course.intent.lengths(np.arange(1))
     meant = np.concatenate([moves.start[:1], moves.end])
     done = meant.copy()
-    done[:, ~machine.rotary] += rng.uniform(-0.01, 0.01, (len(meant), 3))
-    plain = planner._within_limits(meant, done), planner._bounds(meant, done, lengths)
-    core.use("compiled")
-    found = planner._within_limits(meant, done), planner._bounds(meant, done, lengths)
-    assert plain[0]
-    assert found[0]
-    assert found[1] == pytest.approx(plain[1], rel=1e-12)
+    done[:, linear] += rng.uniform(-0.01, 0.01, (len(meant), 3))
+    shift = (done - meant)[:, linear]
+    bounds = straight_bounds(machine.bow, done[:-1], done[1:], (shift[:-1], shift[1:]), lengths, linear)
+    assert planner._bounds(meant, done, lengths) == pytest.approx(bounds, rel=1e-12)
+    assert planner._within_limits(meant, done)
     x, b = machine.axis_names.index("X"), machine.axis_names.index("B")
     for row, axis, much in ((1, x, 0.06), (2, b, 1.0), (3, x, np.nan)):
         wrong = done.copy()
         wrong[row, axis] += much
         assert not planner._within_limits(meant, wrong)
-        core.use("plain")
-        assert not planner._within_limits(meant, wrong)
-        core.use("compiled")
 
 
 def course_of(source: bytes, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> PlainPlan:

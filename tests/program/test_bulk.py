@@ -21,8 +21,7 @@ from ncfix.text.reader import read
 from ncfix.text.spelling import NumberStyle, in_style, is_plain, laid_out, rounded, styles_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Edit, Splices, apply, spliced
-from ncfix.writer import bulk
-from ncfix.writer.bulk import WrittenStretch
+from ncfix.writer.bulk import Bulk
 from ncfix.writer.bulk_arcs import CentreWords
 from ncfix.writer.emit import Emission, emit
 from ncfix.writer.language import WrittenLanguage
@@ -64,8 +63,7 @@ def in_all_ways(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emissio
     found = []
     for form in ("plain", None):
         core.use(form)
-        with mock.patch.object(bulk, "SHORTEST", 1):
-            found.append(emit(program, moves, pieces, STEPS))
+        found.append(emit(program, moves, pieces, STEPS))
     one_by_one = replace(language_of(program.dialect, WrittenLanguage), bulk=None)
     with mock.patch("ncfix.writer.emit.language_of", return_value=one_by_one):
         return *found, emit(program, moves, pieces, STEPS)
@@ -150,9 +148,10 @@ def test_long_stretches(modal: bool) -> None:
     program, moves = followed("\n".join(["G90 G21 G94", *lines, "M2\n"]).encode())
     pieces = moved(moves, 3, 0.01)
     core.use("plain")
-    with mock.patch.object(WrittenStretch, "splices", autospec=True, side_effect=WrittenStretch.splices) as written:
+    taken, take = [], Bulk.take
+    with mock.patch.object(Bulk, "take", lambda *given: taken.append(take(*given)) or taken[-1]):
         emit(program, moves, pieces, STEPS)
-    assert sum(len(call.args[0].block) for call in written.call_args_list) > 1500
+    assert sum(len(ends) for ends in taken if ends is not None) > 1500
     assert_same(program, moves, pieces)
 
 
@@ -234,7 +233,7 @@ def written_from(
     one_by_one = replace(language_of(program.dialect, WrittenLanguage), bulk=None)
     for form, language in (("plain", None), (None, None), (None, one_by_one)):
         core.use(form)
-        with mock.patch.object(bulk, "SHORTEST", 1), ExitStack() as patches:
+        with ExitStack() as patches:
             if language is not None:
                 patches.enter_context(mock.patch("ncfix.writer.emit.language_of", return_value=language))
             emission = emit(program, moves, pieces, STEPS, done=begin)
@@ -277,7 +276,7 @@ def test_arcs_and_dwells_do_not_part_a_stretch() -> None:
     rows, kept = np.arange(len(moves)), moves.kind == MotionKind.DWELL
     shifted = moves.end + 0.0123, moves.kind == MotionKind.ARC, moves.centre + 0.0123
     pieces = Pieces(rows, np.ones(len(rows)), *shifted, kept)
-    with mock.patch.object(bulk.Bulk, "take", autospec=True, side_effect=bulk.Bulk.take) as taken:
+    with mock.patch.object(Bulk, "take", autospec=True, side_effect=Bulk.take) as taken:
         emit(program, moves, pieces, STEPS)
     assert taken.call_count == 1
     assert_same(program, moves, pieces)

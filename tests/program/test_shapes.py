@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from random import Random
+
 import numpy as np
 import pytest
 
-from ncfix.text.shapes import KINDS, LONG, distinct
+from ncfix.text import shapes
+from ncfix.text.shapes import KINDS, LONG, Scan, distinct, scan_any, split_blocks
 
 
 def lines(rng: np.random.Generator, kinds: int, longest: int, n: int) -> list[bytes]:
@@ -28,3 +31,65 @@ def test_each_line_is_its_kind(kinds: int, longest: int) -> None:
 def test_one_empty_line() -> None:
     shapes, group = distinct(b"\n")
     assert (shapes, group.tolist()) == ([b""], [0])
+
+
+USUAL = ("N{n} G1 X{x} Y{y} Z{z} F{f}", "G01X{x}Y{y}Z{z}", "n{n} g1 x{x}\ty{y}", "T{n} M6", "X{x} E{n} D{y}")
+NUMBERS = ("1.2345", "-0.0000", "+7.5", "123.4567", "-1234.5678", "0.0001", "98765.4321", "12.", "-3", ".5", "007.10")
+RARE = (
+    "X1.2.3",
+    "N-5 G1 X1",
+    "X",
+    "G-1 X5.0",
+    "X - 5.0",
+    "X+-5",
+    "(N1 G1 X2)",
+    "X1.5 ; 7",
+    "",
+    "X.",
+    "X12345678901234567.5",
+    "\x01",
+)
+DAMAGES = (
+    (" G1", " G2"),
+    ("X", "X "),
+    ("X", "X-"),
+    ("Y", "Y("),
+    ("Z", "/Z"),
+    (".", ".."),
+    (" ", "  "),
+    ("N", "N+"),
+    (".", ""),
+)
+
+
+def text_of(random: Random, line: str, numbers: tuple[str, ...], others: float) -> bytes:
+    """Lines like one, with these numbers, and some that are not."""
+
+    def usual() -> str:
+        x, y, z, f = random.choices(numbers, k=4)
+        return line.format(n=random.randrange(10**6), x=x, y=y, z=z, f=f)
+
+    def other() -> str:
+        return random.choice((random.choice(RARE), usual().replace(*random.choice(DAMAGES))))
+
+    lines = [other() if random.random() < others else usual() for _ in range(512)]
+    lines[256] = usual()
+    return "".join(each + random.choice(("\n", "\n", "\r\n")) for each in lines).encode("latin-1")
+
+
+def assert_same(found: Scan, meant: Scan) -> None:
+    found, meant = found.expanded(), meant.expanded()
+    assert found.shapes == meant.shapes
+    for name in ("comment", "first_number", "spans"):
+        assert np.array_equal(getattr(found, name), getattr(meant, name)), name
+    assert np.array_equal(found.values, meant.values, equal_nan=True)
+    assert np.array_equal(np.signbit(found.values), np.signbit(meant.values))
+
+
+def test_a_text_in_slices_is_scanned_as_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = text_of(Random(1), USUAL[0], NUMBERS, 0.3)
+    blocks = split_blocks(source)
+    whole = scan_any(source, blocks, pointless=False)
+    for size in (100, 1000, len(source)):
+        monkeypatch.setattr(shapes, "SLICE_BYTES", size)
+        assert_same(shapes.in_slices(source, blocks, lambda *part: scan_any(*part, pointless=False)), whole)

@@ -16,12 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix import core
 from ncfix.control.arcs import CLOCKWISE, COUNTER, Point, centre_from_radius, check_closure, sweep_angle
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.coordinates import DEGREE, IDENTITY, PLANES, X, Y, Z
 from ncfix.control.expressions import Fault
-from ncfix.control.lanes.block_rows import LONGEST, filled, followed, followed_compiled, words
+from ncfix.control.lanes.block_rows import LONGEST, filled, followed, words
 from ncfix.control.lanes.lane import SHORTEST, before_placing
 from ncfix.control.moves import Arc, FeedMode, MotionKind
 from ncfix_heidenhain.klartext.arcs import BAD_ARC, FLAT, direction_at_end
@@ -110,8 +109,7 @@ def stage_of(control: KlartextControl, unit: KlartextUnit, start: int, stop: int
     """What the blocks of a stretch say, and where they lead."""
     program, tables = unit.program, unit.lanes
     shapes, first = program.template[start:stop], program.first_number[start:stop]
-    follow = followed_compiled if core.engaged() else followed
-    found = follow(
+    found = followed(
         control, program.numbers, first, shapes, tables.words, (control.modal.unit, control.modal.feed, RAPID)
     )
     own = tables.side[shapes]

@@ -27,7 +27,6 @@ from ncfix.compensate.plan.arrays import (
     Index,
     Mask,
     distinct,
-    extent,
     lengths,
     offsets,
     owners,
@@ -35,7 +34,7 @@ from ncfix.compensate.plan.arrays import (
     places,
     some,
 )
-from ncfix.compensate.plan.deviation import CORNER, SURE, led_bounds, looked_at, straight_bounds
+from ncfix.compensate.plan.deviation import CORNER, SURE, led_bounds, looked_at
 from ncfix.compensate.plan.ends import led_as_commands
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
@@ -252,11 +251,18 @@ class Planner:
 
     @classmethod
     def of(cls, machine: Machine, options: FixOptions) -> Planner | None:
-        """For a machine and options; None if these need the long way."""
+        """For a machine and options; None if these need the long way, and where the core is not compiled."""
         strategy = get_strategy(options.strategy)
         budget = PathTolerance(options.tolerance_mm, rounding(machine))
         able = strategy.follows_path and not strategy.corrects_orientation and budget.fine
-        if not able or matters(machine) or machine.inputs or machine.bow is None or machine.linear_ways is None:
+        if (
+            not core.engaged()
+            or not able
+            or matters(machine)
+            or machine.inputs
+            or machine.bow is None
+            or machine.linear_ways is None
+        ):
             return None
         demands = Demands(budget, Closure(), options.split_rapids, arc_pieces=False)
         return cls(machine, options, strategy, demands)
@@ -367,12 +373,10 @@ class Planner:
 
         meant, done  (n + 1, n_axes) poses as programmed and as corrected
         """
+        from ncfix.core import motions
+
         bow, linear = self.machine.bow, ~self.machine.rotary
         assert bow is not None
-        if not core.engaged():
-            shift = (done - meant)[:, linear]
-            return straight_bounds(bow, done[:-1], done[1:], (shift[:-1], shift[1:]), tool_length, linear)
-        from ncfix.core import motions
 
         constants = bow.shift, bow.turn, bow.arm(np.zeros(len(linear)), float(tool_length), ~linear), MORE, CORNER
         bound = np.empty(len(done) - 1)
@@ -386,18 +390,12 @@ class Planner:
 
     def _within_limits(self, meant: Array, done: Array) -> bool:
         """Whether corrected poses, and those of the program, come near no limit: as `limits`. Arrays as for bounds."""
-        low, high = self.machine.ranges.T
-        if core.engaged():
-            from ncfix.core import motions
+        from ncfix.core import motions
 
-            linear, rotary = (NEARLY * most for most in self.machine.max_correction)
-            axes = low.copy(), high.copy(), np.where(self.machine.rotary, rotary, np.inf), self._linear
-            return bool(motions.within_limits(meant, done, *axes, linear, NEARLY * JUMP, FUZZ))
-        for least, most in (extent(meant), extent(done)):
-            if not ((low - least <= FUZZ).all() and (most - high <= FUZZ).all()):
-                return False
-        shift = done - meant
-        return self._small(shift) and self._steady(shift[1:] - shift[:-1])
+        low, high = self.machine.ranges.T
+        linear, rotary = (NEARLY * most for most in self.machine.max_correction)
+        axes = low.copy(), high.copy(), np.where(self.machine.rotary, rotary, np.inf), self._linear
+        return bool(motions.within_limits(meant, done, *axes, linear, NEARLY * JUMP, FUZZ))
 
     def _fine_inside(self, poses: MotionEnds, real: Segments, pieces: Pieces, inner: Index, done: Array) -> bool:
         """The same of pieces that end inside of motions (k,); `done` (n + 1, n_axes) poses between these, corrected."""

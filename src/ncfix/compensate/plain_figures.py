@@ -13,20 +13,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix import core
 from ncfix.compensate.plain import PlainPlan
 from ncfix.compensate.plan.arrays import (
     Array,
     Index,
     Mask,
     batches,
-    greatest,
     lengths,
     owners,
     picked,
     places,
     squares,
-    totals,
 )
 from ncfix.compensate.plan.deviation import BATCH, STRAIGHT, FigureTally, PathError, PathSamples, errors_at, samples
 from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends_closely, even, features, passed
@@ -71,7 +68,7 @@ def figures(plan: PlainPlan, text: Emission, rapids: bool) -> PathError:
     else:
         apart[passed(plan.intent, written.start, written.end)[0]] = True
     tally = FigureTally()
-    counts = (_compiled if core.engaged() else _by_columns)(plan, text, written, (shown, apart), tally)
+    counts = _at_ends(plan, text, written, (shown, apart), tally)
     inside = np.flatnonzero(counts)
     for part in batches(counts[inside], BATCH):
         tally.add(_inside(plan, written, inside[part], counts[inside[part]]))
@@ -82,27 +79,11 @@ def figures(plan: PlainPlan, text: Emission, rapids: bool) -> PathError:
     return tally.result()
 
 
-def _by_columns(
-    plan: PlainPlan, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally
-) -> Index:
+def _at_ends(plan: PlainPlan, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally) -> Index:
     """Count the errors at the ends of motions that are shown, and not apart; at how many places inside to look, (n,).
 
     Those at the end of which the error is not known are put apart.
     """
-    (shown, apart), moves, machine = masks, plan.part.moves, plan.intent.machine
-    apart |= greatest(np.abs(written.end - plan.real.end)[:, machine.rotary]) > TURNED
-    bends = totals(np.abs(moves.end - moves.start) / features(machine))
-    counts = _looks(plan, shown & ~apart, _led_bends(plan) if moves.tcp[0] else bends)
-    rows = np.flatnonzero(shown & ~apart)
-    if rows.size:
-        tally.add(_at_ends(plan, written, rows, counts))
-    return counts
-
-
-def _compiled(
-    plan: PlainPlan, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally
-) -> Index:
-    """As `_by_columns`."""
     from ncfix.core import motions
 
     moves, machine, sums = plan.part.moves, plan.intent.machine, np.zeros(5)
@@ -151,16 +132,6 @@ def _looks(plan: PlainPlan, among: Mask, bends: Array) -> Index:
     """At how many places inside of motions `among` (n,) to look, over which the error may bend so many times, (n,)."""
     bent = among & (plan.part.moves.kind == MotionKind.FEED) & (bends >= STRAIGHT)
     return np.where(bent, np.minimum(np.ceil(DENSITY * bends), MOST_SHOWN), 0).astype(np.intp)
-
-
-def _at_ends(plan: PlainPlan, written: Segments, rows: Index, counts: Index) -> PathSamples:
-    """The errors at the ends of motions `rows` (k,), each for its share of the way; `counts` (n,) places are inside."""
-    ways, columns = plan.intent.machine.linear_ways, plan.intent.columns
-    assert ways is not None
-    chosen = slice(None) if len(rows) == len(counts) else rows
-    off = (written.end[chosen] - plan.real.end[chosen])[:, columns] @ ways.T
-    way = lengths((written.end[chosen] - written.start[chosen])[:, ~plan.intent.machine.rotary]) / (counts[chosen] + 1)
-    return PathSamples(rows, np.ones(len(rows)), plan.before[chosen], lengths(off), way, 0.0, 0.0)
 
 
 def _inside(plan: PlainPlan, written: Segments, rows: Index, counts: Index) -> PathSamples:

@@ -2,7 +2,8 @@
 
 Each module is plain Python; the file of the same name that ends in `.pxd` gives its variables C types. So the same
 source also runs interpreted: tests hold both forms together, bit by bit. Where there is no compiled form, or where
-`NCFIX_CORE=plain` asks for that, columns of numpy do the same work, with the same results. `build_core.py` compiles it.
+`NCFIX_CORE=plain` asks for that, blocks are followed and written by the interpreted one (`loops`); columns of numpy
+scan the text and do the kinematics there, with the same results. `build_core.py` compiles it.
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
+from importlib import import_module
 from importlib.machinery import EXTENSION_SUFFIXES, SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 FOLDER = Path(__file__).parent
 WISH = "NCFIX_CORE"
@@ -54,7 +57,7 @@ def has_binary() -> bool:
 def fault() -> str:
     """Why there is no compiled form that may be used; empty if there is one."""
     if not has_binary():
-        return f"not compiled, so that long programs take up to twice as long: {BUILD}"
+        return f"not compiled, so that long programs take up to twenty times as long: {BUILD}"
     try:
         right = FOLDER.joinpath("compiled.txt").read_text().strip() == digest(FOLDER)
     except OSError:
@@ -115,3 +118,36 @@ def interpreted(name: str) -> ModuleType:
         sys.modules[full] = module_from_spec(spec)
         spec.loader.exec_module(sys.modules[full])
     return sys.modules[full]
+
+
+def loops(name: str) -> Any:
+    """A module of the core in the form that is in use."""
+    return import_module(f"ncfix.core.{name}") if engaged() else Interpreted(interpreted(name))
+
+
+class Interpreted:
+    """A module of the interpreted core, or an object that it has made, for callers that have arrays.
+
+    It gets memoryviews of them: these are indexed faster, and what they hold are Python's own numbers.
+    """
+
+    def __init__(self, own: Any) -> None:
+        self._own = own
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._own, name)
+        return partial(self._call, found) if callable(found) else found
+
+    @staticmethod
+    def _call(function: Any, *given: Any) -> Any:
+        result = function(*map(_as_interpreted, given))
+        return Interpreted(result) if isinstance(function, type) else result
+
+
+def _as_interpreted(value: Any) -> Any:
+    """What the interpreted core takes for an argument: an array, a number, or an object of its own."""
+    if isinstance(value, Interpreted):
+        return value._own
+    if not hasattr(value, "__array_interface__"):
+        return value
+    return memoryview(value) if value.ndim else value.item()

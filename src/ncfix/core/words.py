@@ -1,7 +1,6 @@
 """A stretch of corrected motions as text: one pass over its words, digits put where they belong.
 
-What `writer.bulk.WrittenStretch` does by columns, with the same operations on each number, so that the bytes are the
-same; a test holds the two together.
+What `writer.block.BlockWriter` does block by block, so that the bytes are the same; a test holds the two together.
 """
 
 from __future__ import annotations

@@ -150,13 +150,6 @@ def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[n
     return values, broken
 
 
-def digits_of(
-    text: NDArray[np.uint8], starts: NDArray[np.int64], stops: NDArray[np.int64], *, valued: bool = True
-) -> Digits:
-    """What stands in runs of digits and points; of long ones in their last sixteen bytes. See `Digits.of`."""
-    return digits_in(in_lanes(text), starts, stops, valued=valued)
-
-
 def in_lanes(text: NDArray[np.uint8]) -> NDArray[np.uint64]:
     """A text, sixteen zero bytes before it and some behind it, as numbers of eight bytes each."""
     padded = np.zeros((len(text) // EIGHT + 4) * EIGHT, dtype=np.uint8)
@@ -164,46 +157,16 @@ def in_lanes(text: NDArray[np.uint8]) -> NDArray[np.uint64]:
     return padded.view("<u8")
 
 
-def digits_in(
-    lanes: NDArray[np.uint64], starts: NDArray[np.int64], stops: NDArray[np.int64], *, valued: bool = True
+def digits_of(
+    text: NDArray[np.uint8], starts: NDArray[np.int64], stops: NDArray[np.int64], *, valued: bool = True
 ) -> Digits:
-    """As `digits_of`, in a text that is `in_lanes`."""
-    lengths = stops - starts
+    """What stands in runs of digits and points; of long ones in their last sixteen bytes. See `Digits.of`."""
+    lanes, lengths = in_lanes(text), stops - starts
     found = Digits.of(eight_at(lanes, stops + EIGHT), lengths, valued)
     long = np.flatnonzero(lengths > EIGHT)
     if len(long):
         found.put_before(long, Digits.of(eight_at(lanes, stops[long]), lengths[long] - EIGHT, valued))
     return found
-
-
-def values_of_one_tail(
-    lanes: NDArray[np.uint64], starts: NDArray[np.int64], stops: NDArray[np.int64], tail: int
-) -> NDArray[np.float64] | None:
-    """The values of runs of up to eight characters, all with a point `tail` characters before their end (0: none).
-
-    None if any is not so, or has no digit.
-    """
-    lengths = stops - starts
-    if int(lengths.max()) > EIGHT or tail > EIGHT or (tail == 1 and int(lengths.min()) == 1):
-        return None
-    words, own = eight_at(lanes, stops + EIGHT), OWN.take(lengths)
-    words &= own
-    own ^= words
-    own &= POINTS_ONLY
-    point = 1 << 8 * (EIGHT - tail)
-    if (own != np.uint64(POINTS_BIT * point if tail else 0)).any():
-        return None
-    if tail:
-        before = words & np.uint64((point - 1) & int(FOURS))
-        before <<= np.uint64(8)
-        words &= np.uint64(-(point << 8) & int(FOURS))
-        words |= before
-    else:
-        words &= FOURS
-    values = summed(words).view(np.int64).astype(np.float64)
-    if tail > 1:
-        values /= POWERS[tail - 1]
-    return values
 
 
 def eight_at(lanes: NDArray[np.uint64], places: NDArray[np.int64]) -> NDArray[np.uint64]:
@@ -225,9 +188,6 @@ def repeated(byte: int) -> np.uint64:
 
 
 ONES, TOPS, FOURS, POINTS, ZEROS, ABOVE = (repeated(byte) for byte in (0x01, 0x80, 0x0F, POINT, ord("0"), 0x76))
-POINTS_BIT = 0x10
-"""The bit that digits have and a point has not."""
-POINTS_ONLY = repeated(POINTS_BIT)
 OWN = np.array([0, *((1 << 64) - (1 << 64 - 8 * count) for count in range(1, EIGHT + 1))], dtype=np.uint64)
 """The highest so many bytes of eight."""
 MASKS = {8: 0x00FF00FF00FF00FF, 16: 0x0000FFFF0000FFFF, 32: 0x00000000FFFFFFFF}

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +34,6 @@ from ncfix.text.numbers import (
     is_numeric,
     table,
 )
-from ncfix.text.uniform_lines import UniformLines, find_uniform_lines
 
 NUMBER_MARK = 1
 COMMENT_MARK = 2
@@ -140,44 +138,7 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
         found = scan_compiled(text, blocks, pointless)
         if found is not None:
             return found
-    same = find_uniform_lines(source, blocks, pointless=pointless)
-    if same is None:
-        return in_slices(source, blocks, partial(scan_any, pointless=pointless))
-    return with_others(source, blocks, pointless, same)
-
-
-def with_others(source: bytes, blocks: NDArray[np.int64], pointless: bool, same: UniformLines) -> Scan:
-    """The scan of a text of which some lines are alike; the others are put together and scanned as any text is."""
-    n, m, mark = len(blocks), len(same.columns), bytes([NUMBER_MARK])
-    shapes: list[bytes | None] = [same.example.key(mark, bytes([POINTLESS_MARK]) if pointless else mark)]
-    comment, counts, group = (np.full(n, value, dtype=np.int64) for value in (-1, m, 0))
-    spans, values = same.line_by_line()
-    if len(same.rows) == n:
-        return Scan(shapes, comment, np.arange(0, n * m + 1, m, dtype=np.int64), spans, values, group)
-    alone = np.ones(n, dtype=np.bool_)
-    alone[same.rows] = False
-    rows = np.flatnonzero(alone)
-    starts, stops = blocks[rows, 0], np.append(blocks[1:, 0], len(source))[rows]
-    text = b"".join(source[start:stop] for start, stop in zip(starts.tolist(), stops.tolist(), strict=True))
-    moved = starts - firsts(stops - starts)[:-1]
-    rest = in_slices(text, blocks.take(rows, axis=0) - moved[:, None], partial(scan_any, pointless=pointless))
-    comment[rows] = np.where(rest.comment < 0, -1, rest.comment + moved)
-    counts[rows] = np.diff(rest.first_number)
-    group[rows] = len(shapes) + rest.groups
-    first = firsts(counts)
-    own, spans_moved = np.repeat(~alone, counts), rest.spans + np.repeat(moved, counts[rows])[:, None]
-    return Scan(
-        shapes + rest.shapes, comment, first, mixed(own, spans, spans_moved), mixed(own, values, rest.values), group
-    )
-
-
-def mixed(own: NDArray[np.bool_], some: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
-    """The rows of two tables, each in order: those of the first where they are its own (n,)."""
-    result = np.empty((len(own), *some.shape[1:]), dtype=some.dtype)
-    kind = f"V{result.nbytes // len(own)}"
-    rows = result.view(kind).ravel()
-    rows[own], rows[~own] = some.view(kind).ravel(), others.view(kind).ravel()
-    return result
+    return in_slices(source, blocks, partial(scan_any, pointless=pointless))
 
 
 SLICE_BYTES = 1 << 19

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix import core
 from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
 
 if TYPE_CHECKING:
@@ -155,12 +155,10 @@ ROUNDED = 1.01
 ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
 
 
-@cache
 def rules() -> NumberRules:
-    """These numbers, as the compiled core takes them."""
-    from ncfix.core import words
-
-    return words.NumberRules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
+    """These numbers, as the core takes them."""
+    made: NumberRules = core.loops("words").NumberRules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
+    return made
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
-from ncfix.text.numbers import fill
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,13 +98,6 @@ class Splices:
         data = np.frombuffer(self.data, dtype=np.uint8)[np.repeat(kept, self.length)]
         return Splices(self.start[kept], self.stop[kept], self.length[kept], data.tobytes())
 
-    def rows(self, chosen: NDArray[np.int64]) -> Splices:
-        """Some of them, (k,) in order."""
-        length, before = self.length.take(chosen), np.cumsum(self.length) - self.length
-        places = np.arange(int(length.sum())) + np.repeat(before.take(chosen) - (np.cumsum(length) - length), length)
-        data = np.frombuffer(self.data, dtype=np.uint8).take(places).tobytes()
-        return Splices(self.start.take(chosen), self.stop.take(chosen), length, data)
-
     def edits(self) -> Iterator[Edit]:
         """One by one."""
         at = 0
@@ -129,9 +121,7 @@ def spliced(source: bytes, splices: Splices) -> bytes:
         begins, ends, lengths = (np.ascontiguousarray(each) for each in (start, stop, splices.length))
         edits.spliced(text, begins, ends, lengths, data, out)
         return out.tobytes()
-    other = np.flatnonzero(splices.length != stop - start)
-    begun, others = _in_place(source, splices, other), splices.rows(other)
-    return _laid_out(begun, others) if FEW * len(other) > len(splices) else _put_in(begun, others)
+    return apply(source, tuple(splices.edits()))
 
 
 def overlong(source: bytes, blocks: NDArray[np.int64], splices: Splices, limit: int) -> dict[int, int]:
@@ -164,50 +154,3 @@ def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
     columns = (np.ascontiguousarray(each) for each in (splices.start, splices.stop, splices.length))
     old, new = (np.frombuffer(each, dtype=np.uint8) for each in (source, text))
     return bool(edits.left_alone(old, new, *columns))
-
-
-FEW = 16
-"""Where no more than one in so many edits changes the length of the text, these are made one by one."""
-
-
-def _in_place(source: bytes, splices: Splices, other: NDArray[np.int64]) -> memoryview:
-    """The source with all edits made but the `other` ones, which change its length."""
-    text, begins, length = bytearray(source), np.cumsum(splices.length) - splices.length, splices.length.copy()
-    length[other] = 0
-    for size in (np.flatnonzero(np.bincount(length)[1:]) + 1).tolist():
-        rows = np.flatnonzero(length == size)
-        _stretches(text, size)[splices.start.take(rows)] = _stretches(splices.data, size)[begins.take(rows)]
-    return memoryview(text)
-
-
-def _stretches(text: bytes | bytearray, size: int) -> NDArray[np.void]:
-    """The `size` bytes from each byte of a text on."""
-    return np.ndarray((len(text) - size + 1,), f"V{size}", text, strides=(1,))
-
-
-def _put_in(source: memoryview, splices: Splices) -> bytes:
-    """The source with all edits made, one by one."""
-    pieces, done, at = list[bytes | memoryview](), 0, 0
-    for start, stop, length in zip(splices.start.tolist(), splices.stop.tolist(), splices.length.tolist(), strict=True):
-        pieces += (source[done:start], splices.data[at : at + length])
-        done, at = stop, at + length
-    return b"".join([*pieces, source[done:]])
-
-
-def _laid_out(source: memoryview, splices: Splices) -> bytes:
-    """The source with all edits made, by masks of what is kept and of what is new."""
-    start, stop = splices.start, splices.stop
-    kept = ~_cover(len(source), start, stop)
-    ends = np.cumsum(splices.length + start - np.append(0, stop[:-1]))
-    out = np.empty(int(np.count_nonzero(kept) + splices.length.sum()), dtype=np.uint8)
-    new = _cover(len(out), ends - splices.length, ends)
-    out[new] = np.frombuffer(splices.data, dtype=np.uint8)
-    out[~new] = np.frombuffer(source, dtype=np.uint8)[kept]
-    return out.tobytes()
-
-
-def _cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """A mask over `size` bytes that is True from each start up to its stop."""
-    mask = np.zeros(size, dtype=np.bool_)
-    fill(mask, np.stack((starts, stops), axis=1), True)
-    return mask

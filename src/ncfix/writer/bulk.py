@@ -1,6 +1,6 @@
-"""Stretches of corrected motions, straight ones and arcs, written all at once.
+"""Stretches of corrected motions, straight ones and arcs, written all at once by the core.
 
-What the emitter and `BlockWriter` do motion by motion, done as columns, byte for byte; a test holds the two together.
+What the emitter and `BlockWriter` do motion by motion, byte for byte; a test holds the two together.
 A motion qualifies if its block is words with plain numbers, is executed once, and becomes one block with the same
 motion code. Whatever is not clear to the last digit (a value in the middle between two outputs, a position that is
 not on the digits) ends a stretch, and the emitter takes it by itself.
@@ -18,22 +18,13 @@ from numpy.typing import NDArray
 from ncfix import core
 from ncfix.control.moves import Frame, MotionKind, Moves
 from ncfix.text.spelling import (
-    ROUNDED,
-    NumberColumns,
-    Styles,
-    in_style,
-    is_plain,
-    laid_out,
-    plain,
-    rounded,
     rules,
-    styles_of,
 )
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
 from ncfix.writer.bulk_arcs import CentreWords, OutputSteps, whole_arcs
 from ncfix.writer.bulk_fit import qualified, sound, with_dwells
-from ncfix.writer.bulk_layouts import CLOSING, NONE, OPENING, Layouts, lines_of, with_lines
+from ncfix.writer.bulk_layouts import CLOSING, OPENING, Layouts
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 from ncfix.writer.target import FrameMap
@@ -42,11 +33,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-SHORTEST = 16
-"""Stretches of fewer motions go one by one."""
 SWAPPED = bytes.maketrans(b".,", b",.")
-LONGEST = 1 << 14
-"""Motions that are taken at once; where one is not clear, those behind it were taken in vain."""
 
 
 @dataclass
@@ -153,8 +140,7 @@ class Bulk:
             and (self.wordless[row] & (position != self.pieces.end[self.first_piece[row]])).any()
         ):
             return None
-        write = self._compiled if core.engaged() else self._in_columns
-        found = write(row, position, frame, self._steps_for(decimals))
+        found = self._written(row, position, frame, self._steps_for(decimals))
         if found is None:
             return None
         ends, splices = found
@@ -198,22 +184,11 @@ class Bulk:
     def _steps_for(self, decimals: IntArray) -> OutputSteps:
         return OutputSteps(self.text, decimals, _halves(decimals), self.layouts.spelling.signed)
 
-    def _in_columns(
+    def _written(
         self, row: int, position: FloatArray, frame: FrameMap, steps: OutputSteps
     ) -> tuple[FloatArray, Splices] | None:
         """The commands at the ends of the pieces of a stretch, (k, n_axes), and what changes in the words of axes."""
-        stop = min(int(self.stop[row]), row + LONGEST)
-        if stop - row < SHORTEST:
-            return None
-        stretch = WrittenStretch.of(self, row, stop, position, frame, steps).clear_head()
-        return (stretch.commands(), stretch.splices()) if len(stretch.block) else None
-
-    def _compiled(
-        self, row: int, position: FloatArray, frame: FrameMap, steps: OutputSteps
-    ) -> tuple[FloatArray, Splices] | None:
-        """As `_in_columns`, compiled."""
-        from ncfix.core import words
-
+        words = core.loops("words")
         stop, program, layouts = int(self.stop[row]), self.program, self.layouts
         pieces = self.first_piece[row : stop + 1]
         ends, axes = self.pieces.end[pieces[0] : pieces[-1]], len(position)
@@ -280,194 +255,6 @@ def _is_plain(frame: Frame) -> bool:
     """Whether each number in a frame stands for one axis, with a point or without."""
     turned = bool((frame.rotation != np.eye(3)).any())
     return not (turned or frame.diameter) and frame.increments == (1.0, 1.0)
-
-
-@dataclass(slots=True)
-class WrittenStretch:
-    """One stretch while it is written; k pieces of its motions, columns by axis.
-
-    block     (k,) the block of the motion
-    further   (k,) the piece is not the first one of its motion: it gets a line of its own
-    words     (k, n_axes) index of the number of each axis word, -1 where there is none
-    wanted    (k, n_axes) program numbers of the corrected ends
-    values    (k, n_axes) what will stand there: as written now, as written anew, or where the axis is left
-    rewrite   words that get another value
-    add       axes that get a word
-    styles    of the words that get another value, in the order of `words[rewrite]`
-    """
-
-    bulk: Bulk
-    block: IntArray
-    further: Mask
-    position: FloatArray
-    frame: FrameMap
-    decimals: IntArray
-    words: IntArray
-    wanted: FloatArray
-    values: FloatArray
-    rewrite: Mask
-    add: Mask
-    styles: Styles
-    clear: Mask
-
-    @classmethod
-    def of(
-        cls, bulk: Bulk, row: int, stop: int, position: FloatArray, frame: FrameMap, steps: OutputSteps
-    ) -> WrittenStretch:
-        """Work out which words change."""
-        program, decimals = bulk.program, steps.decimals
-        rows = slice(bulk.first_piece[row], bulk.first_piece[stop])
-        move = bulk.pieces.move[rows]
-        block = bulk.moves.block.take(move).astype(np.int64)
-        further = np.diff(move, prepend=-1) == 0
-        words = _words(bulk, block, further)
-        worded, present = words >= 0, words != NONE
-        wanted = frame.program(bulk.pieces.end[rows])
-        half, digits = np.tile(steps.half, (len(block), 1)), np.tile(decimals, (len(block), 1))
-        original = np.where(worded, program.numbers.take(words, mode="clip"), wanted)
-        rewrite = np.abs(wanted - original) >= half
-        rewrite[np.flatnonzero(further[1:])] = True
-        rewrite &= present
-        anew = np.flatnonzero(worded & rewrite)
-        spans = program.number_spans.take(words.ravel().take(anew), axis=0)
-        styles = styles_of(steps.text, spans, signed=steps.signed)
-        digits.ravel()[anew] = np.maximum(digits.ravel().take(anew), styles.decimals)
-        kept = present & ~rewrite
-        clear = is_plain(wanted, digits) | kept
-        clear.ravel()[anew] &= styles.clear
-        values = np.where(kept, original, rounded(wanted, digits))
-        add = np.zeros_like(present)
-        if not present.all():
-            start, stood = frame.program(position), frame.program(frame.command(values))
-            stays = ~present & bulk.layouts.nameless(program, block)
-            for axis in range(len(position)):
-                near = with_those_before(np.flatnonzero(~present[:, axis]), len(block))
-                cells = near, axis
-                add[cells], clear[cells] = missing(
-                    start[axis], stood[cells], present[cells], wanted[cells], clear[cells], stays[cells], half[0, axis]
-                )
-            alone = np.flatnonzero(further)
-            clear[alone[~add[alone].any(axis=1)]] = False
-            still = np.flatnonzero(bulk.moves.kind[move] == MotionKind.DWELL)
-            add[still], clear[still] = False, True
-        return cls(bulk, block, further, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
-
-    def clear_head(self) -> WrittenStretch:
-        """The motions up to the first one that is not clear in all its pieces."""
-        if self.clear.all():
-            return self
-        fine = np.asarray(self.clear.all(axis=1))
-        count = int(np.flatnonzero(~self.further[: int(np.argmin(fine)) + 1])[-1])
-        styles = self.styles.rows(np.arange(np.count_nonzero(self.rewrite[:count])))
-        columns = ("block", "further", "words", "wanted", "values", "rewrite", "add", "clear")
-        return replace(self, styles=styles, **{name: getattr(self, name)[:count] for name in columns})
-
-    def commands(self) -> FloatArray:
-        """The commands at the ends of the pieces, (k, n_axes): an axis that is not told to move stays where it was."""
-        told = (self.words != NONE) | self.add
-        commands = self.frame.command(self.values)
-        if told.all():
-            return commands
-        for axis in range(len(self.position)):
-            near = with_those_before(np.flatnonzero(~told[:, axis]), len(told))
-            commands[near, axis] = last_told(commands[near, axis], told[near, axis], self.position[axis])
-        return commands
-
-    def splices(self) -> Splices:
-        """What changes in the source."""
-        spans, new = self._rewritten()
-        rows, places, added = self._added()
-        start, stop = np.concatenate((spans[:, 0], places)), np.concatenate((spans[:, 1], places))
-        order = np.argsort(2 * start + (stop > start), kind="stable")
-        texts = laid_out(new.and_then(added, order))
-        words = Splices(start.take(order), stop.take(order), texts.length, texts.data)
-        lined = self.bulk.layouts.lined and self.further.any()
-        return self._in_lines(words, rows, np.argsort(order)[len(spans) :]) if lined else words
-
-    def _rewritten(self) -> tuple[IntArray, NumberColumns]:
-        """The words that get another value: where they stand, (m, 2), and how they are to be written."""
-        cells = np.flatnonzero(self.rewrite)
-        values, decimals = self.wanted.ravel().take(cells), self.decimals.take(cells % len(self.decimals))
-        spans = self.bulk.program.number_spans.take(self.words.ravel().take(cells), axis=0)
-        return spans, in_style(values, self.styles, decimals)
-
-    def _added(self) -> tuple[IntArray, IntArray, NumberColumns]:
-        """The words that are missing, and those of further pieces, in the order in which programs write them.
-
-        Returns the row of each, the place where it is put in, and how it is to be written.
-        """
-        program, layouts = self.bulk.program, self.bulk.layouts
-        rows, columns = np.divmod(np.flatnonzero(self.add[:, layouts.by_letter]), len(self.decimals))
-        columns = layouts.by_letter.take(columns)
-        blocks, further = self.block.take(rows), self.further.take(rows)
-        at = np.where(further, program.blocks[blocks, 1], layouts.places(program, blocks))
-        heads = np.zeros((len(rows), 4), dtype=np.uint8)
-        heads[:, 2:] = layouts.heads[program.template[blocks], columns]
-        if not layouts.lined:
-            begins = further & (np.diff(rows, prepend=-1) != 0)
-            heads[begins, :3] = np.frombuffer(program.line_end.rjust(2, b"\0") + b"\0", dtype=np.uint8)
-        values, decimals = self.wanted[rows, columns], self.decimals.take(columns)
-        return rows, at, plain(values, decimals, heads, signed=layouts.spelling.signed)
-
-    def _in_lines(self, words: Splices, rows: IntArray, places: IntArray) -> Splices:
-        """Words with what else stands on lines of further pieces; added ones are of `rows`, at `places` among all."""
-        program, further = self.bulk.program, self.further.take(rows)
-        first = np.flatnonzero(further & (np.diff(rows, prepend=-1) != 0))
-        last = np.flatnonzero(further & (np.diff(rows, append=-1) != 0))
-        texts = lines_of(program, self.bulk.layouts, self.block.take(rows.take(first)), program.line_end)
-        return with_lines(words, *texts, (places.take(first), places.take(last)))
-
-
-def _words(bulk: Bulk, block: IntArray, further: Mask) -> IntArray:
-    """(k, n_axes) the number of each axis word of pieces; `NONE`, or `LED` for what is led without one."""
-    found = bulk.layouts.slots.take(bulk.program.template.take(block), axis=0)
-    found[np.flatnonzero(further)] = NONE
-    first = np.repeat(bulk.program.first_number.take(block), found.shape[1]).reshape(found.shape)
-    words: IntArray = np.where(found >= 0, first + found, found)
-    return words
-
-
-# -- words that axes lack which have to stand elsewhere than where the program leaves them -----------------------------
-
-
-def with_those_before(rows: IntArray, n: int) -> IntArray | slice:
-    """Rows and those just before them, of n; all, if they are many."""
-    if 4 * len(rows) > n:
-        return slice(None)
-    return np.flatnonzero(np.bincount(np.concatenate((rows, np.maximum(rows - 1, 0)))))
-
-
-def last_told(values: FloatArray, told: Mask, start: float) -> FloatArray:
-    """What was told last in each row (k,), `start` before the first time."""
-    last = np.maximum.accumulate(np.where(told, np.arange(len(told)), -1))
-    found: FloatArray = np.where(last >= 0, values[last], start)
-    return found
-
-
-def missing(
-    start: float, values: FloatArray, present: Mask, wanted: FloatArray, clear: Mask, stays: Mask, half: float
-) -> tuple[Mask, Mask]:
-    """Where an axis without a word must stand elsewhere by half an output step, (k,), and what is `clear` then.
-
-    start   program number of where the control stands before the stretch
-    values  program numbers of where it stands behind each piece, if that tells it to go there
-    rows of pieces that have a word may be left out, unless one that lacks it comes next
-    stays  it gets no word; where it must stand elsewhere by more than what rounding does to it, that is not clear
-
-    After its last word an axis is left there until it is off by half a step; from then on it is on the digits, and gets
-    a word whenever the nearest digits change.
-    """
-    rows = np.arange(len(values))
-    last_word = np.maximum.accumulate(np.where(present, rows, -1))
-    left_at = last_told(values, present, start)
-    away = ~(np.abs(wanted - left_at) < half)
-    last_away = np.maximum.accumulate(np.where(away & ~present, rows, -1))
-    held = np.append(-1, last_away[:-1]) <= last_word
-    before = np.where(held, left_at, np.append(start, values[:-1]))
-    add = ~present & ~(np.abs(wanted - before) < half) & ~stays
-    clear = clear | (~present & held & ~away)
-    clear[stays] = (np.abs(wanted - left_at) <= ROUNDED * half)[stays]
-    return add, clear
 
 
 # -- arcs in a stretch that are written by themselves all the same -----------------------------------------------------

@@ -12,7 +12,6 @@ from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import START, Program
-from ncfix.text.writer import Splices
 from ncfix.writer.language import WrittenLanguage
 
 IntArray = NDArray[np.int64]
@@ -145,11 +144,6 @@ class Layouts:
         if arc.radius is not None:
             self.radius[shape], self.taken[shape] = arc.radius
 
-    def nameless(self, program: Program, blocks: IntArray) -> NDArray[np.bool_]:
-        """(k, n_axes) axes that get no word where `blocks` have none."""
-        nameless: NDArray[np.bool_] = self.heads[:, :, 1] == 0
-        return nameless.take(program.template.take(blocks), axis=0)
-
     def places(self, program: Program, blocks: IntArray) -> IntArray:
         """The bytes of `blocks` (k,) at which missing words go."""
         return places_of(program, blocks, self.anchors)
@@ -167,38 +161,3 @@ def places_of(program: Program, blocks: IntArray, anchors: IntArray) -> IntArray
     edges[behind] = program.number_spans[program.first_number[blocks[behind]] + slot[behind], 1]
     places: IntArray = edges + offset
     return places
-
-
-# -- lines of further pieces that are more than axis words: the block number, `L`, FMAX -------------------------------
-
-
-def lines_of(
-    program: Program, layouts: Layouts, blocks: IntArray, end_of_line: bytes
-) -> tuple[list[bytes], list[bytes]]:
-    """What stands before and behind the axis words of the lines of further pieces of `blocks` (k,)."""
-    shapes, begins = program.template[blocks].tolist(), program.blocks[blocks, 0].tolist()
-    stops = layouts.lead_ends(program, blocks).tolist()
-    openings, closings = (
-        [row.tobytes().rstrip(b"\0") for row in table] for table in (layouts.openings, layouts.closings)
-    )
-    before = [
-        end_of_line + program.source[begin:stop] + openings[shape]
-        for begin, stop, shape in zip(begins, stops, shapes, strict=True)
-    ]
-    return before, [closings[shape] for shape in shapes]
-
-
-def with_lines(words: Splices, before: list[bytes], behind: list[bytes], places: tuple[IntArray, IntArray]) -> Splices:
-    """Words, of which some are the first and the last of a line, with what stands before and behind them there."""
-    first, last = places
-    length, ends = words.length.copy(), np.cumsum(words.length)
-    pieces: list[bytes] = []
-    done = 0
-    for begin, stop, head, tail in zip(
-        (ends - words.length)[first].tolist(), ends[last].tolist(), before, behind, strict=True
-    ):
-        pieces += (words.data[done:begin], head, words.data[begin:stop], tail)
-        done = stop
-    np.add.at(length, first, [len(each) for each in before])
-    np.add.at(length, last, [len(each) for each in behind])
-    return Splices(words.start, words.stop, length, b"".join([*pieces, words.data[done:]]))

@@ -124,7 +124,6 @@ def test_most_are_written_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return found
 
     monkeypatch.setattr(bulk.Bulk, "take", noting)
-    monkeypatch.setattr(bulk, "SHORTEST", 1)
     source = program("\n".join(f"{n} L X{n / 7:+.4f} Y{n / 9:+.4f} Z+1.5 B+0.25 C+0.5 F500" for n in range(1, 200)))
     found, moves = followed(source, "same")
     assert_same(found, moves, moved(moves, 3, 0.01))

@@ -74,11 +74,6 @@ def farthest(table: Array) -> Array:
     return np.array([np.abs(column).max() for column in table.T])
 
 
-def extent(table: Array) -> tuple[Array, Array]:
-    """The smallest and the largest number of each column, (m,) each; NaN if one is NaN."""
-    return np.array([column.min() for column in table.T]), np.array([column.max() for column in table.T])
-
-
 def lengths(vectors: Array) -> Array:
     """The lengths (n,) of vectors (n, k)."""
     size: Array = np.sqrt(squares(vectors))

@@ -77,31 +77,14 @@ def stage_of(control: ProgramControl, unit: ProgramText, start: int, stop: int) 
     """What blocks say, and where they lead."""
     program = unit.program
     shapes, first = program.template[start:stop], program.first_number[start:stop]
-    follow = followed_compiled if core.engaged() else followed
     before = feed_unit(control), control.modal.feed, float(control.modal.motion)
-    stage = follow(control, program.numbers, first, shapes, unit.lanes, before)
+    stage = followed(control, program.numbers, first, shapes, unit.lanes, before)
     return replace(stage, turns=unit.lanes.turns.take(shapes)) if unit.lanes.turns.any() else stage
 
 
 def feed_unit(control: ProgramControl) -> float:
     """What the number of an F word counts."""
     return 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
-
-
-def followed(
-    control: ProgramControl, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
-) -> BlockRows:
-    """What blocks of some shapes with numbers from `first` on say, and where they lead."""
-    unit, feed_before, motion_before = before
-    path = np.empty((len(first) + 1, N_LETTERS))
-    path[:] = control.position
-    for letter in np.flatnonzero((tables.axes >= 0).any(axis=0)).tolist():
-        path[1:, letter] = column(control, letter, words(numbers, first, tables.axes[:, letter].take(shapes)))
-    feeds, motion = words(numbers, first, tables.feed.take(shapes)), tables.motion.take(shapes)
-    fed, coded = ~np.isnan(feeds), motion >= 0
-    feed = filled(unit * feeds, fed, feed_before)
-    codes = filled(motion.astype(np.float64), coded, motion_before)
-    return BlockRows(path, feed, fed, codes, coded, tables.mask.take(shapes))
 
 
 def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
@@ -114,23 +97,10 @@ def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
     return values
 
 
-def column(control: ProgramControl, letter: int, words: FloatArray) -> FloatArray:
-    """The commands of one axis at the ends of blocks with these words, (n,)."""
-    here, given = control.position[letter], ~np.isnan(words)
-    if not given.any():
-        return np.full(len(words), here)
-    if control.modal.incremental:
-        steps = np.where(given, control.scale[letter] * words, 0.0)
-        return np.cumsum(np.append(here, steps))[1:]
-    return filled(control.offset[letter] + control.scale[letter] * words, given, here)
-
-
-def followed_compiled(
+def followed(
     control: ProgramControl, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
 ) -> BlockRows:
-    """As `followed`."""
-    from ncfix.core import motions
-
+    """What blocks of some shapes with numbers from `first` on say, and where they lead."""
     position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
     n = len(first)
     stage = BlockRows(
@@ -141,7 +111,7 @@ def followed_compiled(
         np.empty(n, dtype=np.bool_),
         np.empty(n, dtype=np.int64),
     )
-    motions.followed(
+    core.loops("motions").followed(
         numbers,
         first,
         shapes,
