@@ -20,7 +20,6 @@ from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, State, load
-from ncfix.text import spelling
 from ncfix.text.reader import read
 from program.klartext import test_parts
 from program.test_many_blocks import klartext, rs274
@@ -34,10 +33,8 @@ SOME = 10
 @pytest.fixture(autouse=True)
 def _compared() -> Iterator[None]:
     require_core()
-    spelling.rules.cache_clear()
     with both_forms():
         yield
-    spelling.rules.cache_clear()
 
 
 def fixed(source: bytes, machine: Machine, dialect: str, options: FixOptions = OPTIONS) -> bytes:
