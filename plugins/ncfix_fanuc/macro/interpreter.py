@@ -12,7 +12,7 @@ from ncfix.control.expressions import Fault, Unknown, Value, nominal
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
-from ncfix_fanuc.macro import polar, scaling, system, tilt, vectors
+from ncfix_fanuc.macro import coordinates, system, tilt
 from ncfix_fanuc.macro.blocks import CORNER, G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl
 from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
@@ -181,12 +181,12 @@ class MacroInterpreter(RS274Interpreter):
         self.at_once(codes)
         self.take_points(plan, block)
         if G16 in codes:
-            polar.switch(self.control, block, G16)
+            coordinates.switch_polar(self.control, block, G16)
         if self.control.polar is not None and G15 not in codes and plan.codes is not None and not plan.codes.takes:
-            block = polar.cartesian(self.control, block)
-        if scaling.ON in codes and "P" in plan.pointless:
+            block = coordinates.cartesian(self.control, block)
+        if coordinates.ON in codes and "P" in plan.pointless:
             block.unknown |= {"P"}  # thousandths or hundred-thousandths, as a parameter says
-        return block if plan.codes is None else scaling.scaled(self.control, block, plan.codes)
+        return block if plan.codes is None else coordinates.scaled(self.control, block, plan.codes)
 
     def take_points(self, plan: RS274Plan, block: Block) -> None:
         """Numbers without a decimal point count increments, or as the setup says."""
@@ -215,7 +215,7 @@ class MacroInterpreter(RS274Interpreter):
         super().settings(codes, block)
         lone_number(self.control, block, codes)
         if self.control.vectors and codes.takes and block.values.keys() & {*COMPONENTS}:
-            self.control.lose(self.control.turning, vectors.AFTER_VECTOR)
+            self.control.lose(self.control.turning, tilt.AFTER_VECTOR)
         changed = self.control.tools.vector[Z] != before and not codes.takes
         if changed and self.control.modal.incremental and "Z" in block.values:
             self.control.lose((Z,), LENGTH_IN_STEPS)
@@ -239,7 +239,7 @@ class MacroInterpreter(RS274Interpreter):
         found = super().motion_of(plan, codes)
         vector = self.control.vectors and not plan.letters.isdisjoint(COMPONENTS)
         if found is None and vector and codes.motion is None and not codes.takes:
-            return self.control.modal.motion if self.control.modal.motion in vectors.STRAIGHT else None
+            return self.control.modal.motion if self.control.modal.motion in tilt.STRAIGHT else None
         return found
 
     def move(self, block: Block, codes: Codes, motion: int) -> None:
@@ -259,12 +259,12 @@ class MacroInterpreter(RS274Interpreter):
     def by_vector(self, block: Block, codes: Codes, motion: int) -> None:
         """The motion of a block while I J K say where the tool points; rotary axes never get words of their own."""
         control, axes = self.control, self.control.turning
-        before, why = control.refusal, "" if MACHINE in codes.g.values() else vectors.directed(control, block, motion)
+        before, why = control.refusal, "" if MACHINE in codes.g.values() else tilt.directed(control, block, motion)
         control.refusal = before or why
         super().move(block, codes, motion)
         if why:
             control.refusal = before
-            control.lose(axes if why != vectors.ON_ARC or block.values.keys() & {*"IJK"} else (), vectors.AFTER_VECTOR)
+            control.lose(axes if why != tilt.ON_ARC or block.values.keys() & {*"IJK"} else (), tilt.AFTER_VECTOR)
         control.places.lose(mask_of(axes))
 
     # -- calls and ends -----------------------------------------------------------------------------------------------

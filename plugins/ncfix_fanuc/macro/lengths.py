@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ncfix.control.coordinates import Z, mask_of
 from ncfix.text.tree import Comment, Tape, Word
 from ncfix_fanuc.macro.data import CHANGED
-from ncfix_fanuc.macro.vectors import INCLINED
+from ncfix_fanuc.macro.tilt import INCLINED
 from ncfix_iso.rs274 import settings
 from ncfix_iso.rs274.groups import LENGTH
 from ncfix_iso.rs274.parameters import whole

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.expressions import Fault
-from ncfix_fanuc.macro import data, lengths, polar, references, scaling, tilt
+from ncfix_fanuc.macro import coordinates, data, lengths, references, tilt
 from ncfix_fanuc.macro.variables import compiled, is_lasting, is_system
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.control import Block, RS274Control
@@ -118,17 +118,17 @@ FANUC = Rules(
     m_groups=FANUC_M,
     steps={
         100: data.set_data,
-        150: polar.switch,
-        160: polar.switch,
+        150: coordinates.switch_polar,
+        160: coordinates.switch_polar,
         270: references.check,
         280: references.named,
         290: data.made,
         300: references.further,
         **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),
-        500: scaling.switch,
-        510: scaling.switch,
-        501: scaling.mirror,
-        511: scaling.mirror,
+        500: coordinates.switch_scaling,
+        510: coordinates.switch_scaling,
+        501: coordinates.mirror,
+        511: coordinates.mirror,
         531: tilt.align,
         536: tilt.align,
         542: data.setting_error,

@@ -1,8 +1,10 @@
-"""The variables of Macro B: local to a call level, common, and those that the control keeps.
+"""The variables of Macro B, local to a call level, common, and those that the control keeps; and its expressions.
 
-`NaN` is vacant. What exists only at run time is marked, as in RS274; so is the machine's position: compensation
-changes what a program reads there, so nothing that is computed from it can be corrected.
-Source: Fanuc 30i operator's manual, "Custom macro", "System variables".
+A variable that was never set is vacant, and NaN stands for that here: copied as it is, zero in arithmetic, and equal
+to nothing but another vacant one. What exists only at run time is `Unknown`, as in RS274; so is the machine's position:
+compensation changes what a program reads there, so nothing that is computed from it can be corrected.
+Source: Fanuc 30i operator's manual, "Custom macro", "Variables", "System variables" and "Arithmetic and logic
+operation".
 """
 
 from __future__ import annotations

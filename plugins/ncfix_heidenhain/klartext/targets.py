@@ -39,7 +39,7 @@ class MotionWords:
 
     @property
     def axes(self) -> int:
-        """A bit mask of the axes that have a word; polar words stand for those of the plane (see `polar`)."""
+        """A bit mask of the axes that have a word; polar words stand for those of the plane (see `polar_axes`)."""
         return _axes_of(tuple(self.values))
 
     @property

@@ -1,14 +1,17 @@
-"""Scaling: G51 X Y Z P magnifies the words of the program about a point, G50 ends it. A flat program has no need of it.
-And programmable mirror image: G51.1 X10. mirrors X at 10, G50.1 X0 ends that.
+"""Codes under which the words of a block mean other coordinates: they are made those that they mean.
 
-Its words are made those that they mean; a correction cannot be written in them, for a magnified digit is a coarser one.
-Sources: Fanuc 30i operator's manual (machining centre), "Scaling", "Programmable mirror
-image"; Haas mill operator's manual, G51; Mitsubishi M700V
-programming manual, where it acts on the axes that the block names only.
+Polar coordinates: G16 makes the two axis words of the plane a radius and an angle, G15 ends it. Scaling: G51 X Y Z P
+magnifies the words of the program about a point, G50 ends it. Programmable mirror image: G51.1 X10. mirrors X at 10,
+G50.1 X0 ends that. A correction cannot be written in such words (a magnified digit is a coarser one); a flat program
+has no need of them.
+Sources: Fanuc 30i operator's manual (machining centre), "Polar coordinate command", "Scaling", "Programmable mirror
+image"; Haas mill operator's manual, G51; Mitsubishi M700V programming manual, where it acts on the axes that the block
+names only.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from ncfix_iso.rs274.control import Block
     from ncfix_iso.rs274.plans import Codes
 
+
 ON, OFF = 510, 500
 REASON = "scaling (G51) is in force; --flatten writes out what its words mean"
 TOGETHER = "what {} does while scaling (G51) is in force is not certain"
@@ -33,7 +37,7 @@ MIRROR_OFF = 501
 SPATIAL = (X, Y, Z)
 
 
-def switch(control: MacroControl, block: Block, code: int) -> None:
+def switch_scaling(control: MacroControl, block: Block, code: int) -> None:
     """G51 and G50; a scaling that is not certain is not followed."""
     if code == OFF:
         moves = bool(block.axes)
@@ -125,3 +129,60 @@ def put_up(control: MacroControl) -> None:
     control.handedness = handed(rotation)
     turned_back(control)
     control.refresh()
+
+
+POLAR_REASON = "polar coordinates (G16) are in force; --flatten writes them in X and Y"
+POLAR_ON = 160
+
+
+def switch_polar(control: MacroControl, block: Block, code: int) -> None:
+    """G16 and G15."""
+    if code == POLAR_ON and control.polar is None:
+        control.suspend("polar", POLAR_REASON)
+        control.polar = polar_position(control)
+    elif code != POLAR_ON:
+        control.resume("polar")
+        control.polar = None
+
+
+def polar_position(control: MacroControl) -> tuple[float, float]:
+    """Where the control stands, as radius and angle in program units and degrees."""
+    position, plane = control.program_position(), control.modal.plane
+    first, second = position[plane.first] / control.modal.unit, position[plane.second] / control.modal.unit
+    return math.hypot(first, second), math.degrees(math.atan2(second, first))
+
+
+def cartesian(control: MacroControl, block: Block) -> Block:
+    """The block with radius and angle made coordinates of the plane; where a radius is added is not followed."""
+    plane = control.modal.plane
+    letters = LETTERS[plane.first], LETTERS[plane.second]
+    given = [letter for letter in letters if letter in block.values]
+    if control.polar is None or not given:
+        return block
+    if control.modal.incremental and given == [letters[1]] and block.turn is None:
+        return further_round(control, block, letters)
+    radius, angle = (block.get(letter, known) for letter, known in zip(letters, control.polar, strict=True))
+    control.polar = radius, angle
+    turn = math.radians(angle)
+    block.values[letters[0]], block.values[letters[1]] = radius * math.cos(turn), radius * math.sin(turn)
+    block.axes |= plane.axes
+    if control.modal.incremental or block.unknown & set(letters):
+        block.unknown |= set(letters)
+    return block
+
+
+def further_round(control: MacroControl, block: Block, letters: tuple[str, str]) -> Block:
+    """A block in G91 with an angle alone: it is added to the one in force, by each repeat of a cycle anew."""
+    assert control.polar is not None
+    plane, (radius, angle) = control.modal.plane, control.polar
+    block.turn = block.values[letters[1]]
+    count = next((block.values[letter] for letter in control.rules.repeats if letter in block.values), 1.0)
+    control.polar = radius, angle + block.turn * count
+    turn, position = math.radians(angle + block.turn), control.program_position()
+    ends = radius * math.cos(turn), radius * math.sin(turn)
+    for letter, index, end in zip(letters, (plane.first, plane.second), ends, strict=True):
+        block.values[letter] = end - position[index] / control.modal.unit
+    block.axes |= plane.axes
+    if letters[1] in block.unknown:
+        block.unknown |= set(letters)
+    return block
