@@ -11,14 +11,14 @@ from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, 
 from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
-from ncfix.control.moves import Arc, MotionKind
+from ncfix.control.moves import Arc, MotionEnd, MotionKind
 from ncfix_siemens.sinumerik.destination import (
     NO_POLE,
     destination,
     doubtful_polar,
 )
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT, BlockWordValues, End, ProgrammedMotion
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT, BlockWordValues, ProgrammedMotion
 
 NO_HEADING = "in which direction the motion before this arc (CT) ends is not known"
 TURNS_AT_RUNTIME = "the turns of the arc (CT) are known only at run time"
@@ -139,7 +139,7 @@ def doubtful_diameter(control: Sinumerik, words: BlockWordValues, address: str) 
     return DIAMETERS.format(address) if counts else ""
 
 
-def geometry(control: Sinumerik, words: BlockWordValues, end: End, *, clockwise: bool) -> tuple[Point, End]:
+def geometry(control: Sinumerik, words: BlockWordValues, end: MotionEnd, *, clockwise: bool) -> tuple[Point, MotionEnd]:
     """The centre relative to the start in the plane, mm, and the end; raises `Fault` if the control refuses the arc."""
     plane = control.modal.plane
     step = control.way_to(end.target)
@@ -190,7 +190,9 @@ def centre_from_angle(chord: Point, degrees: float, *, clockwise: bool) -> Point
     return centre_from_radius(chord, radius if degrees <= 180.0 else -radius, clockwise=clockwise)
 
 
-def ended_by_angle(control: Sinumerik, words: BlockWordValues, end: End, centre: Point, *, clockwise: bool) -> End:
+def ended_by_angle(
+    control: Sinumerik, words: BlockWordValues, end: MotionEnd, centre: Point, *, clockwise: bool
+) -> MotionEnd:
     """The end of an arc given by its centre and opening angle."""
     plane = control.modal.plane
     angle = math.radians(words.get("AR")) * (-1.0 if clockwise else 1.0)
@@ -202,7 +204,7 @@ def ended_by_angle(control: Sinumerik, words: BlockWordValues, end: End, centre:
     step[plane.across] = whole[plane.across]
     target = end.target[:]
     target[:3] = [here + dot(row, step) for here, row in zip(control.position, control.rotation, strict=False)]
-    return End(target, end.unknown, end.lost)
+    return MotionEnd(target, end.unknown, end.lost)
 
 
 def circle_of(control: Sinumerik, plane: Plane, centre: Point, sweep: float) -> Arc:

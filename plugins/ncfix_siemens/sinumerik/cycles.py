@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 from ncfix.control.coordinates import LETTERS, mask_of, rotated
 from ncfix.control.expressions import Unknown, number
-from ncfix.control.moves import CycleCall, MotionKind
+from ncfix.control.moves import CycleCall, MotionEnd, MotionKind
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
@@ -26,7 +26,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
     FIRST_DEPTH,
     BlockWordValues,
     Drilling,
-    End,
     ProgrammedMotion,
 )
 
@@ -89,14 +88,16 @@ def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float,
     return math.dist(here, last) < math.dist(here, first)
 
 
-def lead_to(control: Sinumerik, block: int, point: tuple[float, float], name: str) -> tuple[BlockWordValues, End, str]:
+def lead_to(
+    control: Sinumerik, block: int, point: tuple[float, float], name: str
+) -> tuple[BlockWordValues, MotionEnd, str]:
     """The words that lead to a place, where that is, and why its hole is not corrected."""
     plane, program, lost = control.modal.plane, control.program_position(), dict(control.lost)
     axes = plane.axes
     for index, value in zip((plane.first, plane.second), point, strict=True):
         program[index] = control.stretch * value
         lost.pop(index, None)
-    end = End(control.command(program, axes), control.axes_of(lost), lost)
+    end = MotionEnd(control.command(program, axes), control.axes_of(lost), lost)
     return BlockWordValues(block, {}, {}, axes), end, WRITE_OUT.format(name)
 
 
@@ -184,7 +185,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
     take_up(control)
     mind_carried(control)
     control.use_all_start_positions()
-    here = End(control.position[:], dict(control.unknown), dict(control.lost))
+    here = MotionEnd(control.position[:], dict(control.unknown), dict(control.lost))
     drill(control, BlockWordValues(block, {}, {}, 0), here, drilling, refusal=WITH_WORDS if words.axes else "")
 
 
@@ -204,12 +205,18 @@ def hole_after(control: Sinumerik, words: BlockWordValues) -> None:
     """The modal cycle behind a motion that is none to a hole: a hole where that has led."""
     drilling = control.modes.modal_cycle
     assert drilling is not None
-    here = End(control.position[:], dict(control.unknown), dict(control.lost))
+    here = MotionEnd(control.position[:], dict(control.unknown), dict(control.lost))
     drill(control, BlockWordValues(words.block, {}, {}, 0), here, drilling, refusal=TO_A_HOLE, modal=True)
 
 
 def drill(
-    control: Sinumerik, words: BlockWordValues, over: End, drilling: Drilling, *, refusal: str = "", modal: bool = False
+    control: Sinumerik,
+    words: BlockWordValues,
+    over: MotionEnd,
+    drilling: Drilling,
+    *,
+    refusal: str = "",
+    modal: bool = False,
 ) -> None:
     """One hole: over its place, which the words say, down to its depth, and up again.
 
@@ -229,15 +236,15 @@ def drill(
     )
     control.heading = None
     if clear is None or depth is None:
-        up = End(control.position, control.unknown, dict(control.lost) | {across: AFTER_CYCLE})
-        up = End(up.target, control.axes_of(up.lost), up.lost)
+        up = MotionEnd(control.position, control.unknown, dict(control.lost) | {across: AFTER_CYCLE})
+        up = MotionEnd(up.target, control.axes_of(up.lost), up.lost)
     else:
-        up = at_height(control, End(control.position, dict(control.unknown), dict(control.lost)), clear)
+        up = at_height(control, MotionEnd(control.position, dict(control.unknown), dict(control.lost)), clear)
         control.count_from_here(1 << across)
     control.position, control.unknown, control.lost = up.target, up.unknown, up.lost
 
 
-def at_height(control: Sinumerik, over: End, height: float) -> End:
+def at_height(control: Sinumerik, over: MotionEnd, height: float) -> MotionEnd:
     """The place at a height along the tool, in program units, where the other coordinates are those of `over`."""
     across = control.modal.plane.across
     inner = [value - offset for value, offset in zip(over.target, control.offset, strict=True)]
@@ -249,7 +256,7 @@ def at_height(control: Sinumerik, over: End, height: float) -> End:
     for index in mixed:
         target[index] = back[index] + control.offset[index]
     lost = {index: why for index, why in over.lost.items() if index != across}
-    return End(target, control.axes_of(lost), lost)
+    return MotionEnd(target, control.axes_of(lost), lost)
 
 
 def refuse(control: Sinumerik, block: int, why: str) -> None:
@@ -257,5 +264,5 @@ def refuse(control: Sinumerik, block: int, why: str) -> None:
     gone = [index for index in GEOMETRY if index in control.machine]
     lost = dict(control.lost) | dict.fromkeys(gone, AFTER_CYCLE)
     words = BlockWordValues(block, {}, {}, mask_of(gone))
-    end = End(control.position[:], control.axes_of(lost), lost)
+    end = MotionEnd(control.position[:], control.axes_of(lost), lost)
     control.go(ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, refusal=why))

@@ -6,10 +6,10 @@ import math
 
 from ncfix.control.coordinates import INDEX, LETTERS, TURN, Vector, mask_of
 from ncfix.control.expressions import Fault
-from ncfix.control.moves import UnknownAxes
+from ncfix.control.moves import MotionEnd, UnknownAxes
 from ncfix.control.tcp import led_in_machine
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, POLAR, TURNING, BlockWordValues, End
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, POLAR, TURNING, BlockWordValues
 
 RUNTIME = "where the axis {} stands is known only at run time"
 RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM90)"
@@ -28,7 +28,7 @@ INCREMENT_IN_PLANE = (
 )
 
 
-def destination(control: Sinumerik, words: BlockWordValues) -> End:
+def destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd:
     """The command at which a motion of this block ends; refused where a word of X that is added would be a radius."""
     program = control.program_position()
     lost = dict(control.lost)
@@ -41,7 +41,7 @@ def destination(control: Sinumerik, words: BlockWordValues) -> End:
             moved |= 1 << INDEX[letter]
     if POLAR & words.values.keys():
         moved |= polar(control, words, program, lost)
-    return End(control.command(program, moved), control.axes_of(lost), lost)
+    return MotionEnd(control.command(program, moved), control.axes_of(lost), lost)
 
 
 def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vector, lost: UnknownAxes) -> None:
@@ -191,7 +191,7 @@ def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
     return None if any(control.unsteady(index) for index in axes) else (here[plane.first], here[plane.second])
 
 
-def machine_destination(control: Sinumerik, words: BlockWordValues) -> End:
+def machine_destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd:
     """The command at which a motion in machine coordinates (SUPA, G53, G153) ends: frames off, the tool's length on.
 
     A swivelled plane is a frame: without it the words are those of the machine's axes. TRAORI keeps them the tip's.
@@ -200,12 +200,12 @@ def machine_destination(control: Sinumerik, words: BlockWordValues) -> End:
         raise Fault(BAD_POLAR, "polar coordinates do not go with machine coordinates")
     if control.tcp and not (control.modes.transformed or control.setup.tcp):
         end = led_in_machine(control, *axes_of_machine(control, words))
-        return End(end.target, end.unknown, control.along_frame(end.unknown), end.in_machine)
+        return MotionEnd(end.target, end.unknown, control.along_frame(end.unknown), end.in_machine)
     target, unknown = control.position[:], dict(control.unknown)
     for letter in LETTERS:
         if letter in words.values:
             place_at_machine(control, words, letter, target, unknown)
-    return End(target, unknown, control.along_frame(unknown))
+    return MotionEnd(target, unknown, control.along_frame(unknown))
 
 
 def axes_of_machine(control: Sinumerik, words: BlockWordValues) -> tuple[dict[int, float], UnknownAxes]:

@@ -19,7 +19,7 @@ from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.expressions import number
 from ncfix.control.flow import Call
 from ncfix.control.interpreter import RUNTIME, Interpreter
-from ncfix.control.moves import MotionKind, Moves, Pass, Passing, Rule
+from ncfix.control.moves import MotionEnd, MotionKind, Moves, Pass, Passing, Rule
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, SourceError
@@ -43,7 +43,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
     UNFOLLOWED_MOTIONS,
     UNSEEN,
     BlockWordValues,
-    End,
     ProgrammedMotion,
 )
 
@@ -303,7 +302,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
         lost = control.lost | control.along_frame(dict.fromkeys(gone, AFTER_POSITIONING))
         control.go(
             ProgrammedMotion(
-                MotionKind.RAPID, still, End(control.position[:], control.axes_of(lost), lost), 0, refusal=why
+                MotionKind.RAPID, still, MotionEnd(control.position[:], control.axes_of(lost), lost), 0, refusal=why
             )
         )
     else:
@@ -365,7 +364,7 @@ def refuse(control: Sinumerik, plan: SinumerikPlan, block: int) -> None:
     lost = dict.fromkeys(control.machine, DECIDED_AT_RUNTIME)
     words = BlockWordValues(block, {}, {}, plan.axes)
     control.go(
-        ProgrammedMotion(MotionKind.RAPID, words, End(control.position[:], lost, dict(lost)), 0, passing=passing)
+        ProgrammedMotion(MotionKind.RAPID, words, MotionEnd(control.position[:], lost, dict(lost)), 0, passing=passing)
     )
 
 

@@ -9,7 +9,7 @@ import re
 
 from ncfix.control.control import AFTER_THAT
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, mask_of
-from ncfix.control.moves import MotionKind, Pass, Passing
+from ncfix.control.moves import MotionEnd, MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, tangential, through_point
 from ncfix_siemens.sinumerik.cycles import TO_A_HOLE, drill, hole_after
 from ncfix_siemens.sinumerik.destination import (
@@ -20,7 +20,7 @@ from ncfix_siemens.sinumerik.destination import (
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.orientation import oriented
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS, BlockWordValues, End, ProgrammedMotion
+from ncfix_siemens.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS, BlockWordValues, ProgrammedMotion
 
 _ACTION = r"""
     \$A_\w+(?:\[[^\]]*\])?=\S+
@@ -168,7 +168,7 @@ def measure(control: Sinumerik, words: BlockWordValues) -> None:
     end = destination(control, words)
     gone = {i: AFTER_MEASURING for i in control.machine if end.target[i] != control.position[i] or i in end.unknown}
     lost = end.lost | control.along_frame(gone)
-    ends = End(end.target, end.unknown | gone, lost)
+    ends = MotionEnd(end.target, end.unknown | gone, lost)
     control.go(ProgrammedMotion(MotionKind.FEED, words, ends, control.modal.motion, passing=MEASURING))
 
 
@@ -186,7 +186,7 @@ def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     reasons = {index: why for index, why in reasons.items() if index in control.machine}
     lost = control.lost | control.along_frame(reasons)
     words = BlockWordValues(words.block, {}, {}, mask_of(gone))
-    end = End(control.position[:], dict(control.unknown) | reasons, lost)
+    end = MotionEnd(control.position[:], dict(control.unknown) | reasons, lost)
     control.go(
         ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True)
     )
@@ -195,5 +195,5 @@ def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 def dwell(control: Sinumerik, words: BlockWordValues) -> None:
     """G4: F is seconds, S turns of the spindle."""
     still = BlockWordValues(words.block, {}, {}, 0)
-    end = End(control.position, control.unknown, control.lost)
+    end = MotionEnd(control.position, control.unknown, control.lost)
     control.go(ProgrammedMotion(MotionKind.DWELL, still, end, control.modal.motion, passing=DWELL))

@@ -32,7 +32,7 @@ from ncfix.control.expressions import Fault, number
 from ncfix.control.frames import WORLD, Affine, projected, shifted, turned
 from ncfix.control.lanes.block_rows import BlockRows, IntArray, stage_of
 from ncfix.control.lanes.lane import SHORTEST, before_placing, is_open, take
-from ncfix.control.moves import FeedMode, MotionKind, Pass, Passing
+from ncfix.control.moves import FeedMode, MotionEnd, MotionKind, Pass, Passing
 from ncfix.control.pointing import Pointing, Triple, Ways, dot, nearest
 from ncfix.control.posture import FAR, WayRules, normal_of
 from ncfix.control.tcp import rotary_at_zero
@@ -40,7 +40,14 @@ from ncfix.text.tree import StringLiteral
 from ncfix_siemens.sinumerik.plans import Calling, plain_text
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.unit import NO_LENGTH, SinumerikUnit
-from ncfix_siemens.sinumerik.vocabulary import ANGLES, NORMALS, OTHERS, VECTOR, BlockWordValues, End, ProgrammedMotion
+from ncfix_siemens.sinumerik.vocabulary import (
+    ANGLES,
+    NORMALS,
+    OTHERS,
+    VECTOR,
+    BlockWordValues,
+    ProgrammedMotion,
+)
 
 BAD_VECTOR = "NCF254"
 WAY = "NCF253"
@@ -347,7 +354,7 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
     lost = dict(control.lost) | dict.fromkeys(gone, AFTER_SWIVEL)
     lost = {index: why for index, why in lost.items() if index not in axes}
     mask = mask_of(control.turning)
-    end = End(target, control.axes_of(lost), lost)
+    end = MotionEnd(target, control.axes_of(lost), lost)
     control.go(
         ProgrammedMotion(
             MotionKind.RAPID, BlockWordValues(block, {}, {}, mask), end, control.modal.motion, passing=SWIVEL

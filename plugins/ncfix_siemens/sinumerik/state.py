@@ -33,7 +33,7 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.expressions import Unknown, Value
 from ncfix.control.frames import WORLD, Affine, FrameStack, shifted
-from ncfix.control.moves import AT_START, Arc, Motion, MotionEnd, MotionKind, Pass, Rule, UnknownAxes
+from ncfix.control.moves import AT_START, Arc, Motion, MotionKind, Pass, Rule, UnknownAxes
 from ncfix.control.setup import Run, Tool
 from ncfix.control.state import Modal
 from ncfix.control.tcp import switch
@@ -303,8 +303,8 @@ class Sinumerik(ProgramControl):
         if follows:
             self.ask_for_length()
         self._head(motion, follows=follows)
-        ends = MotionEnd(end.target, end.unknown, in_machine=end.in_machine)
-        self.make(Motion(motion.kind, axes, ends, motion.code, refusal, motion.passing, motion.arc, placed))
+        own = end._replace(in_frame=None)  # kept in `lost`
+        self.make(Motion(motion.kind, axes, own, motion.code, refusal, motion.passing, motion.arc, placed))
         self.whole = False
         self.count_from_here(axes, by_machine=motion.by_machine)
         self.forget_unknown()

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from ncfix.control.coordinates import INDEX, LETTERS, Vector
+from ncfix.control.coordinates import INDEX, LETTERS
 from ncfix.control.frames import ZEROS
-from ncfix.control.moves import Arc, MotionKind, Passing, UnknownAxes
+from ncfix.control.moves import Arc, MotionEnd, MotionKind, Passing
 
 _SETTERS = """
     ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos
@@ -235,19 +235,6 @@ class BlockWordValues:
         return any(address in self.values and self.values[address] is None for address in addresses)
 
 
-@dataclass(slots=True)
-class End:
-    """Where a motion ends: the command, which axes are not known there, and which coordinates.
-
-    in_machine  as in `Motion`
-    """
-
-    target: Vector
-    unknown: UnknownAxes
-    lost: UnknownAxes
-    in_machine: Vector | None = None
-
-
 class ProgrammedMotion(NamedTuple):
     """One motion of a block, as its words say it: what `Sinumerik.go` makes a `Motion` of.
 
@@ -259,7 +246,7 @@ class ProgrammedMotion(NamedTuple):
 
     kind: MotionKind
     words: BlockWordValues
-    end: End
+    end: MotionEnd
     code: int
     refusal: str = ""
     passing: Passing | None = None

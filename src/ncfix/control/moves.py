@@ -430,6 +430,11 @@ class MotionEnd(NamedTuple):
     in_frame: UnknownAxes | None = None
     in_machine: Vector | None = None
 
+    @property
+    def lost(self) -> UnknownAxes:
+        """What is not known along the axes of the program's frame, where that is kept for every motion."""
+        return self.unknown if self.in_frame is None else self.in_frame
+
 
 class Motion(NamedTuple):
     """One motion of the control.
