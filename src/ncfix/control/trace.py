@@ -24,7 +24,7 @@ from ncfix.text import stamp
 from ncfix.text.dialect import Dialect, check_content, check_zeros, header_length
 from ncfix.text.language import Language, language_of
 from ncfix.text.layout import AXIS_LETTERS
-from ncfix.text.reader import ProgramReading
+from ncfix.text.reader import ProgramReading, moved_by
 from ncfix.text.tree import Program, Skip, Template
 
 TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles", "calls"})
@@ -112,18 +112,13 @@ def stretch(program: Program, start: int, stop: int) -> Program:
         dialect=program.dialect,
         templates=program.templates,
         template=program.template[start:stop],
-        blocks=_behind(program.blocks[start:stop], ends[0]),
-        first_number=_behind(program.first_number[start : stop + 1], int(program.first_number[start])),
-        number_spans=_behind(program.number_spans[numbers], ends[0]),
+        blocks=moved_by(program.blocks[start:stop], -ends[0]),
+        first_number=moved_by(program.first_number[start : stop + 1], -int(program.first_number[start])),
+        number_spans=moved_by(program.number_spans[numbers], -ends[0]),
         numbers=program.numbers[numbers],
         first_line=program.first_line + program.lines_ended_before(ends[0]),
         line_end=program.line_end,
     )
-
-
-def _behind(places: NDArray[np.int64], origin: int) -> NDArray[np.int64]:
-    """Places as they count from an origin: the same array where they do already."""
-    return places - origin if origin else places
 
 
 def joined(parts: list[Program]) -> Program:

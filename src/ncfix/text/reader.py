@@ -312,9 +312,9 @@ class ProgramReading:
         return self.reach.in_doubt
 
 
-def moved_by(spans: NDArray[np.int64], offset: int) -> NDArray[np.int64]:
-    """Spans so many bytes further on."""
-    return spans + offset if offset else spans
+def moved_by(places: NDArray[np.int64], offset: int) -> NDArray[np.int64]:
+    """Places so many bytes, or numbers, further on; the same array where that is none."""
+    return places + offset if offset else places
 
 
 def agrees(scan: Scan, row: int, parsed: Parsed, start: int) -> bool:
