@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnosis import checks
-from ncfix.diagnosis.assessment import Plausibility, plausibility
+from ncfix.diagnosis.assessment import plausibility
 from ncfix.diagnosis.catalogue import Candidate, catalogue, without
+from ncfix.diagnosis.compound import EffectFinding, compound
 from ncfix.diagnosis.constants import ConstantsVerdict, FileLikelihood, MovedConstant, judged_constants, names_of
 from ncfix.diagnosis.evidence import Comparison, Evidence, Member, entry_price
 from ncfix.diagnosis.forms import VisibleForms, scaled_axes, unnamed_alternatives, visible_forms
@@ -75,29 +76,6 @@ CLEAR = float(np.log(1e6))
 """Log odds of what has no name from which on it is no play of the noise, whatever the noise is."""
 ANEW = "use the new machine file, or calibrate the machine anew"
 NO_PATTERN = "something that follows no pattern that was looked for"
-
-
-@dataclass(frozen=True, repr=False)
-class EffectFinding:
-    """One named effect.
-
-    candidate   what it is
-    odds        log odds against its not being there, given the others; p_value by chance for any name
-    aliases     names that explain its part nearly as well
-    size_um     rms of what it shows
-    effects     as they stand in the machine file; empty for what belongs to the measurement
-    shown       (m,) what it shows, um
-    judgement   whether its constants are such as machines have; None where there are none
-    """
-
-    candidate: Candidate
-    odds: float
-    p_value: float
-    aliases: tuple[str, ...]
-    size_um: float
-    effects: tuple[Effect, ...]
-    shown: Array
-    judgement: Plausibility | None = None
 
 
 @dataclass(frozen=True)
@@ -265,6 +243,7 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
     named = _findings(case, selected, joint, added)
     off = _off(case, constants, machine, max((each.size_um for each in named), default=0.0))
     findings = (*off, *named) if named and off and off[0].size_um > named[0].size_um else (*named, *off)
+    findings = compound(data, findings, constants.moved)
     places = scaled_axes(data)
     sets: list[dict[str, Member]] = [{}, {name: selected.members[name] for name in selected.named}, selected.members]
     weights = [scale.weight(each) for each in sets]

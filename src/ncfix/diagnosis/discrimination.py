@@ -170,7 +170,9 @@ class HypothesisPairs:
     @staticmethod
     def of(evidence: Evidence, sides: Sequence[Hypothesis], offered: Measurement, sigma: float) -> HypothesisPairs:
         """Those between the sides; `sigma` is the noise of a value, um."""
-        new = observe(offered, evidence.background.data.machine)
+        data = evidence.background.data
+        seen = {name for each in data.measurements if each.kind == offered.kind for name in each.measured}
+        new = observe(offered.with_columns({name: np.zeros(len(offered)) for name in sorted(seen)}), data.machine)
         pairs = [[(true, other) for other in sides if other is not true] for true in sides]
         contests = [[_contest(evidence, new, *pair, sigma) for pair in own] for own in pairs]
         return HypothesisPairs(tuple(side.group.owner.name for side in sides), contests, len(offered))

@@ -39,6 +39,7 @@ FEWER = 0.8
 HELPS = 0.05
 """And any must raise the chance that one name stands alone by so much."""
 ALIKE = "wherever these axes go, and with other tools, they show nearly the same pattern"
+ALIGNED = "the part was aligned: no poses tell them apart then; measure a square, or both diagonals with a ball-bar"
 """Why no poses are proposed."""
 OFFERED = 320
 """Poses among which those to be measured are chosen."""
@@ -150,7 +151,8 @@ def _best_of(evidence: Evidence, sides: Sequence[Hypothesis], sigma: float, offe
     before, after = (min(worst(rounds.useful or rounds.contests, rows)) for rows in ([], index))
     name, *others = rounds.names
     if not rounds.useful or chances[1] < chances[0] + HELPS:
-        return Proposal(name, None, before, after, chances[0], ALIKE, tuple(others))
+        why = ALIGNED if offered.header("setup") == "rigid" else ALIKE
+        return Proposal(name, None, before, after, chances[0], why, tuple(others))
     told = rounds.told_from_first
     alike = tuple(each for each in others if each not in told)
     reason = _reason(evidence, [side.group for side in sides])
@@ -228,7 +230,16 @@ def poses_on_offer(
     known = {name for each in data.measurements for name in each.columns if STATES.fullmatch(name)}
     held = {name: np.full(len(plan), data.column(name)[-1]) for name in known if name not in plan.columns}
     sets = tuple(f"tool {length:g}" for length in plan.column("tool_length"))
-    return replace(plan, columns={**plan.columns, **held}, labels={"set": sets})
+    return with_headers(replace(plan, columns={**plan.columns, **held}, labels={"set": sets}), data)
+
+
+def with_headers(plan: Measurement, data: ResidualData) -> Measurement:
+    """Poses with the set-up and the frame of the data, where these are of tips as well."""
+    like = next((each for each in data.measurements if each.kind in ("tcp", "tcp6")), None)
+    for name in ("setup", "frame") if like is not None else ():
+        if like is not None and like.header(name) != plan.header(name):
+            plan = plan.with_header(name, str(like.header(name)))
+    return plan
 
 
 def stays_where_it_was(data: ResidualData, plan: Measurement) -> Mask:

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from ncfix.diagnosis.assessment import carriers, conditions
+from ncfix.diagnosis.compound import EffectFinding
 from ncfix.diagnosis.constants import MovedConstant, names_of
-from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, EffectFinding
+from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis
 from ncfix.diagnosis.ladder import in_words, ladder
 from ncfix.diagnosis.next_poses import Proposal, as_objects
 from ncfix.diagnosis.selection import findable_in_words, shows_hardly_anything

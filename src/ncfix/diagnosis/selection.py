@@ -29,6 +29,8 @@ from ncfix.measure.measurement import Array
 
 SAME = 0.8
 """Share of what either may show, its squares beside what is free, that the other must be able to show."""
+OVERLAP = 0.25
+"""Share of what a name shows that another must be able to show to be an alias, however likely it is in its place."""
 TOLD_APART = 6.0
 """Squared noise units of what the first shows that the second cannot, from which on data tell them apart."""
 MOST = 5
@@ -61,6 +63,14 @@ def _acts_alike(evidence: Evidence, members: Sequence[Member], own: Member, othe
     first = _white(evidence, own.group, share)
     shown = first @ evidence.numbers(members, share)[list(members).index(own)]
     return any(act_alike(first, shown, _white(evidence, form, share)) for form in evidence.forms[other])
+
+
+def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> bool:
+    """Whether a name can show some of what `own`, one of the members, shows: else it acts in other directions."""
+    share = evidence.share(members)
+    shown = _white(evidence, own.group, share) @ evidence.numbers(members, share)[list(members).index(own)]
+    by = (_white(evidence, form, share) for form in evidence.forms[other])
+    return max(_shared(shown[:, None], columns) for columns in by) > OVERLAP
 
 
 def _white(evidence: Evidence, group: int, share: float) -> Array:
@@ -217,8 +227,11 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
         odds[name] = gained.pop(name) + paid
         runners_up[name] = {each: value + paid for each, value in gained.items()}
         near = [each for each, value in runners_up[name].items() if value > odds[name] - ASSUMED * ALIKE]
+        there = scale.all(members)
+        for other in [each for each in near if not _overlap(evidence, there, members[name], each)]:
+            del runners_up[name][other]
         acting_alike[name] = frozenset(
-            each for each in near if _acts_alike(evidence, scale.all(members), members[name], each)
+            each for each in near if each in runners_up[name] and _acts_alike(evidence, there, members[name], each)
         )
     ranked = {name: members[name] for name in sorted(members, key=lambda name: -odds[name])}
     return Selected(ranked, odds, runners_up, frozenset(evidence.alternatives), acting_alike)

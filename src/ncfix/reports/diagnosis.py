@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ncfix.diagnosis.diagnosis import NOTHING, Diagnosis, EffectFinding
+from ncfix.diagnosis.compound import EffectFinding
+from ncfix.diagnosis.diagnosis import NOTHING, Diagnosis
 from ncfix.diagnosis.ladder import in_words, ladder
 from ncfix.diagnosis.presentation import (
     HEAD,
