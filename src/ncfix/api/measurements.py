@@ -140,12 +140,14 @@ def diagnose(
     machine: Machine | PathName,
     *,
     without: Sequence[str] = (),
+    since: bool = False,
     output: PathName | None = None,
     force: bool = False,
 ) -> Diagnosis:
     """Say where machine and model disagree, and name the effect that is missing.
 
     without  names of effects that are not to be considered; `messages` of the result say which do not exist (NCF657)
+    since    the last file is of a later date than those before it: only what changed is found
     output   where the machine with the effects added goes; nothing is written where there is nothing to add
     """
     from ncfix.diagnosis.diagnosis import diagnose as diagnosed
@@ -155,7 +157,7 @@ def diagnose(
     refused = as_names("without", without)
     check_writable(output, force, measured, machine)
     known = as_machine(machine)
-    found = diagnosed(as_measurements(measured, known), known, refused)
+    found = diagnosed(as_measurements(measured, known), known, refused, since)
     if found.machine is not None and output is not None:
         sound_machine(found.machine, force)
         write_output(output, dumps(with_provenance(found)).encode(), force)

@@ -354,6 +354,7 @@ def _named(text: str, count: int, option: str) -> tuple[str, list[float]]:
     "-o", "--output", type=PATH, metavar="FILE", help="Where to write the machine with the effects added (TOML)."
 )
 @click.option("--without", multiple=True, metavar="NAME", help="An effect that is not to be considered (repeatable).")
+@click.option("--since", is_flag=True, help="What changed: the last file against all before it.")
 @click.option(
     "--next", "next_path", type=PATH, metavar="FILE", help="Write the poses to be measured next: CSV, else a program."
 )
@@ -366,6 +367,7 @@ def diagnose(
     machine_path: str,
     output: str | None,
     without: tuple[str, ...],
+    since: bool,
     next_path: str | None,
     report: str | None,
     check: bool,
@@ -394,7 +396,7 @@ def diagnose(
     for each in data:
         console.tell_some(each.remarks)
     with console.busy("diagnosing"):
-        diagnosis = ncfix.diagnose(data, machine, without=without)
+        diagnosis = ncfix.diagnose(data, machine, without=without, since=since)
     console.tell(*diagnosis.messages)
     written = None
     if machine_target is not None and diagnosis.machine is not None:

@@ -21,7 +21,15 @@ from ncfix.diagnosis.catalogue import Candidate, catalogue, without
 from ncfix.diagnosis.compound import EffectFinding, compound
 from ncfix.diagnosis.constants import ConstantsVerdict, FileLikelihood, MovedConstant, judged_constants, names_of
 from ncfix.diagnosis.evidence import Comparison, Evidence, Member, entry_price
-from ncfix.diagnosis.forms import VisibleForms, scaled_axes, unnamed_alternatives, visible_forms
+from ncfix.diagnosis.forms import (
+    CHANGE,
+    VisibleForms,
+    changes,
+    file_constants,
+    scaled_axes,
+    unnamed_alternatives,
+    visible_forms,
+)
 from ncfix.diagnosis.joint_fit import (
     RATHER,
     JointFit,
@@ -128,6 +136,7 @@ class Diagnosis:
     before, after  (m,) residuals with the constants alone and with the findings, um; p_lack, p_left by chance
     likelihood     log likelihood of the values about the file with all that was found, less its prices
     named_odds     log odds of all names together
+    steady         of two dates: names of what was there before, and is
     clustering     how much neighbouring residuals are alike, before and after
     constants      what the data say of the constants of the machine file; the gap before is after that
     findable       name -> um rms from which on an effect would be found in these data; inf: never
@@ -152,6 +161,8 @@ class Diagnosis:
     mistake: Mistake | None = None
     likelihood: float = 0.0
     named_odds: float = 0.0
+    steady: tuple[str, ...] = ()
+    dates: bool = False
 
     @property
     def data(self) -> ResidualData:
@@ -368,12 +379,19 @@ def _sigma(evidence: Evidence, members: Sequence[Member], share: float) -> float
     return evidence.background.sigma * float(np.sqrt((evidence.squares(members, share) + freedom) / (count + freedom)))
 
 
-def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = ()) -> Diagnosis:
+def diagnose(
+    measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = (), since: bool = False
+) -> Diagnosis:
     """Compare, name, add, and show how far the gap shrank. `refused` are names that must not be used.
 
+    since  the last file is of a later date than those before: only what changed is a finding
     Raises `UsageError` NCF630, NCF637 and NCF650 ... NCF659 where the data cannot carry a diagnosis.
     """
     checks.before(measurements, machine)
+    if since:
+        if len(measurements) < 2:
+            raise UsageError.of("NCF650", "one file: what changed since takes one of each date")
+        return _changes(_explained(measurements, machine, refused, len(measurements) - 1))
     wrong = find(measurements, machine, refused)
     if wrong is None:
         checks.sensible(measurements, machine)
@@ -395,17 +413,52 @@ def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Seq
     return _with_mistake(undone, wrong, machine)
 
 
-def _explained(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str]) -> Diagnosis:
-    """Constants and names, whatever mistakes there may be. Raises `UsageError` NCF650, NCF656."""
+def _changes(found: Diagnosis) -> Diagnosis:
+    """Of a diagnosis of two dates: what came between them is found, what was there before is steady."""
+    new = tuple(each for each in found.findings if each.candidate.name.startswith(CHANGE))
+    steady = tuple(each.candidate.name for each in found.findings if each not in new)
+    evidence, members = found.case.evidence, found.selected.members
+    every = list(members.values())
+    shown = zip(members, fitted(evidence, every, evidence.share(every)).shown, strict=True)
+    unnamed = {name: own for name, own in shown if name in found.selected.unnamed and name.startswith(CHANGE)}
+    size = visible_um(found.data, np.sum([np.zeros(len(found.data.y)), *unnamed.values()], axis=0))
+    titles = tuple(evidence.groups[members[name].group].owner.title for name in unnamed)
+    rest = Unexplained(size, titles, found.rest.odds if unnamed else 0.0, 0.0, None)
+    told = visible_um(found.data, np.sum([np.zeros(len(found.data.y)), *(each.shown for each in new)], axis=0))
+    verdict = verdict_of(new, rest, told, found.floor, found.gap.floor)
+    machine = found.machine if new else None
+    proposal = found.proposal if found.proposal and found.proposal.name.startswith(CHANGE) else None
+    return replace(
+        found,
+        verdict=verdict,
+        findings=new,
+        rest=rest,
+        machine=machine,
+        proposal=proposal,
+        steady=steady,
+        dates=True,
+    )
+
+
+def _explained(
+    measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str], since: int = 0
+) -> Diagnosis:
+    """Constants and names, whatever mistakes there may be; with what may have changed from file number `since` on.
+
+    Raises `UsageError` NCF650, NCF656.
+    """
     seen = residual_data(measurements, machine)
     checks.enough(seen)
     candidates, unheard_of = without(catalogue(seen.measured), refused)
     visible = visible_forms(seen, candidates)
-    everything = everything_covariance(seen, visible.groups)
-    groups = (*visible.groups, *unnamed_alternatives(seen, visible.groups))
+    named, unnamed = visible.groups, unnamed_alternatives(seen, visible.groups)
+    if since:
+        named = (*named, *changes(seen, (*named, *file_constants(seen)), since))
+        unnamed = (*unnamed, *changes(seen, unnamed, since))
+    everything, groups = everything_covariance(seen, named), (*named, *unnamed)
     relative, outlying = downweighted(seen, everything, groups)
-    background = estimated_background(seen, everything, relative, visible.groups)
-    evidence = Evidence(background, groups, len(visible.groups))
+    background = estimated_background(seen, everything, relative, named)
+    evidence = Evidence(background, groups, len(named))
     case, scale = Case(seen, candidates, unheard_of, visible, outlying, evidence), Comparison(evidence)
     return concluded(case, scale, _selected(scale))
 

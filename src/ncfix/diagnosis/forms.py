@@ -40,7 +40,7 @@ from ncfix.diagnosis.catalogue.candidate import (
 )
 from ncfix.diagnosis.residual_data import UNTELLABLE, ResidualData
 from ncfix.machine import Effect
-from ncfix.machine.axes import SPINDLE, Axis
+from ncfix.machine.axes import SPINDLE, Axis, component_title
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
@@ -97,6 +97,10 @@ SAME_AS_NAME = 0.8
 """Share of an error's squares, beside what is free, that makes it the same as a name."""
 
 
+CHANGE, CAME = "change of ", "came since: "
+"""Of two dates: how the names begin of what is at the later one only, and their titles."""
+
+
 @dataclass(frozen=True, repr=False)
 class EffectForm:
     """One form of a candidate.
@@ -137,6 +141,30 @@ def visible_forms(data: ResidualData, candidates: Sequence[Candidate]) -> Visibl
         if not seen:
             invisible.append((candidate, max(shares, default=0.0)))
     return VisibleForms(tuple(groups), tuple(invisible))
+
+
+def file_constants(data: ResidualData) -> tuple[EffectForm, ...]:
+    """What the free constants of the machine file show, each by itself."""
+    found = []
+    for effect in data.problem.selection.estimated:
+        title = f"constant of the machine file: {component_title(effect.name, data.machine.axis(effect.joint))}"
+        own = zero([replace(effect, covariance=None)])
+        owner = Candidate(f"constant {effect.name}", title, effect.joint, "constant of the file", own, ())
+        found.append(_form(data, owner, np.eye(effect.basis.size), data.design(own)))
+    return tuple(form for form in found if form is not None)
+
+
+def changes(data: ResidualData, groups: Sequence[EffectForm], first: int) -> tuple[EffectForm, ...]:
+    """The forms as what came since: they show in the files from number `first` on, and not in those before."""
+    later = (data.file[np.maximum(data.row, 0)] >= first) & (data.row >= 0)
+    basis, found = orthonormal(data.base / data.relative[:, None]), []
+    for group in groups:
+        columns = np.where(later[:, None], group.columns, 0.0)
+        size = data.rms(np.linalg.norm(columns, axis=1))
+        if size > UNSEEN_UM and _visible_share(basis, columns / data.relative[:, None]) >= VISIBLE:
+            owner = replace(group.owner, name=CHANGE + group.owner.name, title=CAME + group.owner.title, constant=False)
+            found.append(EffectForm(owner, group.loading / size, columns / size))
+    return tuple(found)
 
 
 def expansion_loadings(loadings: Sequence[Array]) -> Iterator[Array]:

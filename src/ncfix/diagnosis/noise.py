@@ -145,8 +145,9 @@ def _drift_correlation(data: ResidualData, relative: Array) -> Array | None:
     time = data.column("time_s")
     if np.ptp(time) == 0:
         return None
-    own = time[np.maximum(data.row, 0)]
-    alike = (data.component[:, None] == data.component) & (data.row[:, None] >= 0)
+    row = np.maximum(data.row, 0)
+    own, file = time[row], data.file[row]
+    alike = (data.component[:, None] == data.component) & (data.row[:, None] >= 0) & (file[:, None] == file)
     lasting = np.where(alike, np.exp(-np.abs(own[:, None] - own) / DRIFT_TIME), 0.0)
     return in_noise(lasting, relative)
 

@@ -34,6 +34,13 @@ SAID = {
     AMBIGUOUS: "the model lacks something, and these data leave more than one name for it",
     UNKNOWN: "the model lacks something that is not in the catalogue",
 }
+CHANGED = {
+    NOTHING: "nothing changed that stands out of the noise",
+    FOUND: "something changed that has a name",
+    AMBIGUOUS: "something changed, and these data leave more than one name for it",
+    UNKNOWN: "something changed that is not in the catalogue",
+}
+"""Of two dates."""
 NOISE = {
     "repeats": "from repeats",
     "given": "as the files state it",
@@ -51,6 +58,8 @@ def text(diagnosis: Diagnosis) -> str:
         f"({NOISE[diagnosis.floor.source]}); held out: {gap.holdout_before:.2f} -> {gap.holdout_after:.2f} um",
     ]
     lines += ["", *_table(diagnosis)]
+    if diagnosis.steady:
+        lines += ["", f"there before, and unchanged: {', '.join(diagnosis.steady)}"]
     for finding in diagnosis.findings:
         lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(diagnosis, finding)}"]
         if finding.aliases:
@@ -89,6 +98,8 @@ def _table(diagnosis: Diagnosis) -> list[str]:
 
 def verdict(diagnosis: Diagnosis) -> str:
     """What the verdict means."""
+    if diagnosis.dates:
+        return CHANGED[diagnosis.verdict]
     if diagnosis.verdict == NOTHING and diagnosis.rest.lacking:
         return f"more than noise is left (p = {diagnosis.p_left:.1g}), but no more than the little that machines have"
     return SAID[diagnosis.verdict]
@@ -229,6 +240,7 @@ def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:
             for rung in ladder(diagnosis)
         ],
         "effects": [_effect(diagnosis, each) for each in diagnosis.findings],
+        "unchanged": list(diagnosis.steady),
         "unknown": {"share_um": diagnosis.unknown_um, "where": diagnosis.rest.kind},
         "gap_um": {name: getattr(diagnosis.gap, name) for name in diagnosis.gap.__dataclass_fields__},
         "where": [{"text": p.text, "rms_um": p.rms_um, "p_value": p.p_value} for p in diagnosis.patterns],
