@@ -91,6 +91,7 @@ def compiled(root: Path, *, stable: bool) -> list[Path]:
         modules = cythonize(wanted, build_dir=str(build / "c"), force=anew, **options)
         command = build_ext(Distribution({"ext_modules": modules}))
         command.build_lib, command.build_temp, command.force = str(build / "lib"), str(build / "temp"), anew
+        command.parallel = os.cpu_count()
         command.ensure_finalized()
         command.run()
         found = [Path(command.get_ext_fullpath(each.name)).resolve() for each in wanted]

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from compensate.side import compared
+from conftest import FULL
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
@@ -96,7 +97,7 @@ def test_a_fault_in_any_piece_of_such_a_motion_is_seen(machine: Machine, axis: i
     text = unwinding()
     before, after = moves_of(text, machine), moves_of(fixed(text, machine), machine)
     fault = np.where(after.rotary, 2e-5, 2e-3)[axis]
-    for row in range(4 + axis, len(after) - 1, 10):
+    for row in range(4 + axis, len(after) - 1, 10 if FULL else 20):
         end, start = after.end.copy(), after.start.copy()
         end[row, axis] += fault
         start[row + 1, axis] += fault
@@ -150,7 +151,7 @@ def test_blocks_that_are_missing_or_too_many(machine: Machine, change: object, l
     assert max(each.max for each in found) >= least_mm
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(6 if FULL else 3))
 def test_blocks_exchanged_on_a_line_give_the_same_in_any_parts(machine: Machine, seed: int) -> None:
     """Rows to and fro, so near to each other that the next one is mistaken for the one that is meant."""
     rng, perfect = np.random.default_rng(seed), replace_errors(machine)

@@ -219,17 +219,16 @@ def feature_lengths(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Arra
     return lengths
 
 
-def breakpoints(axes: tuple[Axis, ...], effects: tuple[Effect, ...], index: int) -> Array:
-    """See `Machine.breakpoints`."""
-    places: set[float] = set()
-    ends = {limit / axes[index].unit for limit in axes[index].range}
-    for effect, axis, signal, is_factor in _dependencies(axes, effects):
-        if axis == index:
-            held = {signal.low, signal.high} - ends
-            kinks = () if is_factor else effect.basis.kinks
-            places.update(x * signal.unit for x in held if np.isfinite(x))
-            places.update((signal.center + signal.scale * u) * signal.unit for u in kinks)
-    return np.array(sorted(places), dtype=np.float64)
+def breakpoints(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> tuple[Array, ...]:
+    """Of each axis, see `Machine.breakpoints`."""
+    places = [set[float]() for _ in axes]
+    ends = [{limit / axis.unit for limit in axis.range} for axis in axes]
+    for effect, index, signal, is_factor in _dependencies(axes, effects):
+        held = {signal.low, signal.high} - ends[index]
+        kinks = () if is_factor else effect.basis.kinks
+        places[index].update(x * signal.unit for x in held if np.isfinite(x))
+        places[index].update((signal.center + signal.scale * u) * signal.unit for u in kinks)
+    return tuple(np.array(sorted(own), dtype=np.float64) for own in places)
 
 
 def kinks(

@@ -154,7 +154,7 @@ class Machine:
 
     @cached_property
     def _breakpoints(self) -> tuple[Array, ...]:
-        return tuple(error_model.breakpoints(self.axes, self.effects, index) for index in range(len(self.axes)))
+        return error_model.breakpoints(self.axes, self.effects)
 
     @cached_property
     def kinks(self) -> tuple[tuple[int, Array], ...]:
