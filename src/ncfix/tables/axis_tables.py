@@ -118,11 +118,11 @@ class AxisTables:
 
 
 def additive(
-    machine: Machine, space: Array, tool_length: float, most: int, target: float, digits: int = 4, both: bool = False
+    machine: Machine, space: Array, tool_length: float, most: int, target: float, both: bool = False
 ) -> tuple[AxisTables, ...]:
     """Tables over every axis, over the space (n_axes, 2): on itself, and on the three linear axes.
 
-    Nodes are evenly spaced, at positions of so many `digits` (mm, degree), as few as keep straight lines between them
+    Nodes are evenly spaced, at positions of four decimals (mm, degree), as few as keep straight lines between them
     within half the target (mm; at a radius of 200 mm) and at most `most`. Rotary axes turn themselves right first.
     `both` fills the table of an axis over itself for either way apart; else its mean serves both.
     """
@@ -137,7 +137,7 @@ def additive(
         outputs = region.outputs(axis, curve, target)
         count = region.nodes_needed(axis, curve, outputs, most, target)
         unit = machine.axes[axis].unit
-        nodes = np.round(region.fine(axis, count) / unit, digits) * unit
+        nodes = np.round(region.fine(axis, count) / unit, 4) * unit
         half = region.half_reversal(axis) if both else np.zeros(FINE)
         tables.append(_axis_tables(region, axis, curve, outputs, nodes, half))
     return tuple(_with_constant(each, machine, total) for each in tables)

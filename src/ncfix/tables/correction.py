@@ -194,15 +194,13 @@ def _size(error: Array) -> dict[str, float]:
     return {"max": 1e3 * float(error.max()), "rms": 1e3 * rms, "mean": 1e3 * float(error.mean())}
 
 
-def residual(
-    machine: Machine, tables: Tables, space: Array, tool_length: float, count: int = POSES, seed: int = 7
-) -> Residual:
+def residual(machine: Machine, tables: Tables, space: Array, tool_length: float, count: int = POSES) -> Residual:
     """Run the machine with the tables active over `count` random poses of the space (n_axes, 2).
 
     The tables see the commanded position, as controls do with setpoint inputs; every axis comes from either side.
     """
-    q = random_poses(space, count, seed)
-    ways = random_ways(len(space), count, seed + 1)
+    q = random_poses(space, count, seed=7)
+    ways = random_ways(len(space), count, seed=8)
     state = State(tool_length, ways)
     correction = tables.for_tool(tool_length).at(machine.axis_names, q, ways)
     meant = machine.tip(q, tool_length)

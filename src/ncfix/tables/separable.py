@@ -72,23 +72,23 @@ class Separation:
     rest: float
 
 
-def taken_apart(values: Array, noise: float = NOISE) -> Separation:
-    """The parts of a function on a full grid, values (m_1, ..., m_n); those below `noise` (rms) belong to the rest."""
+def taken_apart(values: Array) -> Separation:
+    """The parts of a function on a full grid, values (m_1, ..., m_n); those below `NOISE` (rms) belong to the rest."""
     constant = float(values.mean())
     axes = range(values.ndim)
-    return _peeled(constant, values - constant, [*((axis,) for axis in axes), *combinations(axes, 2)], noise)
+    return _peeled(constant, values - constant, [*((axis,) for axis in axes), *combinations(axes, 2)])
 
 
-def taken_apart_along(values: Array, axis: int, noise: float = NOISE) -> Separation:
+def taken_apart_along(values: Array, axis: int) -> Separation:
     """The same, with every part a function of `axis` at least: what changes sign with the way that axis moves.
 
     A function of another axis alone becomes a product with a constant.
     """
     pairs = [(min(axis, other), max(axis, other)) for other in range(values.ndim) if other != axis]
-    return _peeled(0.0, values, [(axis,), *pairs], noise)
+    return _peeled(0.0, values, [(axis,), *pairs])
 
 
-def _peeled(constant: float, left: Array, sets: Sequence[tuple[int, ...]], noise: float) -> Separation:
+def _peeled(constant: float, left: Array, sets: Sequence[tuple[int, ...]]) -> Separation:
     """Take off what depends on each of some axes or pairs of axes in turn: the mean over the others."""
     found: list[Part] = []
     for kept in sets:
@@ -96,8 +96,8 @@ def _peeled(constant: float, left: Array, sets: Sequence[tuple[int, ...]], noise
         left = left - mean
         part = mean.reshape([left.shape[axis] for axis in kept])
         found += [Single(kept[0], part)] if len(kept) == 1 else products(part, (kept[0], kept[1]))
-    lost = sum(part.size**2 for part in found if part.size <= noise)
-    kept_parts = sorted((part for part in found if part.size > noise), key=lambda part: -part.size)
+    lost = sum(part.size**2 for part in found if part.size <= NOISE)
+    kept_parts = sorted((part for part in found if part.size > NOISE), key=lambda part: -part.size)
     return Separation(constant, tuple(kept_parts), float(np.sqrt(np.mean(left**2) + lost)))
 
 
