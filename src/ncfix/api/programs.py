@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ncfix.compensate import FixOptions
-    from ncfix.compensate.driver import Fixed
+    from ncfix.compensate.driver import Fixed, Seen
     from ncfix.compensate.figures.verification import Compared
     from ncfix.compensate.following import Resolve
     from ncfix.machine import Machine
@@ -77,11 +77,19 @@ def fix(
     return found
 
 
-def fixed(program: Program, machine: Machine, setup: Setup, options: FixOptions, resolve: Resolve | None) -> Fixed:
-    """A program corrected with these options, flat where they say so."""
+def fixed(
+    program: Program,
+    machine: Machine,
+    setup: Setup,
+    options: FixOptions,
+    resolve: Resolve | None,
+    seen: Seen | None = None,
+) -> Fixed:
+    """A program corrected with these options, flat where they say so; `seen` as `fix_program` has it."""
     from ncfix.compensate.driver import fix_flat, fix_program
 
-    return (fix_flat if options.flatten else fix_program)(program, machine, setup, options, resolve)
+    looks = (seen,) if seen else ()
+    return (fix_flat if options.flatten else fix_program)(program, machine, setup, options, resolve, *looks)
 
 
 def verify(

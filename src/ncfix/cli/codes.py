@@ -125,4 +125,10 @@ CODES = {
         "programs are not concerned. It is not tried again by `--resume` until something changes.",
         "Give it more time, or fix it alone; `--retry` tries again.",
     ),
+    "NCF031": Code(
+        "a library that draws is not installed",
+        "The page of a program is drawn by plotly's library for browsers, a picture for papers by matplotlib. Both are "
+        "extras, which ncfix does not need for anything else.",
+        'pip install "ncfix[report]" for pages, "ncfix[plot]" for pictures.',
+    ),
 }

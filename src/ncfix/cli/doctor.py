@@ -25,6 +25,8 @@ EXTRAS = {
     "sympy": ("symbolic", "`ncfix derive` does not work"),
     "watchfiles": ("watch", "`ncfix watch` looks every second"),
     "distributed": ("cluster", "`--executor dask://HOST:PORT` does not work"),
+    "plotly": ("report", "there are no pages of programs"),
+    "matplotlib": ("plot", "there are no pictures of programs (`--plot`)"),
 }
 """What is not needed: package -> its extra, and what it is like without."""
 NEEDS = re.compile(r"([A-Za-z0-9_.-]+)(?:[^;]*?>=\s*([0-9.]+))?[^;]*(;.*\bextra\b)?")

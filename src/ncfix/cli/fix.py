@@ -25,6 +25,7 @@ from ncfix.cli.options import (
     tolerance_option,
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.shop.pages import Pages
 from ncfix.cli.shop.projects import (
     ProjectCommand,
     after_next_groups,
@@ -141,6 +142,14 @@ def _executors() -> Iterable[str]:
     help="Of blocks that are put in (Klartext), or all blocks anew (SINUMERIK, too).",
 )
 @click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
+@click.option(
+    "--report",
+    "page",
+    type=PATH,
+    metavar="FILE.html",
+    help="Make a page of the program, or of the batch and each program.",
+)
+@click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Draw the errors of one program for a paper.")
 @click.option("--diff", is_flag=True, help="Print how the text would change (unified diff); write nothing.")
 @click.option("--diff-motions", is_flag=True, help="Print which commands would change, and why; write nothing.")
 @click.option("--no-figures", "verify", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
@@ -176,6 +185,8 @@ def fix(
     force: bool,
     resume: bool,
     retry: bool,
+    page: str | None,
+    plot: str | None,
     diff: bool,
     diff_motions: bool,
     time_limit_s: float | None,
@@ -203,6 +214,8 @@ def fix(
         raise UsageError.of("NCF001", "--json and --json-lines are two forms of one output", hint="leave one out")
     if json_lines and (diff or diff_motions):
         raise UsageError.of("NCF001", "what would change is printed as text or as one object", hint="--json")
+    if (diff or diff_motions) and (page or plot):
+        raise UsageError.of("NCF001", "--diff writes nothing, and so no page", hint="leave one of them out")
     if retry and not resume:
         raise UsageError.of("NCF001", "--retry tries again what --resume would leave out", hint="--resume --retry")
     context = click.get_current_context()
@@ -210,13 +223,16 @@ def fix(
     looks = diff or diff_motions
     outputs = _outputs(context, programs, Outputs(output, in_place, force, resume))
     wanted = [] if looks else _targets(context, programs, outputs, (machine_path, *given.files), as_json or json_lines)
+    many = len(programs) > 1 or any(map(os.path.isdir, programs))
+    pages = Pages.of(page, plot, many, force, wanted, (machine_path, *given.files))
     from ncfix.compensate import FixOptions
 
     if choices.pop("thesis"):
         choices["strategy"] = "thesis"
     machine = sound(load_machine(machine_path), machine_path, force)
     options = FixOptions(**choices, force=force)
-    job = FixJob(machine, given.load(machine), dialect, options, ProgramLimits(time_limit_s, memory_limit_mb))
+    limits = ProgramLimits(time_limit_s, memory_limit_mb)
+    job = FixJob(machine, given.load(machine), dialect, options, limits, pages)
     if looks:
         return _changes(context, job, programs, outputs.folder(programs), diff_motions, as_json)
     verbosity = Verbosity.of(quiet, verbose)
@@ -270,14 +286,18 @@ def _reported(batches: Sequence[tuple[Batch, int, ExecutorMaker]], as_json: bool
 
     summary, entries, worst = Summary(), list[Mapping[str, Any]](), 0
     many = sum(len(batch.targets) for batch, _, _ in batches) > 1
+    pages = batches[0][0].job.pages
+    listed = pages if pages and pages.many and pages.page else None
     runs = (replace(batch, many=many).run(jobs, make) for batch, jobs, make in batches if batch.targets)
     for outcome in chain.from_iterable(runs):
         summary.add(outcome.entry)
         worst = max(worst, outcome.code)
         if json_lines:
             console.put(console.json_text(None, outcome=OutcomeKind.of(outcome.entry), **outcome.entry))
-        if as_json:
+        if as_json or listed:
             entries.append(outcome.entry)
+    if listed:
+        listed.put_batch(entries)
     if many and batches[0][0].verbosity != Verbosity.QUIET:
         from ncfix.cli.listings import all_codes
 

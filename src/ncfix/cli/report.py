@@ -1,17 +1,23 @@
-"""`ncfix report`: machines and results as a page to be read, printed or filed."""
+"""`ncfix report`: programs, machines and results as a page to be read, printed or filed."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+import os
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
+from ncfix.batch.programs import subprograms
 from ncfix.cli import console
-from ncfix.cli.options import PATH, force_option
-from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
-from ncfix.diagnostics import Place, SourceError
+from ncfix.cli.fix import fix
+from ncfix.cli.options import PATH, force_option, load_machine, sound
+from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.shop.pages import Pages
+from ncfix.cli.targets import STREAM, Outputs, OutputTarget, read, shown, targets
+from ncfix.diagnostics import Place, SourceError, UsageError
 
 if TYPE_CHECKING:
     from ncfix.reports.document import ReportSection
@@ -20,30 +26,111 @@ DEEPEST = 64
 """How deep the lists and objects of a result lie in one another at most."""
 
 
+OF_FIX = ("dialect", "strategy", "tolerance_um", "split_rapids", "flatten")
+"""Parameters of `fix` that a page of a program has, too."""
+
+
+def _like_fix(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give the verb those options of `fix`."""
+    own = [param for param in fix.params if param.name in OF_FIX]
+    function.__click_params__ = [*reversed(own), *getattr(function, "__click_params__", ())]  # type: ignore[attr-defined]
+    return function
+
+
 @click.command()
-@click.argument("sources", type=PATH, nargs=-1, required=True, metavar="MACHINE|RESULT...")
+@click.argument("sources", type=PATH, nargs=-1, required=True, metavar="PROGRAM|MACHINE|RESULT...")
+@click.option(
+    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="The machine on which PROGRAM is corrected."
+)
 @click.option("-o", "--output", type=PATH, metavar="FILE", required=True, help="The page: FILE.html or FILE.md.")
+@click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Draw the errors of PROGRAM for a paper, too.")
 @force_option
-def report(sources: tuple[str, ...], output: str, force: bool) -> None:
-    """Put machine files, and what other verbs printed with --json, on one page.
+@_like_fix
+@setup_options
+def report(
+    sources: tuple[str, ...],
+    machine_path: str | None,
+    output: str,
+    plot: str | None,
+    force: bool,
+    given: SetupOptions,
+    **options: Any,
+) -> None:
+    """Put machine files, and what other verbs printed with --json, on one page; or with -m, a program.
 
     Of a machine: its chain, its errors with their curves and uncertainty, and how far they lead the tool tip. Of a
-    result: its tables.
+    result: its tables; of a batch, a list to sort and filter. Of a program: its path with the errors before and after
+    a correction, which is not written.
     """
+    if machine_path is not None:
+        _report_program(sources, machine_path, output, plot, force, given, options)
+        return
+    context = click.get_current_context()
+    said = [name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+    if set(said) - {"sources", "output", "force"}:
+        raise click.UsageError("options of a program need -m MACHINE")
     from ncfix.reports.document import Document
     from ncfix.reports.rendering import form_of
 
     target = targets([STREAM], Outputs(output, force=force), sources)[0]
     form = form_of(output)
     with console.busy("writing the report"):
-        found = [section for source in sources for section in _sections(source)]
-        title = found[0].heading if len(sources) == 1 else f"{len(sources)} machines and results"
-        target.write(form(Document(title, found)))
+        texts = [read(source) for source in sources]
+        page = _batch(texts[0], sources[0], output) if len(sources) == 1 else None
+        if page is None:
+            found = [each for text, source in zip(texts, sources, strict=True) for each in _sections(text, source)]
+            title = found[0].heading if len(sources) == 1 else f"{len(sources)} machines and results"
+            page = form(Document(title, found))
+        target.write(page)
 
 
-def _sections(path: str) -> list[ReportSection]:
+def _batch(text: bytes, path: str, output: str) -> bytes | None:
+    """The page of a batch, if that is what a source is, and a page in HTML is asked for."""
+    if not text.lstrip().startswith(b"{") or os.path.splitext(output)[1].lower() not in ("", ".html", ".htm"):
+        return None
+    entries = _result(text, path).get("files")
+    if not isinstance(entries, list) or len(entries) < 2 or not all(map(_is_fixed, entries)):
+        return None
+    from ncfix.cli.shop.batch_page import batch_page
+
+    return batch_page(entries, os.path.dirname(output), f"Batch {shown(path)}")
+
+
+def _is_fixed(entry: Any) -> bool:
+    """Whether that is what `ncfix fix --json` prints of a program."""
+    return isinstance(entry, dict) and {"path", "output"} <= entry.keys() and bool({"changed", "errors"} & entry.keys())
+
+
+def _report_program(
+    sources: tuple[str, ...],
+    machine_path: str,
+    output: str,
+    plot: str | None,
+    force: bool,
+    given: SetupOptions,
+    options: dict[str, Any],
+) -> None:
+    """Correct a program, and make a page of that instead of writing it."""
+    from ncfix.cli.shop.batch import FixJob
+    from ncfix.compensate import FixOptions
+
+    if len(sources) > 1:
+        hint = "ncfix fix FOLDER -o FOLDER --report FILE.html has pages of many"
+        raise UsageError.of("NCF001", "with -m there is one program on a page", hint=hint)
+    target = OutputTarget(sources[0], output)
+    pages = Pages.of(output, plot, False, force, [OutputTarget(sources[0], STREAM)], (machine_path, *given.files))
+    assert pages is not None
+    machine = sound(load_machine(machine_path), machine_path, force)
+    dialect = options.pop("dialect")
+    job = FixJob(machine, given.load(machine), dialect, FixOptions(**options, force=force), pages=pages)
+    with console.busy(f"fixing {shown(sources[0])}"), job.fixed(target, subprograms(job.setup, sources[0]), 1) as fixed:
+        assert fixed.page is not None
+        pages.put(target, fixed.page)
+    console.tell_some([*fixed.report.warnings, *fixed.report.refusals])
+
+
+def _sections(text: bytes, path: str) -> list[ReportSection]:
     """What one file has to say: a machine if it is TOML, a result if it is JSON."""
-    text = read(path)
     if text.lstrip().startswith(b"{"):
         from ncfix.reports.content import result_sections as of_result
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ncfix.compensate.driver import Stamp
     from ncfix.compensate.report import FixReport
     from ncfix.compensate.workers import Ground
+    from ncfix.reports.program_page import ProgramPage
 
 
 def part_bytes() -> int:
@@ -41,11 +42,15 @@ def looked_bytes() -> int:
 
 @dataclass(frozen=True, slots=True)
 class FixedText:
-    """A corrected program: what of it is not written yet, whether it differs from the original, and the report."""
+    """A corrected program: what of it is not written yet, whether it differs from the original, and the report.
+
+    page  what its page is made of, if there is to be one
+    """
 
     text: bytes | Iterable[bytes]
     changed: bool
     report: FixReport
+    page: ProgramPage | None = None
 
 
 @contextmanager

@@ -51,6 +51,7 @@ from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.plain_figures import figures, largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import PathError, path_error
+from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.offset import is_offset
 from ncfix.compensate.report import FixReport, Tally, in_lines
 from ncfix.compensate.solve import AcceptedPlan, PrecedingMotion, WrittenPlan, accepted_plan, increments
@@ -113,6 +114,11 @@ def _nobody(left: PrecedingMotion, size: int) -> None:
     """Takes what a part leaves where nothing comes behind it."""
 
 
+Watch = Callable[[Program, Machine, WrittenPlan, Mask | None, Signs | None], object]
+"""Is shown each part that has been corrected: its program, the machine, its plan, which motions are its own, and the
+way in which axes came to its first one."""
+
+
 @dataclass(slots=True)
 class Corrector:
     """Corrects a part of a program, or all of it.
@@ -123,6 +129,7 @@ class Corrector:
     at       where the stamp stands in what is written
     stamped  the stamp, as far as it was known then; empty if there is none
     together what was planned and written last
+    watch    is shown what was corrected
     """
 
     task: Task
@@ -133,6 +140,7 @@ class Corrector:
     at: int = 0
     stamped: bytes = b""
     together: Together | None = None
+    watch: Watch | None = None
 
     def stamp(self) -> bytes:
         """The stamp as it has to be by what is known now."""
@@ -174,6 +182,8 @@ class Corrector:
         if task.options.verify:
             errors = [(each.moves, self._tip_errors(each, own, unit)) for each in together.plans]
             self.note(tally, part.program, *errors)
+        if self.watch is not None:
+            self.watch(part.program, self.machine, solution, own, None if unit.head is None else unit.direction)
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _text(self, program: Program, splices: Splices, first: bool) -> bytes:
@@ -221,11 +231,23 @@ def strays(errors: PathError) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Fixed:
-    """The corrected program, whether it differs from the original, and what there is to report."""
+    """The corrected program, whether it differs from the original, and what there is to report.
+
+    lines  of a program that was written out flat: the line of the original of each of its lines
+    """
 
     text: bytes
     changed: bool
     report: FixReport
+    lines: tuple[int, ...] = ()
+
+
+Seen = Callable[[Program, Corrector], object]
+"""Is given the program as it was read, and what corrected it."""
+
+
+def _unseen(program: Program, corrector: Corrector) -> None:
+    """Where nobody wants to see it."""
 
 
 def fix_program(
@@ -234,7 +256,7 @@ def fix_program(
     setup: Setup,
     options: FixOptions = FixOptions(),  # noqa: B008
     resolve: Resolve | None = None,
-    seen: Callable[[Program, Corrector], object] = lambda program, corrector: None,
+    seen: Seen = _unseen,
 ) -> Fixed:
     """Correct a program for a machine. A program that needs no change comes back as it is, without a stamp.
 
@@ -278,7 +300,7 @@ def fix_flat(
     setup: Setup,
     options: FixOptions,
     resolve: Resolve | None = None,
-    seen: Callable[[Program, Corrector], object] = lambda program, corrector: None,
+    seen: Seen = _unseen,
 ) -> Fixed:
     """As `fix_program`; where that refuses motions, the program is written out flat and corrected so.
 
@@ -302,7 +324,8 @@ def fix_flat(
     again = fix_program(flat.program, machine, setup, options, resolve, seen)
     if {each.line for each in fixed.report.refused} <= {flat.lines[each.line - 1] for each in again.report.refused}:
         return fixed
-    return replace(again, changed=True, report=in_lines(again.report, flat, program))
+    report = in_lines(again.report, flat, program)
+    return replace(again, changed=True, report=report, lines=tuple(flat.lines))
 
 
 # -- part after part --------------------------------------------------------------------------------------------------
@@ -365,6 +388,8 @@ class PartCorrector(Corrector):
         tally.add_plain(part.program, solution, largest_shift(plan, plain), plan.intent)
         if self.task.options.verify:
             self.note(tally, part.program, (moves, figures(plan, plain, self.task.options.split_rapids)))
+        if self.watch is not None:
+            self.watch(part.program, self.machine, solution, None, None)
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _accepted_plan(self, unit: ProgramPart) -> AcceptedPlan:
@@ -406,6 +431,7 @@ class Stream:
     jobs   processes that work on it
     ground  the files, which all of them have; without it there is one process
     suspicion  what makes one think that the program was corrected before; None: not judged yet
+    watch      is shown each part; one process only then
     """
 
     task: Task
@@ -416,6 +442,7 @@ class Stream:
     tally: Tally = field(init=False)
     suspicion: tuple[Message, ...] | None = None
     corrector: PartCorrector | None = None
+    watch: Watch | None = None
 
     def __post_init__(self) -> None:
         self.tally = Tally(self.task.machine.least_increment[0])
@@ -430,8 +457,9 @@ class Stream:
         task = self.task
         task.check()
         task.follower()
-        with worker_pool(self.jobs, partial(PartCorrector, task), self.ground) as others:
+        with worker_pool(1 if self.watch else self.jobs, partial(PartCorrector, task), self.ground) as others:
             own = self.corrector = PartCorrector(task, others.spread(self.read))
+            own.watch = self.watch
             for number, done in own.work(others.share):
                 others.put(number, done)
                 self._take(others.ready())

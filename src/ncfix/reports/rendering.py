@@ -70,7 +70,7 @@ def _html_part(part: Part) -> str:
         case Table():
             return _html_table(part)
         case Plot():
-            return _html_plot(part)
+            return html_plot(part)
         case Bars():
             return _html_bars(part)
 
@@ -86,7 +86,8 @@ def _html_cell(text: str, aligned: bool) -> str:
     return f"{opened}{escape(text)}</td>"
 
 
-def _html_plot(plot: Plot) -> str:
+def html_plot(plot: Plot) -> str:
+    """The plot as a figure with its caption."""
     frame = PlotAxes.around(plot.drawn)
     inside = "".join(_drawn(frame, each, colour) for each, colour in zip(plot.drawn, cycle(COLOURS), strict=False))
     caption = f"<figcaption>{escape(plot.caption)}{_legend(plot.drawn)}</figcaption>"

@@ -30,11 +30,16 @@ from ncfix.plugins import load_plugins
 from ncfix.version import __version__
 
 if TYPE_CHECKING:
+    from ncfix.cli.shop.pages import Pages
     from ncfix.compensate import FixOptions
-    from ncfix.compensate.driver import Stream
+    from ncfix.compensate.driver import Corrector, Fixed, Stream
+    from ncfix.compensate.figures.path_record import PathRecord
+    from ncfix.compensate.report import FixReport
     from ncfix.control.setup import Setup
     from ncfix.machine import Machine
+    from ncfix.reports.program_page import ProgramPage
     from ncfix.text.dialect import Dialect
+    from ncfix.text.tree import Program
 
 FLATTEN = "--flatten may correct more: it writes out what cycles, loops and subprograms repeat; "
 STALE = "is of an earlier state of the program, the machine, the set-up or the options, and was left as it is"
@@ -84,6 +89,7 @@ class ProgramLimits:
 class FixJob:
     """What is the same for all programs.
 
+    pages    where pages of programs go; None: there are none
     journal  where outputs are announced; None: nowhere
     basis    a digest of all that a result depends on besides program and subprograms, with a journal
     """
@@ -93,6 +99,7 @@ class FixJob:
     dialect: str | None
     options: FixOptions
     limits: ProgramLimits = ProgramLimits()
+    pages: Pages | None = None
     journal: str | None = None
     basis: str = ""
 
@@ -152,8 +159,16 @@ class FixJob:
 
         path = shown(source.path)
         program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
-        found = fixed(program, self.machine, self.setup, self.options, find)
-        return FixedText(found.text, found.changed, found.report)
+        seen: list[tuple[Program, Corrector]] = []
+        look = (lambda *each: seen.append(each)) if self.pages else None
+        found = fixed(program, self.machine, self.setup, self.options, find, look)
+        page = self._page(_recorded(seen, found), found.report, text) if self.pages else None
+        return FixedText(found.text, found.changed, found.report, page)
+
+    def _page(self, record: PathRecord, report: FixReport, text: bytes) -> ProgramPage:
+        from ncfix.reports.program_page import ProgramPage
+
+        return ProgramPage(record, report, self.machine, self.options, text)
 
     @contextmanager
     def _outlet(
@@ -177,23 +192,34 @@ class FixJob:
         from ncfix.control.trace import NotInPartsError
 
         _let_stay()
+        record = None
+        if self.pages:
+            from ncfix.compensate.figures.path_record import PathRecord
+
+            record = PathRecord()
+            stream.watch = record.take
         try:
             done = stream.run()
         except NotInPartsError:
             fixed = self._whole(source, source.everything(), find)
             assert isinstance(fixed.text, bytes)
-            return FixedText(outlet.after(fixed.text, source.path), fixed.changed, fixed.report)
+            return replace(fixed, text=outlet.after(fixed.text, source.path))
         except GoneError:
             text = "one of the processes that worked on it was killed"
             raise FaultError.of("NCF017", text, Place(shown(source.path)), "fix it with --jobs 1") from None
         source.check_unchanged()
-        return FixedText(outlet.remaining(done.stamp), done.report.changed, done.report)
+        page = None if record is None else self._page(record, done.report, source.everything())
+        return FixedText(outlet.remaining(done.stamp), done.report.changed, done.report, page)
 
     def _written(self, fixed: FixedText, target: OutputTarget) -> FixOutcome:
         entry: dict[str, Any] = fixed.report.as_dict()
         digest = ""
         console.tell_some([*fixed.report.warnings, *fixed.report.refusals], partial(_with_lines, source=target.source))
         refused = bool(entry["refused"]) and not self.options.allow_refused
+        if self.pages and fixed.page:
+            fixed.page.output = None if refused else target.path
+            self.pages.put(target, fixed.page)
+            entry["page"] = self.pages.path_of(target)
         if not refused:
             if self.journal:
                 digest = text_digest(fixed.text)
@@ -206,6 +232,20 @@ class FixJob:
         if refused:
             console.say(f"  {ACCEPT if self.options.flatten else FLATTEN + ACCEPT}")
         return FixOutcome(ExitCode.REFUSED if refused else ExitCode.DONE, entry, digest=digest)
+
+
+def _recorded(seen: Sequence[tuple[Program, Corrector]], fixed: Fixed) -> PathRecord:
+    """What is to be shown of a program that was corrected as a whole; seen twice if it was written out flat, too."""
+    from ncfix.compensate.figures.path_record import PathRecord
+
+    record = PathRecord()
+    if seen:
+        program, corrector = seen[-1 if fixed.lines else 0]
+        assert corrector.together is not None
+        record.take(program, corrector.machine, corrector.together.plans[0])
+    if fixed.lines:
+        record.in_lines(fixed.lines)
+    return record
 
 
 @cache
@@ -323,7 +363,7 @@ class Batch:
     def _kept(self, job: FixJob, target: OutputTarget, journal: Journal) -> JournalRecord | None:
         """The record of a program that need not be fixed again; None if it is to be fixed."""
         record = journal.records.get(target.name) if self.resume else None
-        if record is None or (self.retry and not record.digest):
+        if record is None or (self.retry and not record.digest) or (job.pages and not job.pages.has(target)):
             return None
         find = subprograms(job.setup, target.source)
         return record if record.holds(job.key(target), target.path, find, repr(job.limits)) else None

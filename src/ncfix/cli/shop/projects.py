@@ -23,8 +23,8 @@ from ncfix.outputs import exists_already
 if TYPE_CHECKING:
     from ncfix.project import Project
 
-COMMAND_LINE_ONLY = frozenset({"force", "in_place", "executor"})
-"""Options that replace files, or have programs worked on elsewhere: they are said anew each time.
+COMMAND_LINE_ONLY = frozenset({"force", "in_place", "executor", "report", "plot"})
+"""Options that write other files, replace some, or have programs worked on elsewhere: they are said anew each time.
 
 A project file may come with programs from anywhere.
 """

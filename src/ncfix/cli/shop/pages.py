@@ -1,0 +1,144 @@
+"""Where pages and pictures of programs go: `ncfix fix --report`, `--plot`, and `ncfix report PROGRAM -m MACHINE`.
+
+Of one program the page is one file. Of a batch it is a table of all programs, and beside it a folder with the page of
+each, and one copy of the library that draws. A page of ncfix's own is replaced, any other file is not.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ncfix import files
+from ncfix.cli.targets import STREAM, OutputTarget
+from ncfix.diagnostics import Place, UsageError
+from ncfix.inputs import identities
+from ncfix.outputs import check_target, exists_already, folded_name
+
+if TYPE_CHECKING:
+    from ncfix.reports.program_page import ProgramPage
+
+
+@dataclass(frozen=True, slots=True)
+class Pages:
+    """Pages of programs.
+
+    page   the file of the one program, or of the batch; None: none
+    plot   the picture of the one program; None: none
+    many   it is a batch
+    force  files that are no pages are replaced, too
+    """
+
+    page: str | None
+    plot: str | None
+    many: bool
+    force: bool
+
+    @classmethod
+    def of(
+        cls,
+        page: str | None,
+        plot: str | None,
+        many: bool,
+        force: bool,
+        targets: Sequence[OutputTarget],
+        read: Sequence[str | None],
+    ) -> Pages | None:
+        """Those that are asked for; None if none are. Raises `UsageError` if they cannot be, before anything is done.
+
+        targets  where the programs come from and go to
+        read     other inputs
+        """
+        if page is None and plot is None:
+            return None
+        if plot is not None and many:
+            raise UsageError.of("NCF001", "--plot is a picture of one program", hint="--report has pages of many")
+        found = cls(page, plot, many, force)
+        inputs = identities([*(target.source for target in targets), *(path for path in read if path)])
+        outputs = {folded_name(target.path) for target in targets}
+        for path, check in ((page, _check_page), (plot, _check_plot)):
+            if path is not None:
+                if folded_name(path) in outputs:
+                    raise UsageError.of(
+                        "NCF006", "is the output of a program, too", Place(path), "give it another name"
+                    )
+                check_target(path, inputs, replace=True)
+                check(path)
+                found.check_replaced(path)
+        return found
+
+    def check_replaced(self, path: str) -> None:
+        """Refuse to replace a file that is no page of ncfix's: NCF004."""
+        from ncfix.reports.pages import is_own
+
+        if os.path.lexists(path) and not (self.force or (path != self.plot and is_own(path))):
+            raise exists_already(path)
+
+    @property
+    def folder(self) -> str:
+        """Where the pages of a batch are."""
+        assert self.page is not None
+        return f"{os.path.splitext(self.page)[0]}-pages"
+
+    def path_of(self, target: OutputTarget) -> str | None:
+        """Where the page of a program goes."""
+        if self.page is None or not self.many:
+            return self.page
+        return os.path.join(self.folder, f"{target.name or os.path.basename(target.source)}.html")
+
+    def has(self, target: OutputTarget) -> bool:
+        """Whether there is a page of a program already."""
+        path = self.path_of(target)
+        return path is not None and os.path.exists(path)
+
+    def put(self, target: OutputTarget, page: ProgramPage) -> None:
+        """Write the page of a program, and its picture."""
+        path = self.path_of(target)
+        if path is not None and self.many:
+            from ncfix.reports.pages import LIBRARY, library
+
+            there = os.path.join(self.folder, LIBRARY)
+            if not (os.path.exists(there) and files.holds(there, library())):
+                self._write(there, library(), self.folder)
+            beside = os.path.relpath(self.folder, os.path.dirname(path)).replace(os.sep, "/")
+            self._write(path, page.html(f"{beside}/"), self.folder)
+        elif path is not None:
+            self._write(path, page.html())
+        if self.plot is not None:
+            from ncfix.reports.picture import picture
+
+            files.write_whole(self.plot, picture(page, _suffix(self.plot)), replace=True)
+
+    def _write(self, path: str, content: bytes, root: str | None = None) -> None:
+        self.check_replaced(path)
+        files.write_whole(path, content, replace=True, root=root)
+
+    def put_batch(self, entries: Sequence[Mapping[str, Any]]) -> None:
+        """Write the page of a batch."""
+        from ncfix.cli.shop.batch_page import batch_page
+
+        assert self.page is not None
+        self._write(self.page, batch_page(entries, os.path.dirname(self.page)))
+
+
+def _suffix(path: str) -> str:
+    return os.path.splitext(path)[1].lower()[1:]
+
+
+def _check_page(path: str) -> None:
+    from ncfix.reports.pages import library
+
+    if path == STREAM or _suffix(path) not in ("html", "htm"):
+        raise UsageError.of("NCF018", "the page of programs is an .html file", Place(path), "--report FILE.html")
+    library()
+
+
+def _check_plot(path: str) -> None:
+    from ncfix.reports.picture import FORMS, require_matplotlib
+
+    if _suffix(path) not in FORMS:
+        hint = f"one of {' '.join(f'.{form}' for form in FORMS)}"
+        raise UsageError.of("NCF018", f"a picture cannot be a .{_suffix(path)} file", Place(path), hint)
+    require_matplotlib()

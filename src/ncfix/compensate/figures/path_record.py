@@ -1,0 +1,369 @@
+"""The path of a program as a page shows it: where the tip should be, how far it is off before and after, and why.
+
+A record takes what a correction has planned and written, part after part (`take`), and keeps the places of the path
+that a picture needs. Of a long program these are a selection: of every stretch the largest error before and after,
+then, again and again, the places that are farthest from the lines drawn so far. How far the picture then leaves the
+path is measured, and stands in the result. Figures, histogram and lists are of all places, not of the selection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ncfix.compensate.account import Account, Reason
+from ncfix.compensate.plan.arrays import Array, Index, Mask, owners, picked, places
+from ncfix.compensate.plan.deviation import errors_at, samples
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.kinematics import Signs
+from ncfix.compensate.plan.written import WrittenPieces
+from ncfix.compensate.solve import WrittenPlan
+from ncfix.control.moves import MotionKind, Moves
+from ncfix.machine import Machine, State
+from ncfix.text.tree import Program
+
+CUT, RAPID, REFUSED, PASSED = range(4)
+"""What leads to a place: a corrected cut, a rapid, a refused motion, one passed by rule."""
+DRAWN = 24_000
+"""So many places are drawn at most, about."""
+HELD = 2_000_000
+"""From so many places on, those in memory are thinned."""
+STEP = np.radians(7.5)
+"""An arc, or a turn of a rotary axis, is drawn in steps of this angle at most."""
+MOST_STEPS = 400
+LISTED = 500
+"""So many blocks of a list are kept; all are counted."""
+WORST = 40
+"""So many lines with the largest errors are kept."""
+ROUNDS = 10
+FINE = 1e-3
+"""mm; places that are no farther off the lines that are drawn need not be drawn."""
+EDGES = np.logspace(-4, 4, 97)
+"""Bins of the histogram, um: twelve a decade."""
+COLUMNS = {"x": "f4", "y": "f4", "z": "f4", "way": "f4", "before": "f4", "after": "f4", "line": "i4", "kind": "u1"}
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A place of the path that a list names: line, way along the path and tip (mm), error before and after (um)."""
+
+    line: int
+    way: float
+    tip: tuple[float, float, float]
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, slots=True)
+class ListedBlock:
+    """A block that stayed as it was, why, and where its motion ends; None: nobody knows."""
+
+    line: int
+    reason: str
+    spot: Spot | None
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """The corrections of an axis: smallest and largest, mm or rad, and the line of the larger one."""
+
+    low: float = 0.0
+    high: float = 0.0
+    line: int = 0
+
+    def with_more(self, values: Array, lines: Index) -> Extent:
+        """With those (k,) of more motions."""
+        if not len(values):
+            return self
+        most = int(np.argmax(np.abs(values)))
+        larger = abs(values[most]) > max(-self.low, self.high)
+        line = int(lines[most]) if larger else self.line
+        return Extent(min(self.low, float(values.min())), max(self.high, float(values.max())), line)
+
+
+@dataclass(slots=True)
+class PathRecord:
+    """What is kept of a path; call `take` with each part in turn, then read `columns()` and the rest.
+
+    way        mm along the path so far
+    total      places that were looked at
+    share      (2, 96) mm of path by error before and after, in bins between EDGES
+    worst      places with the largest errors after, one a line
+    corrections  of the axes, by name
+    linear     the size of X, Y and Z together
+    refused, passed   blocks that stayed as they were, the first of each; `counts` of passed ones by rule
+    """
+
+    drawn: int = DRAWN
+    way: float = 0.0
+    total: int = 0
+    share: Array = field(default_factory=lambda: np.zeros((2, len(EDGES) - 1)))
+    worst: list[Spot] = field(default_factory=list)
+    corrections: dict[str, Extent] = field(default_factory=dict)
+    linear: Extent = Extent()
+    refused: list[ListedBlock] = field(default_factory=list)
+    passed: list[ListedBlock] = field(default_factory=list)
+    _parts: list[tuple[dict[str, Array], Array]] = field(default_factory=list)
+    _held: int = 0
+    _strays: float = 0.0
+
+    def take(
+        self,
+        program: Program,
+        machine: Machine,
+        solution: WrittenPlan,
+        own: Mask | None = None,
+        direction: Signs | None = None,
+    ) -> None:
+        """Take in a part; of its motions those that are `own` (n,) if given.
+
+        machine    with the workpiece in its place
+        direction  (n_axes,) in which axes came to its first motion
+        """
+        moves = solution.moves
+        state = State() if direction is None else State(direction=direction)
+        intent = Intent(machine, moves, state)
+        pieces = replace(solution.plan.pieces, end=solution.emission.end, centre=solution.emission.centre)
+        written = WrittenPieces(intent, pieces, solution.emission.start)
+        mine = np.ones(len(moves), dtype=bool) if own is None else own
+        lines = program.lines(moves.block)
+        found = _Places.of(written, mine & (moves.kind != MotionKind.DWELL), solution)
+        kind, shown = _kinds(moves, solution), solution.shown(False)
+        self._count(found, shown)
+        way = self.way + np.cumsum(found.weight)
+        self.way = float(way[-1]) if len(way) else self.way
+        values = {
+            **dict(zip("xyz", found.tip.T, strict=True)),
+            "way": way,
+            "before": 1e3 * found.before,
+            "after": 1e3 * found.after,
+            "line": lines[found.move],
+            "kind": np.where(found.lifted, RAPID, kind[found.move]),
+        }
+        shift = np.nan_to_num(solution.shift)
+        self._note_corrections(moves, shift, lines, mine & ~solution.kept)
+        self._note_blocks(moves, solution, lines, values, found.move, mine)
+        self._note_worst(values, shown[found.move])
+        self._hold(values, shift[found.move])
+
+    def _count(self, found: _Places, shown: Mask) -> None:
+        rows = shown[found.move] & (found.weight > 0)
+        for side, error in enumerate((found.before, found.after)):
+            bins = np.clip(np.searchsorted(EDGES, 1e3 * error[rows], side="right") - 1, 0, len(EDGES) - 2)
+            self.share[side] += np.bincount(bins, found.weight[rows], len(EDGES) - 1)
+
+    def _note_corrections(self, moves: Moves, shift: Array, lines: Index, done: Mask) -> None:
+        rows = np.flatnonzero(done)
+        for column, axis in enumerate(moves.axes):
+            known = self.corrections.get(axis, Extent())
+            self.corrections[axis] = known.with_more(shift[rows, column], lines[rows])
+        size = np.sqrt((shift[rows][:, ~moves.rotary] ** 2).sum(axis=1))
+        self.linear = self.linear.with_more(size, lines[rows])
+
+    def _note_blocks(
+        self, moves: Moves, solution: WrittenPlan, lines: Index, values: Mapping[str, Array], at: Index, mine: Mask
+    ) -> None:
+        account = Account.of(moves, solution.kept, solution.reasons)
+        if not (account.refused or account.passed):
+            return
+        theirs = set(moves.block[~mine].tolist())
+        line_of = dict(zip(moves.block.tolist(), lines.tolist(), strict=True))
+        last = dict(zip(moves.block[at].tolist(), range(len(at)), strict=True))
+
+        def listed(blocks: Mapping[int, object], why: Callable[[int], str]) -> list[ListedBlock]:
+            chosen = [block for block in sorted(blocks) if block not in theirs][:LISTED]
+            return [
+                ListedBlock(line_of[block], why(block), _spot(values, last[block]) if block in last else None)
+                for block in chosen
+            ]
+
+        self.refused += listed(account.refused, lambda block: _said(account.refused[block]))
+        self.passed += listed(account.passed, lambda block: account.passed[block] or account.rules[block])
+        del self.refused[LISTED:], self.passed[LISTED:]
+
+    def _note_worst(self, values: Mapping[str, Array], shown: Mask) -> None:
+        rows = np.flatnonzero(shown & np.isfinite(values["after"]))
+        rows = rows[np.lexsort((rows, -values["after"][rows]))][: 50 * WORST]
+        best = {spot.line: spot for spot in self.worst}
+        for row in rows.tolist():
+            line = int(values["line"][row])
+            if line not in best or best[line].after < values["after"][row]:
+                best[line] = _spot(values, row)
+        self.worst = sorted(best.values(), key=lambda spot: (-spot.after, spot.line))[:WORST]
+
+    def _hold(self, values: dict[str, Array], shift: Array) -> None:
+        self.total += len(shift)
+        kept = {name: values[name].astype(kind) for name, kind in COLUMNS.items()}
+        self._parts.append((kept, shift.astype("f4")))
+        self._held += len(shift)
+        if self._held > HELD:
+            self._thin(HELD // 8)
+
+    def _together(self) -> tuple[dict[str, Array], Array]:
+        if not self._parts:
+            return {name: np.zeros(0, kind) for name, kind in COLUMNS.items()}, np.zeros((0, 0), "f4")
+        columns = {name: np.concatenate([values[name] for values, _ in self._parts]) for name in COLUMNS}
+        return columns, np.concatenate([shift for _, shift in self._parts])
+
+    def _thin(self, most: int) -> None:
+        """Keep so many places, and note how far the picture then leaves the path."""
+        values, shift = self._together()
+        self._parts, self._held = [(values, shift)], len(shift)
+        if len(shift) <= most:
+            return
+        rows = selection(values, most)
+        tips = np.stack([values[name] for name in "xyz"], axis=1).astype(np.float64)
+        self._strays += float(_off_lines(tips, rows).max(initial=0.0))
+        self._parts = [({name: column[rows] for name, column in values.items()}, shift[rows])]
+        self._held = len(rows)
+
+    def columns(self) -> tuple[dict[str, Array], Array, float]:
+        """The places to be drawn by columns, as COLUMNS has them; the corrections (k, n_axes) at the ends of the
+        motions there, mm and rad; how far straight lines between these places leave those between all at most, mm.
+        """
+        self._thin(self.drawn)
+        values, shift = self._together()
+        return values, shift, self._strays
+
+    def in_lines(self, lines: Sequence[int]) -> None:
+        """Say the lines of another text instead: `lines` has those of each line here."""
+        table = np.array([0, *lines], dtype=np.int64)
+
+        def at(line: int) -> int:
+            return int(table[line]) if line < len(table) else line
+
+        def moved(spot: Spot | None) -> Spot | None:
+            return None if spot is None else replace(spot, line=at(spot.line))
+
+        for values, _ in self._parts:
+            values["line"] = table[np.minimum(values["line"], len(table) - 1)].astype("i4")
+        best: dict[int, Spot] = {}
+        for each in self.worst:  # the largest first
+            best.setdefault(at(each.line), replace(each, line=at(each.line)))
+        self.worst = list(best.values())
+        for name in ("refused", "passed"):
+            blocks = [replace(each, line=at(each.line), spot=moved(each.spot)) for each in getattr(self, name)]
+            setattr(self, name, blocks)
+        self.corrections = {axis: replace(each, line=at(each.line)) for axis, each in self.corrections.items()}
+        self.linear = replace(self.linear, line=at(self.linear.line))
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Places in the order of the path: motion, tip (k, 3), errors and way (mm); `lifted`: over a hole."""
+
+    move: Index
+    tip: Array
+    before: Array
+    after: Array
+    weight: Array
+    lifted: Mask
+
+    @classmethod
+    def of(cls, written: WrittenPieces, mine: Mask, solution: WrittenPlan) -> _Places:
+        """Those at which figures look, and some more where the way is bent."""
+        intent, which = written.intent, np.flatnonzero(mine[written.pieces.move])
+        looked = list(samples(written, which, tilts=False, known=solution.plan.known))
+        piece, fraction = _bent(written, which)
+        move, at = written.pieces.move[piece], written.before[piece] + fraction * written.span[piece]
+        before, after = errors_at(intent, move, at, written.segments.at(piece, fraction))
+        nothing = np.zeros(0)
+        move = np.concatenate([np.zeros(0, dtype=np.intp), *(each.move for each in looked), move])
+        at = np.concatenate([nothing, *(each.fraction for each in looked), at])
+        before = np.concatenate([nothing, *(each.before for each in looked), before])
+        after = np.concatenate([nothing, *(each.after for each in looked), after])
+        weight = np.concatenate([nothing, *(each.weight for each in looked), np.zeros(len(piece))])
+        tip = intent.tip(move, at)
+        lifted = np.zeros(len(move), dtype=bool)
+        if intent.moves.approach is not None:
+            holes = np.flatnonzero((intent.moves.kind[move] == MotionKind.CYCLE) & (at == 1.0))
+            above = intent.meant(move[holes], picked(intent.moves.approach, move[holes]))
+            extra = move[holes], np.zeros(len(holes)), above, before[holes], after[holes], np.zeros(len(holes))
+            move, at, tip, before, after, weight = (
+                np.concatenate(pair) for pair in zip((move, at, tip, before, after, weight), extra, strict=True)
+            )
+            lifted = np.concatenate([lifted, np.ones(len(holes), dtype=bool)])
+        weight = np.nan_to_num(weight)
+        order = np.lexsort((at, move))
+        order = order[np.isfinite(tip[order]).all(axis=1) & np.isfinite(before[order]) & np.isfinite(after[order])]
+        return cls(move[order], tip[order], before[order], after[order], weight[order], lifted[order])
+
+
+def _bent(written: WrittenPieces, which: Index) -> tuple[Index, Array]:
+    """Pieces and fractions at which a picture of arcs and turns needs a place, without their ends; where cuts begin."""
+    moves, segments, move = written.intent.moves, written.segments, written.pieces.move[which]
+    turned = np.abs(picked(segments.end, which) - picked(segments.start, which))[:, moves.rotary].max(
+        axis=1, initial=0.0
+    )
+    turned = np.where(moves.tcp[move], 0.0, turned) + np.where(segments.arc[which], np.abs(segments.sweep[which]), 0.0)
+    drawn = np.isin(moves.kind[move], (MotionKind.FEED, MotionKind.ARC))
+    counts = np.where(drawn, np.minimum(np.ceil(np.nan_to_num(turned) / STEP), MOST_STEPS), 0).astype(np.intp)
+    counts = np.maximum(counts - 1, 0)
+    inside = which[owners(counts)], (places(counts) + 1) / np.repeat(counts + 1, counts)
+    first = np.flatnonzero(
+        np.diff(moves.kind[move], prepend=-1) != 0
+    )  # where a rapid has led a cut, and where all begins
+    first = first[drawn[first] & np.isfinite(picked(segments.start, which[first])).all(axis=1)]
+    return np.concatenate([which[first], inside[0]]), np.concatenate([np.zeros(len(first)), inside[1]])
+
+
+def _kinds(moves: Moves, solution: WrittenPlan) -> Array:
+    """(n,) what leads to places of motions."""
+    refused = np.isin(moves.block, np.fromiter(solution.reasons, dtype=np.int64, count=len(solution.reasons)))
+    kind = np.where(moves.kind == MotionKind.RAPID, RAPID, np.where(solution.kept, PASSED, CUT))
+    return np.where(solution.kept & refused, REFUSED, kind)
+
+
+def _said(reason: Reason) -> str:
+    return f"{reason.code}: {reason.text}"
+
+
+def _spot(values: Mapping[str, Array], row: int) -> Spot:
+    tip = tuple(round(float(values[name][row]), 4) for name in "xyz")
+    way, before, after = (round(float(values[name][row]), 4) for name in ("way", "before", "after"))
+    return Spot(int(values["line"][row]), way, (tip[0], tip[1], tip[2]), before, after)
+
+
+def selection(values: Mapping[str, Array], most: int) -> Index:
+    """Places that stand for all, about `most` (k,): see the head of this module."""
+    count = len(values["way"])
+    changes = np.flatnonzero(np.diff(values["kind"]) != 0)
+    fixed = np.concatenate([[0, count - 1], changes, changes + 1])
+    fixed = fixed if len(fixed) < most // 2 else fixed[:2]
+    stretches = max((most - len(fixed)) // 6, 1)
+    first = np.unique(np.linspace(0, count, stretches, endpoint=False).astype(np.intp))
+    chosen = [_largest(values[side], first) for side in ("before", "after")]
+    rows = np.unique(np.concatenate([fixed, *chosen]))
+    tips = np.stack([values[name] for name in "xyz"], axis=1).astype(np.float64)
+    for _ in range(ROUNDS):
+        off = _off_lines(tips, rows)
+        peaks = _largest(off, rows)
+        peaks = peaks[off[peaks] > FINE]
+        room = (most - len(rows) + 1) // 2
+        if not len(peaks) or room <= 0:
+            break
+        rows = np.unique(np.concatenate([rows, peaks[np.argsort(-off[peaks], kind="stable")[:room]]]))
+    return rows
+
+
+def _largest(values: Array, first: Index) -> Index:
+    """Where the largest value of each stretch is, the first of equal ones; stretches begin at `first`."""
+    most = np.maximum.reduceat(values, first)
+    at = np.flatnonzero(values == np.repeat(most, np.diff(np.append(first, len(values)))))
+    return at[np.searchsorted(at, first)]
+
+
+def _from_line(points: Array, begin: Array, end: Array) -> Array:
+    """How far points (k, 3) are from the straight lines between two others, (k,) mm."""
+    along = end - begin
+    size = np.maximum((along**2).sum(axis=1), 1e-12)
+    share = np.clip(((points - begin) * along).sum(axis=1) / size, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(points - begin - share[:, None] * along, axis=1))
+
+
+def _off_lines(tips: Array, rows: Index) -> Array:
+    """How far all points are from the polyline through those in `rows`, mm."""
+    after = np.clip(np.searchsorted(rows, np.arange(len(tips))), 1, len(rows) - 1)
+    return _from_line(tips, tips[rows[after - 1]], tips[rows[after]])
