@@ -100,7 +100,7 @@ CASES = {
     "no grammar": Case("dialects", "", ODD.format("'none.lark'", ""), (*FIX, "--dialect", "odd"),
                        "failed as the dialect 'odd': FileNotFoundError"),
     "a grammar that is none": Case("dialects", "", ODD.format("__file__", ""), (*FIX, "--dialect", "odd"),
-                                   "failed as the dialect 'odd': "),
+                                   "failed as the dialect 'odd': ValueError: third_party_broken.py: "),
     "no language": Case("dialects", "", ODD.format("'iso.lark'", ", language='no.such:THING'"),
                         (*FIX, "--dialect", "odd"), "failed as the dialect 'odd': ModuleNotFoundError"),
     "another language": Case("dialects", "", ODD.format("'iso.lark'", ", language='os:sep'"),

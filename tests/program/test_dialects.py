@@ -77,6 +77,7 @@ def test_signs_of_another_language_in_a_comment_are_none(name: str) -> None:
         (b"G65 P9832\n", "mitsubishi", "mitsubishi"),
         (b"G65 P9832\n", "siemens", "fanuc"),
         (b"G187 P3\n", "fanuc", "haas"),
+        (b"G187 P3\n", "mitsubishi", "mitsubishi"),
         (b"o<side> call\n", "iso", "linuxcnc"),
     ],
 )

@@ -136,8 +136,8 @@ class Dialect:
     grammar             file name under `grammars/`, or the path of a plugin's own
     suffixes            file extensions that suggest it, lower case with the point
     signature           regular expressions (bytes) in a file that suggest it, strongest first
-    variant_of          the dialect of which this is a variant: a text that shows that one is read as this where the
-                        machine has this control
+    variant_of          the dialect of which this is a variant: a text that shows that one, or another variant of it, is
+                        read as this where the machine has this control
     foreign             languages that are refused by name: what people call them, and a regular expression (bytes)
                         whose first group, if there is one, is what shows it
     line_limit          characters a line may have, its end not counted; 0 = no limit
@@ -297,8 +297,9 @@ def detect(source: bytes, path: str, control: str = "") -> Dialect:
     head = beginning_without_comments(source)
     ranks = {name: rank for name, dialect in known.items() if (rank := signature_rank(dialect, head)) is not None}
     if ranks:
-        shown = min(ranks, key=lambda name: (ranks[name], name))
-        return known[control if control in known and known[control].variant_of == shown else shown]
+        shown = known[min(ranks, key=lambda name: (ranks[name], name))]
+        family = known[control].variant_of if control in known else ""
+        return known[control] if family and family in (shown.name, shown.variant_of) else shown
     if control in known:
         return known[control]
     suffix = PurePath(path).suffix.lower()

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ncfix.host import cache_folders
-from ncfix.plugins import working
+from ncfix.plugins import describe, working
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree
@@ -66,7 +66,8 @@ def find_grammar(name: str) -> Path:
     for path in (Path(name), *(folder / name for folder in FOLDERS)):
         if path.is_file():
             return path
-    raise FileNotFoundError(f"no grammar {name!r} in {', '.join(map(str, FOLDERS))}")
+    where = "" if Path(name).is_absolute() else f" in {', '.join(map(str, FOLDERS))}"
+    raise FileNotFoundError(f"no grammar {name!r}{where}")
 
 
 def place_of_tables(grammar: Path) -> str | None:
@@ -109,7 +110,9 @@ def parse(dialect: Dialect, code: str) -> Tree[Token]:
     """The tree of one squeezed block; raises Lark's own `UnexpectedInput`."""
     try:
         grammar = parser(dialect.grammar)
-    except Exception:
+    except Exception as error:
         with working("dialects", dialect.name):  # a grammar that is missing, or is none, is the fault of whose it is
-            raise
+            if isinstance(error, FileNotFoundError):
+                raise
+            raise ValueError(f"{Path(dialect.grammar).name}: {describe(error)}") from error
     return grammar.parse(code)
