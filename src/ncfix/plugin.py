@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from ncfix.machine import Machine as Machine
     from ncfix.machine import State as State
     from ncfix.machine.basis import Basis as Basis
+    from ncfix.machine.basis import key as key
     from ncfix.measure.measurement import Measurement as Measurement
     from ncfix.reports.document import Document as Document
     from ncfix.tables.axis_tables import Reversal as Reversal
@@ -99,7 +100,7 @@ ELSEWHERE = {
         *("Code", "ConfigError", "Message", "NcfixError", "Place", "RefusedError", "SourceError", "UsageError"),
     ),
     "ncfix.machine": ("Effect", "Machine", "State"),
-    "ncfix.machine.basis": ("Basis",),
+    "ncfix.machine.basis": ("Basis", "key"),
     "ncfix.measure.measurement": ("Measurement",),
     "ncfix.reports.document": ("Document",),
     "ncfix.tables.axis_tables": ("Reversal", "positioning", "reversal_note", "reversals"),
@@ -118,6 +119,8 @@ ELSEWHERE = {
 
 MODULES = {name: module for module, names in ELSEWHERE.items() for name in names}
 
+__all__ = sorted((*HERE, *MODULES))
+
 
 def made_by(name: str) -> Callable[[], Any]:
     """A function that calls another, or a class, `module:name`, whose module is imported only then."""
@@ -131,7 +134,7 @@ def made_by(name: str) -> Callable[[], Any]:
 
 
 def __dir__() -> list[str]:
-    return sorted((*HERE, *MODULES))
+    return __all__
 
 
 def __getattr__(name: str) -> Any:

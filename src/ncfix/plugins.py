@@ -18,7 +18,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache, lru_cache
 from importlib import import_module
 from types import TracebackType
@@ -121,6 +121,11 @@ def lacking(kind: str, thing: Any) -> str:
     absent = [name for name in NEEDS[kind] if not hasattr(thing, name) or name in abstract]
     if absent:
         return f"it has no {', '.join(absent)}"
+    if kind == "bases":
+        if not is_dataclass(thing):
+            return "it is no dataclass"
+        undeclared = [each.name for each in fields(thing) if "kind" not in each.metadata]
+        return f"its fields are not declared with `key`: {', '.join(undeclared)}" if undeclared else ""
     return str(thing.complaint()) if kind == "dialects" and hasattr(thing, "complaint") else ""
 
 

@@ -86,6 +86,7 @@ class Case(NamedTuple):
 FIX = ("fix", "{program}", "-m", "{machine}", "-o", "{out}")
 EXPORT = ("export", "mine", "-m", "{machine}", "-o", "{out}")
 CALIBRATE = ("calibrate", "{data}", "-m", "{machine}", "-o", "{out}")
+TREE = "block: word+\nword: A N\nA: /[A-Z]/\nN: /[-0-9.]+/"
 ODD = 'register(replace(family("iso"), name="odd", title="Odd", grammar={0}, suffixes=(".odd",){1}))'
 CASES = {
     "reader raises": Case("readers", "def read(text, path):\n    return {}[path]\n", "register(read, 'r')", CALIBRATE,
@@ -101,6 +102,10 @@ CASES = {
                        "failed as the dialect 'odd': FileNotFoundError"),
     "a grammar that is none": Case("dialects", "", ODD.format("__file__", ""), (*FIX, "--dialect", "odd"),
                                    "failed as the dialect 'odd': ValueError: third_party_broken.py: "),
+    "a grammar with another tree": Case(
+        "dialects", f"import pathlib\n\npathlib.Path(__file__ + '.lark').write_text({TREE!r})\n",
+        ODD.format("__file__ + '.lark'", ""), (*FIX, "--dialect", "odd"),
+        "failed as the dialect 'odd': ValueError: third_party_broken.py.lark: no tree of words and values: 'G90 "),
     "no language": Case("dialects", "", ODD.format("'iso.lark'", ", language='no.such:THING'"),
                         (*FIX, "--dialect", "odd"), "failed as the dialect 'odd': ModuleNotFoundError"),
     "another language": Case("dialects", "", ODD.format("'iso.lark'", ", language='os:sep'"),
@@ -128,6 +133,9 @@ CASES = {
                                          "it has no title", "NCF508"),
     "a basis that is abstract": Case("bases", "class Half(Basis):\n    name = title = 'half'\n", "register(Half)",
                                      ("effects", "--bases"), "it has no labels, rows, slopes, feature", "NCF508"),
+    "a basis with a key that is not declared": Case(
+        "bases", "@dataclass(frozen=True)\nclass Long(Wave):\n    length: float = 1.0\n", "register(Long)",
+        ("effects", "--bases"), "its fields are not declared with `key`: length", "NCF508"),
     "effect raises": Case("effects", "Bad.effects = lambda self, machine: machine.nothing\n", "register(Bad(), 'bad')",
                           ("effects", "-m", "{machine}"), "failed as the effect 'bad': AttributeError"),
     "effect returns text": Case("effects", "Bad.effects = lambda self, machine: ['EXX']\n", "register(Bad(), 'bad')",

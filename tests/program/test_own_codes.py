@@ -21,8 +21,7 @@ from ncfix.control.trace import trace
 from ncfix.diagnostics import PluginError, SourceError
 from ncfix.machine import Machine, load
 from ncfix.plugin import family
-from ncfix.testing import check_language, gcode_statements
-from ncfix.testing.language import Pair
+from ncfix.testing import Pair, check_language, gcode_statements
 from ncfix.text.dialect import CycleTable, Dialect
 from ncfix.text.reader import read
 

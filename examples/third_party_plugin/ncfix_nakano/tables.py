@@ -65,7 +65,8 @@ class NakanoPitch(Control):
         return Written({FILE: "\n".join([*lines, "END", ""]).encode()})
 
     def read(self, files):
-        document, _ = read_form(FORM, FILE, files[FILE])
+        document, remarks = read_form(FORM, FILE, files[FILE])
+        remarks.check()
         terms = []
         for axis, rows in document.sections("axis").items():
             place, ahead, back = np.array(rows).T

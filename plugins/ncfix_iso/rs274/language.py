@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lark import UnexpectedInput
 
 from ncfix.control.interpreter import RUNTIME
 from ncfix.diagnostics import SourceError
+from ncfix.plugins import working
 from ncfix.text.build import Parsed, TooDeepError, build, check_exponents, check_numbers, start_of
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, bare_expression, explain
@@ -48,6 +50,9 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
     except TooDeepError as error:
         place = squeezed.places[error.position]
         raise BlockError("NCF118", "the expression is nested too deep, or too long", place) from None
+    except (LookupError, AttributeError, TypeError, ValueError) as error:
+        with working("dialects", dialect.name):  # of a plugin's own grammar
+            raise ValueError(f"{Path(dialect.grammar).name}: no tree of words and values: {text.strip()!r}") from error
     check_products(squeezed)
     check_numbers(parsed)
     check_exponents(parsed, text)

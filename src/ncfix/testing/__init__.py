@@ -4,9 +4,16 @@
 things that are wrong, each with the program, the table or the pose that shows it.
 """
 
-from ncfix.testing.language import Statements as Statements
-from ncfix.testing.language import check_language as check_language
-from ncfix.testing.language import gcode_statements as gcode_statements
-from ncfix.testing.strategy import check_strategy as check_strategy
-from ncfix.testing.tables import check_control as check_control
-from ncfix.testing.tables import single_error as single_error
+from ncfix.testing.language import Pair, Statements, check_language, gcode_statements
+from ncfix.testing.strategy import check_strategy
+from ncfix.testing.tables import check_control, single_error
+
+__all__ = [
+    "Pair",
+    "Statements",
+    "check_control",
+    "check_language",
+    "check_strategy",
+    "gcode_statements",
+    "single_error",
+]
