@@ -36,8 +36,7 @@ Value = TypeVar("Value")
 class Memory(Generic[Value]):
     """Values by key, the least recently used forgotten first."""
 
-    def __init__(self, capacity: int = CAPACITY) -> None:
-        self._capacity = capacity
+    def __init__(self) -> None:
         self._values: OrderedDict[bytes, Value] = OrderedDict()
 
     def __len__(self) -> int:
@@ -52,7 +51,7 @@ class Memory(Generic[Value]):
     def keep(self, key: bytes, value: Value) -> None:
         """Remember a value."""
         self._values[key] = value
-        if len(self._values) > self._capacity:
+        if len(self._values) > CAPACITY:
             self._values.popitem(last=False)
 
 

@@ -106,15 +106,13 @@ def even(counts: Index) -> Array:
     return (places(counts) + 1) / np.repeat(counts + 1, counts)
 
 
-def interior(
-    intent: Intent, real: Segments, rows: Index, per_bend: float, least: int, most: int = MOST
-) -> tuple[Index, Array]:
+def interior(intent: Intent, real: Segments, rows: Index, per_bend: float, least: int) -> tuple[Index, Array]:
     """Fractions at which to look at motions, ends left out: counts (k,) and flat fractions, ascending.
 
-    `per_bend` samples for each time that the error may bend, from `least` to `most`, and one wherever an axis passes a
+    `per_bend` samples for each time that the error may bend, from `least` to `MOST`, and one wherever an axis passes a
     kink or a jump of the error model, done as `real` has the motions. Those that are too long get the least.
     """
-    counts = closely(intent, rows, per_bend, least, most)
+    counts = closely(intent, rows, per_bend, least)
     return with_kinks(intent, real, rows, counts, even(counts))
 
 

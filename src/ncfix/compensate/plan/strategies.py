@@ -124,10 +124,10 @@ class PositionStrategy(Strategy):
 
     def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
         """See `Strategy.solve`."""
-        return _position(machine, q, state)
+        return untouched(q) if machine.is_perfect else steered(machine, q, None, state)
 
 
-class RotaryThenLinear(Strategy):
+class RotaryThenLinear(PositionStrategy):
     """Ellingsdalen's order: the error of the rotary axes first, then the linear axes' error where that leads.
 
     S. H. Ellingsdalen (NTNU, 2021), sections 3.5 and 3.6, with its signs put right. Pass 1: X Y Z are moved so that a
@@ -139,17 +139,14 @@ class RotaryThenLinear(Strategy):
     """
 
     name = "rotary-then-linear"
-    leaves = "The orientation of the tool is left as the machine makes it; rotary axes keep their values."
 
     def __init__(self, passes: int | None = None) -> None:
         self.passes = passes
 
     def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
         """See `Strategy.solve`."""
-        if machine.is_perfect:
-            return untouched(q)
-        if self.passes != 1:
-            return _position(machine, q, state)
+        if machine.is_perfect or self.passes != 1:
+            return super().solve(machine, q, state, path)
         columns = linear_columns(machine)
         turning, rest = parted(machine)
         target = machine.tip(q, state.tool_length)
@@ -167,12 +164,6 @@ def parted(machine: Machine) -> tuple[Machine, Machine]:
     turning = tuple(effect for effect in machine.effects if effect.joint in rotary)
     rest = tuple(effect for effect in machine.effects if effect.joint not in rotary)
     return machine.replace(effects=turning), machine.replace(effects=rest)
-
-
-def _position(machine: Machine, q: Array, state: State) -> Correction:
-    if machine.is_perfect:
-        return untouched(q)
-    return steered(machine, q, None, state)
 
 
 def untouched(q: Array) -> Correction:
