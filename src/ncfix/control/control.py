@@ -358,22 +358,6 @@ class ProgramControl(ControlState):
         """Axes that are moved by words of others, since the frame is turned."""
         return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < ALONG)
 
-    def _verdict(self, kind: MotionKind, unknown: UnknownAxes, refusal: str) -> str:
-        """Why a motion that does not pass is refused; empty if it may be corrected.
-
-        A canned cycle begins with a rapid, so it does not matter where from.
-        """
-        reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
-        if not reason and self.tools.unsure and self.tools.offset is None:
-            reason = TOOL_AT_RUN_TIME
-        if not reason and unknown:
-            reason = first_reason(unknown)
-        if not reason and kind not in (MotionKind.RAPID, MotionKind.CYCLE) and self.unknown:
-            reason = first_reason(self.unknown)
-        if not reason and self.external:
-            reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
-        return reason
-
     @contextmanager
     def in_one_piece(self) -> Iterator[None]:
         """The motions that are made meanwhile must not be split."""
@@ -389,18 +373,27 @@ class ProgramControl(ControlState):
             style = self._style(motion.kind, Rule.PASS, passing.words, motion.code, passing.rule)
         else:
             wrong = motion.refusal if passing is None else passing.words
-            style = self._judged(motion.kind, motion.end.unknown, wrong, motion.code)
+            style = self.style_of(motion.kind, motion.code, motion.end.unknown, wrong)
         self.whole = whole
         return style
 
-    def _judged(self, kind: MotionKind, unknown: UnknownAxes, refusal: str, code: int) -> int:
-        """The style of a motion that does not pass."""
-        reason = self._verdict(kind, unknown, refusal)
-        return self._style(kind, Rule.REFUSE if reason else Rule.CORRECT, reason, code)
+    def style_of(self, kind: MotionKind, code: int, unknown: UnknownAxes | None = None, refusal: str = "") -> int:
+        """The style of a motion that does not pass: corrected, or refused where there is a reason.
 
-    def style_of(self, kind: MotionKind, code: int) -> int:
-        """The style of motions whose start and end are known and that have no reason of their own."""
-        return self._judged(kind, {}, "", code)
+        A canned cycle begins with a rapid, so it does not matter where from.
+
+        unknown, refusal  as in `Motion`; of many motions at once, nothing
+        """
+        reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
+        if not reason and self.tools.unsure and self.tools.offset is None:
+            reason = TOOL_AT_RUN_TIME
+        if not reason and unknown:
+            reason = first_reason(unknown)
+        if not reason and kind not in (MotionKind.RAPID, MotionKind.CYCLE) and self.unknown:
+            reason = first_reason(self.unknown)
+        if not reason and self.external:
+            reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
+        return self._style(kind, Rule.REFUSE if reason else Rule.CORRECT, reason, code)
 
     def note_foreign(self, letter: str, also: str = "") -> None:
         """The program moves an axis that the machine lacks; `also`: what else it may mean."""
