@@ -90,6 +90,8 @@ class Contender:
         return Run(self.scale * (usage.ru_utime + usage.ru_stime), self.scale * wall, usage.ru_maxrss / 1024)
 
 
+MOST_INTERPRETED = 100_000
+"""Blocks that are worth a run without the compiled core: it takes minutes for more."""
 PLAIN, COMPILED = {"NCFIX_CORE": "plain"}, {"NCFIX_CORE": "compiled"}
 NCFIX = shutil.which("ncfix", path=str(Path(sys.executable).parent)) or "ncfix"
 SETUP = ["-m", str(MACHINE), "--dialect", "linuxcnc", "--offset", "G54=0,0,0,0,0", "--tool", "0=0"]
@@ -100,7 +102,7 @@ def contenders(program: Path, folder: Path, blocks: int) -> list[Contender]:
     fix = [NCFIX, "fix", str(program), "-o", str(folder / OUTPUT), "--force", *SETUP]
     two, fix = [*fix, "--jobs", "2"], [*fix, "--jobs", "1"]
     found = [
-        Contender("ncfix, plain", fix, PLAIN),
+        *([Contender("ncfix, core interpreted", fix, PLAIN)] if blocks <= MOST_INTERPRETED else []),
         Contender("ncfix", fix, COMPILED),
         Contender("ncfix, without figures", [*fix, "--no-figures"], COMPILED),
         Contender("ncfix, two jobs", two, COMPILED),
@@ -224,14 +226,14 @@ def long_file(blocks: int, folder: Path) -> list[str]:
 def other_controls(blocks: int) -> None:
     """One run each of the programs of other controls, into the page."""
     rows = [f"{spaced(blocks)} blocks, {conditions(1)[0]}", ""]
-    rows += ["| | program | way | CPU s | us a block | peak MB |", "|---|---|---|---|---|---|"]
+    rows += ["| | program | CPU s | us a block | peak MB |", "|---|---|---|---|---|"]
     with tempfile.TemporaryDirectory() as temporary:
         for control in controls.OTHERS:
             for style in control.programs.STYLES:
                 path = Path(temporary) / "program"
                 control.programs.write(path, blocks, style)
-                rows += [row_of(control, style, way, way.run(), blocks) for way in ways_of(control, path)]
-                print(*rows[-2:], sep="\n", flush=True)
+                rows.append(row_of(control, style, way_of(control, path).run(), blocks))
+                print(rows[-1], flush=True)
     into_page(rows, OTHER_BEGIN, OTHER_END)
 
 
@@ -268,29 +270,29 @@ def other_verbs(sizes: list[int]) -> None:
     into_page(rows, VERBS_BEGIN, VERBS_END)
 
 
-def ways_of(control: controls.OtherControl, program: Path) -> list[Contender]:
-    """ncfix on a program of another control, plain and compiled."""
+def way_of(control: controls.OtherControl, program: Path) -> Contender:
+    """ncfix on a program of another control."""
     fix = [NCFIX, "fix", str(program), "-m", str(MACHINE), "-o", str(program.with_name(OUTPUT)), "--force"]
     fix += ["--dialect", control.dialect, "--assume-zero", "--allow-refused", "--jobs", "1", *control.options]
-    return [Contender("plain", fix, PLAIN), Contender("compiled", fix, COMPILED)]
+    return Contender("ncfix", fix, COMPILED)
 
 
-def row_of(control: controls.OtherControl, style: str, way: Contender, run: Run, blocks: int) -> str:
+def row_of(control: controls.OtherControl, style: str, run: Run, blocks: int) -> str:
     """A row of the table of other controls."""
     figures = f"{run.cpu:.1f} | {1e6 * run.cpu / blocks:.0f} | {run.memory:.0f}"
-    return f"| {control.title} | {style} | {way.name} | {figures} |"
+    return f"| {control.title} | {style} | {figures} |"
 
 
 def stages(folder: Path) -> list[str]:
     """Where the time goes, from inside one run."""
     path = folder / "stages.nc"
-    programs.write(path, 200_000, "full")
+    programs.write(path, 100_000, "full")
     command = [sys.executable, str(HERE / "stages.py"), str(path), "--dialect", "linuxcnc"]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, env=environment)
     said = "Without the start of the process, imports and compiling. `without it`: how much faster the whole would be"
     head = [
-        "Share of time of each stage, 200 000 blocks, full words",
+        "Share of time of each stage, 100 000 blocks, full words",
         "",
         said,
         "if the stage took no time at all.",
