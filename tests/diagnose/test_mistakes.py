@@ -72,10 +72,17 @@ def corrected(data: Measurement, known: Machine, factor: float, wanted: Callable
     return data.with_columns({n: data.columns[n] - factor * quiet.columns[n] for n in ("dx", "dy", "dz")})
 
 
+def one_way(data: Measurement, changed: Measurement, axis: str) -> Measurement:
+    """The other values where an axis came in plus."""
+    there = data.columns[f"dir_{axis}"] > 0
+    return data.with_columns({n: np.where(there, changed.columns[n], data.columns[n]) for n in ("dx", "dy", "dz")})
+
+
 VALUES = ("dx", "dy", "dz")
 CASES: dict[str, Callable[[Measurement, Machine], Changed]] = {
     "table active": lambda d, m: (corrected(d, m, 1.0, lambda e: True), m),
     "table active X": lambda d, m: (corrected(d, m, 1.0, lambda e: e.name == "EXX"), m),
+    "table active Y one way": lambda d, m: (one_way(d, corrected(d, m, 1.0, lambda e: e.name == "EYY"), "Y"), m),
     "wrong sign": lambda d, m: (d, scaled(m, -1.0, lambda e: True)),
     "wrong sign control": lambda d, m: (corrected(d, m, -1.0, lambda e: True), m),
     "sign of EYY": lambda d, m: (d, scaled(m, -1.0, lambda e: e.name == "EYY")),
@@ -110,6 +117,7 @@ ALSO = {
     "wrong sign": {"sign of values"},
     "wrong sign control": {"wrong sign"},
     "table active X": {"table active EXX"},
+    "table active Y one way": {"table active Y"},
 }
 
 

@@ -20,7 +20,7 @@ from ncfix.diagnosis.assessment import plausibility
 from ncfix.diagnosis.catalogue import Candidate, catalogue, without
 from ncfix.diagnosis.compound import EffectFinding, compound
 from ncfix.diagnosis.constants import ConstantsVerdict, FileLikelihood, MovedConstant, judged_constants, names_of
-from ncfix.diagnosis.evidence import Comparison, Evidence, Member, entry_price
+from ncfix.diagnosis.evidence import SHARES, Comparison, Evidence, Member, entry_price
 from ncfix.diagnosis.forms import (
     CHANGE,
     VisibleForms,
@@ -80,6 +80,8 @@ LACKING = 1e-3
 AS_GOOD = 1.5
 """A file that is refused as it stands is put right by a mistake that leaves no more than this times the noise."""
 CONSTANT_FAMILY = "constant of the file"
+PLAUSIBLE_UM = 4.0
+"""More of everything together no machine has that cuts parts, rms: a clear pattern is not taken for a little of all."""
 CLEAR = float(np.log(1e6))
 """Log odds of what has no name from which on it is no play of the noise, whatever the noise is."""
 ANEW = "use the new machine file, or calibrate the machine anew"
@@ -460,7 +462,19 @@ def _explained(
     background = estimated_background(seen, everything, relative, named)
     evidence = Evidence(background, groups, len(named))
     case, scale = Case(seen, candidates, unheard_of, visible, outlying, evidence), Comparison(evidence)
-    return concluded(case, scale, _selected(scale))
+    selected = _selected(scale)
+    while evidence.most > 1 and _everything_um(evidence, selected) > PLAUSIBLE_UM:
+        evidence.most = SHARES.index(evidence.share(list(selected.members.values())))
+        scale = Comparison(evidence)
+        selected = _selected(scale)
+    return concluded(case, scale, selected)
+
+
+def _everything_um(evidence: Evidence, selected: Selected) -> float:
+    """How much of everything together the background has beside what was selected, um rms."""
+    every = list(selected.members.values())
+    share = evidence.share(every)
+    return share * _sigma(evidence, every, share)
 
 
 def _selected(scale: Comparison) -> Selected:

@@ -170,11 +170,13 @@ class Evidence:
     """All groups in the coordinates of the background, and the names that own them.
 
     groups  those with a name come first, `named` of them; then their rivals without one
+    most    how many of `SHARES`, from the least, the background may have
     """
 
     background: Background
     groups: tuple[EffectForm, ...]
     named: int
+    most: int = len(SHARES)
     columns: Array = field(init=False)
     bounds: Array = field(init=False)
     y: Array = field(init=False)
@@ -246,8 +248,8 @@ class Evidence:
 
         It has one peak: from the middle share on, each side is followed until it has fallen by `FALLEN`.
         """
-        found, middle = np.full(len(SHARES), -np.inf), len(SHARES) // 2
-        for side in (range(middle, -1, -1), range(middle + 1, len(SHARES))):
+        found, middle = np.full(len(SHARES), -np.inf), min(len(SHARES) // 2, self.most - 1)
+        for side in (range(middle, -1, -1), range(middle + 1, self.most)):
             for k in side:
                 found[k] = self._likelihood(members, beside, SHARES[k]) + np.log(PRIOR[k])
                 if found[k] < found.max() - FALLEN:

@@ -204,6 +204,7 @@ def _quick(
         )
         undone = Mistake(name, title, axis, machine.replace(effects=effects), measurements)
         yield rest.left(rest.y + (1.0 - factor) * change), undone
+    yield from _one_sided(measurements, machine, rest, shown)
     yield from _of_values(measurements, machine, rest)
     yield from _tools(measurements, machine, rest)
     yield from _warm(measurements, machine, rest)
@@ -247,6 +248,36 @@ def _scalings(machine: Machine) -> Iterator[tuple[float, tuple[int, ...], str, s
             yield 0.0, curves, f"table active {name}", title, joint
             if len(curves) < len(own):
                 yield -1.0, curves, f"sign of {name}", f"wrong sign of the table of {name} in the machine file", joint
+
+
+def _one_sided(
+    measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder, shown: Sequence[Array]
+) -> Iterator[tuple[float, Mistake]]:
+    """A table of an axis over itself that the control adds only where the axis moves one way."""
+    if any(each.kind not in ("tcp", "tcp6") for each in measurements):
+        return
+    seen = rest.now.problem.observations
+    directions = np.concatenate([np.broadcast_to(each.state.direction, each.q.shape) for each in seen])[rest.rows]
+    for index, axis in enumerate(machine.axes):
+        own = [k for k, e in enumerate(machine.effects) if not is_free(e) and {e.joint, e.signal} == {axis.name}]
+        for side, said in ((1, "plus"), (-1, "minus")) if own else ():
+            there = directions[:, index] == side
+            if there.all() or not (directions[:, index] == -side).any():
+                continue
+            column = np.where(there, np.sum([shown[k] for k in own], axis=0), 0.0)
+            sizes = [len(each.components) * len(each.measurement) for each in seen]
+            parts = np.split(column / UM, np.cumsum(sizes)[:-1])
+            changed = tuple(
+                each.with_columns(
+                    {
+                        name: each.column(name) + values
+                        for name, values in zip(of.components, part.reshape(len(each), -1).T, strict=True)
+                    }
+                )
+                for each, of, part in zip(measurements, seen, parts, strict=True)
+            )
+            title = f"table already active for {axis.name}, but only where it moves in {said}"
+            yield rest.left(rest.y + column), Mistake(f"table active {axis.name}", title, axis.name, machine, changed)
 
 
 def _of_values(
