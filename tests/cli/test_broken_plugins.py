@@ -156,6 +156,8 @@ CASES = {
         "    return Compensation(own_terms('#X', np.arange(2.0), flat, flat))\n\n\nMine.read = read\n",
         "register(Mine, 'mine')", EXPORT, "mine reads its own files as tables for axes that the machine does not have",
         "NCF508"),
+    "control lacks something": Case("controls", "del Mine.properties, Mine.steps\n", "register(Mine, 'mine')", EXPORT,
+                                    "the control 'mine' has no properties, steps", "NCF508"),
     "control is none": Case("controls", "", "register(dict, 'mine')", EXPORT,
                             "returned dict as the control 'mine', not Control", "NCF508"),
     "reporter raises": Case("reporters", "def form(document):\n    raise KeyError('x')\n", "register(form, '.odd')",

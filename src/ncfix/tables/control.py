@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 from ncfix.arguments import TARGET_UM, TOOL_LENGTH
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
-from ncfix.plugins import called, nearest, registry
+from ncfix.plugins import called, nearest, registry, useless
 from ncfix.tables.compensation import Compensation, Tables, class_of
 from ncfix.tables.grid import Array
 
@@ -282,4 +282,9 @@ def get_control(name: str) -> Control:
 
 def _made(name: str, factory: Callable[[], Control]) -> Control:
     control: Control = called("controls", name, factory, gives=Control)
+    needed = ("name", "title", "reaches", "properties", "steps", "switch_off")
+    if absent := [each for each in needed if not hasattr(control, each)]:
+        raise useless(
+            "controls", name, f"the control {name!r} has no {', '.join(absent)}", "see `ncfix.plugin.Control`"
+        )
     return control
