@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from conftest import require_module
 from ncfix.cli.main import run
 from ncfix.compensate.figures.path_record import COLUMNS, DRAWN, PathRecord, selection
 from report.browser import Tab
@@ -239,3 +240,33 @@ def test_a_page_says_what_it_leaves_out_and_stays_small(tmp_path: Path, chromium
     found = Tab(chromium, path)
     assert found.do("document.getElementById('view').data[0].x.length") >= int(said[0])
     found.close()
+
+
+@pytest.mark.parametrize("form", ["svg", "pdf", "png"])
+def test_a_picture_for_a_paper_has_the_same_bytes_again(tmp_path: Path, form: str) -> None:
+    require_module("matplotlib")
+    require_module("plotly")
+    made = []
+    for name in ("a", "b"):
+        blade(tmp_path, "--plot", tmp_path / f"{name}.{form}", "--force")
+        made.append((tmp_path / f"{name}.{form}").read_bytes())
+    assert made[0] == made[1]
+    assert made[0][:4] in (b"<?xm", b"%PDF", b"\x89PNG")
+
+
+def test_a_program_that_cuts_nothing_has_a_page_too(tmp_path: Path, chromium: Any) -> None:
+    program, page = tmp_path / "rapid.nc", tmp_path / "rapid.html"
+    program.write_text("%\nG21 G90 G54\nG0 X1. Y1. Z50. A0. C0.\nG0 X50.\nM30\n%\n")
+    for machine in ("mill.toml", "nominal.toml"):
+        given = [
+            "-m",
+            EXAMPLES / "guide" / machine,
+            "--assume-zero",
+            "-o",
+            page,
+            "--plot",
+            tmp_path / "p.svg",
+            "--force",
+        ]
+        assert run(["report", *map(str, (program, *given))]) == 0
+        Tab(chromium, page).close()

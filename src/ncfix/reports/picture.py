@@ -88,11 +88,13 @@ def _path(axes: Any, columns: dict[str, Array], error: Array, most: float, side:
     tips = np.stack([columns[name] for name in "xyz"], axis=1).astype(float)
     pieces = np.stack([tips[:-1], tips[1:]], axis=1) if len(tips) > 1 else np.zeros((0, 2, 3))
     led = columns["kind"][1:]
-    axes.add_collection3d(Line3DCollection(pieces[led == RAPID], colors="#9aa4b1", linewidths=0.3))
+    if (led == RAPID).any():
+        axes.add_collection3d(Line3DCollection(pieces[led == RAPID], colors="#9aa4b1", linewidths=0.3))
     cuts = Line3DCollection(pieces[led == CUT], cmap=LinearSegmentedColormap.from_list("error", ERROR), linewidths=0.9)
     cuts.set_array(error[1:][led == CUT])
     cuts.set_clim(0, most)
-    axes.add_collection3d(cuts)
+    if (led == CUT).any():
+        axes.add_collection3d(cuts)
     seen = tips[columns["kind"] == CUT] if (columns["kind"] == CUT).any() else np.zeros((1, 3))
     low, high = seen.min(axis=0), seen.max(axis=0)
     room = np.maximum(high - low, 0.15 * max(float((high - low).max()), 1e-3))

@@ -363,7 +363,9 @@ class Batch:
     def _kept(self, job: FixJob, target: OutputTarget, journal: Journal) -> JournalRecord | None:
         """The record of a program that need not be fixed again; None if it is to be fixed."""
         record = journal.records.get(target.name) if self.resume else None
-        if record is None or (self.retry and not record.digest) or (job.pages and not job.pages.has(target)):
+        if record is None or (self.retry and not record.digest):
+            return None
+        if job.pages and "errors" not in record.entry and not job.pages.has(target):
             return None
         find = subprograms(job.setup, target.source)
         return record if record.holds(job.key(target), target.path, find, repr(job.limits)) else None
