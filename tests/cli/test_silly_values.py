@@ -59,6 +59,22 @@ def test_silly_values_are_refused(
     assert {path: path.read_bytes() for path in Path().iterdir()} == before
 
 
+def test_a_program_for_another_control_is_remarked_on(shop: Shop, ncfix: Ncfix) -> None:
+    shop.machine.write_text('control = "haas"\n' + shop.machine.read_text())
+    klartext, fanuc = shop.folder / "plate.h", shop.folder / "part.fnc"
+    klartext.write_text("BEGIN PGM P MM\nL X+10 Y+10 Z-1 R0 FMAX\nL X+110 F600\nEND PGM P MM\n")
+    fanuc.write_bytes(b"%\nO1 (CORNER)\n" + shop.program.read_bytes())
+    for program, more, remarks in (
+        (klartext, (), 1),
+        (klartext, ("--dialect", "heidenhain"), 0),
+        (fanuc, ("--no-point", "calculator"), 0),
+    ):
+        result = ncfix("fix", program, "-m", shop.machine, "-o", "-", "--assume-zero", *more)
+        assert result.code == 0
+        said = "NCF106: this is Heidenhain Klartext, and the control of the machine file is haas"
+        assert result.err.count(said) == remarks
+
+
 def test_a_size_of_parts_that_is_none(shop: Shop, ncfix: Ncfix, monkeypatch: pytest.MonkeyPatch) -> None:
     for said in ("abc", "0", "-5"):
         monkeypatch.setenv("NCFIX_PART_BYTES", said)

@@ -32,6 +32,12 @@ CODES: dict[str, Code] = {
         "The control refuses lines of more characters than its buffer holds; so would it refuse this one.",
         "Break the line, or shorten its comment.",
     ),
+    "NCF106": Code(
+        "a program for another control",
+        "The text shows another family's language than that of the control which the machine file names. It is read as "
+        "what it shows; the corrections are those of the machine file.",
+        "Check that the machine file is that of the machine which the program is for; --dialect says that it is.",
+    ),
     "NCF110": Code(
         "Unexpected text",
         "At this place the language allows no such character or word.",

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import PurePath
 from typing import Any, ClassVar, Literal, Protocol
 
-from ncfix.diagnostics import Place, SourceError, UsageError
+from ncfix.diagnostics import Message, Place, SourceError, UsageError
 from ncfix.plugins import nearest, registry, working
 
 FOREIGN: tuple[tuple[str, bytes], ...] = (
@@ -305,6 +305,15 @@ def detect(source: bytes, path: str, control: str = "") -> Dialect:
     suffix = PurePath(path).suffix.lower()
     by_suffix = [name for name, dialect in sorted(known.items()) if suffix in dialect.suffixes]
     return known[by_suffix[0]] if by_suffix else get(DEFAULT)
+
+
+def other_control(dialect: Dialect, control: str, path: str) -> Message | None:
+    """A remark (NCF106) on a program whose text shows another family's language than that of the machine's control."""
+    own: Dialect | None = registry("dialects").get(control)
+    if own is None or (own.variant_of or own.name) == (dialect.variant_of or dialect.name):
+        return None
+    text = f"this is {dialect.title}, and the control of the machine file is {control}"
+    return Message("NCF106", text, Place(path), f"is it the right machine file? --dialect {dialect.name} says so")
 
 
 def signature_rank(dialect: Dialect, head: bytes) -> int | None:

@@ -151,7 +151,7 @@ class FixJob:
                 return
             dialect = dialect_of(source.head, shown(target.source), self.dialect, self.machine)
             with self._outlet(source, target, dialect, find, jobs) as (stream, outlet):
-                yield self._in_parts(source, stream, outlet, find)
+                yield self._in_parts(source, stream, outlet, find, dialect)
 
     def _whole(self, source: Source, text: bytes, find: Find) -> FixedText:
         from ncfix.api.programs import fixed
@@ -162,8 +162,16 @@ class FixJob:
         seen: list[tuple[Program, Corrector]] = []
         look = (lambda *each: seen.append(each)) if self.pages else None
         found = fixed(program, self.machine, self.setup, self.options, find, look)
-        page = self._page(_recorded(seen, found), found.report, text) if self.pages else None
-        return FixedText(found.text, found.changed, found.report, page)
+        report = self._remarked(found.report, program.dialect)
+        page = self._page(_recorded(seen, found), report, text) if self.pages else None
+        return FixedText(found.text, found.changed, report, page)
+
+    def _remarked(self, report: FixReport, dialect: Dialect) -> FixReport:
+        """With a remark (NCF106) where the program shows another control than the machine file names."""
+        from ncfix.text.dialect import other_control
+
+        remark = None if self.dialect else other_control(dialect, self.machine.control or "", report.path)
+        return replace(report, warnings=(remark, *report.warnings)) if remark else report
 
     def _page(self, record: PathRecord, report: FixReport, text: bytes) -> ProgramPage:
         from ncfix.reports.program_page import ProgramPage
@@ -187,7 +195,7 @@ class FixJob:
             stream = Stream(task, source.read, outlet.put, jobs, source.ground(outlet.kept.fileno()))
             yield stream, outlet
 
-    def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find) -> FixedText:
+    def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find, dialect: Dialect) -> FixedText:
         from ncfix.compensate.workers import GoneError
         from ncfix.control.trace import NotInPartsError
 
@@ -208,8 +216,9 @@ class FixJob:
             text = "one of the processes that worked on it was killed"
             raise FaultError.of("NCF017", text, Place(shown(source.path)), "fix it with --jobs 1") from None
         source.check_unchanged()
-        page = None if record is None else self._page(record, done.report, source.everything())
-        return FixedText(outlet.remaining(done.stamp), done.report.changed, done.report, page)
+        report = self._remarked(done.report, dialect)
+        page = None if record is None else self._page(record, report, source.everything())
+        return FixedText(outlet.remaining(done.stamp), report.changed, report, page)
 
     def _written(self, fixed: FixedText, target: OutputTarget) -> FixOutcome:
         entry: dict[str, Any] = fixed.report.as_dict()
