@@ -1,10 +1,6 @@
-"""What a diagnosis says: the names, the gap, and everything a report needs.
+"""From measurements and a machine to a verdict: what a diagnosis says, in one of four words, and all a report needs.
 
-What the whole amounts to, in one of four words.
-
-From the effects that are there to a verdict, a machine file with them, and the gap before and after.
-
-The whole way from measurements and a machine to a verdict.
+From the effects that are there to a machine file with them, and the gap before and after.
 """
 
 from __future__ import annotations
@@ -41,7 +37,8 @@ from ncfix.diagnosis.joint_fit import (
     unnamed_um,
     visible_um,
 )
-from ncfix.diagnosis.mistakes import Mistake, find
+from ncfix.diagnosis.mistake_kinds import Mistake
+from ncfix.diagnosis.mistakes import find
 from ncfix.diagnosis.next_poses import Proposal, proposed
 from ncfix.diagnosis.noise import (
     NoiseFloor,

@@ -7,32 +7,23 @@ does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ncfix.diagnosis.catalogue import plain
 from ncfix.diagnosis.evidence import SURE
+from ncfix.diagnosis.mistake_kinds import Mistake, at_first_sight, looks_typed, not_of_first_order
 from ncfix.diagnosis.residual_data import (
     AS_IT_STANDS_UM,
     TIGHT_UM,
-    UM,
     Misfit,
-    is_free,
     misfit,
-    rows_of,
 )
-from ncfix.diagnosis.stale_tables import shifted_tables
 from ncfix.diagnostics import NcfixError
-from ncfix.machine import Effect, Machine
-from ncfix.machine.axes import Axis
-from ncfix.machine.plausible import much
-from ncfix.measure.estimate import Problem
-from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Index, Measurement
-from ncfix.measure.selection import Selection
+from ncfix.machine import Machine
+from ncfix.measure.measurement import Measurement
 
 SUSPECT = 1.15
 """Times the noise from which on a mistake is looked for."""
@@ -50,69 +41,22 @@ A_LITTLE_UM = 0.6
 """What machines have of everything, of one value: the noise is never reached closer."""
 PLAUSIBLE_UM, DECADE = 3.0, float(np.log(10.0))
 """Usual noise of a value, and the spread of its logarithm: a unit may be wrong where noise is a thousand times that."""
-LARGE_RAD = 2e-4
-"""An angle above this may have been typed in degrees."""
 TYPED = 5.0
 """Log odds beforehand for a mistake that the file itself looks like."""
-TURN_RAD = 6.6
-OFF = 3.0
-"""Times what is much of a machine of its size and kind: an axis point that is further off was measured wrongly."""
-NOWHERE_MM = 0.1
-"""A first step that is smaller leads to none that is off: what it leaves is of second order."""
-PIVOT_STEPS = 3
-"""Steps in which the point of an axis is moved to where the data have it."""
-INCH = 25.4
 TINY_UM = 1e-6
 ALIKE = 3.0
 """Log odds (20 to 1) within which another mistake explains the data as well."""
-TOOL_STEP_MM, TOOL_LEAST_MM, MOST_TOOLS, MOST_SETS, TOOL_NUMBERS = 50.0, 1.0, 4, 12, 4
-"""By how much a tool is longer to see what that shows; the least error; of how many tools, and sets of rows; what is
-unknown of a tool that nothing is stated of: its length, and where its tip is."""
-WARM_STEP_K, WARM_LEAST_K, STEEL = 20.0, 8.0, 11.5e-6
-"""The same for the temperature of a workpiece, and the growth of steel per kelvin."""
 FIRST_SIGHT = 5.0
 """Mistakes that are less likely by so much, to first order, are not looked at again."""
-
-
-@dataclass(frozen=True, repr=False)
-class Mistake:
-    """A mistake, and machine and measurements as they are without it.
-
-    before_um, after_um  misfit with it and without it
-    likely               the file itself looks like it
-    aliases              mistakes of its kind that explain the data as well
-    stretch              values of the file are to be multiplied with this: densities are stretched by as much
-    fitted               how many numbers were fitted to undo it
-    given_um             rms of the lengths that the file as given leaves
-    odds, paid           log odds against the file as given, after what the mistake pays
-    sure                 it reaches the noise: no names do better
-    """
-
-    name: str
-    title: str
-    axis: str
-    machine: Machine
-    measurements: tuple[Measurement, ...]
-    before_um: float = 0.0
-    after_um: float = 0.0
-    likely: bool = False
-    aliases: tuple[str, ...] = ()
-    stretch: float = 1.0
-    fitted: int = 0
-    replaces: bool = False
-    given_um: float = 0.0
-    odds: float = 0.0
-    paid: float = 0.0
-    sure: bool = False
 
 
 def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = ()) -> Mistake | None:
     """The mistake that explains the data better than the file as it stands, if one does: by log odds."""
     measurements = tuple(measurements)
     now = misfit(measurements, machine)
-    left, typed = now.left(), any(_looks_typed(effect) for effect in machine.effects)
+    left, typed = now.left(), any(looks_typed(effect) for effect in machine.effects)
     far, names = left >= SUSPECT * now.noise or typed, {plain(name) for name in refused}
-    deep = [each for each in _offered(measurements, machine) if plain(each.name) not in names] if far else []
+    deep = [each for each in not_of_first_order(measurements, machine) if plain(each.name) not in names] if far else []
     tried = _judged(measurements, machine, now, TIGHT_UM, deep, names)
     found = max(tried, key=lambda each: each.odds, default=None)
     standing = now.left(AS_IT_STANDS_UM)
@@ -142,7 +86,7 @@ def _judged(
     deep: Sequence[Mistake], refused: Collection[str],
 ) -> list[Mistake]:  # fmt: skip
     """Mistakes with their log odds, constants held within so much: the best at first sight, and all of `deep`."""
-    quick = [each for each in _quick(measurements, machine, now, held_um) if plain(each[1].name) not in refused]
+    quick = [each for each in at_first_sight(measurements, machine, now, held_um) if plain(each[1].name) not in refused]
     count, before = len(quick) + len(deep), now.left(held_um)
     sighted = [(_odds(left, before, each, now, count), each) for left, each in quick]
     sighted.sort(key=lambda pair: pair[0])
@@ -188,405 +132,3 @@ def _reaches_noise(mistake: Mistake, now: Misfit) -> bool:
     still = _weight(max(mistake.after_um, fixed.left(AS_IT_STANDS_UM)), mistake.stretch, now) - mistake.paid
     floor = float(np.hypot(fixed.noise, A_LITTLE_UM)) / mistake.stretch
     return still >= _weight(floor, 1.0, now) - NAMES_COST
-
-
-def _quick(
-    measurements: tuple[Measurement, ...], machine: Machine, now: Misfit, held_um: float
-) -> Iterator[tuple[float, Mistake]]:
-    """Mistakes that change what the file says by a known column, or the values: with what is left to first order."""
-    rest, problem = FirstOrder.of(now, held_um), now.problem
-    shown = [UM * (problem_design @ np.asarray(effect.coefficients)) for effect, problem_design in _designs(problem)]
-    for factor, parts, name, title, axis in _scalings(machine):
-        change = sum((shown[k] for k in parts), np.zeros(len(problem.values)))
-        effects = tuple(
-            replace(e, coefficients=tuple(factor * c for c in e.coefficients)) if k in parts else e
-            for k, e in enumerate(machine.effects)
-        )
-        undone = Mistake(name, title, axis, machine.replace(effects=effects), measurements)
-        yield rest.left(rest.y + (1.0 - factor) * change), undone
-    yield from _one_sided(measurements, machine, rest, shown)
-    yield from _of_values(measurements, machine, rest)
-    yield from _tools(measurements, machine, rest)
-    yield from _warm(measurements, machine, rest)
-
-
-def _designs(problem: Problem) -> list[tuple[Effect, Array]]:
-    """Each effect of the file with its columns (m, p), mm."""
-    return [
-        (effect, np.concatenate([each.design([effect]) for each in problem.observations]))
-        for effect in problem.machine.effects
-    ]
-
-
-def _scalings(machine: Machine) -> Iterator[tuple[float, tuple[int, ...], str, str, str]]:
-    """Factor of some effects of the file, which ones, name, title and axis."""
-    effects = machine.effects
-    if machine.is_perfect:
-        return
-    every = tuple(range(len(effects)))
-    title = "table already active: the control compensates what the model predicts"
-    yield 0.0, every, "table active", title, ""
-    title = "wrong sign: the model holds corrections instead of errors"
-    yield -1.0, every, "wrong sign", title, ""
-    title = "wrong sign of the table in the control: errors are doubled"
-    yield 2.0, every, "wrong sign", title, ""
-    for joint in dict.fromkeys(effect.joint for effect in effects):
-        own = tuple(k for k in every if effects[k].joint == joint)
-        if len(own) < len(every):
-            yield -1.0, own, f"sign of {joint}", f"wrong sign of all errors of {joint} in the machine file", joint
-            title = f"table already active for {joint}: the control compensates its errors"
-            yield 0.0, own, f"table active {joint}", title, joint
-            title = f"wrong sign of the table of {joint} in the control: its errors are doubled"
-            yield 2.0, own, f"wrong sign {joint}", title, joint
-    for name in dict.fromkeys(effect.name for effect in effects):
-        own = tuple(k for k in every if effects[k].name == name)
-        joint = effects[own[0]].joint
-        yield -1.0, own, f"sign of {name}", f"wrong sign of {name} in the machine file", joint
-        curves = tuple(k for k in own if not is_free(effects[k]))
-        if curves:
-            title = f"table already active for {joint}: the control compensates {name}"
-            yield 0.0, curves, f"table active {name}", title, joint
-            if len(curves) < len(own):
-                yield -1.0, curves, f"sign of {name}", f"wrong sign of the table of {name} in the machine file", joint
-
-
-def _one_sided(
-    measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder, shown: Sequence[Array]
-) -> Iterator[tuple[float, Mistake]]:
-    """A table of an axis over itself that the control adds only where the axis moves one way."""
-    if any(each.kind not in ("tcp", "tcp6") for each in measurements):
-        return
-    seen = rest.now.problem.observations
-    directions = np.concatenate([np.broadcast_to(each.state.direction, each.q.shape) for each in seen])[rest.rows]
-    for index, axis in enumerate(machine.axes):
-        own = [k for k, e in enumerate(machine.effects) if not is_free(e) and {e.joint, e.signal} == {axis.name}]
-        for side, said in ((1, "plus"), (-1, "minus")) if own else ():
-            there = directions[:, index] == side
-            if there.all() or not (directions[:, index] == -side).any():
-                continue
-            column = np.where(there, np.sum([shown[k] for k in own], axis=0), 0.0)
-            sizes = [len(each.components) * len(each.measurement) for each in seen]
-            parts = np.split(column / UM, np.cumsum(sizes)[:-1])
-            changed = tuple(
-                each.with_columns(
-                    {
-                        name: each.column(name) + values
-                        for name, values in zip(of.components, part.reshape(len(each), -1).T, strict=True)
-                    }
-                )
-                for each, of, part in zip(measurements, seen, parts, strict=True)
-            )
-            title = f"table already active for {axis.name}, but only where it moves in {said}"
-            yield rest.left(rest.y + column), Mistake(f"table active {axis.name}", title, axis.name, machine, changed)
-
-
-def _of_values(
-    measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder
-) -> Iterator[tuple[float, Mistake]]:
-    """Measured values of another sign, unit or column."""
-    if any(each.kind not in ("tcp", "tcp6", "axis") for each in measurements):
-        return
-    names = list(dict.fromkeys(name for each in measurements for name in each.measured))
-    lengths = [name for name in names if name in ("dx", "dy", "dz", "value")]
-    everywhere = [name for name in lengths if all(name in each.columns for each in measurements)]
-
-    def undone(name: str, title: str, columns: dict[str, tuple[str, float]], stretch: float = 1.0) -> Mistake:
-        changed = tuple(
-            each.with_columns(
-                {to: factor * each.columns[of] for to, (of, factor) in columns.items() if of in each.columns}
-            )
-            for each in measurements
-        )
-        return Mistake(name, title, "", machine, changed, stretch=stretch)
-
-    offered = [
-        undone("sign of values", "wrong sign of all measured values", {name: (name, -1.0) for name in names}),
-    ]
-    if len(names) > 1:
-        offered += [
-            undone(f"sign of {name}", f"wrong sign of the measured values {name}", {name: (name, -1.0)})
-            for name in names
-        ]
-    for first, second in combinations(everywhere, 2):
-        columns = {first: (second, 1.0), second: (first, 1.0)}
-        offered.append(undone(f"swapped {first} {second}", f"the columns {first} and {second} are exchanged", columns))
-    if len(everywhere) == 3:
-        for order in ((1, 2, 0), (2, 0, 1)):
-            columns = {to: (everywhere[k], 1.0) for to, k in zip(everywhere, order, strict=True)}
-            listed = ", ".join(everywhere[k] for k in order)
-            offered.append(undone("swapped columns", f"the measured columns are in the order {listed}", columns))
-    values = sum(len(each) * len(each.measured) for each in measurements)
-    share = sum(len(each) * sum(name in lengths for name in each.measured) for each in measurements) / max(values, 1)
-    for unit, factor in (("um", 1e-3), ("m", 1e3), ("inch", INCH)):
-        columns = {name: (name, factor) for name in lengths}
-        title = f"unit of values: the measured values are in {unit}, not in mm"
-        offered.append(undone("unit of values", title, columns, factor**share))
-    for each in offered:
-        yield rest.left(rest.of_values(each.measurements)), each
-
-
-@dataclass(frozen=True, repr=False)
-class FirstOrder:
-    """The misfit of a file to first order: its set-up free, its constants nearly fixed.
-
-    y         (m,) values minus what the file says, um
-    basis     orthonormal columns of what is free, with the rows of the prior below, (m + k, r)
-    """
-
-    now: Misfit
-    y: Array
-    basis: Array
-
-    @staticmethod
-    def of(now: Misfit, held_um: float) -> FirstOrder:
-        """About the first guess of the set-up, constants held within so much."""
-        problem = now.problem
-        free = UM * problem.nuisance(problem.start) / now.relative[:, None]
-        own = UM * problem.design / now.relative[:, None]
-        size = np.sqrt((own**2).mean(axis=0))
-        prior = np.diag(now.noise / held_um * np.where(size > 0, size, 1.0))
-        below = np.concatenate([np.zeros((len(prior), free.shape[1])), prior], axis=1)
-        columns = np.concatenate([np.concatenate([free, own], axis=1), below])
-        y = UM * problem.residual(problem.selection.start, problem.start)
-        return FirstOrder(now, y, orthonormal(columns))
-
-    def of_values(self, measurements: Sequence[Measurement]) -> Array:
-        """(m,) other values minus what the file says, um."""
-        problem = self.now.problem
-        pairs = zip(measurements, problem.observations, strict=True)
-        values = np.concatenate([
-            np.concatenate([
-                np.stack([each.column(name) for name in seen.components], axis=1).ravel(), seen.extra_values
-            ])
-            for each, seen in pairs
-        ])  # fmt: skip
-        changed: Array = self.y + UM * (values - problem.values)
-        return changed
-
-    def of_places(self, measurements: Sequence[Measurement]) -> Array:
-        """(m,) values minus what the file says at other positions, or with other tools, um."""
-        seen = Problem.of(measurements, self.now.problem.machine, self.now.problem.selection)
-        changed: Array = UM * seen.residual(seen.selection.start, seen.start)
-        return changed
-
-    @property
-    def rows(self) -> Index:
-        """(m,) the row of each value among those of all files; the first for what has none."""
-        return np.maximum(rows_of(self.now.problem), 0)
-
-    def amounts(self, columns: Array) -> Array:
-        """(k,) how much of each column (m, k) is to be added to the values so that least is left."""
-        scaled = np.column_stack([self.y, columns]) / self.now.relative[:, None]
-        below = np.zeros((len(self.basis) - len(scaled), scaled.shape[1]))
-        rest = without(self.basis, np.concatenate([scaled, below]))
-        return np.asarray(np.linalg.lstsq(rest[:, 1:], -rest[:, 0], rcond=None)[0], dtype=np.float64)
-
-    def left(self, y: Array) -> float:
-        """Root mean square of what these values leave, um, without the largest."""
-        scaled = np.concatenate([y / self.now.relative, np.zeros(len(self.basis) - len(y))])
-        rest = np.abs(without(self.basis, scaled[:, None])[:, 0])
-        kept = np.sort(rest[: len(y)])[: self.now.count]
-        return float(np.sqrt(((kept**2).sum() + (rest[len(y) :] ** 2).sum()) / len(kept)))
-
-
-def _offered(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Mistakes of positions, tools and axes, whose effect is not of first order."""
-    yield from _units(measurements, machine)
-    yield from _exchanged_axes(measurements, machine)
-    for axis in machine.axes:
-        if axis.rotary:
-            title = f"rotary sign: the machine file turns {axis.name} the other way round"
-            turned = _with(machine, replace(axis, direction=tuple(-x for x in axis.direction)))  # type: ignore[arg-type]
-            yield Mistake(f"rotary sign {axis.name}", title, axis.name, turned, measurements)
-            moved = _pivot(measurements, machine, axis)
-            if moved is not None:
-                yield moved
-        else:
-            title = f"axis sign: the positions of {axis.name} count the other way"
-            yield Mistake(
-                f"axis sign {axis.name}",
-                title,
-                axis.name,
-                machine,
-                _times(measurements, [axis.name], -1.0),
-            )
-    yield from _unstated_tools(measurements, machine)
-    yield from _other_machine(measurements, machine)
-    for shifted, title in shifted_tables(measurements, machine):
-        axes = sum(not axis.rotary for axis in machine.axes)
-        yield Mistake("stale table", title, "", shifted, measurements, fitted=axes)
-
-
-def _exchanged_axes(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Columns of positions of two axes under each other's names."""
-    for kind in (False, True):
-        names = [axis.name for axis in machine.axes if axis.rotary == kind]
-        for first, second in combinations(names, 2):
-            if all(first in each.columns and second in each.columns for each in measurements):
-                changed = tuple(
-                    each.with_columns({first: each.columns[second], second: each.columns[first]})
-                    for each in measurements
-                )
-                title = f"the columns {first} and {second} are exchanged"
-                yield Mistake(f"swapped {first} {second}", title, "", machine, changed)
-
-
-def _tools(
-    measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder
-) -> Iterator[tuple[float, Mistake]]:
-    """A tool of another length than was stated, all of another unit, or two of them exchanged."""
-    if any("tool_length" not in each.columns for each in measurements):
-        return
-    lengths = sorted({float(x) for each in measurements for x in each.column("tool_length")})
-    offered = []
-    title = "tool length: the lengths of the two tools are exchanged"
-    if len(lengths) == 2:
-        swapped = _lengths(measurements, lambda length: sum(lengths) - length)
-        offered.append(Mistake("tool length", title, "", machine, swapped))
-    for unit, factor in (("m", 1e3), ("inch", INCH)):
-        title = f"tool length: the lengths of the tools are in {unit}, not in mm"
-        offered.append(Mistake("tool length", title, "", machine, _times(measurements, ["tool_length"], factor)))
-    for each in offered if lengths != [0.0] else ():
-        yield rest.left(rest.of_places(each.measurements)), each
-    lever = (rest.of_places(_lengths(measurements, lambda x: x + TOOL_STEP_MM)) - rest.y) / TOOL_STEP_MM
-    own = np.concatenate([each.column("tool_length") for each in measurements])[rest.rows]
-    for length in [None, *lengths] if 1 < len(lengths) <= MOST_TOOLS else [None]:
-        column = lever * (length is None or own == length)
-        off = float(rest.amounts(column[:, None])[0])
-        if abs(off) > TOOL_LEAST_MM:
-            which = "the tools" if length is None else f"the tool of {length:g} mm"
-            title = f"tool length: {which} {'are' if length is None else 'is'} {off:+.1f} mm longer than stated"
-            changed = _lengths(measurements, lambda x: np.where((length is None) | (x == length), x + off, x))  # noqa: B023
-            yield (
-                rest.left(rest.y + off * column),
-                Mistake("tool length", title, "", machine, changed, fitted=1, likely=lengths == [0.0]),
-            )
-
-
-def _unstated_tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Tools of which no length is stated: each set of rows with a tool of its own."""
-    names = list(dict.fromkeys(name for each in measurements for name in each.sets))
-    if any(each.column("tool_length").any() for each in measurements) or not 1 < len(names) <= MOST_SETS:
-        return
-
-    def of_sets(lengths: Sequence[float]) -> tuple[Measurement, ...]:
-        own = dict(zip(names, lengths, strict=True))
-        return tuple(each.with_columns({"tool_length": np.array([own[n] for n in each.sets])}) for each in measurements)
-
-    apart = [1.0 + k for k in range(len(names))]
-    rest = FirstOrder.of(misfit(of_sets(apart), machine), TIGHT_UM)
-    ways = np.eye(len(names)) * TOOL_STEP_MM + apart
-    levers = np.stack([rest.of_places(of_sets(way.tolist())) - rest.y for way in ways], axis=1) / TOOL_STEP_MM
-    lengths = apart + rest.amounts(levers)
-    title = "tool length: all are zero in the file, but the sets have tools of different lengths"
-    found = of_sets([round(float(length), 3) for length in lengths])
-    yield Mistake("tool length", title, "", machine, found, fitted=(len(names) - 1) * TOOL_NUMBERS, likely=True)
-
-
-def _lengths(measurements: tuple[Measurement, ...], change: Callable[[Array], Array]) -> tuple[Measurement, ...]:
-    return tuple(each.with_columns({"tool_length": change(each.column("tool_length"))}) for each in measurements)
-
-
-def _warm(measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder) -> Iterator[tuple[float, Mistake]]:
-    """The workpiece or artefact was warmer than it should be: all it shows grows from a point that the set-up has."""
-    if any(each.kind != "tcp" or not set(each.measured) & {"dx", "dy", "dz"} for each in measurements):
-        return
-    column = (rest.of_values(_grown(measurements, machine, WARM_STEP_K)) - rest.y) / WARM_STEP_K
-    kelvin = float(rest.amounts(column[:, None])[0])
-    if abs(kelvin) > WARM_LEAST_K:
-        title = f"workpiece {abs(kelvin):.1f} K too {'warm' if kelvin > 0 else 'cold'}, if it is of steel"
-        grown = _grown(measurements, machine, kelvin)
-        yield (
-            rest.left(rest.y + kelvin * column),
-            Mistake("workpiece temperature", title, "", machine, grown, fitted=1),
-        )
-
-
-def _grown(measurements: tuple[Measurement, ...], machine: Machine, kelvin: float) -> tuple[Measurement, ...]:
-    """The measurements less what a workpiece of steel grows by."""
-    found = []
-    for each in measurements:
-        tip = machine.tip(each.positions(machine), each.column("tool_length"))
-        names = [name for name in ("dx", "dy", "dz") if name in each.columns]
-        found.append(
-            each.with_columns(
-                {name: each.columns[name] - STEEL * kelvin * tip[:, "xyz".index(name[1])] for name in names}
-            )
-        )
-    return tuple(found)
-
-
-def _units(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    linear = [axis.name for axis in machine.axes if not axis.rotary]
-    for name, said, factor in (("inch", "inches", INCH), ("metre", "metres", 1e3), ("um", "micrometres", 1e-3)):
-        changed = _times(measurements, linear, factor)
-        title = f"{name}: positions of the linear axes are in {said}"
-        yield Mistake(name, title, "", machine, changed, stretch=_stretch(measurements, linear, factor))
-    rotary = [axis.name for axis in machine.axes if axis.rotary]
-    if rotary and max(float(np.abs(each.column(a)).max()) for each in measurements for a in rotary) < TURN_RAD:
-        title = "radian: angles in the measurement are in radians instead of degrees"
-        yield Mistake("degree", title, "", machine, _times(measurements, rotary, 180 / np.pi))
-    for index, effect in enumerate(machine.effects):
-        if _looks_typed(effect):
-            title = f"degree: {effect.name} of the machine file was typed in degrees instead of radians"
-            yield Mistake("degree", title, effect.joint, _in_radians(machine, index), measurements, likely=True)
-
-
-def _looks_typed(effect: Effect) -> bool:
-    return effect.rotational and max(map(abs, effect.coefficients), default=0.0) > LARGE_RAD
-
-
-def _in_radians(machine: Machine, index: int) -> Machine:
-    effects = list(machine.effects)
-    values = tuple(c * np.pi / 180 for c in effects[index].coefficients)
-    effects[index] = replace(effects[index], coefficients=values)
-    return machine.replace(effects=tuple(effects))
-
-
-def _times(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> tuple[Measurement, ...]:
-    names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
-    return tuple(
-        each.with_columns({name: factor * values for name, values in each.columns.items() if name in names})
-        for each in measurements
-    )
-
-
-def _stretch(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> float:
-    """By how much the readings are stretched: those of a probe are positions of axes."""
-    names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
-    shares = [len(names & set(each.measured)) / max(len(each.measured), 1) for each in measurements]
-    return float(factor ** np.mean(shares))
-
-
-def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) -> Mistake | None:
-    """The axis point moved to where the data have it."""
-    located = [Effect(f"E{letter}0{axis.name}", (0.0,)) for letter in "XYZ"]
-    moved, point = machine, np.asarray(axis.point)
-    for _ in range(PIVOT_STEPS):
-        shift = misfit(measurements, moved, located).coefficients
-        way = np.asarray(axis.error_axes).T @ shift
-        way -= np.asarray(axis.direction) * (way @ np.asarray(axis.direction))
-        point = point + way
-        if np.linalg.norm(point - np.asarray(axis.point)) < NOWHERE_MM:
-            return None
-        moved = _with(machine, replace(axis, point=tuple(float(x) for x in point)))  # type: ignore[arg-type]
-    off = float(np.linalg.norm(point - np.asarray(axis.point)))
-    if off < OFF * much(machine, f"EX0{axis.name}"):
-        return None
-    title = f"pivot: the point of {axis.name} is {off:.2f} mm off in the machine file"
-    return Mistake(f"pivot {axis.name}", title, axis.name, moved, measurements, fitted=2)
-
-
-def _other_machine(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """The file of another machine with the same axes: nothing of its errors holds; its constants are fitted anew."""
-    constants = [replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects if is_free(e)]
-    if machine.is_perfect or len(constants) == len(machine.effects):
-        return
-    own = misfit(measurements, machine.replace(effects=tuple(constants))).constants
-    fitted = Selection(tuple(constants), (True,) * len(constants)).machine(machine.replace(effects=()), own.tolist())
-    title = "another machine: nothing of the file's tables holds; it is another machine's file, or out of date"
-    yield Mistake("another machine", title, "", fitted, measurements, fitted=len(own), replaces=True)
-
-
-def _with(machine: Machine, axis: Axis) -> Machine:
-    return machine.replace(axes=tuple(axis if each.name == axis.name else each for each in machine.axes))
