@@ -55,7 +55,7 @@ class Mistake:
     aliases              mistakes of its kind that explain the data as well
     stretch              values of the file are to be multiplied with this: densities are stretched by as much
     fitted               how many numbers were fitted to undo it
-    replaces             the constants of the file are other ones, too: preferred where its own do not agree with the data
+    replaces             the constants of the file are other ones, too: taken where its own do not agree with the data
     given_um             rms of the lengths that the file as given leaves
     odds, paid           log odds against the file as given, after what the mistake pays
     sure                 it reaches the noise: no names do better
