@@ -131,4 +131,21 @@ CODES = {
         "extras, which ncfix does not need for anything else.",
         'pip install "ncfix[report]" for pages, "ncfix[plot]" for pictures.',
     ),
+    "NCF032": Code(
+        "a certificate that does not hold",
+        "The program, the corrected program, the machine file or the setup is another one than the certificate is "
+        "about, or the second reader finds something else in them now.",
+        "Correct the program again, and write a new certificate.",
+    ),
+    "NCF033": Code(
+        "a corrected program in which the second reader finds faults",
+        "A second reader, which shares no parsing code with `fix`, has followed the corrected program. It is not what "
+        "the correction of the original should be. The program was written all the same.",
+        "Do not run it. `ncfix verify ORIGINAL FIXED -m MACHINE --certificate FILE` lists the faults; report them.",
+    ),
+    "NCF034": Code(
+        "a file that is no certificate",
+        "`--against` names a certificate that `ncfix verify --certificate` or `ncfix fix --certificate` has written.",
+        "Give that file; write it anew if it was made by another version of ncfix.",
+    ),
 }

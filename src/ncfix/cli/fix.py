@@ -150,6 +150,7 @@ def _executors() -> Iterable[str]:
     help="Make a page of the program, or of the batch and each program.",
 )
 @click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Draw the errors of one program for a paper.")
+@click.option("--certificate", is_flag=True, help="Let a second reader prove it; its certificate stands beside it.")
 @click.option("--diff", is_flag=True, help="Print how the text would change (unified diff); write nothing.")
 @click.option("--diff-motions", is_flag=True, help="Print which commands would change, and why; write nothing.")
 @click.option("--no-figures", "verify", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
@@ -187,6 +188,7 @@ def fix(
     retry: bool,
     page: str | None,
     plot: str | None,
+    certificate: bool,
     diff: bool,
     diff_motions: bool,
     time_limit_s: float | None,
@@ -216,6 +218,8 @@ def fix(
         raise UsageError.of("NCF001", "what would change is printed as text or as one object", hint="--json")
     if (diff or diff_motions) and (page or plot):
         raise UsageError.of("NCF001", "--diff writes nothing, and so no page", hint="leave one of them out")
+    if certificate and output == STREAM:
+        raise UsageError.of("NCF001", "a certificate stands beside a file", hint="-o FILE")
     if retry and not resume:
         raise UsageError.of("NCF001", "--retry tries again what --resume would leave out", hint="--resume --retry")
     context = click.get_current_context()
@@ -233,6 +237,8 @@ def fix(
     options = FixOptions(**choices, force=force)
     limits = ProgramLimits(time_limit_s, memory_limit_mb)
     job = FixJob(machine, given.load(machine), dialect, options, limits, pages)
+    if certificate:
+        job = replace(job, certify=machine_path)
     if looks:
         return _changes(context, job, programs, outputs.folder(programs), diff_motions, as_json)
     verbosity = Verbosity.of(quiet, verbose)

@@ -102,6 +102,13 @@ def compared(following: Following, original: str, fixed: str, tolerance_um: floa
 @tolerance_option
 @dialect_option
 @setup_options
+@click.option(
+    "--certificate",
+    type=PATH,
+    metavar="FILE",
+    help="Let the second reader prove it instead; write what it finds (JSON).",
+)
+@click.option("--against", type=PATH, metavar="FILE", help="Is this certificate of these files, and does it hold?")
 @project_options
 @json_option
 def verify(
@@ -111,6 +118,8 @@ def verify(
     tolerance_um: float,
     dialect: str | None,
     given: SetupOptions,
+    certificate: str | None,
+    against: str | None,
     as_json: bool,
 ) -> int:
     """Compare what this machine cuts with FIXED with what ORIGINAL means, along the whole path.
@@ -119,6 +128,13 @@ def verify(
     add, or may, where nobody can look.
     """
     following = Following.of(machine_path, dialect, given)
+    if certificate is not None or against is not None:
+        from ncfix.cli.shop.certificates import verify_certificate
+
+        assert following.machine is not None
+        known, setup = following.machine, following.setup
+        files = (certificate, against, as_json)
+        return verify_certificate(original, fixed, known, machine_path, setup, dialect, tolerance_um, *files)
     with console.busy(f"comparing {shown(fixed)} with {shown(original)}"):
         found = compared(following, original, fixed, tolerance_um)
     if as_json:

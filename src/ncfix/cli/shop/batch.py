@@ -91,6 +91,7 @@ class FixJob:
 
     pages    where pages of programs go; None: there are none
     journal  where outputs are announced; None: nowhere
+    certify  the machine file, if a certificate is to stand beside each output; empty: none
     basis    a digest of all that a result depends on besides program and subprograms, with a journal
     """
 
@@ -102,6 +103,7 @@ class FixJob:
     pages: Pages | None = None
     journal: str | None = None
     basis: str = ""
+    certify: str = ""
 
     def noted_in(self, journal: str) -> FixJob:
         """The same with a journal."""
@@ -240,7 +242,14 @@ class FixJob:
             console.say(line)
         if refused:
             console.say(f"  {ACCEPT if self.options.flatten else FLATTEN + ACCEPT}")
-        return FixOutcome(ExitCode.REFUSED if refused else ExitCode.DONE, entry, digest=digest)
+        code = ExitCode.REFUSED if refused else ExitCode.DONE
+        if self.certify and entry["output"] is not None and (fixed.changed or not target.in_place):
+            from ncfix.cli.shop.certificates import certify_output
+
+            known = (self.machine, self.certify, self.setup, self.dialect, self.options.tolerance_um)
+            entry["certificate"] = certify_output(target, *known)
+            code = ExitCode.FINDINGS if entry["certificate"]["faults"] else code
+        return FixOutcome(code, entry, digest=digest)
 
 
 def _recorded(seen: Sequence[tuple[Program, Corrector]], fixed: Fixed) -> PathRecord:

@@ -1,0 +1,164 @@
+"""Two programs as the second reader knows them, and where the machine model wants corrected motions to end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.certificate.families import follower_of
+from ncfix.certificate.following import AxisStep, Given, Kind
+from ncfix.certificate.model import Array, Mask, TipModel, Ways
+from ncfix.certificate.reading import AXES, Text, TextLine
+from ncfix.machine import Machine
+
+SLACK = 3e-6
+"""mm; numbers agree to that, apart from digits: the correction is solved to 1 nm."""
+FULL = 0.2
+"""mm within which commands are taken for those of a correction that turns rotary axes, too."""
+PoseColumns = tuple[Mask, Array, Array]
+"""Of motions: under tool-centre-point control (n,), the length of the tool (n,) mm, directions (n, n_axes)."""
+
+
+class Expected:
+    """The steps of an original and of its correction, by line, and where the correction of each should end.
+
+    expected    line of the original -> command (n_axes,), mm and rad
+    directions  line of the original -> the last direction of each axis; 0 where it is not sure
+    """
+
+    def __init__(self, first: Text, second: Text, machine: Machine, given: Given) -> None:
+        self.first, self.second = first, second
+        x, y, z = (a + b for a, b in zip(machine.workpiece_offset, given.workpiece_offset, strict=True))
+        self.machine = machine.replace(workpiece_offset=(x, y, z), conditions=dict(given.inputs))
+        self.model = TipModel.of(self.machine)
+        self.strategy = second.stamp.strategy if second.stamp else "rotary-then-linear"
+        turned = self.model.turned if self.model else lambda numbers, length, on: [math.nan] * len(numbers)
+        ours, theirs = (follower_of(text.family, machine.axis_names, given, turned) for text in (first, second))
+        self.ours = {step.row: step for step in ours.run(first)}
+        self.foreign = ours.foreign
+        self.theirs = {step.row: step for step in theirs.run(second)}
+        self.our_ends, self.their_ends = self._ends(self.ours), self._ends(self.theirs)
+        self._halves: dict[tuple[Any, ...], Array] = {}
+        self._expect()
+
+    def _expect(self) -> None:
+        """Work out where corrected motions should end."""
+        self.expected: dict[int, Array] = {}
+        self.directions: dict[int, NDArray[np.int8]] = {}
+        model = self.model
+        if model is None:
+            return
+        known = [step for step in self.ours.values() if not step.why and step.kind != Kind.FIXED]
+        known = [step for step in known if not any(map(math.isnan, step.end))]
+        known = [step for step in known if not step.tcp or (model.leads and not math.isnan(step.length))]
+        if not known:
+            return
+        self._signs(known)
+        end, tcp, length, direction = self.columns(known)
+        found = model.aimed(end, tcp, length, direction)
+        self.expected = dict(zip([step.row for step in known], found, strict=True))
+
+    def _signs(self, steps: Sequence[AxisStep]) -> None:
+        """The last direction of each axis at the end of each step, as its program means it; 0 where it is not sure."""
+        assert self.model is not None
+        last = np.zeros(len(self.machine.axes), dtype=np.int8)
+        if not self.machine.depends_on_direction:
+            self.directions = dict.fromkeys((step.row for step in steps), last)
+            return
+        ways, rows = Ways.of(self.model, steps), np.arange(len(steps))
+        tcp = np.array([step.tcp for step in steps])
+        length = np.nan_to_num(np.array([step.length for step in steps]))
+        before = self.model.joints(ways.at(rows, np.full(len(steps), 1 - 1e-4)), tcp, length)
+        way = self.model.joints(ways.end, tcp, length) - before
+        signs = np.where(np.isfinite(way) & (np.abs(way) > 1e-11), np.sign(way), 0).astype(np.int8)
+        found = {step.row: sign for step, sign in zip(steps, signs, strict=True)}
+        tcp_before = False
+        for row in sorted(self.ours):
+            sign, tcp_now = found.get(row), self.ours[row].tcp
+            sign = None if tcp_now != tcp_before else sign
+            last = np.zeros_like(last) if sign is None else np.where(sign != 0, sign, last)
+            tcp_before = tcp_now
+            self.directions[row] = last
+
+    def columns(self, steps: Sequence[AxisStep]) -> tuple[Array, Mask, Array, Array]:
+        """Ends (n, n_axes), under tool-centre-point control (n,), tool lengths (n,), directions (n, n_axes)."""
+        assert self.model is not None
+        return (
+            self.model.internal([step.end for step in steps]),
+            np.array([step.tcp for step in steps], dtype=bool),
+            np.nan_to_num(np.array([step.length for step in steps], dtype=np.float64)),
+            np.array([self.directions[step.row] for step in steps], dtype=np.float64),
+        )
+
+    def leads_there(self, row: int, at: int) -> bool:
+        """Whether a corrected line leads where the correction of an original one should."""
+        step, other = self.ours.get(row), self.theirs.get(at)
+        if step is None or other is None:
+            return step is None and other is None
+        expected = self.expected.get(row)
+        if expected is None or any(map(math.isnan, other.end)) or not np.isfinite(expected).all():
+            return self._alike(self.first.lines[row], self.second.lines[at], step.unit)
+        off = np.abs(self.their_ends[at] - expected)
+        if (step.kind == Kind.RAPID) != (other.kind == Kind.RAPID):
+            return False
+        near = 3 * self.half_steps(step, True) + SLACK
+        if self.strategy == "full":
+            near = np.where(self.machine.rotary, self.machine.max_correction[1], FULL)
+        return bool((off[step.said] <= near[step.said]).all())
+
+    def _alike(self, line: TextLine, other: TextLine, unit: float) -> bool:
+        """Whether the numbers of two lines differ by corrections only, word by word."""
+        most = 2.5 * self.machine.max_correction[0] / unit
+        for word in line.path:
+            found = other.word(word.name)
+            if word.name in AXES and (
+                found is None
+                or (word.value is not None and found.value is not None and abs(found.value - word.value) > most)
+            ):
+                return False
+        return True
+
+    def half_steps(self, step: AxisStep, added: bool = False) -> Array:
+        """Half of the last digit of each axis, as it is written in a block, (n_axes,) mm and rad.
+
+        added  the number stands in an added line, which has the digits of the control only
+        """
+        words = () if added else tuple(step.named.items())
+        digits_of = tuple((name, word.decimals) for name, word in words if word.value is not None)
+        key = (step.unit, digits_of)
+        found = self._halves.get(key)
+        if found is None:
+            found = np.empty(len(self.machine.axes))
+            written = dict(digits_of)
+            for column, name in enumerate(self.machine.axis_names):
+                rotary = bool(self.machine.rotary[column])
+                unit = math.pi / 180 if rotary else step.unit
+                least = self.machine.least_increment[rotary] / unit
+                digits = max(0, math.ceil(-math.log10(least) - 1e-9), written.get(name, 0))
+                found[column] = 0.5 * 10.0**-digits * unit
+            self._halves[key] = found
+        return found
+
+    def sure_of_side(self, step: AxisStep) -> bool:
+        """Whether the direction of every axis is known on which an error depends."""
+        return step.row in self.directions and all(
+            self.directions[step.row][column] != 0 for column in self.machine.directed
+        )
+
+    def is_followed(self, row: int) -> bool:
+        """Whether it is known where a line should lead, or that it leads nowhere."""
+        step = self.ours.get(row)
+        if step is None:
+            return True
+        sure = not self.machine.depends_on_direction or self.sure_of_side(step)
+        return sure and row in self.expected and bool(np.isfinite(self.expected[row]).all())
+
+    def _ends(self, steps: Mapping[int, AxisStep]) -> dict[int, Array]:
+        """The ends of steps, mm and rad, by line."""
+        if self.model is None:
+            return {}
+        return dict(zip(steps, self.model.internal([step.end for step in steps.values()]), strict=True))

@@ -1,0 +1,350 @@
+"""The second reader: what the words of each family do."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from ncfix.certificate.following import (
+    CENTRES,
+    INCH,
+    NAN,
+    NO_CENTRE,
+    NO_POLE,
+    PLANES,
+    UNKNOWN_WORDS,
+    AxisFollower,
+    AxisStep,
+    Given,
+    Kind,
+    Turned,
+)
+from ncfix.certificate.reading import AXES, Family, TextLine, TextWord
+
+QUIET = frozenset((51, 80, 90, 150, 501, 600, 610, 611, 620, 640, 690, 800, 911, 960, 970, 980, 990)) | frozenset(
+    (4500, 4510, 6010, 6020, 6030, 6410, 6420, 6430, 6440, 6450)
+)
+"""G codes in tenths that move nothing and change no coordinates, or whose use is seen to elsewhere."""
+WORDS_QUIET = re.compile(
+    r"DEF|REAL|INT|BOOL|MSG|ORI(WKS|MKS|AXES|VECT|VIRT1)|SOFT|BRISK|DRIVE|FFWO(N|F)|COMP(OF|CAD|ON)|CFC|CFTCP|CFIN|"
+    r"FNORM|FLIN|SUPA|ADIS|ADISPOS|CYCLE832|WALIMO(N|F)|STOPRE|PTP|CP|UPATH|SPOS|KONT|NORM"
+)
+"""Words of SINUMERIK that move nothing and change no coordinates."""
+SINGLE = frozenset("NFSTDMHPLEQO")
+"""Letters whose words are seen to, or mean nothing here."""
+FRAMES = re.compile(r"CYCL DEF (?:7|8|9|10|11|13|19|26|32|247)\b|PLANE|TRANS|FUNCTION")
+"""Lines of Klartext that this reader does not follow, behind which blocks keep their form."""
+
+
+class WordAddressFollower(AxisFollower):
+    """Follows word addresses and SINUMERIK."""
+
+    def block(self, row: int, line: TextLine) -> AxisStep | None:
+        """What one line does; None if it moves nothing."""
+        codes = [round(10 * word.value) for word in line.codes if word.name == "G" and word.value is not None]
+        if line.odd and (codes or line.path):
+            self.lost["odd"] = line.odd
+        apart, fixed = self._modes(line, codes)
+        words = {word.name: word for word in line.path if word.name in AXES}
+        if apart:
+            if line.path and apart != "dwell":
+                return self.step(row, Kind.FIXED, dict(self.at), line, apart)
+            return None
+        if fixed or 280 in codes or 300 in codes:
+            return self._fixed(row, line, words, codes)
+        if not line.path:
+            return None
+        if not words and self.kind != Kind.ARC:
+            self.lost["odd"] = UNKNOWN_WORDS
+            return self.step(row, Kind.FEED, dict(self.at), line, UNKNOWN_WORDS)
+        if self.kind is None:
+            return self.step(row, Kind.FEED, dict(self.at), line, "which motion this is")
+        if self.kind == Kind.HOLE:
+            return self._hole(row, line, words)
+        if self.kind != Kind.ARC and len(line.path) > len(words):
+            return self.step(row, self.kind, dict(self.at), line, UNKNOWN_WORDS)
+        start = dict(self.at)
+        step = self.step(row, self.kind, self.target({k: v for k, v in words.items() if k in self.at}), line)
+        step.said = [self.said[axis] for axis in self.axes]
+        if self.kind == Kind.ARC and not step.why:
+            return self._arc_of_words(step, line, start)
+        return step
+
+    def _arc_of_words(self, step: AxisStep, line: TextLine, start: Mapping[str, float]) -> AxisStep:
+        radius = line.word("R") or line.word("CR")
+        one, two, _ = PLANES[self.plane]
+        centre = {}
+        for axis in (one, two):
+            word = line.word(CENTRES[axis])
+            value = 0.0 if word is None or word.value is None else word.value * self.unit
+            absolute = word is not None and word.counted == "="
+            centre[axis] = (self.offset(axis) if absolute else start[axis]) + value
+        if line.code("P") is not None or any(
+            word.name in ("AR", "AP", "RP", "I1", "J1", "K1", "TURN") for word in line.path
+        ):
+            step.why = UNKNOWN_WORDS
+        elif radius is None and not any(word.name in "IJK" for word in line.path):
+            step.why = NO_CENTRE
+        if step.why:
+            return step
+        size = None if radius is None or radius.value is None else radius.value * self.unit
+        return self.circle(step, centre, self.clockwise, size)
+
+    def _modes(self, line: TextLine, codes: Sequence[int]) -> tuple[str, bool]:
+        """Take in the codes of a block: why it has no motion that this reader knows, and whether it is in machine
+        coordinates.
+        """
+        apart, fixed, length_set = "", False, False
+        self._other_words(line)
+        for code in codes:
+            match code:
+                case 0 | 10 | 20 | 30:
+                    self.kind = (Kind.RAPID, Kind.FEED, Kind.ARC, Kind.ARC)[code // 10]
+                    self.clockwise = code == 20
+                case 170 | 180 | 190:
+                    self.plane = code // 10
+                case 200 | 210 | 700 | 710 | 7000 | 7100:
+                    if code in (700, 710) and self.family is Family.WORDS:
+                        self.lost[f"G{code / 10:g}"] = f"G{code / 10:g} is not known to this reader"
+                    self.unit = INCH if code in (200, 700, 7000) else 1.0
+                case 900 | 910:
+                    self.counting = code == 910
+                case 930 | 940 | 950:
+                    self.feed_mode = code // 10
+                case 410 | 420:
+                    self.beside = True
+                case 400:
+                    self.beside = False
+                    self.unsay()
+                case 530 | 1530:
+                    fixed = True
+                case 540 | 550 | 560 | 570 | 580 | 590 if self.family is Family.WORDS or code < 580:
+                    self._system(f"G{code // 10}")
+                case 5000:
+                    self._system("G500")
+                case 40:
+                    apart = "dwell"
+                case 430 | 434 if self.family is Family.WORDS:
+                    length_set = True
+                    self._length_offset(line, code == 434)
+                case 490 if self.family is Family.WORDS:
+                    self.lead(False)
+                    self.new_length(0.0)
+                case 730 | 740 | 810 | 820 | 830 | 840 | 850 | 860 | 870 | 880 | 890 if self.family is Family.WORDS:
+                    if self.kind != Kind.HOLE:
+                        self.cycle = {}
+                        self.before_cycle = self.at.get("Z", NAN)
+                    self.kind = Kind.HOLE
+                case 800 if self.family is Family.WORDS:
+                    self.kind = None if self.kind == Kind.HOLE else self.kind
+                case 980 | 990:
+                    self.returns_to_level = code == 990
+                case 280 | 300 if self.family is Family.WORDS:
+                    pass
+                case _ if code in QUIET:
+                    pass
+                case _:
+                    apart = apart or f"G{code / 10:g} is not known to this reader"
+                    self.lost[f"G{code / 10:g}"] = f"G{code / 10:g} is not known to this reader"
+        if self.tcp and not length_set and any(code in (540, 550, 560, 570) for code in codes):
+            self.unsay("XYZ")
+        return apart, fixed or any(word.name == "SUPA" for word in line.codes)
+
+    def _other_words(self, line: TextLine) -> None:
+        for word in line.codes:
+            name = word.name
+            if name == "F":
+                self.feed = None if word.value is None else word.value
+            elif name == "T":
+                self.next_tool = int(word.value) if word.value is not None else word.number.strip('"').upper()
+                if self.family is Family.SINUMERIK:
+                    self._change()
+            elif name == "M":
+                self.auxiliary(word)
+            elif name == "D" and self.family is Family.SINUMERIK:
+                self.new_length(self.length_of(self.tool) if word.value else 0.0)
+            elif name in ("TRAORI", "TRAFOOF"):
+                self.lead(name == "TRAORI")
+                self.unsay()
+            elif name == "G" and word.value is None:
+                self.lost["G"] = "a G code is a formula"
+            elif name == "MCALL":
+                if len(line.codes) - sum(each.name == "N" for each in line.codes) == 1:
+                    self.lost = {key: why for key, why in self.lost.items() if not re.match("MCALL|CYCLE|HOLES", key)}
+                    self.forget()
+                else:
+                    self.lost[name] = "a modal call"
+            elif len(name) > 1 and self.family is Family.SINUMERIK:
+                plain = name.partition("(")[0].strip()
+                if not WORDS_QUIET.fullmatch(plain) and not word.number and not name.startswith(("%", "_N_", "$")):
+                    self.lost[plain] = f"{plain} is not known to this reader"
+            elif name not in SINGLE and name != "G":
+                self.lost[name] = f"{name} is not known to this reader"
+
+    def _change(self) -> None:
+        """Another tool in the spindle of a SINUMERIK; its length holds at once where one was in force."""
+        self.tool = self.next_tool
+        self.new_length(self.length_of(self.tool))
+        self.unsay()
+
+    def _system(self, name: str) -> None:
+        if name != self.system:
+            self.system = name
+        self.unsay()
+
+    def _length_offset(self, line: TextLine, tcp: bool) -> None:
+        number = line.code("H")
+        tool = int(number) if number is not None else self.tool
+        if any(word.name == "H" and word.value is None for word in line.codes):
+            self.lost["H"] = "a length offset is a formula"
+        self.tool = tool
+        self.lead(tcp)
+        self.new_length(self.length_of(tool))
+
+    def _fixed(self, row: int, line: TextLine, words: Mapping[str, TextWord], codes: Sequence[int]) -> AxisStep:
+        """A motion in machine coordinates, or to a reference point."""
+        named = {axis: word for axis, word in words.items() if axis in self.at}
+        if 280 in codes or 300 in codes:
+            point = self.given.references.get("G28" if 280 in codes else "G30", {})
+            end = dict(self.at)
+            for axis in named or self.axes:
+                end[axis] = point.get(axis, NAN)
+        else:
+            end = self.target(named, machine=True) if not self.tcp else dict.fromkeys(self.at, NAN)
+        step = self.step(row, Kind.FIXED, end, line)
+        self.unsay(tuple(named) or self.axes)
+        return step
+
+    def _hole(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
+        """A drilling cycle at a place: in G17, with absolute words."""
+        if self.counting or self.plane != 17 or line.code("K") or line.code("L") or line.word("I") or line.word("K"):
+            return self.step(row, Kind.HOLE, dict(self.at), line, "a drilling cycle that this reader does not know")
+        for name in "ZR":
+            word = line.word(name)
+            if word is not None:
+                depth = NAN if word.value is None else word.value * self.unit
+                self.cycle[name] = self.offset("Z") + depth
+        over = self.target({axis: word for axis, word in words.items() if axis in self.at and axis != "Z"})
+        bottom = {**over, "Z": self.cycle.get("Z", NAN)}
+        self.said["Z"] = True
+        step = self.step(row, Kind.HOLE, bottom, line)
+        level = self.cycle.get("R", NAN)
+        back = level if self.returns_to_level else max(level, self.before_cycle)
+        self.at = {**bottom, "Z": back}
+        return step
+
+
+class KlartextFollower(AxisFollower):
+    """Follows Klartext."""
+
+    def block(self, row: int, line: TextLine) -> AxisStep | None:
+        """What one line does; None if it moves nothing."""
+        keys = [word.name for word in line.codes]
+        lead = keys[0] if keys else ""
+        if lead.startswith("TOOL CALL"):
+            parts = lead.split()
+            if len(parts) > 2 and parts[2].isdigit():
+                self.tool = int(parts[2])
+                self.lead(False) if self.tcp else None
+                self.new_length(self.length_of(self.tool))
+                self.unsay()
+            else:
+                self.lost["tool"] = "a tool call without a number"
+            return None
+        if lead.startswith("BEGIN PGM"):
+            self.unit = INCH if lead.endswith("INCH") else 1.0
+            return None
+        if lead in ("M128", "M129"):
+            self.lead(lead == "M128")
+            return None
+        if lead.startswith(("BLK FORM", "END PGM", "TOOL DEF", "LBL ")):
+            return None
+        if line.odd:
+            if line.rest.strip():
+                self.lost["frame" if FRAMES.match(lead) else "odd"] = line.odd
+            return self.step(row, Kind.FEED, dict(self.at), line, line.odd) if line.path else None
+        self._klartext_words(line)
+        words = {word.name: word for word in line.path if word.name in AXES}
+        if lead == "CC":
+            self._set_pole(line, words)
+            return None
+        turn = line.word("PA")
+        if not words and turn is None:
+            return None
+        if any(word.name == "M" and word.value in (91, 92) for word in line.codes):
+            end = self.target(words, machine=True) if not self.tcp else dict.fromkeys(self.at, NAN)
+            step = self.step(row, Kind.FIXED, end, line)
+            self.unsay(tuple(words))
+            return step
+        if lead not in ("L", "C", "CR", "CP") or (lead == "CP") != (turn is not None):
+            return self.step(row, Kind.FEED, dict(self.at), line, f"{lead} is not known to this reader")
+        self.kind = Kind.RAPID if "FMAX" in keys else Kind.FEED
+        end = self.target({k: v for k, v in words.items() if k in self.at})
+        if turn is not None:
+            end |= self._turned_about_pole(turn)
+        step = self.step(row, self.kind, end, line)
+        step.said = [self.said[axis] for axis in self.axes]
+        if lead == "L" or step.why:
+            return step
+        if "DR+" not in keys and "DR-" not in keys:
+            step.why = "an arc without its sense"
+            return step
+        radius = line.word("R")
+        if lead == "CR":
+            value = None if radius is None or radius.value is None else radius.value * self.unit
+            if value is None:
+                step.why = "an arc without a radius"
+                return step
+            return self.circle(step, {}, "DR-" in keys, value)
+        if not {"X", "Y"} <= set(self.pole) or any(math.isnan(value) for value in self.pole.values()):
+            step.why = NO_POLE
+            return step
+        found = self.circle(step, self.pole, "DR-" in keys, None)
+        if turn is not None and turn.value is not None:
+            found.sweep = math.radians(turn.value)
+        return found
+
+    def _turned_about_pole(self, turn: TextWord) -> dict[str, float]:
+        """Where a turn about the pole leads, in the plane."""
+        x, y = self.pole.get("X", NAN), self.pole.get("Y", NAN)
+        if turn.value is None or turn.counted != "+" or not {"X", "Y"} <= set(self.at):
+            return dict.fromkeys(("X", "Y"), NAN)
+        angle, dx, dy = math.radians(turn.value), self.at["X"] - x, self.at["Y"] - y
+        cos, sin = math.cos(angle), math.sin(angle)
+        return {"X": x + cos * dx - sin * dy, "Y": y + sin * dx + cos * dy}
+
+    def _klartext_words(self, line: TextLine) -> None:
+        for word in line.codes:
+            if word.name == "F":
+                self.feed = word.value
+            elif word.name in ("RL", "RR"):
+                self.beside = True
+            elif word.name == "R0":
+                if self.beside:
+                    self.unsay()
+                self.beside = False
+            elif word.name == "M":
+                match word.value:
+                    case 128 | 129:
+                        self.lead(word.value == 128)
+                    case 0 | 1 | 2 | 3 | 4 | 5 | 6 | 8 | 9 | 13 | 14 | 30 | 91 | 92:
+                        self.auxiliary(word)
+                    case _:
+                        self.lost[f"M{word.number}"] = f"M{word.number} is not known to this reader"
+
+    def _set_pole(self, line: TextLine, words: Mapping[str, TextWord]) -> None:
+        if set(words) - {"X", "Y"}:
+            self.lost["pole"] = "a pole in another plane"
+        said = dict(self.said)
+        target = self.target(words)
+        self.said = said
+        self.pole = {axis: target[axis] if words else self.at[axis] for axis in "XY" if axis in self.at}
+        if words and len(words) < 2:
+            self.pole = dict.fromkeys(self.pole, NAN)
+
+
+def follower_of(family: Family, axes: Sequence[str], given: Given, turned: Turned) -> AxisFollower:
+    """What follows programs of a family."""
+    kind = KlartextFollower if family is Family.KLARTEXT else WordAddressFollower
+    return kind(axes, family, given, turned)

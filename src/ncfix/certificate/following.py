@@ -1,0 +1,307 @@
+"""The second reader: where the axes go, block by block, in plain programs of three families.
+
+It follows straight motions, arcs, drilling cycles, work offsets, tool lengths and tool-centre-point control. Whatever
+else a program uses, it says so and follows no further: `AxisStep.why` has the reason. It never guesses.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from ncfix.certificate.reading import AXES, JUMPS, Family, Text, TextLine, TextWord
+
+NAN = math.nan
+INCH = 25.4
+PLANES = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}
+CENTRES = {"X": "I", "Y": "J", "Z": "K"}
+
+
+class Kind(IntEnum):
+    """What a step is."""
+
+    RAPID = 0
+    FEED = 1
+    ARC = 2
+    HOLE = 3
+    """A drilling cycle: the end is the bottom of the hole."""
+    FIXED = 4
+    """In machine coordinates, or to a reference point: never corrected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What a program cannot know: offsets, tool lengths, start and reference points by axis letter, mm and degree.
+
+    tools  by number, or by name in upper case
+    skip   whether blocks with `/` are skipped; None: either way
+    """
+
+    offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    tools: Mapping[int | str, float | None] = field(default_factory=dict)
+    initial: Mapping[str, float] = field(default_factory=dict)
+    references: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    tcp: bool = False
+    assume_zero: bool = False
+    skip: bool | None = None
+    workpiece_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inputs: Mapping[str, float] = field(default_factory=dict)
+    """What the errors of the machine depend on besides its axes."""
+    pointless: bool = False
+    """Numbers without a decimal point count increments: such programs are not followed."""
+
+
+@dataclass(slots=True)
+class AxisStep:
+    """What one line does; positions are commands, mm and degree, NaN where they are not known.
+
+    row     the index of the line
+    said    axes that the program itself has brought to their places
+    named   the words of the axes
+    why     why this reader cannot follow it; empty if it does
+    tcp     X Y Z are those of the tool tip in the workpiece
+    unit    mm in a unit of linear words
+    centre  of arcs, mm, in the order X Y Z; `across`: the axis normal to its plane; `sweep`: rad, about that axis
+    """
+
+    row: int
+    kind: Kind
+    start: list[float]
+    end: list[float]
+    said: list[bool]
+    named: dict[str, TextWord]
+    why: str
+    tcp: bool
+    length: float
+    feed: float | None
+    feed_mode: int
+    unit: float
+    centre: tuple[float, float, float] = (NAN, NAN, NAN)
+    across: str = "Z"
+    sweep: float = 0.0
+    foreign: bool = False
+    """It is because of what the program uses before, or in this line, that a correction may rewrite otherwise."""
+    unsteady: bool = False
+    """Cutter radius compensation is on: the control offsets the contour."""
+
+
+Turned = Callable[[Sequence[float], float, bool], Sequence[float]]
+"""A command (mm, degree), the tool length, and whether tool-centre-point control goes on: the same as it is then."""
+
+REWRITTEN = re.compile(r"jumps|skip|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
+"""What a program uses, and is not followed behind; a correction may write further lines another way."""
+UNKNOWN_WORDS = "words that this reader does not know here"
+NO_POLE, NO_CENTRE, NO_CIRCLE = "the pole is not known", "an arc without a centre", "no circle has this radius"
+
+
+class AxisFollower:
+    """A control that knows a few codes. One for each program; `run` gives its steps."""
+
+    def __init__(self, axes: Sequence[str], family: Family, given: Given, turned: Turned) -> None:
+        self.axes, self.family, self.given, self.turned = tuple(axes), family, given, turned
+        start = 0.0 if given.assume_zero else NAN
+        self.at = {axis: given.initial.get(axis, start) for axis in axes}
+        self.said = {axis: axis in given.initial and not given.assume_zero for axis in axes}
+        self.kind: Kind | None = None
+        self.clockwise = False
+        self.plane, self.unit, self.counting = 17, 1.0, False
+        self.system = {Family.WORDS: "G54", Family.SINUMERIK: "G500", Family.KLARTEXT: "PRESET"}[family]
+        if family is Family.KLARTEXT and "PRESET" not in given.offsets:
+            self.system = "G54"
+        self.tool: int | str = 0
+        self.next_tool: int | str = 0
+        self.length: float | None = 0.0
+        """The tool length that is in force in coordinates."""
+        self.tcp = given.tcp
+        self.beside = False
+        self.feed: float | None = None
+        self.feed_mode = 94
+        self.cycle: dict[str, float] = {}
+        self.returns_to_level = False
+        self.before_cycle = NAN
+        self.pole: dict[str, float] = {}
+        self.lost: dict[str, str] = {}
+        self.foreign: set[int] = set()
+        """Lines that a correction may rewrite otherwise."""
+        if given.pointless:
+            self.lost["points"] = "numbers without a decimal point count increments"
+
+    def run(self, text: Text) -> list[AxisStep]:
+        """Follow the lines of a program."""
+        if any(line.odd is JUMPS for line in text.lines):
+            self.lost["jumps"] = JUMPS
+        steps: list[AxisStep] = []
+        for row, line in enumerate(text.lines):
+            if line.odd or any(REWRITTEN.match(key) for key in self.lost):
+                self.foreign.add(row)
+            if line.skipped and self.given.skip is None and (line.path or line.codes):
+                self._perhaps(line)
+                if line.path:
+                    steps.append(self.step(row, Kind.FEED, dict(self.at), line, "blocks with / may be skipped"))
+                    steps[-1].foreign = True
+                continue
+            if line.skipped and self.given.skip:
+                continue
+            found = self.block(row, line)
+            if found is not None:
+                steps.append(found)
+                if found.why:
+                    self.forget()
+        return steps
+
+    def block(self, row: int, line: TextLine) -> AxisStep | None:
+        """What one line does; None if it moves nothing."""
+        raise NotImplementedError
+
+    # -- what all families share --------------------------------------------------------------------------------------
+
+    def _perhaps(self, line: TextLine) -> None:
+        self.forget()
+        self.kind = None
+        if any(word.name not in "NFSM" and not (word.name == "G" and (word.value or 0) < 4) for word in line.codes):
+            self.lost["skip"] = "blocks with / may change the state of the control"
+
+    def forget(self) -> None:
+        """Nothing is known of where axes stand."""
+        for axis in self.axes:
+            self.at[axis], self.said[axis] = NAN, False
+
+    def unsay(self, axes: str | tuple[str, ...] = ()) -> None:
+        """The program has not brought these axes, or all, to where they stand."""
+        for axis in axes or self.axes:
+            if axis in self.said:
+                self.said[axis] = False
+
+    def offset(self, axis: str) -> float:
+        """What is added to the numbers of an axis, mm or degree."""
+        system = self.given.offsets.get(self.system)
+        if system is None:
+            shift = 0.0 if self.given.assume_zero or self.system == "G500" else NAN
+        else:
+            shift = system.get(axis, 0.0)
+        if axis == "Z" and not self.tcp:
+            shift += NAN if self.length is None else self.length
+        return shift
+
+    def length_of(self, tool: int | str) -> float | None:
+        """The length of a tool, mm, if it is given."""
+        found = self.given.tools.get(tool)
+        return 0.0 if found is None and self.given.assume_zero else found
+
+    def lead(self, on: bool) -> None:
+        """Tool-centre-point control goes on or off: the same place has other numbers."""
+        if on == self.tcp:
+            return
+        self.tcp = on
+        known = [self.at[axis] for axis in self.axes]
+        length = self.length_of(self.tool)
+        numbers = self.turned(known, NAN if length is None else length, on)
+        self.at.update(zip(self.axes, numbers, strict=True))
+        self.unsay("XYZ")
+
+    def _scale(self, axis: str) -> float:
+        return self.unit if axis in "XYZUVW" else 1.0
+
+    def target(self, words: Mapping[str, TextWord], machine: bool = False) -> dict[str, float]:
+        """Where the words lead, and which axes they say."""
+        end = dict(self.at)
+        for axis, word in words.items():
+            value = NAN if word.value is None else word.value * self._scale(axis)
+            counted = word.counted == "+" or (word.counted == "" and self.counting)
+            if machine:
+                end[axis] = value
+            elif counted:
+                end[axis] = self.at[axis] + value
+            else:
+                end[axis] = self.offset(axis) + value
+                self.said[axis] = True
+        return end
+
+    def step(self, row: int, kind: Kind, end: dict[str, float], line: TextLine, why: str = "") -> AxisStep:
+        """What a line does, which ends at `end`, and why it cannot be followed, if so."""
+        named = {word.name: word for word in line.path if word.name in self.at}
+        strange = next((word.name for word in line.path if word.name in AXES and word.name not in self.at), "")
+        if not why and strange:
+            why = f"the machine has no axis {strange}"
+        foreign = bool(line.odd) or any(REWRITTEN.match(key) for key in self.lost)
+        if not why and line.odd:
+            why = line.odd
+        if not why and (twice := line.doubled()):
+            why = f"two words {twice}"
+        if not why and any(word.value is None for word in line.path):
+            why = "a word is a formula"
+        if not why:
+            why = next(iter(self.lost.values()), "")
+        length = self.length_of(self.tool)
+        step = AxisStep(
+            row,
+            kind,
+            [self.at[axis] for axis in self.axes],
+            [end[axis] for axis in self.axes],
+            [self.said[axis] for axis in self.axes],
+            named,
+            why,
+            self.tcp,
+            NAN if length is None else length,
+            self.feed,
+            self.feed_mode,
+            self.unit,
+            foreign=foreign,
+            unsteady=self.beside,
+        )
+        self.at = end
+        return step
+
+    def circle(self, step: AxisStep, centre: Mapping[str, float], clockwise: bool, radius: float | None) -> AxisStep:
+        """Give a step the circle that its words describe."""
+        one, two, up = PLANES[self.plane]
+        start = dict(zip(self.axes, step.start, strict=True))
+        end = dict(zip(self.axes, step.end, strict=True))
+        a, b = (start[one], start[two]), (end[one], end[two])
+        if radius is not None:
+            chord = math.dist(a, b)
+            height = radius * radius - chord * chord / 4
+            if not chord > 0 or height < -0.01 * radius * radius:
+                step.why = step.why or NO_CIRCLE
+                return step
+            side = math.sqrt(max(height, 0.0)) * (1 if (radius > 0) != clockwise else -1)
+            way = ((b[0] - a[0]) / chord, (b[1] - a[1]) / chord)
+            middle = ((a[0] + b[0]) / 2 - side * way[1], (a[1] + b[1]) / 2 + side * way[0])
+        else:
+            middle = (centre[one], centre[two])
+        first = math.atan2(a[1] - middle[1], a[0] - middle[0])
+        last = math.atan2(b[1] - middle[1], b[0] - middle[0])
+        turn = (last - first) % (2 * math.pi)
+        if clockwise:
+            turn -= 2 * math.pi
+        if math.dist(a, b) < 1e-9 or abs(turn) < 1e-12:
+            turn = -2 * math.pi if clockwise else 2 * math.pi
+        places = {one: middle[0], two: middle[1], up: 0.0}
+        step.centre = (places["X"], places["Y"], places["Z"])
+        step.across, step.sweep, step.kind = up, turn, Kind.ARC
+        return step
+
+    def auxiliary(self, word: TextWord) -> None:
+        """An M word."""
+        match word.value:
+            case 6:
+                self.tool = self.next_tool
+                if self.family is Family.SINUMERIK:
+                    self.new_length(self.length_of(self.tool))
+                self.unsay()
+            case 2 | 30:
+                self.lost["end"] = "behind the end of the program"
+            case 96 | 97 | 98 | 99 | 198 if self.family is not Family.KLARTEXT:
+                self.lost["jumps"] = JUMPS
+            case None:
+                self.lost["M"] = "an M code is a formula"
+            case _:
+                pass
+
+    def new_length(self, length: float | None) -> None:
+        """Another tool length is in force in coordinates."""
+        self.length = length
+        self.unsay("XYZ")

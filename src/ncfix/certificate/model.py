@@ -1,0 +1,165 @@
+"""What the machine model expects of a correction: which commands bring the real tip where a perfect one would be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.certificate.following import AxisStep, Kind
+from ncfix.machine import Machine, State
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+FLAT = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class TipModel:
+    """A calibrated machine with the workpiece in its place."""
+
+    machine: Machine
+    columns: tuple[int, int, int]
+
+    @classmethod
+    def of(cls, machine: Machine) -> TipModel | None:
+        """None for a machine without three linear axes X, Y and Z."""
+        names = machine.axis_names
+        if not all(name in names and not machine.rotary[names.index(name)] for name in "XYZ"):
+            return None
+        x, y, z = (names.index(name) for name in "XYZ")
+        return cls(machine, (x, y, z))
+
+    @property
+    def leads(self) -> bool:
+        """Whether X Y Z bring the tip to every place wherever the rotary axes are."""
+        ways = self.machine.linear_ways
+        return ways is not None and abs(np.linalg.det(ways)) > FLAT
+
+    def internal(self, rows: Sequence[Sequence[float]]) -> Array:
+        """Positions in mm and degree as mm and rad, (n, n_axes)."""
+        found = np.array(rows, dtype=np.float64).reshape(-1, len(self.machine.axes))
+        found[:, self.machine.rotary] *= math.pi / 180
+        return found
+
+    def _at_zero(self, command: Array) -> Array:
+        offset, ways = self.machine.at_zero
+        tip: Array = offset + command @ ways
+        return tip
+
+    def joints(self, command: Array, tcp: Mask, length: Array) -> Array:
+        """Axis positions for commands (n, n_axes), those under tool-centre-point control included."""
+        q = command.copy()
+        if tcp.any():
+            found = self.machine.placed(command[tcp], self.columns, self._at_zero(command[tcp]), length[tcp])
+            q[np.flatnonzero(tcp)[:, None], list(self.columns)] = found
+        return q
+
+    def commands(self, q: Array, tcp: Mask, length: Array) -> Array:
+        """The inverse of `joints`."""
+        command = q.copy()
+        if tcp.any():
+            rest = q[tcp].copy()
+            rest[:, self.columns] = 0.0
+            ways = self.machine.at_zero[1][list(self.columns)]
+            off = self.machine.tip(q[tcp], length[tcp]) - self._at_zero(rest)
+            command[np.flatnonzero(tcp)[:, None], list(self.columns)] = off @ np.linalg.inv(ways)
+        return command
+
+    def turned(self, numbers: Sequence[float], length: float, on: bool) -> Sequence[float]:
+        """A command, mm and degree, as it is when tool-centre-point control goes on or off."""
+        if not self.leads or any(map(math.isnan, (*numbers, length))):
+            return [math.nan] * len(numbers)
+        q, every, tool = self.internal([numbers]), np.array([True]), np.array([length])
+        found = self.commands(q, every, tool) if on else self.joints(q, every, tool)
+        found[:, self.machine.rotary] *= 180 / math.pi
+        result: list[float] = found[0].tolist()
+        return result
+
+    def aimed(self, meant: Array, tcp: Mask, length: Array, direction: Array, turned: Array | None = None) -> Array:
+        """The commands that are right for what is meant, both (n, n_axes); NaN where there are none.
+
+        direction  (n, n_axes) signs of the motion
+        turned     (n, n_axes) where rotary axes are instead, of a correction that turns them, too
+        """
+        q = self.joints(meant, tcp, length)
+        begin, target = q, None
+        if turned is not None:
+            target = self.machine.tip(q, length)
+            begin = np.where(self.machine.rotary, turned, q)
+        found = self.machine.aim(begin, self.columns, State(length, direction), target)
+        result = begin.copy()
+        result[:, self.columns] = np.where(np.asarray(found.arrived)[:, None], found.place, np.nan)
+        return self.commands(result, tcp, length)
+
+    def gaps(self, meant: Array, done: Array, tcp: Mask, length: Array, direction: Array) -> Array:
+        """How far the real tip with commands `done` is from where `meant` wants it, (n,) mm."""
+        state = State(length, direction)
+        off = self.machine.gaps(self.joints(meant, tcp, length), [self.joints(done, tcp, length)], state)[0]
+        gap: Array = np.linalg.norm(off, axis=1)
+        return gap
+
+
+@dataclass(frozen=True, slots=True)
+class Ways:
+    """Motions as the control makes them: straight in all axes, or X Y Z on a circle; commands in mm and rad."""
+
+    start: Array
+    end: Array
+    arc: Mask
+    centre: Array
+    across: NDArray[np.intp]
+    sweep: Array
+    columns: tuple[int, int, int]
+
+    @classmethod
+    def of(cls, model: TipModel, steps: Sequence[AxisStep]) -> Ways:
+        """Those of steps."""
+        return cls(
+            model.internal([step.start for step in steps]),
+            model.internal([step.end for step in steps]),
+            np.array([step.kind == Kind.ARC for step in steps], dtype=bool),
+            np.array([step.centre for step in steps], dtype=np.float64).reshape(-1, 3),
+            np.array(["XYZ".index(step.across) for step in steps], dtype=np.intp),
+            np.array([step.sweep for step in steps], dtype=np.float64),
+            model.columns,
+        )
+
+    def at(self, row: NDArray[np.intp], share: Array) -> Array:
+        """The commands at shares (k,) of motions (k,), shape (k, n_axes)."""
+        begin, end = self.start[row], self.end[row]
+        found: Array = begin + share[:, None] * (end - begin)
+        on = np.flatnonzero(self.arc[row])
+        if on.size:
+            here, part = row[on], share[on]
+            one, two = (self.across[here] + 1) % 3, (self.across[here] + 2) % 3
+            columns, each = np.array(self.columns), np.arange(len(on))
+            middle = self.centre[here]
+            a = begin[on][:, columns] - middle
+            b = end[on][:, columns] - middle
+            first, last = np.hypot(a[each, one], a[each, two]), np.hypot(b[each, one], b[each, two])
+            angle = np.arctan2(a[each, two], a[each, one]) + part * self.sweep[here]
+            radius = first + part * (last - first)
+            found[on, columns[one]] = middle[each, one] + radius * np.cos(angle)
+            found[on, columns[two]] = middle[each, two] + radius * np.sin(angle)
+        return found
+
+    def share(self, row: NDArray[np.intp], place: Array) -> Array:
+        """Where on motions (k,) a place (k, n_axes) is nearest, as a share; of arcs by the angle."""
+        way = self.end[row] - self.start[row]
+        square = np.einsum("ij,ij->i", way, way)
+        with np.errstate(all="ignore"):
+            share: Array = np.einsum("ij,ij->i", place - self.start[row], way) / square
+        on = np.flatnonzero(self.arc[row])
+        if on.size:
+            here, each, columns = row[on], np.arange(len(on)), np.array(self.columns)
+            one, two = (self.across[here] + 1) % 3, (self.across[here] + 2) % 3
+            a = self.start[here][:, columns] - self.centre[here]
+            b = place[on][:, columns] - self.centre[here]
+            turn = np.arctan2(b[each, two], b[each, one]) - np.arctan2(a[each, two], a[each, one])
+            turn = np.where(self.sweep[here] > 0, turn % (2 * np.pi), -((-turn) % (2 * np.pi)))
+            share[on] = turn / self.sweep[here]
+        return share

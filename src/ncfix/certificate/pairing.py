@@ -1,0 +1,213 @@
+"""The second reader: which lines of the corrected program stand for which line of the original.
+
+A correction changes numbers, adds words of axes behind others, and puts further lines behind the line of a motion that
+it splits. All else has to stay. So lines that hold more than a path are found again by their other words; between them,
+lines are told apart by where they lead.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from ncfix.certificate.reading import Family, Text, TextLine
+
+AHEAD = 8
+"""Lines that are looked at for where a line that should be here has gone."""
+FAR = 30
+"""Lines that are looked at for where two programs agree again."""
+MOTION = {
+    Family.WORDS: re.compile(r"[ \t]*\bG[ \t]*0?[0-3](?![\d.])", re.IGNORECASE),
+    Family.KLARTEXT: re.compile(r"[ \t]*(?<![\w.])(?:L|CC|CP|CR|C|DR[+-])(?![\w.+-])", re.IGNORECASE),
+}
+STOPS = re.compile(r"[ \t]*\bM[ \t]*0*(?:0|1|2|30|60)(?![\d.])", re.IGNORECASE)
+PACE = re.compile(
+    r"[ \t]*(?:\bF(?:[ \t]*=)?[ \t]*(?:[\d.]+|MAX)|\bG9[34](?![\d.])|(?<![\w.])R[0LR](?![\w.]))", re.IGNORECASE
+)
+
+
+class LinePair(NamedTuple):
+    """An original line, and the first and the last of the lines in its place (indices)."""
+
+    row: int
+    first: int
+    last: int
+
+
+class BlockFault(NamedTuple):
+    """What is wrong, with the line of the corrected program, and of the original (0: of none)."""
+
+    text: str
+    line: int
+    original: int
+
+
+@dataclass(slots=True)
+class Pairing:
+    """Two programs, and how near a corrected line leads to where the correction of an original one should."""
+
+    original: Text
+    corrected: Text
+    nearness: Callable[[int, int], bool]
+    followed: Callable[[int], bool]
+    foreign: Callable[[int], bool]
+    pairs: list[LinePair] = field(default_factory=list)
+    faults: list[BlockFault] = field(default_factory=list)
+    unsure: set[int] = field(default_factory=set)
+    """Original lines among which nobody can say which added line belongs to which."""
+
+    def run(self) -> None:
+        """Find `pairs` and `faults`."""
+        ours, theirs = self.original.lines, self.corrected.lines
+        own, other = [self._key(line) for line in ours], [self._key(line) for line in theirs]
+        i = j = 0
+        while i < len(ours) or j < len(theirs):
+            if i < len(ours) and j < len(theirs) and own[i] is not None and own[i] == other[j]:
+                self.pairs.append(LinePair(i, j, j))
+                i, j = i + 1, j + 1
+            elif (i < len(ours) and own[i] is None) or (j < len(theirs) and other[j] is None):
+                i, j = self._stretch(own, other, i, j)
+            else:
+                i, j = self._apart(own, other, i, j)
+
+    def _key(self, line: TextLine) -> str | None:
+        """What a line holds besides a path and its pace; None for a line that holds nothing else."""
+        if line.odd:
+            return line.rest
+        motion = MOTION.get(self.original.family, MOTION[Family.WORDS])
+        bare = motion.sub("", STOPS.sub("", line.rest)) if line.path else line.rest
+        if not PACE.sub("", bare).strip() and (line.path or PACE.search(line.rest)):
+            return None
+        return PACE.sub("", bare) if line.path else bare
+
+    def _stretch(self, own: list[str | None], other: list[str | None], i: int, j: int) -> tuple[int, int]:
+        """Lines that hold a path only, from here on in both; the line before may have been split, too."""
+        end, stop = i, j
+        while end < len(own) and own[end] is None:
+            end += 1
+        while stop < len(other) and other[stop] is None:
+            stop += 1
+        if self.pairs and self.pairs[-1].row == i - 1 and self.original.lines[i - 1].path:
+            i, j = i - 1, self.pairs.pop().first
+        more = (stop - j) - (end - i)
+        for row in range(i, end):
+            if more > 0 and not self.followed(row):
+                self.unsure.update(range(row, end))
+            whole = row == end - 1 and not (more > 0 and end < len(own) and self.foreign(end))
+            if j >= stop or (not whole and self._is_gone(row, j, end)):
+                self._lost(row)
+                more += 1
+                continue
+            last = stop - 1 if whole else self._last(row, j, j + max(more, 0), min(stop, j + AHEAD))
+            if last + 1 < stop and more > last - j and not whole and not self.corrected.lines[last + 1].path:
+                last += self.original.lines[min(row + 1, len(own) - 1)].path != []
+            self.pairs.append(LinePair(row, j, last))
+            more -= last - j
+            j = last + 1
+        if i == end or more > 0:
+            self._extra(j, stop)
+        return end, stop
+
+    def _is_gone(self, row: int, at: int, end: int) -> bool:
+        """Whether a line is not there any more: the next one leads where its correction should, and it does not."""
+        return (
+            row + 1 < end
+            and self.followed(row)
+            and self.followed(row + 1)
+            and not self.nearness(row, at)
+            and self.nearness(row + 1, at)
+        )
+
+    def _last(self, row: int, first: int, most: int, stop: int) -> int:
+        """The first of these lines that leads where the correction of an original line should.
+
+        most  as many lines are there more than in the original; if a line is lost elsewhere, it may be a later one
+
+        If none does, the line itself has changed.
+        """
+        found = next((at for at in range(first, most + 1) if self.nearness(row, at)), None)
+        if found is None and self.followed(row) and not self.nearness(row + 1, most + 1):
+            found = next((at for at in range(most + 1, stop) if self.nearness(row, at)), None)
+        return first if found is None else found
+
+    def _apart(self, own: list[str | None], other: list[str | None], i: int, j: int) -> tuple[int, int]:
+        """Lines that hold more than a path and differ: one is lost, added, or changed."""
+        here = other[j] if j < len(other) else None
+        there = own[i] if i < len(own) else None
+        lost = next((k for k in range(1, FAR) if i + k < len(own) and own[i + k] == here), FAR) if here else FAR
+        more = next((k for k in range(1, FAR) if j + k < len(other) and other[j + k] == there), FAR) if there else FAR
+        if j >= len(other) or (lost < FAR and lost <= more):
+            count = len(own) - i if j >= len(other) else lost
+            for row in range(i, i + count):
+                self._lost(row)
+            return i + count, j
+        if i >= len(own) or more < FAR:
+            count = len(other) - j if i >= len(own) else more
+            self._extra(j, j + count)
+            return i, j + count
+        self.pairs.append(LinePair(i, j, j))
+        return i + 1, j + 1
+
+    def _lost(self, row: int) -> None:
+        if self.original.lines[row].rest.strip() or self.original.lines[row].path:
+            line = self.original.lines[row].number
+            self.faults.append(BlockFault("a line is not there any more", self._line(), line))
+
+    def _line(self) -> int:
+        return self.corrected.lines[self.pairs[-1].last].number if self.pairs else 1
+
+    def _extra(self, first: int, stop: int) -> None:
+        for line in self.corrected.lines[first:stop]:
+            if line.rest.strip() or line.path:
+                self.faults.append(BlockFault("a line that the original does not have", line.number, 0))
+
+
+def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool, numbered: str) -> list[str]:
+    """What is wrong with the text of the lines that stand for one.
+
+    arc       the motion is an arc: it may have become straight, and its radius a centre
+    timed     its F is an inverse time, and its pieces have parts of it
+    numbered  how Klartext numbers the lines: "same" or "none" of added ones, "renumber"
+    """
+    line = pairing.original.lines[pair.row]
+    pieces = pairing.corrected.lines[pair.first : pair.last + 1]
+    head, last = pieces[0], pieces[-1]
+    if line.odd:
+        return []
+    found: list[str] = []
+    twice = "" if line.doubled() else next((piece.doubled() for piece in pieces if piece.doubled()), "")
+    if line.path and twice:
+        found.append(f"two words {twice} in a block")
+    klartext = pairing.original.family is Family.KLARTEXT
+    ours, theirs = line.rest, head.rest
+    if len(pieces) > 1:
+        if [*map(str.strip, STOPS.findall(line.rest))] != [*map(str.strip, STOPS.findall(last.rest))]:
+            found.append("a stop is not at the end of the pieces of its block")
+        ours, theirs = STOPS.sub("", ours), STOPS.sub("", theirs)
+    if arc or (klartext and line.codes and line.codes[0].name == "CC"):
+        motion = MOTION.get(pairing.original.family, MOTION[Family.WORDS])
+        ours, theirs = motion.sub("", ours), motion.sub("", theirs)
+    circle = klartext and arc and (len(pieces) > 1 or bool(head.codes and head.codes[0].name == "CC"))
+    if not circle and ours.rstrip() != theirs.rstrip() and not _paced(ours, theirs, line, timed):
+        found.append("words that are no axes have changed")
+    if circle:
+        return found
+    names = [word.name for word in line.path if not arc or word.name in "XYZABCUVW"]
+    left = [word.name for word in head.path]
+    for name in names:
+        if name not in left:
+            found.append(f"the word {name} is not there any more")
+    kept = [name for name in left if name in names]
+    if not found and kept != names:
+        found.append("words have changed their places")
+    if klartext and numbered != "renumber" and head.block != line.block:
+        found.append("the block has another number")
+    return found
+
+
+def _paced(ours: str, theirs: str, line: TextLine, timed: bool) -> bool:
+    """Whether only a feed was put in or changed, for a turn of rotary axes alone, or an inverse time."""
+    turn = bool(line.path) and all(word.name in "ABC" for word in line.path)
+    return (turn or timed) and PACE.sub("", ours).strip() == PACE.sub("", theirs).strip()

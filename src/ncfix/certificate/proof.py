@@ -1,0 +1,474 @@
+"""The proof: every block of the original against what stands for it in the corrected program.
+
+A block is proved if all its text but the numbers of its path is untouched, and the corrected motion, followed by a
+reader of its own, brings the real tip where it is meant to be: at the end to half a digit of the control, on the way
+within the tolerance. It is faulty if one of these is wrong for sure. Where this reader cannot tell, it is not proved,
+with the reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.certificate.expected import SLACK, Expected, PoseColumns
+from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, AxisStep, Given, Kind
+from ncfix.certificate.model import Array, Ways
+from ncfix.certificate.pairing import BlockFault, LinePair, Pairing, text_faults
+from ncfix.certificate.reading import Family, StampFound, Text, TextLine
+from ncfix.machine import Machine
+
+TURNED = 1e-9
+"""rad, the same of rotary axes."""
+SAMPLES = np.arange(1, 12) / 12
+"""Where on a motion, or a piece of one, its way is looked at."""
+WIDER = 1.05
+"""Of the tolerance: a way farther out is beyond it for sure."""
+PLAIN_STRATEGIES = frozenset(("rotary-then-linear", "position"))
+AS_IF = 4e-4
+"""mm; where the program has not said where an axis stands, the others are corrected as if it stood in its place."""
+OFF = "{} ends {} from where the correction belongs"
+UNSAID = "the program has not said where an axis stands"
+UNSURE = "which added lines belong to which block is not known"
+LEFT = "left as it was programmed"
+
+
+@dataclass(slots=True)
+class BlockProof:
+    """What was found.
+
+    blocks   lines of the original that are not empty; `motions` of them move something
+    proved, unproved   how many of each; the rest is faulty
+    reasons  of what is not proved: how many blocks, and the lines of the first few
+    """
+
+    blocks: int = 0
+    motions: int = 0
+    proved: int = 0
+    proved_motions: int = 0
+    reasons: Counter[str] = field(default_factory=Counter)
+    lines: dict[str, list[int]] = field(default_factory=dict)
+    faults: list[BlockFault] = field(default_factory=list)
+    faulty: set[int] = field(default_factory=set)
+    largest_um: float = 0.0
+    """The largest change of a command of X, Y or Z that was looked at."""
+    farthest_um: float = 0.0
+    """The farthest that the tip was found from the intended way, on the way of proved motions."""
+    stamp: StampFound | None = None
+
+    @property
+    def unproved(self) -> int:
+        """Blocks that are neither proved nor faulty."""
+        return sum(self.reasons.values())
+
+    def fault(self, text: str, line: int, original: int) -> None:
+        """Something is wrong."""
+        self.faults.append(BlockFault(text, line, original))
+        if original:
+            self.faulty.add(original)
+
+    def leave(self, why: str, line: int) -> None:
+        """A block is not proved."""
+        self.reasons[why] += 1
+        self.lines.setdefault(why, [])
+        if len(self.lines[why]) < 5:
+            self.lines[why].append(line)
+
+
+@dataclass(frozen=True, slots=True)
+class ProofTerms:
+    """What the correction was to hold.
+
+    tolerance_um  of the way; the stamp of the program wins
+    numbered      how added blocks of Klartext are numbered
+    """
+
+    tolerance_um: float = 1.0
+    numbered: str = "same"
+
+
+def prove(
+    original: bytes,
+    corrected: bytes,
+    machine: Machine,
+    given: Given,
+    dialect: str = "",
+    terms: ProofTerms | None = None,
+) -> BlockProof:
+    """Compare a program with its correction for a machine.
+
+    dialect  its name, by which the family of the language is known; empty: found out
+    """
+    family = Family.of(original, dialect)
+    first, second = Text.of(original, family), Text.of(corrected, family)
+    return Prover(first, second, machine, given, terms or ProofTerms()).run()
+
+
+class Prover(Expected):
+    """Judges two programs."""
+
+    def __init__(self, first: Text, second: Text, machine: Machine, given: Given, terms: ProofTerms) -> None:
+        super().__init__(first, second, machine, given)
+        self.terms = terms
+        self.machine_hash = machine.hash
+        self.proof = BlockProof(stamp=second.stamp)
+        self.tolerance = (second.stamp.tolerance_um if second.stamp else terms.tolerance_um) / 1e3
+        self.polar = {row for row, line in enumerate(second.lines) if line.word("PA")}
+        """Lines of the corrected program whose digits are those of an angle about a pole."""
+
+    def run(self) -> BlockProof:
+        """Compare all blocks."""
+        self._stamps()
+        pairing = Pairing(self.first, self.second, self.leads_there, self.is_followed, self._is_foreign)
+        pairing.run()
+        for fault in pairing.faults:
+            if self._foreign_near(fault, pairing):
+                self.proof.leave(UNSURE, fault.original or fault.line)
+            else:
+                self.proof.fault(*fault)
+        motions: list[LinePair] = []
+        for pair in pairing.pairs:
+            line = self.first.lines[pair.row]
+            if pair.row in pairing.unsure:
+                self.proof.blocks += 1
+                self.proof.motions += pair.row in self.ours
+                self.proof.leave(UNSURE, line.number)
+                continue
+            self._text(pairing, pair)
+            if not line.rest.strip() and not line.path:
+                continue
+            self.proof.blocks += 1
+            step = self.ours.get(pair.row)
+            self.proof.motions += step is not None
+            if line.number in self.proof.faulty:
+                continue
+            if step is None:
+                if line.odd and self._changed(pair):
+                    self.proof.leave(line.odd, line.number)
+                else:
+                    self.proof.proved += 1
+                continue
+            why = self._hindrance(step, pair)
+            if why:
+                self.proof.leave(why, line.number)
+                self._roughly(step, pair)
+            else:
+                motions.append(pair)
+        self.proof.blocks += sum(1 for fault in pairing.faults if fault.original)
+        if motions:
+            self._motions(motions)
+        self.proof.faults.sort(key=lambda fault: fault.line)
+        return self.proof
+
+    # -- stamp and text -----------------------------------------------------------------------------------------------
+
+    def _stamps(self) -> None:
+        stamp = self.second.stamp
+        if stamp is not None and stamp.machine != self.machine_hash:
+            self.proof.fault("the stamp names another machine, or this one before it was changed", stamp.line, 0)
+        if stamp is None and [line.rest for line in self.first.lines] != [line.rest for line in self.second.lines]:
+            self.proof.fault("the program has changed and carries no stamp", 1, 0)
+
+    def _text(self, pairing: Pairing, pair: LinePair) -> None:
+        step = self.ours.get(pair.row)
+        arc = step is not None and (step.kind == Kind.ARC or (bool(step.why) and len(step.named) < 9))
+        line = self.second.lines[pair.first].number
+        if self._is_foreign(pair.row):
+            return
+        timed = step is not None and step.feed_mode == 93
+        for text in text_faults(pairing, pair, arc, timed, self.terms.numbered):
+            self.proof.fault(text, line, self.first.lines[pair.row].number)
+
+    def _foreign_near(self, fault: BlockFault, pairing: Pairing) -> bool:
+        """Whether what is wrong with lines may be due to what this reader does not know."""
+        row = (
+            fault.original - 1
+            if fault.original
+            else max(
+                (pair.row for pair in pairing.pairs if self.second.lines[pair.last].number < fault.line), default=0
+            )
+        )
+        near = range(max(row - 2, 0), min(row + 3, len(self.first.lines)))
+        return any(self._is_foreign(at) or (at in self.ours and bool(self.ours[at].why)) for at in near)
+
+    def _is_foreign(self, row: int) -> bool:
+        step = self.ours.get(row)
+        return row in self.foreign or (step is not None and step.foreign)
+
+    def _changed(self, pair: LinePair) -> bool:
+        """Whether anything of a line has changed."""
+        return pair.first != pair.last or not same(self.first.lines[pair.row], self.second.lines[pair.first])
+
+    # -- what this reader can follow ----------------------------------------------------------------------------------
+
+    def _hindrance(self, step: AxisStep, pair: LinePair) -> str:
+        """Why a motion cannot be proved."""
+        if step.why:
+            return step.why
+        if step.kind == Kind.FIXED:
+            if self._changed(pair):
+                self.proof.fault(
+                    "a motion in machine coordinates has changed",
+                    self.second.lines[pair.first].number,
+                    self.first.lines[pair.row].number,
+                )
+            else:
+                self.proof.proved += 1
+                self.proof.proved_motions += 1
+            return ""
+        if self.model is None or (step.tcp and not self.model.leads):
+            return "the machine has no three linear axes that lead the tip everywhere"
+        if self.strategy not in PLAIN_STRATEGIES and self.strategy != "full":
+            return f"the strategy {self.strategy} does not bring the tip to its place"
+        if any(map(math.isnan, step.end)):
+            return "where an axis stands is not known"
+        if math.isnan(step.length):
+            if step.tcp or self.machine.depends_on_tool_length:
+                return "the length of the tool is not known"
+            step.length = 0.0
+        if step.unsteady:
+            return "cutter radius compensation is on"
+        return ""
+
+    def _roughly(self, step: AxisStep, pair: LinePair) -> None:
+        """Of a block that is not followed: no absolute number may change by more than the largest correction."""
+        line, last = self.first.lines[pair.row], self.second.lines[pair.last]
+        if line.odd or step.foreign or step.kind == Kind.ARC:
+            return
+        most = 2.5 * self.machine.max_correction[0] + 1e-6
+        for word in line.path:
+            other = last.word(word.name)
+            if word.name not in "XYZ" or other is None or word.value is None or other.value is None:
+                continue
+            if pair.first == pair.last and abs(other.value - word.value) * step.unit > most:
+                self.proof.fault(f"{word.name} has changed by more than corrections are", last.number, line.number)
+                return
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def _motions(self, pairs: Sequence[LinePair]) -> None:
+        """Judge motions that this reader can follow."""
+        ways: list[LinePair] = []
+        for pair in pairs:
+            step, number = self.ours[pair.row], self.first.lines[pair.row].number
+            if step.kind == Kind.FIXED:
+                continue
+            line = self.second.lines[pair.last].number
+            pieces = [self.theirs[row] for row in range(pair.first, pair.last + 1) if row in self.theirs]
+            broken = next((piece.why for piece in pieces if piece.why in (NO_POLE, NO_CENTRE, NO_CIRCLE)), "")
+            if broken:
+                self.proof.fault(broken, line, number)
+                continue
+            why = self._pieces(step, pieces)
+            if why:
+                self.proof.leave(why, number)
+                continue
+            if not pieces or not self._same_kind(step, pieces):
+                self.proof.fault("the block does not move as it did", line, number)
+                continue
+            verdict, proved = self._end(step, pieces, pair)
+            if verdict and proved:
+                self.proof.leave(verdict, number)
+            elif verdict:
+                self.proof.fault(verdict, line, number)
+            elif pace := self._pace(step, pieces):
+                self.proof.fault(pace, line, number)
+            else:
+                ways.append(pair)
+        self._ways(ways)
+
+    def _pieces(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
+        """Why what stands for a motion cannot be followed."""
+        for piece in pieces:
+            if piece.why:
+                return piece.why
+            if any(map(math.isnan, piece.end)):
+                return "where an axis stands is not known"
+        if self.expected.get(step.row) is None or not np.isfinite(self.expected[step.row]).all():
+            return "the machine model has no answer"
+        if self.machine.depends_on_direction and not self.sure_of_side(step):
+            return "play: the side of an axis is not known to this reader"
+        return ""
+
+    @staticmethod
+    def _same_kind(step: AxisStep, pieces: Sequence[AxisStep]) -> bool:
+        kinds = {piece.kind for piece in pieces}
+        if step.kind == Kind.ARC:
+            return kinds <= {Kind.ARC, Kind.FEED}
+        return kinds == {step.kind}
+
+    def _end(self, step: AxisStep, pieces: Sequence[AxisStep], pair: LinePair) -> tuple[str, bool]:
+        """What is wrong with the end of a motion, and whether that is only not proved."""
+        assert self.model is not None
+        meant, done = self.our_ends[step.row], self.their_ends[pieces[-1].row]
+        expected = self.expected[step.row]
+        rotary = self.machine.rotary
+        full = self.strategy == "full" and bool(rotary.any())
+        if full:
+            if (np.abs(done - meant)[rotary] > self.machine.max_correction[1] + 1e-6).any():
+                return UNSURE, True
+            tcp, length = np.array([step.tcp]), np.array([step.length])
+            side = self.directions[step.row][None].astype(np.float64)
+            expected = self.model.aimed(meant[None], tcp, length, side, done[None])[0]
+            expected = np.where(rotary, done, expected)
+        said = np.array(step.said)
+        off = np.where(said, np.abs(done - expected), 0.0)
+        loose = full or any(row in self.polar for row in range(pair.first, pair.last + 1))
+        if not said.all() and self._changed(pair):
+            most = self.half_steps(step, True) + np.where(rotary, TURNED, AS_IF)
+            return (UNSAID, True) if loose or (off <= most).all() else (OFF.format(*self._worst(off, most)), False)
+        allowed = self.half_steps(step, len(pieces) > 1) * 1.002 + np.where(
+            rotary, TURNED, self.tolerance if loose else SLACK
+        )
+        added = np.where(said & ~rotary, np.abs(done - meant), 0.0)
+        if (off > allowed).any():
+            if not self._changed(pair):
+                return LEFT, True
+            return OFF.format(*self._worst(off, allowed)), False
+        if (added > self.machine.max_correction[0] + self.half_steps(step, True)).any():
+            return "a correction is larger than the machine file allows", False
+        low, high = self.machine.ranges.T
+        inside, there = meant, done
+        if step.tcp:
+            tcp, length = np.array([True, True]), np.array([step.length] * 2)
+            inside, there = self.model.joints(np.stack([meant, done]), tcp, length)
+        if (((there < low - 1e-6) | (there > high + 1e-6)) & (inside >= low) & (inside <= high) & said).any():
+            return "the corrected motion leaves the travel of an axis", False
+        self.proof.largest_um = max(self.proof.largest_um, 1e3 * float(added.max()))
+        return (UNSAID, True) if not said.all() else ("", False)
+
+    def _worst(self, off: Array, allowed: Array) -> tuple[str, str]:
+        """The axis that is farthest off, and by how much."""
+        worst = int(np.argmax(off / allowed))
+        amount = float(off[worst])
+        size = f"{math.degrees(amount):.4f} degree" if self.machine.rotary[worst] else f"{1e3 * amount:.2f} um"
+        return self.machine.axis_names[worst], size
+
+    def _pace(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
+        """What is wrong with the feed; turns of rotary axes alone get another one."""
+        if step.kind not in (Kind.FEED, Kind.ARC):
+            return ""
+        turn = all(name in "ABC" for name in step.named)
+        if turn or step.feed is None or any(piece.feed is None for piece in pieces):
+            return ""
+        feeds = [piece.feed or 0.0 for piece in pieces]
+        if any(piece.feed_mode != step.feed_mode for piece in pieces):
+            return "" if turn else "the feed is meant in another way"
+        if step.feed_mode == 93:
+            ours = 1 / step.feed if step.feed else math.inf
+            theirs = sum(1 / feed if feed else math.inf for feed in feeds)
+            return "" if abs(theirs - ours) <= 2e-3 * ours else "the pieces take another time than the block"
+        return "" if all(feed == step.feed for feed in feeds) else "the feed has changed"
+
+    def _ways(self, pairs: Sequence[LinePair]) -> None:
+        """Judge the ways of motions whose ends are right."""
+        self.proof.proved += len(pairs)
+        self.proof.proved_motions += len(pairs)
+        cutting = [pair for pair in pairs if self.ours[pair.row].kind in (Kind.FEED, Kind.ARC)]
+        cutting = [pair for pair in cutting if self._starts(pair)]
+        if not cutting or self.model is None:
+            return
+        steps = [self.ours[pair.row] for pair in cutting]
+        pieces = [[self.theirs[row] for row in range(p.first, p.last + 1) if row in self.theirs] for p in cutting]
+        counts = np.array([len(each) for each in pieces])
+        owner = np.repeat(np.arange(len(steps)), counts)
+        meant, done = Ways.of(self.model, steps), Ways.of(self.model, [step for each in pieces for step in each])
+        _, tcp, length, direction = self.columns(steps)
+        last = np.cumsum(counts) - 1
+        share = np.ones(len(owner))
+        inner = np.setdiff1d(np.arange(len(owner)), last)
+        if inner.size:
+            share[inner] = self._shares(meant, done, owner, inner, (tcp, length, direction))
+        before = np.concatenate([[0.0], share[:-1]])
+        before[np.concatenate([[0], last[:-1] + 1])] = 0.0
+        bad: dict[int, str] = {}
+        for k in inner[share[inner] < before[inner] - 1e-2].tolist():
+            bad.setdefault(int(owner[k]), "the pieces of the block are not one behind the other")
+        each = np.repeat(np.arange(len(owner)), len(SAMPLES))
+        part = np.tile(SAMPLES, len(owner))
+        at = (before + 0.0)[each] + part * (share - before)[each]
+        rows = owner[each]
+        given = (tcp, length, direction)
+        gap = self._gaps(meant.at(rows, at), done.at(each, part), rows, given).reshape(len(owner), -1).max(axis=1)
+        if inner.size:
+            places = self._gaps(meant.at(owner[inner], share[inner]), done.end[inner], owner[inner], given)
+            gap[inner] = np.maximum(gap[inner], places)
+        allowed = np.array([self._allowed(step) for step in steps])[owner]
+        opens = np.concatenate([[0], last[:-1] + 1])
+        here = np.arange(len(steps))
+        allowed[opens] += self._gaps(meant.start, done.start[opens], here, given)
+        for k in np.flatnonzero(~(gap <= allowed)).tolist():
+            text = f"the tip leaves the intended way by {1e3 * gap[k]:.2f} um between the ends of the block"
+            bad.setdefault(int(owner[k]), text)
+        good = np.array([int(k) not in bad for k in owner])
+        if good.any():
+            self.proof.farthest_um = max(self.proof.farthest_um, 1e3 * float(gap[good].max()))
+        for k, text in sorted(bad.items()):
+            pair = cutting[k]
+            self.proof.proved -= 1
+            self.proof.proved_motions -= 1
+            number = self.first.lines[pair.row].number
+            if self.strategy == "full" or self.machine.depends_on_direction:
+                why = "play" if self.machine.depends_on_direction else "rotary axes that are corrected, too"
+                self.proof.leave(f"the way of a motion, because of {why}", number)
+                continue
+            self.proof.fault(text, self.second.lines[pair.first].number, number)
+
+    def _gaps(self, meant: Array, done: Array, rows: NDArray[np.intp], given: PoseColumns) -> Array:
+        """How far the tip is from where it is meant to be, mm; with play, on the better side of each axis."""
+        assert self.model is not None
+        tcp, length, direction = given[0][rows], given[1][rows], given[2][rows]
+        sides = [direction]
+        for column in self.machine.directed:
+            turned = np.where(np.arange(direction.shape[1]) == column, -1.0, 1.0)
+            sides += [side * turned for side in sides]
+        gap: Array = np.min([self.model.gaps(meant, done, tcp, length, side) for side in sides], axis=0)
+        return gap
+
+    def _starts(self, pair: LinePair) -> bool:
+        """Whether it is known where a motion begins, in both programs."""
+        step = self.ours[pair.row]
+        piece = next(self.theirs[row] for row in range(pair.first, pair.last + 1) if row in self.theirs)
+        return not any(map(math.isnan, (*step.start, *piece.start)))
+
+    def _allowed(self, step: AxisStep) -> float:
+        """How far the tip may be from the intended way, mm: the tolerance, and what digits add."""
+        halves = self.half_steps(step, True)[~self.machine.rotary]
+        digits = float(np.linalg.norm(halves))
+        if step.kind == Kind.ARC:
+            digits *= 3
+        return WIDER * self.tolerance + digits + SLACK
+
+    def _shares(
+        self,
+        meant: Ways,
+        done: Ways,
+        owner: NDArray[np.intp],
+        inner: NDArray[np.intp],
+        given: PoseColumns,
+    ) -> Array:
+        """Where on the original motions pieces end: there the expected command is nearest to the written one."""
+        assert self.model is not None
+        rows, place = owner[inner], done.end[inner]
+        tcp, length, direction = given[0][rows], given[1][rows], given[2][rows]
+        share = np.clip(meant.share(rows, place), 0.0, 1.0)
+        turned = place if self.strategy == "full" else None
+        for _ in range(3):
+            here = meant.at(rows, share)
+            expected = self.model.aimed(here, tcp, length, direction, turned)
+            off = np.where(np.isfinite(expected), place - expected, 0.0)
+            ahead = meant.at(rows, np.clip(share + 1e-4, 0, 1)) - meant.at(rows, np.clip(share - 1e-4, 0, 1))
+            way = ahead / np.maximum(np.clip(share + 1e-4, 0, 1) - np.clip(share - 1e-4, 0, 1), 1e-9)[:, None]
+            square = np.maximum(np.einsum("ij,ij->i", way, way), 1e-12)
+            share = np.clip(share + np.einsum("ij,ij->i", off, way) / square, 0.0, 1.0)
+        return share
+
+
+def same(line: TextLine, other: TextLine) -> bool:
+    """Whether two lines say the same."""
+    return line.rest == other.rest and line.path == other.path and line.block == other.block

@@ -1,0 +1,286 @@
+"""The second reader: the lines of a program as words, by regular expressions of its own.
+
+It reads three families: word addresses (LinuxCNC, ISO 6983, Fanuc and its like), SINUMERIK and Klartext. It knows no
+grammar and no meaning. Of each line it keeps which words a correction may change (axes, arc centres and radii), and all
+other text as it stands, byte for byte. What it cannot take apart it calls odd, with the reason.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
+
+AXES = frozenset("XYZABCUVW")
+
+
+class Family(Enum):
+    """How the words of a program look."""
+
+    WORDS = "word addresses"
+    SINUMERIK = "SINUMERIK"
+    KLARTEXT = "Klartext"
+
+    @classmethod
+    def of(cls, text: bytes, dialect: str) -> Family:
+        """That of a dialect, by its name, or else what the beginning of a text shows."""
+        head = text[:4096].upper()
+        if dialect == "heidenhain" or re.search(rb"^\s*(?:\d+\s+)?BEGIN\s+PGM\b", head, re.MULTILINE):
+            return cls.KLARTEXT
+        if dialect == "siemens" or re.search(rb"^(?:%_N_|\s*;\$PATH)", head, re.MULTILINE):
+            return cls.SINUMERIK
+        return cls.WORDS
+
+
+class TextWord(NamedTuple):
+    """A word: its name, its number as written, and its value.
+
+    value    None for a formula
+    counted  "" as the mode says, "+" an increment, "=" absolute, whatever the mode
+    """
+
+    name: str
+    number: str
+    value: float | None
+    counted: str = ""
+
+    @property
+    def decimals(self) -> int:
+        """Digits behind the point."""
+        return len(self.number.replace(",", ".").partition(".")[2])
+
+
+@dataclass(slots=True)
+class TextLine:
+    """A line of a program.
+
+    number   counted from 1
+    path     words that a correction may change or add, in order
+    codes    all other words, in order
+    rest     the text without the words of `path` and the blanks before them; Klartext: without the block number
+    block    number of the block, Klartext only
+    odd      why the line cannot be taken apart; empty if it could be
+    skipped  it begins with `/`
+    """
+
+    number: int
+    path: list[TextWord] = field(default_factory=list)
+    codes: list[TextWord] = field(default_factory=list)
+    rest: str = ""
+    block: str = ""
+    odd: str = ""
+    skipped: bool = False
+
+    def word(self, name: str) -> TextWord | None:
+        """The word of `path` with this name."""
+        return next((word for word in self.path if word.name == name), None)
+
+    def code(self, name: str) -> float | None:
+        """The value of the last of the other words with this name."""
+        return next((word.value for word in reversed(self.codes) if word.name == name), None)
+
+    def doubled(self) -> str:
+        """The name of an axis or centre that has two words; empty if there is none."""
+        names = [word.name for word in self.path]
+        return next((name for name in names if names.count(name) > 1), "") if len(names) > 1 else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A program as lines.
+
+    ends   what stands behind each line: its line end, empty behind the last one without
+    """
+
+    family: Family
+    lines: list[TextLine]
+    ends: list[str]
+    stamp: StampFound | None
+
+    @classmethod
+    def of(cls, source: bytes, family: Family) -> Text:
+        """Read a program; the line of its stamp, if it has one, is kept apart."""
+        reader = READERS[family]
+        lines: list[TextLine] = []
+        ends: list[str] = []
+        stamp = None
+        for number, raw in enumerate(re.findall(r"[^\r\n]*(?:\r\n|\n|\r)|[^\r\n]+$", source.decode("latin-1")), 1):
+            text = raw.rstrip("\r\n")
+            if stamp is None and (found := STAMP.search(text)):
+                stamp = StampFound(number, found[1].lower(), found[2].lower(), float(found[3]))
+                continue
+            lines.append(reader(number, text))
+            ends.append(raw[len(text) :])
+        return cls(family, lines, ends, stamp)
+
+
+class StampFound(NamedTuple):
+    """What a corrected program says of itself: the line, the hash of the machine, strategy and tolerance (um)."""
+
+    line: int
+    machine: str
+    strategy: str
+    tolerance_um: float
+
+
+STAMP = re.compile(r"\bncfix \d\S* machine ([0-9a-f]+) strategy ([\w-]+) tolerance ([\d.e-]+) um", re.IGNORECASE)
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
+FORMULA = r"[+-]?(?:\#+(?:\d+|<[^<>]*>)|\#?\[(?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])*\])"
+WORD_ADDRESS = re.compile(
+    rf"(\([^()]*\)|;.*|%)|([A-Za-z])[ \t]*(?:({NUMBER})(?!\.?[\d\#\[])|({FORMULA}))|([^ \t])",
+)
+"""Comment; letter, and its number or formula; anything else."""
+FLOW = re.compile(
+    r"\b(?:GOTO|IF|WHILE|END|THEN|DO)\d*\b|\bO[ \t]*(?:<|\d+[ \t]*(?:SUB|CALL|IF|WHILE|DO|REPEAT|END|ELSE|R))"
+)
+PATH_WORDS = AXES | frozenset("IJKR")
+
+
+def _word_address(number: int, text: str) -> TextLine:
+    line = TextLine(number)
+    line.skipped = text.lstrip(" \t").startswith("/")
+    rest: list[str] = []
+    at = 0
+    for found in WORD_ADDRESS.finditer(text):
+        start, end = found.span()
+        letter = found[2]
+        if letter is None:
+            if found[5] is not None and found[5] not in "/*:":
+                line.odd = line.odd or f"{text[start:].split()[0]!r} is no plain word"
+        else:
+            name, digits = letter.upper(), found[3]
+            word = TextWord(name, digits or "", float(digits) if digits else None)
+            if name in PATH_WORDS:
+                rest.append(text[at:start].rstrip(" \t"))
+                line.path.append(word)
+                at = end
+                continue
+            line.codes.append(word)
+        rest.append(text[at:end])
+        at = end
+    rest.append(text[at:])
+    line.rest = "".join(rest)
+    if line.odd and FLOW.search(text.upper()):
+        line.odd = JUMPS
+    return line
+
+
+JUMPS = "the program has loops, jumps or subprograms"
+CODE = r"[A-Z]{1,2}\d*"
+SINUMERIK_WORD = re.compile(
+    rf"(;.*|\"[^\"]*\")"
+    rf"|([A-Z_$][A-Z0-9_$]*)[ \t]*=[ \t]*(?:(IC|AC|DC|ACP|ACN)\([ \t]*({NUMBER})[ \t]*\)|({NUMBER})(?![\w.(*/+])"
+    rf"|(\"[^\"]*\"|[^;\s]+))"
+    rf"|(?<![A-Z0-9_$])([A-Z])({NUMBER})(?![\w.(])"
+    rf"|([A-Z_$%][A-Z0-9_$]*(?:[ \t]*\((?:[^()]|\([^()]*\))*\))?)"
+    rf"|([^ \t])",
+    re.IGNORECASE,
+)
+SINUMERIK_PATH = AXES | frozenset(("I", "J", "K", "CR", "AR", "AP", "RP", "TURN", "LEAD", "TILT", "PHI", "PSI"))
+SINUMERIK_PATH |= frozenset(("RND", "RNDM", "CHR", "CHF", "ANG", "X1", "Y1", "Z1", "I1", "J1", "K1"))
+SINUMERIK_PATH |= frozenset(letter + digit for letter in "ABC" for digit in "2345")
+SINUMERIK_FLOW = re.compile(
+    r"^(?:GOTO[FBCS]?|IF|ELSE|ENDIF|FOR|ENDFOR|WHILE|ENDWHILE|LOOP|ENDLOOP|REPEATB?|UNTIL|CALL|CASE|PROC|RET|M17)\b"
+)
+
+
+def _sinumerik(number: int, text: str) -> TextLine:
+    line = TextLine(number)
+    line.skipped = text.lstrip(" \t").startswith("/")
+    rest: list[str] = []
+    at = 0
+    for found in SINUMERIK_WORD.finditer(text):
+        start, end = found.span()
+        name = found[2] or found[7]
+        if name is not None:
+            name = name.upper()
+            digits = found[4] or found[5] or found[8] or ""
+            kind = (found[3] or "").upper()
+            counted = "+" if kind == "IC" else "=" if kind == "AC" else ""
+            word = TextWord(name, digits, float(digits) if digits and kind in ("", "IC", "AC") else None, counted)
+            if name in SINUMERIK_PATH:
+                rest.append(text[at:start].rstrip(" \t"))
+                line.path.append(word)
+                at = end
+                continue
+            line.codes.append(TextWord(name, digits or (found[6] or ""), word.value))
+        elif (key := found[9]) is not None:
+            key = key.upper()
+            line.codes.append(TextWord(key, "", None))
+            if SINUMERIK_FLOW.match(key):
+                line.odd = JUMPS
+            elif "(" in key:
+                line.odd = line.odd or f"{key.partition('(')[0].strip()} is not known to this reader"
+        elif found[10] is not None and found[10] not in "/%:":
+            line.odd = line.odd or f"{text[start:].split()[0]!r} is no plain word"
+        rest.append(text[at:end])
+        at = end
+    rest.append(text[at:])
+    line.rest = "".join(rest)
+    return line
+
+
+DECIMAL = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)"
+KLARTEXT_WORD = re.compile(
+    rf"(;.*)|(R0|RL|RR|FMAX|DR[+-])(?![\w.,])|(I?(?:[XYZABCUVW]|P[AR])|R|F|M|S)({DECIMAL})(?![\w.,])|([A-Z]+)|([^ \t])",
+    re.IGNORECASE,
+)
+KLARTEXT_LEAD = frozenset(("L", "C", "CC", "CP", "CR", "M", "STOP"))
+KLARTEXT_FLOW = re.compile(r"^(?:CALL (?:LBL|PGM)|FN ?(?:9|1[0-2])\b|SEL PGM|CALL SELECTED|PATTERN|CYCL CALL)")
+
+
+def _klartext(number: int, text: str) -> TextLine:
+    line = TextLine(number)
+    head = re.match(r"[ \t]*(/[ \t]*)?(\d+)(?=[ \t]|$)", text)
+    body = text
+    if head:
+        line.block = head[2]
+        body = text[head.end() :]
+    body_upper = body.strip().upper()
+    line.skipped = "/" in text[: head.end()] if head else body_upper.startswith("/")
+    first = body_upper.split(" ", 1)[0] if body_upper else ""
+    if body_upper.startswith("*"):
+        line.rest = body
+        return line
+    if body_upper and first not in KLARTEXT_LEAD and not re.match(r"(;|M\d)", body_upper):
+        line.rest = body
+        line.codes.append(TextWord(body_upper, "", None))
+        line.odd = JUMPS if KLARTEXT_FLOW.match(body_upper) else f"{first} is not known to this reader"
+        if re.match(r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$|TOOL DEF", body_upper):
+            line.odd = ""
+        return line
+    rest: list[str] = []
+    at = 0
+    for found in KLARTEXT_WORD.finditer(body):
+        start, end = found.span()
+        if found[3] is not None:
+            name, digits = found[3].upper(), found[4]
+            value = float(digits.replace(",", "."))
+            counted = name.startswith("I")
+            name = name.removeprefix("I")
+            if name in AXES or name in ("R", "PA", "PR"):
+                rest.append(body[at:start].rstrip(" \t"))
+                line.path.append(TextWord(name, digits, value, "+" if counted else "="))
+                at = end
+                continue
+            line.codes.append(TextWord(name, digits, value))
+        elif found[2] is not None or found[5] is not None:
+            line.codes.append(TextWord((found[2] or found[5]).upper(), "", None))
+            if found[5] is not None and found[5].upper() not in KLARTEXT_LEAD:
+                line.odd = line.odd or f"{found[5]} is not known to this reader"
+        elif found[6] is not None and found[6] not in "*/":
+            line.odd = line.odd or f"{body[start:].split()[0]!r} is no plain word"
+        rest.append(body[at:end])
+        at = end
+    rest.append(body[at:])
+    line.rest = "".join(rest)
+    return line
+
+
+READERS: dict[Family, Callable[[int, str], TextLine]] = {
+    Family.WORDS: _word_address,
+    Family.SINUMERIK: _sinumerik,
+    Family.KLARTEXT: _klartext,
+}

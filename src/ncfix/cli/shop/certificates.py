@@ -1,0 +1,115 @@
+"""Certificates on the command line: `verify --certificate`, `verify --against`, and `fix --certificate`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ncfix import files
+from ncfix.cli import console
+from ncfix.cli.options import dialect_of
+from ncfix.cli.targets import read, shown
+from ncfix.diagnostics import ExitCode, Message, Place
+
+if TYPE_CHECKING:
+    from ncfix.certificate.following import Given
+    from ncfix.cli.targets import OutputTarget
+    from ncfix.control.setup import Setup
+    from ncfix.machine import Machine
+
+SUFFIX = ".certificate.json"
+"""Of the certificate beside a corrected program."""
+
+
+def given_of(setup: Setup) -> Given:
+    """What the setup says that the second reader knows of."""
+    from ncfix.certificate.following import Given
+
+    tools: dict[int | str, float | None] = {number: tool.length for number, tool in setup.tools.items()}
+    tools |= {name.upper(): tool.length for name, tool in setup.named_tools.items()}
+    return Given(
+        offsets=setup.work_offsets,
+        tools=tools,
+        initial=setup.initial,
+        references=setup.references,
+        tcp=setup.tcp,
+        assume_zero=setup.assume_zero,
+        skip=setup.block_skip if isinstance(setup.block_skip, bool) else None,
+        workpiece_offset=setup.workpiece_offset,
+        inputs=setup.inputs,
+        pointless=setup.no_point.startswith("IS"),
+    )
+
+
+def certified(
+    original: tuple[str, bytes],
+    corrected: tuple[str, bytes],
+    machine: Machine,
+    machine_path: str,
+    setup: Setup,
+    dialect: str | None,
+    tolerance_um: float,
+) -> dict[str, Any]:
+    """The certificate of a correction; programs are given by name and content."""
+    from ncfix.certificate.certificate import Subject
+    from ncfix.certificate.proof import ProofTerms
+
+    known = dialect_of(original[1], original[0], dialect, machine)
+    machine_file = (shown(machine_path), read(machine_path))
+    terms = ProofTerms(tolerance_um)
+    return Subject(original, corrected, machine_file, machine, given_of(setup), known.name, terms).certificate()
+
+
+def verify_certificate(
+    original: str,
+    fixed: str,
+    machine: Machine,
+    machine_path: str,
+    setup: Setup,
+    dialect: str | None,
+    tolerance_um: float,
+    output: str | None,
+    against: str | None,
+    as_json: bool,
+) -> int:
+    """Prove a corrected program by the second reader; write the certificate, or compare it with an earlier one."""
+    from ncfix.certificate.certificate import FAULTY, differences, dumps, loads, said
+
+    earlier = None if against is None else loads(read(against), shown(against))
+    texts = [(shown(path), read(path)) for path in (original, fixed)]
+    with console.busy(f"proving {shown(fixed)}"):
+        now = certified(texts[0], texts[1], machine, machine_path, setup, dialect, tolerance_um)
+    if output is not None:
+        files.write_whole(output, dumps(now).encode())
+    changed = [] if earlier is None else list(differences(earlier, now))
+    if as_json:
+        console.put_json(**({**now, "changed": changed} if against is not None else now))
+    else:
+        console.put("".join(f"{line}\n" for line in said(now)))
+    for text in changed:
+        console.tell(Message("NCF032", text, Place(shown(against or ""))))
+    return ExitCode.FINDINGS if changed or now["verdict"] == FAULTY else ExitCode.DONE
+
+
+def certify_output(
+    target: OutputTarget,
+    machine: Machine,
+    machine_path: str,
+    setup: Setup,
+    dialect: str | None,
+    tolerance_um: float,
+) -> dict[str, Any]:
+    """Prove what was written for a program as it is on the disk, and write its certificate beside it."""
+    from ncfix.certificate.certificate import FAULTY, dumps
+
+    source = target.backup if target.in_place else target.source
+    texts = [(shown(path), read(path)) for path in (source, target.path)]
+    found = certified(texts[0], texts[1], machine, machine_path, setup, dialect, tolerance_um)
+    path = target.path + SUFFIX
+    files.write_whole(path, dumps(found).encode(), target.force or target.resume)
+    counts = f"{found['proved']} of {found['blocks']} blocks"
+    console.say(f"  certificate         {found['verdict']}, {counts}: {path}")
+    if found["verdict"] == FAULTY:
+        first = found["faults"][0]
+        text = f"the second reader finds {found['faulty']} faults in the corrected program: {first['text']}"
+        console.tell(Message("NCF033", text, Place(shown(target.path), first["line"])))
+    return found

@@ -1,0 +1,425 @@
+"""Programs of five languages as a CAM system posts them, their corrections, and faults planted into these.
+
+    PYTHONPATH=tests python -m certificate.planting --programs 1000 --faults 1000
+
+counts how many faults the second reader finds and how many good programs it calls faulty.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import re
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from ncfix.certificate.following import Given
+from ncfix.certificate.proof import BlockProof, prove
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
+from ncfix.control.setup import Setup, Tool
+from ncfix.machine import Machine, load
+from ncfix.text.dialect import get
+from ncfix.text.reader import read
+
+ROOT = Path(__file__).parents[2]
+LANGUAGES = ("linuxcnc", "iso", "fanuc", "siemens", "heidenhain")
+SETUP = Setup(
+    work_offsets={name: {"X": 10.0, "Y": -5.0, "Z": 40.0} for name in ("G54", "PRESET")},
+    tools={1: Tool(80.0, 3.0)},
+    initial={"X": 0.0, "Y": 0.0, "Z": 350.0, "A": 0.0, "C": 0.0},
+)
+GIVEN = Given(offsets=SETUP.work_offsets, tools={1: 80.0}, initial=SETUP.initial)
+STEP = 0.001
+"""mm, the last digit in which all these programs are written; the machines resolve as much or less."""
+LETTER = re.compile(r"(?<![A-Z])([XYZAC])(=?)([+-]?\d+\.?\d*)")
+
+
+def machine(name: str) -> Machine:
+    """One of the machines of the goldens: `three` without rotary axes, `table` with A and C."""
+    return load(str(ROOT / "tests" / "goldens" / "machines" / f"{name}.toml"))
+
+
+@dataclass(slots=True)
+class Writer:
+    """Writes random motions as one language does; `numbered`: every block has its number."""
+
+    language: str
+    rng: random.Random
+    numbered: bool
+    five: bool
+    at: dict[str, float]
+    lines: list[str]
+
+    @property
+    def klartext(self) -> bool:
+        return self.language == "heidenhain"
+
+    def put(self, text: str) -> None:
+        if self.klartext:
+            self.lines.append(f"{len(self.lines)} {text}" if self.numbered else text)
+        elif self.numbered and not text.startswith(("%", "O")):
+            self.lines.append(f"N{10 * (len(self.lines) + 1)} {text}")
+        else:
+            self.lines.append(text)
+
+    def word(self, axis: str, value: float) -> str:
+        self.at[axis] = round(value, 3)
+        digits = f"{self.at[axis]:+.3f}" if self.klartext else f"{self.at[axis]:.3f}"
+        if not self.klartext and self.rng.random() < 0.2 and "." in digits:
+            digits = digits.rstrip("0")
+        return axis + digits
+
+    def motion(self, rapid: bool, axes: str, feed: str = "") -> None:
+        words = " ".join(self.word(axis, self.place(axis)) for axis in axes)
+        if self.klartext:
+            self.put(f"L {words} {'FMAX' if rapid else feed}".strip())
+        else:
+            self.put(f"G{0 if rapid else 1} {words}{' ' + feed if feed and not rapid else ''}")
+
+    def place(self, axis: str) -> float:
+        spread = {"X": 90, "Y": 90, "Z": 25, "A": 30, "C": 60}[axis]
+        return self.rng.uniform(-spread, spread)
+
+    def arc(self) -> None:
+        """A circle's part about a centre nearby, its end to three digits."""
+        i, j = (round(self.rng.uniform(-25, 25), 3) for _ in "IJ")
+        x, y = self.at["X"] + i, self.at["Y"] + j
+        if abs(i) < 1 or abs(j) < 1:
+            return
+        self.at["X"], self.at["Y"] = x + i, self.rng.choice((y + j, y - j))
+        sense = self.rng.choice((2, 3))
+        if self.klartext:
+            self.put(f"CC X{x:+.3f} Y{y:+.3f}")
+            self.put(f"C {self.word('X', self.at['X'])} {self.word('Y', self.at['Y'])} DR{'-' if sense == 2 else '+'}")
+        else:
+            self.put(f"G{sense} {self.word('X', self.at['X'])} {self.word('Y', self.at['Y'])} I{i:.3f} J{j:.3f}")
+
+    def note(self, text: str) -> None:
+        plain = self.language in ("siemens", "heidenhain")
+        self.put(f"; {text}" if plain else f"({text})")
+
+    def program(self, blocks: int) -> bytes:
+        """A program of about so many blocks."""
+        rng = self.rng
+        self.head()
+        every = "XYZAC" if self.five else "XYZ"
+        self.motion(True, every)
+        self.motion(False, every, "F500")
+        for _ in range(blocks):
+            choice = rng.random()
+            if choice < 0.12 and not self.five:
+                self.arc()
+            elif choice < 0.2:
+                self.motion(True, "".join(rng.sample("XYZ", 2)))
+            elif choice < 0.25:
+                self.note(f"PASS {rng.randint(1, 99)}")
+            elif choice < 0.3:
+                self.put(rng.choice(("M8", "M9")))
+            else:
+                axes = [axis for axis in every if rng.random() < 0.7] or ["X"]
+                self.motion(False, "".join(axes), rng.choice(("", "", "F800", "F1200")))
+        self.put({"heidenhain": "END PGM PART MM"}.get(self.language, "M30"))
+        return ("\n".join(self.lines) + "\n").encode()
+
+    def head(self) -> None:
+        match self.language:
+            case "heidenhain":
+                self.put("BEGIN PGM PART MM")
+                self.put("TOOL CALL 1 Z S8000")
+                self.put("L X+0 Y+0 Z+200 R0 FMAX M3")
+                if self.five:
+                    self.put("L A+0 C+0 FMAX")
+                    self.put("M128")
+            case "siemens":
+                self.put("G17 G40 G90 G94 G71")
+                self.put("T1 D1")
+                self.put("M6")
+                self.put("G54")
+                self.put("S8000 M3")
+                self.put("G0 X0 Y0 Z200" + (" A0 C0" if self.five else ""))
+                if self.five:
+                    self.put("TRAORI")
+            case _:
+                if self.language == "fanuc":
+                    self.put("%")
+                    self.put("O1000(PART)")
+                self.put("G21 G17 G40 G49 G80 G90 G94")
+                self.put("T1 M6")
+                self.put("G54")
+                self.put("S8000 M3")
+                lead = "G43.4" if self.five else "G43"
+                rotary = " A0. C0." if self.five else ""
+                self.put(f"G0 X0. Y0.{rotary}")
+                self.put(f"{lead} H1 Z200.")
+        self.at.update(X=0.0, Y=0.0, Z=200.0, A=0.0, C=0.0)
+
+
+class Case(NamedTuple):
+    """A program and its correction."""
+
+    language: str
+    original: bytes
+    corrected: bytes
+    machine: Machine
+    numbered: bool
+
+
+def cases(count: int, seed: int) -> Iterator[Case]:
+    """Programs of all languages in turn, and their corrections."""
+    rng = random.Random(seed)
+    machines = {False: machine("three"), True: machine("table")}
+    made = 0
+    while made < count:
+        language = LANGUAGES[made % len(LANGUAGES)]
+        five = rng.random() < 0.3 and language in ("fanuc", "iso", "siemens", "heidenhain")
+        numbered = rng.random() < 0.6
+        writer = Writer(language, rng, numbered, five, {}, [])
+        original = writer.program(rng.randint(8, 40))
+        known = machines[five]
+        program = read(original, "part", get(language))
+        fixed = fix_program(program, known, SETUP, FixOptions(verify=False, allow_refused=True))
+        made += 1
+        yield Case(language, original, fixed.text, known, numbered)
+
+
+# -- faults -----------------------------------------------------------------------------------------------------------
+
+
+class Draft:
+    """The lines of a corrected program, and which of them belong together."""
+
+    def __init__(self, case: Case, rng: random.Random) -> None:
+        self.rng = rng
+        self.lines = case.corrected.decode().splitlines()
+        known = set(case.original.decode().splitlines())
+        self.klartext, numbered = case.language == "heidenhain", case.numbered
+        self.path = [k for k, line in enumerate(self.lines) if LETTER.search(line) and "ncfix" not in line.lower()]
+        self.touched = [k for k in self.path if self.lines[k] not in known]
+        self.ends = [k for k in self.touched if numbered and not self._added(k + 1)] if numbered else []
+        self.heads = [k for k in self.ends if not self._added(k)]
+
+    def _added(self, at: int) -> bool:
+        if at >= len(self.lines) or at not in self.path:
+            return False
+        if self.klartext:
+            return self.lines[at].split()[0] == self.lines[at - 1].split()[0]
+        return not re.match(r"N\d", self.lines[at])
+
+    def text(self) -> bytes:
+        """The program with the fault."""
+        return ("\n".join(self.lines) + "\n").encode()
+
+    def values(self, upto: int) -> dict[str, float]:
+        """The last word of each axis before a line."""
+        found: dict[str, float] = {}
+        for line in self.lines[:upto]:
+            if "ncfix" not in line.lower():
+                found.update({m[1]: float(m[3]) for m in LETTER.finditer(line)})
+        return found
+
+
+def digit(draft: Draft) -> bool:
+    """Another digit in the number of an axis at the end of a block."""
+    if not draft.ends:
+        return False
+    at = draft.rng.choice(draft.ends)
+    words = list(LETTER.finditer(draft.lines[at]))
+    word = draft.rng.choice(words)
+    text = word[3]
+    where = draft.rng.choice([k for k, c in enumerate(text) if c.isdigit()])
+    new = draft.rng.choice([c for c in "0123456789" if c != text[where]])
+    other = text[:where] + new + text[where + 1 :]
+    change = abs(float(other) - float(text))
+    rotary = word[1] in "AC"
+    if change < (0.001 if rotary else STEP / 2):
+        return False
+    draft.lines[at] = draft.lines[at][: word.start(3)] + other + draft.lines[at][word.end(3) :]
+    return True
+
+
+def lost_word(draft: Draft) -> bool:
+    """A word of an axis that moves is gone."""
+    at = draft.rng.choice(draft.touched)
+    word = draft.rng.choice(list(LETTER.finditer(draft.lines[at])))
+    if abs(draft.values(at).get(word[1], 1e9) - float(word[3])) < 0.02:
+        return False
+    draft.lines[at] = (draft.lines[at][: word.start()].rstrip() + draft.lines[at][word.end() :]).strip()
+    return bool(draft.lines[at])
+
+
+def doubled_word(draft: Draft) -> bool:
+    """A word twice."""
+    at = draft.rng.choice(draft.touched)
+    word = draft.rng.choice(list(LETTER.finditer(draft.lines[at])))
+    draft.lines[at] = f"{draft.lines[at][: word.end()]} {word[0]}{draft.lines[at][word.end() :]}"
+    return True
+
+
+def dropped_line(draft: Draft) -> bool:
+    """A line of the original is gone."""
+    spare = [k for k, line in enumerate(draft.lines) if line.strip() and "ncfix" not in line.lower()]
+    at = draft.rng.choice(draft.heads if draft.heads and draft.rng.random() < 0.7 else spare)
+    if at in draft.path and at not in draft.heads:
+        return False
+    del draft.lines[at]
+    return True
+
+
+def wrong_sign(draft: Draft) -> bool:
+    """The sign of a coordinate."""
+    at = draft.rng.choice(draft.touched)
+    word = draft.rng.choice(list(LETTER.finditer(draft.lines[at])))
+    value = float(word[3])
+    if abs(value) < 0.02:
+        return False
+    plain = word[3].lstrip("+-")
+    text = (
+        ("+" if word[3].startswith("-") and "+" in "".join(draft.lines) else "") + plain if value < 0 else f"-{plain}"
+    )
+    draft.lines[at] = draft.lines[at][: word.start(3)] + text + draft.lines[at][word.end(3) :]
+    return True
+
+
+def swapped_axes(draft: Draft) -> bool:
+    """The numbers of two axes exchanged."""
+    at = draft.rng.choice(draft.touched)
+    words = list(LETTER.finditer(draft.lines[at]))
+    if len(words) < 2:
+        return False
+    one, two = sorted(draft.rng.sample(words, 2), key=lambda word: word.start())
+    if abs(float(one[3]) - float(two[3])) < 0.02:
+        return False
+    line = draft.lines[at]
+    draft.lines[at] = line[: one.start(3)] + two[3] + line[one.end(3) : two.start(3)] + one[3] + line[two.end(3) :]
+    return True
+
+
+def stale_stamp(draft: Draft) -> bool:
+    """The stamp of another machine."""
+    at = next(k for k, line in enumerate(draft.lines) if "ncfix" in line.lower())
+    found = re.search(r"(?i)machine ([0-9a-f]{12})", draft.lines[at])
+    assert found is not None
+    other = "".join(draft.rng.choice("0123456789abcdef") for _ in range(12))
+    draft.lines[at] = draft.lines[at][: found.start(1)] + other + draft.lines[at][found.end(1) :]
+    return True
+
+
+def unsplit(draft: Draft) -> bool:
+    """The pieces of a straight motion at feed made one again: its way leaves the tolerance."""
+    many = [k for k in draft.ends if draft._added(k) and draft._added(k - 1)]
+    if not many:
+        return False
+    last = draft.rng.choice(many)
+    first = last
+    while draft._added(first):
+        first -= 1
+    block = "".join(draft.lines[first : last + 1])
+    if re.search(r"G0\b|G[23]\b|[IJ]", block):
+        return False
+    words = {match[1]: match[3] for k in range(first, last + 1) for match in LETTER.finditer(draft.lines[k])}
+    head = LETTER.sub(lambda match: match[1] + match[2] + words.pop(match[1]), draft.lines[first])
+    extra = " ".join(f"{axis}{value}" for axis, value in words.items())
+    draft.lines[first : last + 1] = [f"{head} {extra}".strip()]
+    return True
+
+
+KINDS: tuple[Callable[[Draft], bool], ...] = (
+    digit, lost_word, doubled_word, dropped_line, wrong_sign, swapped_axes, stale_stamp, unsplit,
+)  # fmt: skip
+
+
+def planted(case: Case, kind: Callable[[Draft], bool], rng: random.Random) -> bytes | None:
+    """The correction with a fault of this kind; None if it has no place for one."""
+    for _ in range(40):
+        draft = Draft(case, rng)
+        if not draft.touched:
+            return None
+        if kind(draft) and draft.text() != case.corrected:
+            return draft.text()
+    return None
+
+
+def judged(case: Case, corrected: bytes) -> BlockProof:
+    """What the second reader says."""
+    return prove(case.original, corrected, case.machine, GIVEN, case.language)
+
+
+@dataclass(slots=True)
+class Score:
+    """Figures of a run, and what was wrong: descriptions with the texts."""
+
+    good: int = 0
+    alarms: int = 0
+    planted: Counter[str] = field(default_factory=Counter)
+    found: Counter[str] = field(default_factory=Counter)
+    motions: int = 0
+    proved: int = 0
+    wrong: list[tuple[str, Case, bytes, BlockProof]] = field(default_factory=list)
+
+
+def run(programs: int, faults: int, seed: int = 1) -> Score:
+    """Judge so many good programs, and so many faults in them, of all kinds in turn."""
+    score, rng = Score(), random.Random(seed)
+    each = -(-faults // programs)
+    kinds = 0
+    for case in cases(programs, seed):
+        found = judged(case, case.corrected)
+        score.good += 1
+        score.motions += found.motions
+        score.proved += found.proved_motions
+        if found.faults:
+            score.alarms += 1
+            score.wrong.append(("alarm", case, case.corrected, found))
+            continue
+        for _ in range(each):
+            if sum(score.planted.values()) >= faults:
+                break
+            for _ in range(len(KINDS)):
+                kind = KINDS[kinds % len(KINDS)]
+                kinds += 1
+                text = planted(case, kind, rng)
+                if text is not None:
+                    break
+            else:
+                continue
+            name = kind.__name__
+            score.planted[name] += 1
+            verdict = judged(case, text)
+            if verdict.faults:
+                score.found[name] += 1
+            else:
+                score.wrong.append((f"missed {name}", case, text, verdict))
+    return score
+
+
+def main() -> int:
+    """Print the figures; exit code 1 if a good program is called faulty or more than 2 in 1,000 faults are missed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--programs", type=int, default=1000)
+    parser.add_argument("--faults", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--show", type=int, default=3, help="of what was wrong")
+    asked = parser.parse_args()
+    score = run(asked.programs, asked.faults, asked.seed)
+    for text, case, corrected, verdict in score.wrong[: asked.show]:
+        print(text, case.language, verdict.faults[:3], dict(verdict.reasons))
+        before = case.corrected.decode().splitlines()
+        for number, line in enumerate(corrected.decode().splitlines(), 1):
+            mark = "" if line in before else "   <<<"
+            if mark or any(fault.line == number for fault in verdict.faults):
+                print("    ", number, line, mark)
+    print(f"{score.good} good programs, {score.proved} of {score.motions} motions proved, {score.alarms} false alarms")
+    print(f"{sum(score.planted.values())} faults, {sum(score.found.values())} found")
+    for name, count in sorted(score.planted.items()):
+        print(f"  {name.replace('_', ' '):13} {score.found[name]} of {count}")
+    missed = sum(score.planted.values()) - sum(score.found.values())
+    return int(score.alarms > 0 or missed > 0.002 * sum(score.planted.values()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

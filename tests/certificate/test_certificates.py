@@ -1,0 +1,120 @@
+"""Certificates on the command line: written, compared with later, and beside what `fix` writes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from cli import conftest
+from cli.conftest import Ncfix, Result
+
+ncfix = conftest.ncfix
+ROOT = Path(__file__).parents[2]
+PROGRAMS = ROOT / "examples" / "programs"
+
+
+class Example(NamedTuple):
+    """An example program with what belongs to it."""
+
+    program: Path
+    machine: Path
+    setup: Path
+
+    def arguments(self) -> tuple[object, ...]:
+        return ("-m", self.machine, "--setup", self.setup)
+
+
+@pytest.fixture
+def example() -> Example:
+    """Five axes under tool-centre-point control, in Klartext."""
+    machine = ROOT / "examples" / "machines" / "dmu50.toml"
+    return Example(PROGRAMS / "klartext_tcp.h", machine, PROGRAMS / "klartext.setup.toml")
+
+
+@pytest.fixture
+def fixed(example: Example, ncfix: Ncfix, tmp_path: Path) -> Path:
+    """Its correction, with a certificate beside it."""
+    output = tmp_path / "fixed.h"
+    done = ncfix("fix", example.program, "-o", output, "--certificate", *example.arguments())
+    assert done.code == 0
+    assert "certificate         proved in part, 156 of 158 blocks" in done.err
+    return output
+
+
+def _certificate(path: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(path.read_text())
+    return found
+
+
+def test_fix_writes_a_certificate(fixed: Path) -> None:
+    found = _certificate(fixed.with_name("fixed.h.certificate.json"))
+    assert found["verdict"] == "proved in part"
+    assert (found["proved_motions"], found["motions"], found["faults"]) == (142, 144, [])
+    assert [each["reason"] for each in found["not_proved"]] == ["the program has not said where an axis stands"]
+    assert found["strategy"] == "rotary-then-linear"
+    assert len(found["corrected"]["sha256"]) == 64
+
+
+def test_a_certificate_holds_as_long_as_nothing_changes(
+    example: Example,
+    fixed: Path,
+    ncfix: Ncfix,
+    tmp_path: Path,
+) -> None:
+    earlier = fixed.with_name("fixed.h.certificate.json")
+
+    def against(machine: Path = example.machine) -> Result:
+        given = ("-m", machine, "--setup", example.setup, "--against", earlier)
+        return ncfix("verify", example.program, fixed, *given)
+
+    assert against().code == 0
+    other = tmp_path / "other.toml"
+    other.write_text(example.machine.read_text() + "\n# the same machine, another file\n")
+    found = against(other)
+    assert found.code == 1
+    assert "NCF032: the machine file is not the one of the certificate" in found.err
+    fixed.write_text(fixed.read_text().replace("Z+3.5", "Z+3.6", 1))
+    found = against()
+    assert found.code == 1
+    assert "the corrected program is not the one of the certificate" in found.err
+    assert "verdict: proved in part in the certificate, faulty now" in found.err
+
+
+def test_a_fault_is_told_with_its_lines(example: Example, fixed: Path, ncfix: Ncfix, tmp_path: Path) -> None:
+    lines = fixed.read_text().splitlines(keepends=True)
+    del lines[40]
+    fixed.write_text("".join(lines))
+    output = tmp_path / "certificate.json"
+    found = ncfix("verify", example.program, fixed, "--certificate", output, "--json", *example.arguments())
+    assert found.code == 1
+    assert found.json()["verdict"] == _certificate(output)["verdict"] == "faulty"
+    assert {(each["text"], each["original_line"]) for each in found.json()["faults"]} == {
+        ("a line is not there any more", 39)
+    }
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"schema": 1}', '{"schema": 2}', "\xff", "[" * 100_000])
+def test_what_is_no_certificate_is_refused(text: str, example: Example, ncfix: Ncfix, tmp_path: Path) -> None:
+    path = tmp_path / "certificate.json"
+    path.write_bytes(text.encode("latin-1"))
+    found = ncfix("verify", example.program, example.program, "--against", path, *example.arguments())
+    assert found.code == 3
+    assert "NCF034" in found.err
+
+
+def test_a_certificate_needs_a_file(example: Example, ncfix: Ncfix) -> None:
+    found = ncfix("fix", example.program, "-o", "-", "--certificate", *example.arguments())
+    assert found.code == 2
+    assert "NCF001" in found.err
+
+
+def test_the_certificate_says_what_it_does_not_know(ncfix: Ncfix, tmp_path: Path) -> None:
+    arguments = ("-m", ROOT / "examples" / "machines" / "wCAYFXZSt.toml", "--setup", PROGRAMS / "fanuc.setup.toml")
+    output = tmp_path / "fixed.nc"
+    found = ncfix("fix", PROGRAMS / "fanuc_tilted.nc", "-o", output, "--json", "--certificate", *arguments)
+    (entry,) = found.json()["files"]
+    assert entry["certificate"]["verdict"] == "proved in part"
+    assert "G68.2 is not known to this reader" in [each["reason"] for each in entry["certificate"]["not_proved"]]
