@@ -2,7 +2,7 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: demo test full lint share screenshots format accuracy bench batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
-	goldens goldens-update planted ci clean
+	goldens goldens-update planted fuzz ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -75,6 +75,10 @@ goldens-update:  ## take what comes out now as right; ONLY="klartext"
 planted:         ## 1,000 faults in corrected programs and 1,000 good ones, judged by the second reader (minutes); COUNT=100
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) -m certificate.planting \
 		--programs $(or $(COUNT),1000) --faults $(or $(COUNT),1000)
+
+fuzz:            ## damaged files for all readers; what goes wrong is kept in tests/robustness/found; SECONDS=600 ONLY=machine
+	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) -m robustness.readers \
+		--seconds $(or $(SECONDS),600) $(if $(ONLY),--only $(ONLY))
 
 ci:              ## what the server runs
 	.ci/run

@@ -173,7 +173,7 @@ SINUMERIK_WORD = re.compile(
     rf"(;.*|\"[^\"]*\")"
     rf"|([A-Z_$][A-Z0-9_$]*)[ \t]*=[ \t]*(?:(IC|AC|DC|ACP|ACN)\([ \t]*({NUMBER})[ \t]*\)|({NUMBER})(?![\w.(*/+])"
     rf"|(\"[^\"]*\"|[^;\s]+))"
-    rf"|(?<![A-Z0-9_$])([A-Z])({NUMBER})(?![\w.(])"
+    rf"|(?<![A-Z_$])([A-Z])({NUMBER})(?![\d.(_$])"
     rf"|([A-Z_$%][A-Z0-9_$]*(?:[ \t]*\((?:[^()]|\([^()]*\))*\))?)"
     rf"|([^ \t])",
     re.IGNORECASE,
@@ -211,6 +211,8 @@ def _sinumerik(number: int, text: str) -> TextLine:
             line.codes.append(TextWord(key, "", None))
             if SINUMERIK_FLOW.match(key):
                 line.odd = JUMPS
+            elif re.match(r"[A-Z]\d", key):
+                line.odd = line.odd or f"{key!r} is no plain word"
             elif "(" in key:
                 line.odd = line.odd or f"{key.partition('(')[0].strip()} is not known to this reader"
         elif found[10] is not None and found[10] not in "/%:":
