@@ -137,16 +137,14 @@ FILES: Mapping[str, Sequence[str]] = {
     "setup": ("examples/programs/siemens.setup.toml", "tests/goldens/setup.toml"),
     "measurement": ("examples/guide/rtest.csv", "examples/guide/laser.csv", "examples/guide/autumn.csv"),
 }
-PROJECT = b'machine = "mill.toml"\noutput = "out"\n[options]\ntolerance_um = 2.0\n[[programs]]\nmatch = "a/*.nc"\nsetup = "b.toml"\n'
+PROJECT = b'machine = "mill.toml"\noutput = "out"\n[options]\ntolerance_um = 2.0\n[[programs]]\nmatch = "a/*.nc"\n'
 TOOLS = (
     b"T1 P1 Z120.5 D10 ; drill\nT2 P2 Z80 D3\n",
     b"tool,length,radius\n1,120.5,5\n2,80,1.5\n",
     b"BEGIN TOOL .T MM\nT NAME L R DL DR\n1 DRILL +120.5 +5 +0 +0\n[END]\n",
 )
-RECORD = b'{"name": "a.nc", "digest": "0", "source": "/a.nc"}\n{"schema": 1, "name": "b.nc", "outcome": "done", "key": "1"}\n'
-CERTIFICATE = (
-    b'{"schema": 1, "verdict": "proved", "original": {"path": "a", "sha256": "b"}, "corrected": {"sha256": "c"}}'
-)
+RECORD = b'{"name": "a.nc", "digest": "0", "source": "/a.nc"}\n{"schema": 1, "name": "b.nc", "key": "1"}\n'
+CERTIFICATE = b'{"schema": 1, "verdict": "proved", "original": {"sha256": "b"}, "corrected": {"sha256": "c"}}'
 TABLES = (
     b"N1A1P100A2P-20A3P5;\n%\nN10Q0L2P1R100\n",
     b"-100 -101 -99\n0 0 0\n100 100.2 100.1\n",

@@ -1,4 +1,4 @@
-"""Damaged files of all kinds are read or refused in words, and what went wrong once goes right; `make fuzz` does more."""
+"""Damaged files of all kinds are read or refused in words, and what went wrong once goes right: see `make fuzz`."""
 
 from __future__ import annotations
 

@@ -51,6 +51,7 @@ class Pairing:
     original: Text
     corrected: Text
     nearness: Callable[[int, int], bool]
+    moves: Callable[[int], bool]
     followed: Callable[[int], bool]
     foreign: Callable[[int], bool]
     pairs: list[LinePair] = field(default_factory=list)
@@ -116,6 +117,7 @@ class Pairing:
             row + 1 < end
             and self.followed(row)
             and self.followed(row + 1)
+            and self.moves(row + 1)
             and not self.nearness(row, at)
             and self.nearness(row + 1, at)
         )

@@ -124,7 +124,9 @@ class Prover(Expected):
     def run(self) -> BlockProof:
         """Compare all blocks."""
         self._stamps()
-        pairing = Pairing(self.first, self.second, self.leads_there, self.is_followed, self._is_foreign)
+        pairing = Pairing(
+            self.first, self.second, self.leads_there, self.ours.__contains__, self.is_followed, self._is_foreign
+        )
         pairing.run()
         for fault in pairing.faults:
             if self._foreign_near(fault, pairing):
