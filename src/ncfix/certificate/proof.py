@@ -415,6 +415,9 @@ class Prover(Expected):
             self.proof.proved -= 1
             self.proof.proved_motions -= 1
             number = self.first.lines[pair.row].number
+            if not self._changed(pair):
+                self.proof.leave(LEFT, number)
+                continue
             if self.strategy == "full" or self.machine.depends_on_direction:
                 why = "play" if self.machine.depends_on_direction else "rotary axes that are corrected, too"
                 self.proof.leave(f"the way of a motion, because of {why}", number)
