@@ -94,7 +94,7 @@ Turned = Callable[[Sequence[float], float, bool], Sequence[float]]
 REWRITTEN = re.compile(r"jumps|skip|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
 """What a program uses, and is not followed behind; a correction may write further lines another way."""
 UNKNOWN_WORDS = "words that this reader does not know here"
-NO_POLE, NO_CENTRE, NO_CIRCLE = "the pole is not known", "an arc without a centre", "no circle has this radius"
+NO_POLE, NO_CENTRE, NO_CIRCLE = "the pole is not known", "an arc without a centre", "an arc that does not close"
 
 
 class AxisFollower:
@@ -272,6 +272,9 @@ class AxisFollower:
             middle = ((a[0] + b[0]) / 2 - side * way[1], (a[1] + b[1]) / 2 + side * way[0])
         else:
             middle = (centre[one], centre[two])
+        sizes = math.dist(a, middle), math.dist(b, middle)
+        if abs(sizes[0] - sizes[1]) > 0.05 + 1e-3 * sizes[0]:
+            step.why = step.why or NO_CIRCLE
         first = math.atan2(a[1] - middle[1], a[0] - middle[0])
         last = math.atan2(b[1] - middle[1], b[0] - middle[0])
         turn = (last - first) % (2 * math.pi)
