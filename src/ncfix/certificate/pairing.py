@@ -129,6 +129,9 @@ class Pairing:
 
         If none does, the line itself has changed.
         """
+        ours, theirs = self.original.lines[row], self.corrected.lines[first]
+        if (ours.rest, ours.path) == (theirs.rest, theirs.path):
+            return first  # left as it was programmed; what follows brings the tool back
         found = next((at for at in range(first, most + 1) if self.nearness(row, at)), None)
         if found is None and self.followed(row) and not self.nearness(row + 1, most + 1):
             found = next((at for at in range(most + 1, stop) if self.nearness(row, at)), None)
