@@ -240,7 +240,7 @@ class Prover(Expected):
     def _roughly(self, step: AxisStep, pair: LinePair) -> None:
         """Of a block that is not followed: no absolute number may change by more than the largest correction."""
         line, last = self.first.lines[pair.row], self.second.lines[pair.last]
-        if line.odd or step.foreign or step.kind == Kind.ARC:
+        if line.odd or line.doubled() or step.foreign or step.kind == Kind.ARC:
             return
         most = 2.5 * self.machine.max_correction[0] + 1e-6
         for word in line.path:
