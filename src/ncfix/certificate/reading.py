@@ -138,6 +138,11 @@ FLOW = re.compile(
 PATH_WORDS = AXES | frozenset("IJKR")
 
 
+def _piece(text: str, start: int) -> str:
+    """What stands at a place of a line, up to a blank; a control character is a piece."""
+    return (text[start:].split() or [text[start]])[0]
+
+
 def _word_address(number: int, text: str) -> TextLine:
     line = TextLine(number)
     line.skipped = text.lstrip(" \t").startswith("/")
@@ -148,7 +153,7 @@ def _word_address(number: int, text: str) -> TextLine:
         letter = found[2]
         if letter is None:
             if found[5] is not None and found[5] not in "/*:":
-                line.odd = line.odd or f"{text[start:].split()[0]!r} is no plain word"
+                line.odd = line.odd or f"{_piece(text, start)!r} is no plain word"
         else:
             name, digits = letter.upper(), found[3]
             word = TextWord(name, digits or "", float(digits) if digits else None)
@@ -216,7 +221,7 @@ def _sinumerik(number: int, text: str) -> TextLine:
             elif "(" in key:
                 line.odd = line.odd or f"{key.partition('(')[0].strip()} is not known to this reader"
         elif found[10] is not None and found[10] not in "/%:":
-            line.odd = line.odd or f"{text[start:].split()[0]!r} is no plain word"
+            line.odd = line.odd or f"{_piece(text, start)!r} is no plain word"
         rest.append(text[at:end])
         at = end
     rest.append(text[at:])
@@ -273,7 +278,7 @@ def _klartext(number: int, text: str) -> TextLine:
             if found[5] is not None and found[5].upper() not in KLARTEXT_LEAD:
                 line.odd = line.odd or f"{found[5]} is not known to this reader"
         elif found[6] is not None and found[6] not in "*/":
-            line.odd = line.odd or f"{body[start:].split()[0]!r} is no plain word"
+            line.odd = line.odd or f"{_piece(body, start)!r} is no plain word"
         rest.append(body[at:end])
         at = end
     rest.append(body[at:])
