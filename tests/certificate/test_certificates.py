@@ -49,6 +49,25 @@ def _certificate(path: Path) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.parametrize("numbers", ["none", "renumber"])
+@pytest.mark.parametrize(
+    ("program", "machine", "setup"),
+    [
+        ("klartext_tcp.h", "dmu50", "klartext.setup.toml"),
+        ("siemens_traori.mpf", "wCAYFXZSt", "siemens.setup.toml"),
+    ],
+)
+def test_blocks_that_are_numbered_anew(
+    program: str, machine: str, setup: str, numbers: str, ncfix: Ncfix, tmp_path: Path
+) -> None:
+    given = ("-m", ROOT / "examples/machines" / f"{machine}.toml", "--setup", PROGRAMS / setup)
+    options = ("--block-numbers", numbers, "--certificate", "--allow-refused")
+    done = ncfix("fix", PROGRAMS / program, "-o", tmp_path / program, *options, *given)
+    found = _certificate(tmp_path / f"{program}.certificate.json")
+    assert found["faults"] == [], done.err
+    assert found["proved_motions"]
+
+
 def test_fix_writes_a_certificate(fixed: Path) -> None:
     found = _certificate(fixed.with_name("fixed.h.certificate.json"))
     assert found["verdict"] == "proved in part"

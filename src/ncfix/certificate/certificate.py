@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ncfix.certificate.following import Given
-from ncfix.certificate.proof import BlockProof, ProofTerms, prove
+from ncfix.certificate.proof import BlockProof, prove
 from ncfix.diagnostics import Place, SourceError
 from ncfix.machine import Machine
 from ncfix.version import __version__
@@ -34,11 +34,11 @@ class Subject:
     machine: Machine
     given: Given
     dialect: str
-    terms: ProofTerms = ProofTerms()  # noqa: RUF009
+    tolerance_um: float
 
     def certificate(self) -> dict[str, Any]:
         """Prove it, and say so."""
-        proof = prove(self.original[1], self.corrected[1], self.machine, self.given, self.dialect, self.terms)
+        proof = prove(self.original[1], self.corrected[1], self.machine, self.given, self.dialect, self.tolerance_um)
         stamp = proof.stamp
         return {
             "schema": SCHEMA,
@@ -50,7 +50,7 @@ class Subject:
             "setup_sha256": _digest(json.dumps(asdict(self.given), sort_keys=True, default=str).encode()),
             "dialect": self.dialect,
             "strategy": stamp.strategy if stamp else None,
-            "tolerance_um": stamp.tolerance_um if stamp else self.terms.tolerance_um,
+            "tolerance_um": stamp.tolerance_um if stamp else self.tolerance_um,
             "blocks": proof.blocks,
             "motions": proof.motions,
             "proved": proof.proved,

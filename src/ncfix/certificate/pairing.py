@@ -169,12 +169,11 @@ class Pairing:
                 self.faults.append(BlockFault("a line that the original does not have", line.number, 0))
 
 
-def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool, numbered: str) -> list[str]:
+def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> list[str]:
     """What is wrong with the text of the lines that stand for one.
 
-    arc       the motion is an arc: it may have become straight, and its radius a centre
-    timed     its F is an inverse time, and its pieces have parts of it
-    numbered  how Klartext numbers the lines: "same" or "none" of added ones, "renumber"
+    arc    the motion is an arc: it may have become straight, and its radius a centre
+    timed  its F is an inverse time, and its pieces have parts of it
     """
     line = pairing.original.lines[pair.row]
     pieces = pairing.corrected.lines[pair.first : pair.last + 1]
@@ -207,7 +206,7 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool, number
     kept = [name for name in left if name in names]
     if not found and kept != names:
         found.append("words have changed their places")
-    if klartext and numbered != "renumber" and head.block != line.block:
+    if klartext and head.block != line.block:
         found.append("the block has another number")
     return found
 

@@ -80,44 +80,34 @@ class BlockProof:
             self.lines[why].append(line)
 
 
-@dataclass(frozen=True, slots=True)
-class ProofTerms:
-    """What the correction was to hold.
-
-    tolerance_um  of the way; the stamp of the program wins
-    numbered      how added blocks of Klartext are numbered
-    """
-
-    tolerance_um: float = 1.0
-    numbered: str = "same"
-
-
 def prove(
     original: bytes,
     corrected: bytes,
     machine: Machine,
     given: Given,
     dialect: str = "",
-    terms: ProofTerms | None = None,
+    tolerance_um: float = 1.0,
 ) -> BlockProof:
     """Compare a program with its correction for a machine.
 
-    dialect  its name, by which the family of the language is known; empty: found out
+    dialect       its name, by which the family of the language is known; empty: found out
+    tolerance_um  of the way; the stamp of the corrected program wins
     """
     family = Family.of(original, dialect)
     first, second = Text.of(original, family), Text.of(corrected, family)
-    return Prover(first, second, machine, given, terms or ProofTerms()).run()
+    if second.is_renumbered and second.block_numbers != first.block_numbers:
+        first, second = first.without_block_numbers(), second.without_block_numbers()
+    return Prover(first, second, machine, given, tolerance_um).run()
 
 
 class Prover(Expected):
     """Judges two programs."""
 
-    def __init__(self, first: Text, second: Text, machine: Machine, given: Given, terms: ProofTerms) -> None:
+    def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float) -> None:
         super().__init__(first, second, machine, given)
-        self.terms = terms
         self.machine_hash = machine.hash
         self.proof = BlockProof(stamp=second.stamp)
-        self.tolerance = (second.stamp.tolerance_um if second.stamp else terms.tolerance_um) / 1e3
+        self.tolerance = (second.stamp.tolerance_um if second.stamp else tolerance_um) / 1e3
         self.polar = {row for row, line in enumerate(second.lines) if line.word("PA")}
         """Lines of the corrected program whose digits are those of an angle about a pole."""
 
@@ -183,7 +173,7 @@ class Prover(Expected):
         if self._is_foreign(pair.row):
             return
         timed = step is not None and step.feed_mode == 93
-        for text in text_faults(pairing, pair, arc, timed, self.terms.numbered):
+        for text in text_faults(pairing, pair, arc, timed):
             self.proof.fault(text, line, self.first.lines[pair.row].number)
 
     def _foreign_near(self, fault: BlockFault, pairing: Pairing) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
@@ -115,6 +115,28 @@ class Text:
             ends.append(raw[len(text) :])
         return cls(family, lines, ends, stamp)
 
+    @property
+    def block_numbers(self) -> list[int]:
+        """The numbers of the blocks that have one."""
+        found = (line.block or (BLOCK_NUMBER.match(line.rest) or [""] * 2)[1] for line in self.lines)
+        return [int(number) for number in found if number]
+
+    @property
+    def is_renumbered(self) -> bool:
+        """Whether its blocks have the numbers that `fix --block-numbers renumber` gives, in each program of a text."""
+        if self.family not in RENUMBERED:
+            return False
+        numbers, (start, step) = self.block_numbers, RENUMBERED[self.family]
+        pairs = list(zip([start - step, *numbers], numbers, strict=False))
+        gaps = sum(number == before + 2 * step for before, number in pairs)  # there is the number of the stamp
+        counted = all(number in (start, before + step, before + 2 * step) for before, number in pairs)
+        return counted and gaps <= (self.stamp is not None)
+
+    def without_block_numbers(self) -> Text:
+        """The same program where nobody looks at block numbers, nor at those to which jumps go."""
+        lines = [replace(line, block="", rest=ANY_BLOCK_NUMBER.sub("", line.rest)) for line in self.lines]
+        return replace(self, lines=lines)
+
 
 class StampFound(NamedTuple):
     """What a corrected program says of itself: the line, the hash of the machine, strategy and tolerance (um)."""
@@ -126,6 +148,10 @@ class StampFound(NamedTuple):
 
 
 STAMP = re.compile(r"\bncfix \d\S* machine ([0-9a-f]+) strategy ([\w-]+) tolerance ([\d.e-]+) um", re.IGNORECASE)
+RENUMBERED = {Family.KLARTEXT: (0, 1), Family.SINUMERIK: (10, 10)}
+"""The first number that blocks get anew, and the step to the next."""
+BLOCK_NUMBER = re.compile(r"[ \t]*/?[ \t]*N[ \t]*(\d+)", re.IGNORECASE)
+ANY_BLOCK_NUMBER = re.compile(r"[ \t]*\bN[ \t]*\d+[ \t]*", re.IGNORECASE)
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 FORMULA = r"[+-]?(?:\#+(?:\d+|<[^<>]*>)|\#?\[(?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])*\])"
 WORD_ADDRESS = re.compile(

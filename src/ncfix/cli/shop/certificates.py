@@ -51,12 +51,10 @@ def certified(
 ) -> dict[str, Any]:
     """The certificate of a correction; programs are given by name and content."""
     from ncfix.certificate.certificate import Subject
-    from ncfix.certificate.proof import ProofTerms
 
     known = dialect_of(original[1], original[0], dialect, machine)
     machine_file = (shown(machine_path), read(machine_path))
-    terms = ProofTerms(tolerance_um)
-    return Subject(original, corrected, machine_file, machine, given_of(setup), known.name, terms).certificate()
+    return Subject(original, corrected, machine_file, machine, given_of(setup), known.name, tolerance_um).certificate()
 
 
 def verify_certificate(
