@@ -82,6 +82,8 @@ PLAUSIBLE_UM = 4.0
 CLEAR = float(np.log(1e6))
 """Log odds of what has no name from which on it is no play of the noise, whatever the noise is."""
 ANEW = "use the new machine file, or calibrate the machine anew"
+ELSEWHERE = "; if the control has the point of {} elsewhere than the old file, correct the point in that file instead"
+"""Of where a rotary axis lies, seen by probing alone: that it moved, and that the file has it wrong, look the same."""
 NO_PATTERN = "something that follows no pattern that was looked for"
 
 
@@ -317,13 +319,17 @@ def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: fl
         title = f"constants of the machine file: all {constants.freedom} that can be told are off together"
         owner = Candidate("constants of the file", title, "", CONSTANT_FAMILY, (), (), remedy=ANEW)
         return (EffectFinding(owner, constants.odds, p_value, (), constants.size_um, (), constants.shown),)
+    probed = all(each.kind == "probe" for each in case.data.measurements)
+    rotary = {axis.name for axis in machine.axes if axis.rotary and probed}
     effects = dict(zip(names_of(case.data.problem.selection), _owners(case.data, machine), strict=True))
     found = []
     for each in constants.moved:
         effect = effects[each.name]
         title = f"constant of the machine file: {component_title(effect.name, case.data.machine.axis(effect.joint))}"
         title += ", with the other sign" if each.turned else ""
-        owner = Candidate(f"constant {each.name}", title, effect.joint, CONSTANT_FAMILY, (), (), remedy=ANEW)
+        place = effect.location and effect.name[1] in "XYZ" and effect.joint in rotary
+        remedy = ANEW + ELSEWHERE.format(effect.joint) * place
+        owner = Candidate(f"constant {each.name}", title, effect.joint, CONSTANT_FAMILY, (), (), remedy=remedy)
         shown = np.zeros(len(case.data.y))
         odds = max(each.odds, 0.0) if len(constants.moved) > 1 else constants.odds
         alike = tuple(f"constant {name}" for name in each.aliases)

@@ -32,12 +32,15 @@ from ncfix.measure.selection import Selection
 LARGE_RAD = 2e-4
 """An angle above this may have been typed in degrees."""
 TURN_RAD = 6.6
-OFF = 3.0
-"""Times what is much of a machine of its size and kind: an axis point that is further off was measured wrongly."""
+DOUBTED, OFF = 0.3, 3.0
+"""Times what is much of a machine of its size and kind: an axis point that is further off may be wrong in the file
+only; from the second on it was measured wrongly, no axis moves so far."""
 NOWHERE_MM = 0.1
 """A first step that is smaller leads to none that is off: what it leaves is of second order."""
-PIVOT_STEPS = 3
-"""Steps in which the point of an axis is moved to where the data have it."""
+SIDE = 0.3
+"""Share of its way from which on a direction in which the point of an axis moved is named."""
+PIVOT, PIVOT_STEPS = "pivot", 3
+"""The name of an axis point that is off; and steps in which it is moved to where the data have it."""
 INCH = 25.4
 TOOL_STEP_MM, TOOL_LEAST_MM, MOST_TOOLS, MOST_SETS, TOOL_NUMBERS = 50.0, 1.0, 4, 12, 4
 """By how much a tool is longer to see what that shows; the least error; of how many tools, and sets of rows; what is
@@ -278,8 +281,15 @@ class FirstOrder:
         return float(np.sqrt(((kept**2).sum() + (rest[len(y) :] ** 2).sum()) / len(kept)))
 
 
+def points_of_axes(measurements: tuple[Measurement, ...], machine: Machine) -> list[Mistake]:
+    """Axis points that the data have elsewhere than the machine file, by more than axes move."""
+    moved = [_pivot(measurements, machine, axis) for axis in machine.axes if axis.rotary]
+    return [each for each in moved if each is not None]
+
+
 def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
     """Mistakes of positions, tools and axes, whose effect is not of first order."""
+    yield from points_of_axes(measurements, machine)
     yield from _units(measurements, machine)
     yield from _exchanged_axes(measurements, machine)
     for axis in machine.axes:
@@ -287,9 +297,6 @@ def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine) 
             title = f"rotary sign: the machine file turns {axis.name} the other way round"
             turned = _with(machine, replace(axis, direction=tuple(-x for x in axis.direction)))  # type: ignore[arg-type]
             yield Mistake(f"rotary sign {axis.name}", title, axis.name, turned, measurements)
-            moved = _pivot(measurements, machine, axis)
-            if moved is not None:
-                yield moved
         else:
             title = f"axis sign: the positions of {axis.name} count the other way"
             yield Mistake(
@@ -460,11 +467,22 @@ def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) 
         if np.linalg.norm(point - np.asarray(axis.point)) < NOWHERE_MM:
             return None
         moved = _with(machine, replace(axis, point=tuple(float(x) for x in point)))  # type: ignore[arg-type]
-    off = float(np.linalg.norm(point - np.asarray(axis.point)))
-    if off < OFF * much(machine, f"EX0{axis.name}"):
+    off = point - np.asarray(axis.point)
+    far, large = float(np.linalg.norm(off)), much(machine, f"EX0{axis.name}")
+    if far < DOUBTED * large:
         return None
-    title = f"pivot: the point of {axis.name} is {off:.2f} mm off in the machine file"
-    return Mistake(f"pivot {axis.name}", title, axis.name, moved, measurements, fitted=2)
+    title = f"{PIVOT}: the point of {axis.name} is {far:.2f} mm off in the machine file"
+    carriers: tuple[str, ...] = ()
+    if far < OFF * large and all(each.kind == "probe" for each in measurements):
+        title += (
+            "; if the control has the same point as the file, the axis itself has moved (calibrate): measurements "
+            "of kind tcp under tool-centre-point control tell"
+        )
+        along = np.abs(np.asarray(axis.error_axes) @ off)
+        carriers = tuple(
+            f"constant E{letter}0{axis.name}" for letter, way in zip("XYZ", along, strict=True) if way > SIDE * far
+        )
+    return Mistake(f"{PIVOT} {axis.name}", title, axis.name, moved, measurements, fitted=2, aliases=carriers)
 
 
 def _other_machine(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:

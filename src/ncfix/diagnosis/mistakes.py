@@ -14,7 +14,14 @@ import numpy as np
 
 from ncfix.diagnosis.catalogue import plain
 from ncfix.diagnosis.evidence import SURE
-from ncfix.diagnosis.mistake_kinds import Mistake, at_first_sight, looks_typed, not_of_first_order
+from ncfix.diagnosis.mistake_kinds import (
+    PIVOT,
+    Mistake,
+    at_first_sight,
+    looks_typed,
+    not_of_first_order,
+    points_of_axes,
+)
 from ncfix.diagnosis.residual_data import (
     AS_IT_STANDS_UM,
     TIGHT_UM,
@@ -56,11 +63,13 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     now = misfit(measurements, machine)
     left, typed = now.left(), any(looks_typed(effect) for effect in machine.effects)
     far, names = left >= SUSPECT * now.noise or typed, {plain(name) for name in refused}
-    deep = [each for each in not_of_first_order(measurements, machine) if plain(each.name) not in names] if far else []
+    standing = now.left(AS_IT_STANDS_UM)
+    moved = standing >= SUSPECT * max(left, now.noise)  # constants that moved explain the data: or points of axes
+    kinds = not_of_first_order if far else points_of_axes
+    deep = [each for each in kinds(measurements, machine) if plain(each.name) not in names] if far or moved else []
     tried = _judged(measurements, machine, now, TIGHT_UM, deep, names)
     found = max(tried, key=lambda each: each.odds, default=None)
-    standing = now.left(AS_IT_STANDS_UM)
-    if (found is None or found.odds <= 0) and standing >= SUSPECT * max(left, now.noise):
+    if (found is None or found.odds <= 0) and moved:
         tried = _judged(measurements, machine, now, AS_IT_STANDS_UM, (), names)
         tried = [each for each in tried if each.after_um**2 - left**2 < OTHERWISE * (standing**2 - left**2)]
         found = max(tried, key=lambda each: each.odds, default=None)
@@ -70,13 +79,15 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     alike = [each for each in tried if each.odds > found.odds - slack and each.stretch == found.stretch]
     simplest = min(alike, key=lambda each: (each.fitted, -each.odds))
     others = [each for each in tried if each.replaces and each.after_um < AS_SIMPLE * found.after_um]
-    if others and not _stands(simplest):
-        simplest = max(others, key=lambda each: each.odds)
+    if (others or len(alike) > 1) and not _stands(simplest):
+        points = [each for each in alike if each.name.startswith(PIVOT) and _stands(each)]
+        if points or others:
+            simplest = max(points or others, key=lambda each: each.odds)
     if simplest.odds <= 0:
         return None
     components = len(now.problem.values) / max(sum(map(len, measurements)), 1)
     near = [each for each in alike if each.odds > simplest.odds - ALIKE and each is not simplest]
-    aliases = tuple(dict.fromkeys(each.name for each in near if each.name != simplest.name))
+    aliases = (*dict.fromkeys(each.name for each in near if each.name != simplest.name), *simplest.aliases)
     sure = simplest.odds > NAMES_COST and _reaches_noise(simplest, now)
     return replace(simplest, given_um=standing * float(np.sqrt(components)), aliases=aliases, sure=sure)
 

@@ -39,6 +39,8 @@ USUAL_UM = 50.0
 """How far the constants of another machine are from none."""
 FREE_UM = 500.0
 """The same where they are free: no more, or what cannot be told runs away."""
+LOOSE_UM = 200.0
+"""How far effects go that are loose besides, in one step: what the set-up may do as well is the set-up's."""
 WIDE_UM = 1e5
 TRIM = 0.97
 """Share of the values that count: the rest may be outliers."""
@@ -344,7 +346,8 @@ def _fitted(problem: Problem, relative: Array, sigma: float, prior_um: float, fr
         size = np.sqrt((columns**2).mean(axis=0))
         size = np.where(size > 0, size, 1.0)
         allowed = np.full(columns.shape[1], WIDE_UM)
-        allowed[k : len(allowed) - free] = prior_um
+        allowed[k:] = prior_um
+        allowed[len(allowed) - free :] = LOOSE_UM
         held = sigma / allowed * size
         y = UM * problem.residual(coefficients, unknowns) / relative
         back = -held * np.concatenate([np.zeros(k), coefficients - start])
