@@ -41,7 +41,6 @@ SILLY = [
     (["fix", "machine.toml", "-m", "machine.toml", "-o", "a"], 3, "NCF103: this is a machine file, not a program"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--setup", "part.ngc"], 3, "looks like an NC program"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--dialect", "SINUMERIK"], 2, "hint: did you mean siemens?"),
-    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--offset", "G54=0,0,0,0,0,9"], 2, "NCF384: work offset G54"),
     (["export", "klartext", "-m", "machine.toml", "-o", "t"], 2, "hint: did you mean heidenhain?"),
 ]
 
@@ -136,3 +135,15 @@ def test_tables_are_written_all_or_not_at_all(shop: Shop, ncfix: Ncfix, monkeypa
     result = ncfix("export", "linuxcnc", "-m", shop.machine, "-o", shop.folder / "tables")
     assert (result.code, "NCF007" in result.err, left) == (2, True, [])
     assert list((shop.folder / "tables").iterdir()) == []
+
+
+@pytest.mark.parametrize(("offset", "code"), [("0,0,60,0,10", 2), ("0,0,60,0,10,0", 0), ("Z60,C10", 0)])
+def test_a_work_offset_in_the_order_of_the_axes_of_a_machine_is_refused(
+    offset: str, code: int, ncfix: Ncfix, root: Path
+) -> None:
+    """X Y Z A C of a machine without B: the fifth number is B."""
+    guide = root / "examples" / "guide"
+    given = ("--setup", guide / "setup.toml", "--offset", f"G54={offset}")
+    result = ncfix("check", guide / "shop" / "bracket.nc", "-m", guide / "mill.toml", *given)
+    assert result.code == code
+    assert ("NCF384: work offset G54: B is 10" in result.err) == (code == 2)

@@ -10,7 +10,7 @@ import pytest
 
 from ncfix.compensate.following import kinematics_of
 from ncfix.control.moves import TcpState
-from ncfix.control.pointing import Pointing, led, nearest
+from ncfix.control.pointing import Pointing, nearest, nearest_turn
 from ncfix.control.posture import within
 from ncfix.machine import Machine, load
 
@@ -104,8 +104,8 @@ def test_many_directions_are_solved_to_the_bit_as_one_is(root: Path, name: str) 
 
 def test_an_angle_is_led_to_the_nearest_turn() -> None:
     turn = 2 * math.pi
-    assert led(0.25, 7.0) == 0.25 + turn
-    assert led(0.25, -0.5) == 0.25
-    assert led(math.pi, 0.0) == -math.pi
-    assert led(-math.pi, 0.0) == -math.pi
-    assert led(math.nan, 0.3) == 0.3
+    assert nearest_turn(0.25, 7.0) == 0.25 + turn
+    assert nearest_turn(0.25, -0.5) == 0.25
+    assert nearest_turn(math.pi, 0.0) == -math.pi
+    assert nearest_turn(-math.pi, 0.0) == -math.pi
+    assert nearest_turn(math.nan, 0.3) == 0.3

@@ -90,8 +90,8 @@ def as_program(program: Program | PathName, machine: Machine) -> Program:
 def as_setup(setup: Setup | PathName | None, machine: Machine) -> Setup:
     """A set-up, or that of a file; without one nothing is given.
 
-    Raises `UsageError` NCF025 for a value that is not finite and for an axis that there is not, NCF384 for a work
-    offset along an axis that the machine lacks.
+    Raises `UsageError` NCF025 for a value that is not finite and for an axis that there is not, NCF384 for work
+    offsets in the order of the machine's axes.
     """
     if setup is None:
         return Setup()

@@ -209,7 +209,8 @@ class SetupOptions:
     def load(self, machine: Machine | None = None) -> Setup:
         """The setup: the file, then the tool table, then the single options, each over the one before.
 
-        Raises what is wrong in the files, and `UsageError` NCF384 for a work offset along an axis that `machine` lacks.
+        Raises what is wrong in the files, and `UsageError` NCF384 for work offsets in the order of the axes of
+        `machine`.
         """
         from ncfix.control.setup import Setup, Tool, check_offsets
 

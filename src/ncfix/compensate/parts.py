@@ -276,7 +276,7 @@ class Units(Parts):
     @property
     def assumed(self) -> tuple[str, ...]:
         """What was taken as zero so far, in words."""
-        return (*self.follower.assumed, *self.tools)
+        return tuple(dict.fromkeys((*self.follower.assumed, *self.tools)))
 
     @property
     def messages(self) -> tuple[Message, ...]:

@@ -293,7 +293,7 @@ CODES: dict[str, Code] = {
         "docs/formats.md shows a setup file.",
     ),
     "NCF384": Code(
-        "Work offset along an axis that the machine lacks",
+        "Work offset in the order of the machine's axes",
         "A list of numbers gives X Y Z A B C in this order, so the fifth is B, also on a machine with A and C.",
         "Name the axes: G54 = { Z = 60, C = 10 }, or --offset G54=Z60,C10.",
     ),

@@ -90,10 +90,15 @@ class Setup:
 
 
 def check_offsets(setup: Setup, axes: Collection[str]) -> None:
-    """Refuse a work offset along an axis that the machine lacks; zero is none. Raises `UsageError` NCF384."""
+    """Refuse work offsets whose numbers seem to be in the order of the machine's axes. Raises `UsageError` NCF384.
+
+    The order is X Y Z A B C on any machine. Where an axis that the machine lacks has a number that is not zero, and one
+    of its axes further on has none, the number was meant for that one. Numbers of other axes are not used.
+    """
     for system, values in setup.work_offsets.items():
         for letter, value in values.items():
-            if value and letter not in axes:
+            behind = LETTERS[LETTERS.index(letter) + 1 :]
+            if value and letter not in axes and any(axis in axes and axis not in values for axis in behind):
                 text = f"work offset {system}: {letter} is {value:g}, and the machine has no axis {letter}"
                 hint = f"numbers are {' '.join(LETTERS)} on any machine; or name the axes: {system} = {{ Z = 60 }}"
                 raise UsageError.of("NCF384", text, hint=hint)

@@ -241,15 +241,21 @@ class Equation:
         return sum(len(poly) for poly in self.coefficients.values()) + len(self.constant)
 
 
-def equations(derivation: Derivation, zero: Iterable[str] = (), signs: Sequence[int] = (-1, 1)) -> tuple[Equation, ...]:
-    """All differences (sign -1) and sums (1) of every coordinate over every pair of poses at right angles.
+def equations(
+    derivation: Derivation,
+    angles: Sequence[int] = RIGHT_ANGLES,
+    zero: Iterable[str] = (),
+    signs: Sequence[int] = (-1, 1),
+) -> tuple[Equation, ...]:
+    """All differences (sign -1) and sums (1) of every coordinate over every pair of poses.
 
-    zero  names of errors assumed to be zero
+    angles  degrees that each rotary axis takes
+    zero    names of errors assumed to be zero
 
     An error that depends on a rotary axis is another unknown at each of its positions.
     """
     axes = [variable.symbol for variable in derivation.chain.axes if variable.rotary]
-    poses = list(product(RIGHT_ANGLES, repeat=len(axes)))
+    poses = list(product(angles, repeat=len(axes)))
     readings = [_reading(derivation, dict(zip(axes, pose, strict=True)), set(zero)) for pose in poses]
     algebra = Algebra(sp.expand(e) for reading in readings for linear in reading for e in linear.values())
     polys = [[{key: algebra.poly(e) for key, e in linear.items()} for linear in reading] for reading in readings]
