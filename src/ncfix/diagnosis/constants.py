@@ -90,6 +90,16 @@ class ConstantsVerdict:
     whole: bool
     paid: float
 
+    def remedy(self, probed: str = "") -> str:
+        """What to do; `probed`: the rotary axis whose place it is, if only probing has seen it.
+
+        That such an axis moved, and that the file has its point wrong, look the same to a probe.
+        """
+        anew = "use the new machine file, or calibrate the machine anew"
+        point = f"; if the control has the point of {probed} elsewhere than the old file, "
+        point += "correct the point in that file instead"
+        return anew + point if probed else anew
+
     @property
     def p_value(self) -> float:
         """How likely constants so far from the file's are by chance."""

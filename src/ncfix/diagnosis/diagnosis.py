@@ -81,9 +81,6 @@ PLAUSIBLE_UM = 4.0
 """More of everything together no machine has that cuts parts, rms: a clear pattern is not taken for a little of all."""
 CLEAR = float(np.log(1e6))
 """Log odds of what has no name from which on it is no play of the noise, whatever the noise is."""
-ANEW = "use the new machine file, or calibrate the machine anew"
-ELSEWHERE = "; if the control has the point of {} elsewhere than the old file, correct the point in that file instead"
-"""Of where a rotary axis lies, seen by probing alone: that it moved, and that the file has it wrong, look the same."""
 NO_PATTERN = "something that follows no pattern that was looked for"
 
 
@@ -317,7 +314,7 @@ def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: fl
     p_value = min(constants.p_value, float(np.exp(-constants.odds)))
     if constants.whole:
         title = f"constants of the machine file: all {constants.freedom} that can be told are off together"
-        owner = Candidate("constants of the file", title, "", CONSTANT_FAMILY, (), (), remedy=ANEW)
+        owner = Candidate("constants of the file", title, "", CONSTANT_FAMILY, (), (), remedy=constants.remedy())
         return (EffectFinding(owner, constants.odds, p_value, (), constants.size_um, (), constants.shown),)
     probed = all(each.kind == "probe" for each in case.data.measurements)
     rotary = {axis.name for axis in machine.axes if axis.rotary and probed}
@@ -328,7 +325,7 @@ def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: fl
         title = f"constant of the machine file: {component_title(effect.name, case.data.machine.axis(effect.joint))}"
         title += ", with the other sign" if each.turned else ""
         place = effect.location and effect.name[1] in "XYZ" and effect.joint in rotary
-        remedy = ANEW + ELSEWHERE.format(effect.joint) * place
+        remedy = constants.remedy(effect.joint if place else "")
         owner = Candidate(f"constant {each.name}", title, effect.joint, CONSTANT_FAMILY, (), (), remedy=remedy)
         shown = np.zeros(len(case.data.y))
         odds = max(each.odds, 0.0) if len(constants.moved) > 1 else constants.odds
