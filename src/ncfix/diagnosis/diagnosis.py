@@ -1,7 +1,4 @@
-"""From measurements and a machine to a verdict: what a diagnosis says, in one of four words, and all a report needs.
-
-From the effects that are there to a machine file with them, and the gap before and after.
-"""
+"""From measurements and a machine to a verdict: what a diagnosis says, in one of four words, and all a report needs."""
 
 from __future__ import annotations
 
