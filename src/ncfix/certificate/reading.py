@@ -164,6 +164,21 @@ FLOW = re.compile(
 PATH_WORDS = AXES | frozenset("IJKR")
 
 
+class _Rest:
+    """The text of a line without what is cut out of it."""
+
+    def __init__(self, text: str) -> None:
+        self.text, self.pieces, self.at = text, list[str](), 0
+
+    def cut(self, start: int, end: int) -> None:
+        """Leave out a word, and the blanks before it."""
+        self.pieces.append(self.text[self.at : start].rstrip(" \t"))
+        self.at = end
+
+    def __str__(self) -> str:
+        return "".join([*self.pieces, self.text[self.at :]])
+
+
 def _piece(text: str, start: int) -> str:
     """What stands at a place of a line, up to a blank; a control character is a piece."""
     return (text[start:].split() or [text[start]])[0]
@@ -172,8 +187,7 @@ def _piece(text: str, start: int) -> str:
 def _word_address(number: int, text: str) -> TextLine:
     line = TextLine(number)
     line.skipped = text.lstrip(" \t").startswith("/")
-    rest: list[str] = []
-    at = 0
+    rest = _Rest(text)
     for found in WORD_ADDRESS.finditer(text):
         start, end = found.span()
         letter = found[2]
@@ -184,15 +198,11 @@ def _word_address(number: int, text: str) -> TextLine:
             name, digits = letter.upper(), found[3]
             word = TextWord(name, digits or "", float(digits) if digits else None)
             if name in PATH_WORDS:
-                rest.append(text[at:start].rstrip(" \t"))
+                rest.cut(start, end)
                 line.path.append(word)
-                at = end
                 continue
             line.codes.append(word)
-        rest.append(text[at:end])
-        at = end
-    rest.append(text[at:])
-    line.rest = "".join(rest)
+    line.rest = str(rest)
     if line.odd and FLOW.search(text.upper()):
         line.odd = JUMPS
     return line
@@ -220,8 +230,7 @@ SINUMERIK_FLOW = re.compile(
 def _sinumerik(number: int, text: str) -> TextLine:
     line = TextLine(number)
     line.skipped = text.lstrip(" \t").startswith("/")
-    rest: list[str] = []
-    at = 0
+    rest = _Rest(text)
     for found in SINUMERIK_WORD.finditer(text):
         start, end = found.span()
         name = found[2] or found[7]
@@ -232,9 +241,8 @@ def _sinumerik(number: int, text: str) -> TextLine:
             counted = "+" if kind == "IC" else "=" if kind == "AC" else ""
             word = TextWord(name, digits, float(digits) if digits and kind in ("", "IC", "AC") else None, counted)
             if name in SINUMERIK_PATH:
-                rest.append(text[at:start].rstrip(" \t"))
+                rest.cut(start, end)
                 line.path.append(word)
-                at = end
                 continue
             line.codes.append(TextWord(name, digits or (found[6] or ""), word.value))
         elif (key := found[9]) is not None:
@@ -248,10 +256,7 @@ def _sinumerik(number: int, text: str) -> TextLine:
                 line.odd = line.odd or f"{key.partition('(')[0].strip()} is not known to this reader"
         elif found[10] is not None and found[10] not in "/%:":
             line.odd = line.odd or f"{_piece(text, start)!r} is no plain word"
-        rest.append(text[at:end])
-        at = end
-    rest.append(text[at:])
-    line.rest = "".join(rest)
+    line.rest = str(rest)
     return line
 
 
@@ -281,11 +286,10 @@ def _klartext(number: int, text: str) -> TextLine:
         line.rest = body
         line.codes.append(TextWord(body_upper, "", None))
         line.odd = JUMPS if KLARTEXT_FLOW.match(body_upper) else f"{first} is not known to this reader"
-        if re.match(r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$|TOOL DEF", body_upper):
+        if re.match(r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$", body_upper):
             line.odd = ""
         return line
-    rest: list[str] = []
-    at = 0
+    rest = _Rest(body)
     for found in KLARTEXT_WORD.finditer(body):
         start, end = found.span()
         if found[3] is not None:
@@ -294,9 +298,8 @@ def _klartext(number: int, text: str) -> TextLine:
             counted = name.startswith("I")
             name = name.removeprefix("I")
             if name in AXES or name in ("R", "PA", "PR"):
-                rest.append(body[at:start].rstrip(" \t"))
+                rest.cut(start, end)
                 line.path.append(TextWord(name, digits, value, "+" if counted else "="))
-                at = end
                 continue
             line.codes.append(TextWord(name, digits, value))
         elif found[2] is not None or found[5] is not None:
@@ -305,10 +308,7 @@ def _klartext(number: int, text: str) -> TextLine:
                 line.odd = line.odd or f"{found[5]} is not known to this reader"
         elif found[6] is not None and found[6] not in "*/":
             line.odd = line.odd or f"{_piece(body, start)!r} is no plain word"
-        rest.append(body[at:end])
-        at = end
-    rest.append(body[at:])
-    line.rest = "".join(rest)
+    line.rest = str(rest)
     return line
 
 

@@ -214,7 +214,7 @@ class ProgramPage:
         if len(self.text) <= WHOLE:
             wanted = set(range(1, len(self._lines) + 1))
         else:
-            wanted = {line + k for spot in self._spots for line in (spot.line,) for k in range(-AROUND, AROUND + 1)}
+            wanted = {spot.line + k for spot in self._spots for k in range(-AROUND, AROUND + 1)}
         return {line: self._text(line) for line in sorted(wanted) if 0 < line <= len(self._lines)}
 
     def _curves(self) -> str:
