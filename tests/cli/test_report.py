@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 
+from ncfix.cli.shop.batch_page import batch_page
 from ncfix.diagnostics import ExitCode
+from ncfix.reports.content import is_of_fix, result_sections
 
 
 def test_every_shipped_machine_has_a_page(ncfix: Any, examples: Path, tmp_path: Path) -> None:
@@ -66,3 +68,18 @@ def test_a_page_is_not_written_over_what_it_shows(ncfix: Any, shop: Any) -> None
     result = ncfix("report", shop.machine, "-o", shop.machine, "--force")
     assert result.code == ExitCode.USAGE
     assert "NCF005" in result.err or "NCF018" in result.err
+
+
+@pytest.mark.parametrize("value", [None, 1, "x", [], [1], {}, [{}], {"max": "x"}, [{"code": 1, "text": None}]])
+def test_a_result_that_was_changed_by_hand_makes_a_page_all_the_same(ncfix: Any, shop: Any, value: Any) -> None:
+    """Each field of what `fix` printed of two programs in turn is something else."""
+    entry = json.loads(results(ncfix, shop)["Programs"])["files"][0]
+    refused = {**entry, "output": None, "refused": [{"line": 1, "code": "NCF432", "reason": "no"}]}
+    assert is_of_fix(entry)
+    assert is_of_fix(refused)
+    for each in (entry, refused):
+        for key in each:
+            files = [{**each, key: value}, entry]
+            assert result_sections({"schema": 1, "files": files}, "night.json")
+            if all(map(is_of_fix, files)):
+                assert b"Batch" in batch_page(files)

@@ -89,16 +89,13 @@ def _batch(text: bytes, path: str, output: str) -> bytes | None:
     if not text.lstrip().startswith(b"{") or os.path.splitext(output)[1].lower() not in ("", ".html", ".htm"):
         return None
     entries = _result(text, path).get("files")
-    if not isinstance(entries, list) or len(entries) < 2 or not all(map(_is_fixed, entries)):
+    from ncfix.reports.content import is_of_fix
+
+    if not isinstance(entries, list) or len(entries) < 2 or not all(map(is_of_fix, entries)):
         return None
     from ncfix.cli.shop.batch_page import batch_page
 
     return batch_page(entries, os.path.dirname(output), f"Batch {shown(path)}")
-
-
-def _is_fixed(entry: Any) -> bool:
-    """Whether that is what `ncfix fix --json` prints of a program."""
-    return isinstance(entry, dict) and {"path", "output"} <= entry.keys() and bool({"changed", "errors"} & entry.keys())
 
 
 def _report_program(

@@ -122,7 +122,7 @@ def result_sections(result: Result, path: str) -> list[ReportSection]:
 def _parts(result: Result) -> Iterator[Part]:
     rest = {key: value for key, value in result.items() if key != "schema"}
     files: Any = rest.get("files")
-    if _is_rows(files) and any("error_after_um" in each for each in files):  # what `fix` printed
+    if _is_rows(files) and any("error_after_um" in each for each in files) and all(map(is_of_fix, files)):
         yield from _programs(rest.pop("files"))
     plain = [
         (_words(key), _cell(value)) for key, value in rest.items() if not _is_rows(value) and value not in (None, [])
@@ -137,11 +137,49 @@ def _parts(result: Result) -> Iterator[Part]:
             yield from _limited([_words(name) for name in header], cells)
 
 
+def is_of_fix(entry: Any) -> bool:
+    """Whether that is what `ncfix fix --json` prints of a program; files that people have changed may be anything."""
+    if not isinstance(entry, Mapping) or not isinstance(entry.get("path"), str) or "output" not in entry:
+        return False
+    rows = (("refused", "reason"), ("warnings", "text"), ("errors", "text"))
+    return (
+        all(isinstance(entry[key], str | None) for key in ("output", "page") if key in entry)
+        and ("errors" in entry or {"changed", "refused", "warnings"} <= entry.keys())
+        and all(_is_said(entry[key], text) for key, text in rows if key in entry)
+        and bool(entry.get("errors", True))
+        and (entry["output"] is not None or bool(entry.get("refused") or entry.get("errors")))
+        and isinstance(entry.get("compensated", 0), int)
+        and _is_figure(entry.get("max_correction_um"))
+        and all(
+            error is None
+            or (isinstance(error, Mapping) and all(_is_figure(error.get(name, "")) for name in ("max", "rms")))
+            for error in map(entry.get, FIGURES)
+        )
+    )
+
+
+def _is_said(rows: Any, text: str) -> bool:
+    """Whether these are messages, each with a code and a text."""
+    return isinstance(rows, list) and all(
+        isinstance(row, Mapping)
+        and isinstance(row.get("code"), str)
+        and isinstance(row.get(text), str)
+        and bool(row[text])
+        for row in rows
+    )
+
+
+def _is_figure(value: Any) -> bool:
+    return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
+
+
 def _programs(files: Sequence[Result]) -> Iterator[Part]:
     columns = [*FIX.values(), "refused", *(f"tip error {name}, um max (rms)" for name in FIGURES.values())]
     yield Table(columns, [_program(each) for each in files])
     refused = [
-        (each["path"], str(it["line"]), it["code"], it["reason"]) for each in files for it in each.get("refused", ())
+        (each["path"], _cell(it.get("line")), it["code"], it["reason"])
+        for each in files
+        for it in each.get("refused", ())
     ]
     if refused:
         yield Paragraph("Motions that were refused:")

@@ -93,7 +93,7 @@ class PathRecord:
     worst      places with the largest errors after, one a line
     corrections  of the axes, by name
     linear     the size of X, Y and Z together
-    refused, passed   blocks that stayed as they were, the first of each; `counts` of passed ones by rule
+    refused, passed   blocks that stayed as they were, the first of each
     """
 
     drawn: int = DRAWN
