@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test full lint share screenshots format accuracy bench batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
+.PHONY: demo test full lint docs release share screenshots format accuracy bench batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
 	goldens goldens-update planted fuzz ci clean
 
 demo:            ## fix the shipped five-axis example
@@ -21,6 +21,13 @@ lint:            ## style, types, floors (needs: pip install -e '.[dev]')
 
 share:           ## write the manual page and the completion scripts into share/
 	$(PYTHON) -c "from pathlib import Path; from ncfix.cli.manual import shared_files as s; [((p := Path('share', f)).parent.mkdir(parents=True, exist_ok=True), p.write_text(t)) for f, t in s()]"
+
+docs:            ## the site of all documents, strictly, into build/site (needs: pip install -e '.[docs]')
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict -q
+
+release:         ## wheel, sdist, bill of materials (CycloneDX) and hashes into dist/ (needs: pip install -e '.[release]')
+	rm -rf dist
+	NCFIX_BUILD=$(or $(NCFIX_BUILD),require) $(PYTHON) release.py dist
 
 screenshots:     ## take the pictures of pages in docs/figures/ (needs chromium)
 	NCFIX_REQUIRE_TOOLS=1 NCFIX_SCREENSHOTS=docs/figures $(PYTHON) -m pytest -q tests/report

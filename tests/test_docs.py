@@ -148,7 +148,7 @@ def test_the_floors_and_modules_of_the_documents_are_there(root: Path) -> None:
     assert set(packages) == {path.parent.name for path in root.glob("src/ncfix/*/__init__.py")}
     pages = [*root.glob("docs/*.md"), root / "README.md", root / "CONTRIBUTING.md"]
     named = {(page.name, name) for page in pages for name in re.findall(r"`([\w/]+\.py)`", page.read_text())}
-    folders = ("src", "plugins", "tests", "benchmarks", "examples")
+    folders = ("src", "plugins", "tests", "benchmarks", "examples", "docs")
     there = {f"/{path.relative_to(root)}" for folder in folders for path in (root / folder).rglob("*.py")}
     there |= {f"/{path.name}" for path in root.glob("*.py")}
     assert len(named) > 20

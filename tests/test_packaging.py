@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import release
 
 from conftest import require_core
 from ncfix import __version__
@@ -147,6 +148,20 @@ def test_the_example_with_tables_installs_and_works(root: Path, tmp_path: Path) 
     assert found["class"] == "L-POS"
     assert found["residual_um"]["after"]["rms"] < found["residual_um"]["before"]["rms"]
     assert (tmp_path / "tables" / "axeserr.dat").exists()
+
+
+def test_the_bill_of_materials_of_a_release(wheel: Path) -> None:
+    pytest.importorskip("cyclonedx_py")
+    bill = json.loads(release.bill_of_materials(sys.executable, __version__, [wheel]))
+    subject = bill["metadata"]["component"]
+    assert (bill["bomFormat"], subject["name"], subject["version"]) == ("CycloneDX", "ncfix", __version__)
+    (file,) = subject["externalReferences"]
+    assert file["url"] == wheel.name
+    assert file["hashes"][0]["content"] == release.digest(wheel)
+    needs = next(each["dependsOn"] for each in bill["dependencies"] if each["ref"] == subject["bom-ref"])
+    assert {name.split("=")[0].lower() for name in needs} >= {"numpy", "scipy", "pluggy", "lark", "click", "rich"}
+    licences = {each["name"]: each.get("licenses") for each in bill["components"]}
+    assert licences["lark"]
 
 
 def test_the_core_depends_on_little(root: Path) -> None:
