@@ -20,6 +20,7 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from ncfix.entry_points import entry_points
 from ncfix.hookspecs import GROUP
 from ncfix.hookspecs import Register as Register
 from ncfix.hookspecs import hookimpl as hookimpl
@@ -151,14 +152,12 @@ def family(name: str) -> Dialect:
 
     Raises LookupError where there is none.
     """
-    from importlib.metadata import entry_points
-
     found: dict[str, Dialect] = {}
 
     def register(dialect: Dialect, name: str | None = None) -> None:
         found.setdefault(name or dialect.name, dialect)
 
-    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name != name):
+    for point in sorted(entry_points(GROUP), key=lambda point: point.name != name):
         own = point.dist is not None and point.dist.metadata["Name"] == "ncfix"
         if own or point.name == name:
             hook = getattr(point.load(), "register_dialects", None)

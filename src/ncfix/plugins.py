@@ -22,15 +22,12 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache, lru_cache
 from importlib import import_module
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pluggy
 
 from ncfix.diagnostics import Message, NcfixError, PluginError
-
-if TYPE_CHECKING:
-    from importlib.metadata import Distribution, EntryPoint
-
+from ncfix.entry_points import EntryPoint, entry_points
 
 hookspecs = import_module("ncfix.hookspecs")
 """The contract speaks of things of all floors, so it stands above them, and the ground takes it by its name."""
@@ -164,10 +161,8 @@ def load_plugins() -> Plugins:
 
 def installed() -> list[EntryPoint]:
     """The entry points of the group that are not disabled; those of ncfix first, then by distribution and name."""
-    from importlib.metadata import entry_points
-
     disabled = {name.strip() for name in os.environ.get("NCFIX_DISABLE_PLUGINS", "").split(",")}
-    points = {(distribution(point), point.name): point for point in entry_points(group=GROUP)}
+    points = {(distribution(point), point.name): point for point in entry_points(GROUP)}
     order = sorted(points, key=lambda key: (key[0] != "ncfix", key))
     return [points[key] for key in order if disabled.isdisjoint(key)]
 
@@ -315,8 +310,8 @@ def distribution(point: EntryPoint) -> str:
 
 
 @cache
-def described(dist: Distribution | None) -> tuple[str, str]:
-    """Name and version of a distribution, empty for none; its metadata is read as a mail is, which takes a while."""
+def described(dist: Any) -> tuple[str, str]:
+    """Name and version of a distribution, empty for none."""
     if dist is None:
         return "", ""
     metadata = dist.metadata

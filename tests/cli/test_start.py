@@ -8,7 +8,7 @@ import pytest
 
 FAMILIES = {"ncfix_iso.rs274", "ncfix_fanuc.macro", "ncfix_siemens.sinumerik", "ncfix_heidenhain.klartext"}
 ELSEWHERE = {
-    "scipy", "rich", "sympy", "multiprocessing", "concurrent.futures", "numpy.ma",
+    "scipy", "rich", "sympy", "multiprocessing", "concurrent.futures", "numpy.ma", "importlib.metadata",
     "ncfix.diagnosis", "ncfix.measure", "ncfix.reports", "ncfix.machine.symbolic",
     "ncfix.control.flatten",
     "ncfix.control.setup_file", "ncfix.api.measurements", "ncfix.api.tables",
@@ -64,6 +64,8 @@ def test_a_control_does_not_wait_for_the_others(program: str, needed: set[str], 
     assert families(modules) == needed
 
 
-@pytest.mark.parametrize("arguments", [["--version"], ["fix", "--help"]])
-def test_plugins_are_looked_for_when_one_may_be_asked_for(arguments: list[str], root: Path) -> None:
-    assert not imported(arguments, root) & {"importlib.metadata", "numpy", *ELSEWHERE}
+@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["fix", "--help"]])
+def test_help_waits_for_neither_arrays_nor_machines(arguments: list[str], root: Path) -> None:
+    modules = imported(arguments, root)
+    assert not modules & {"numpy", "ncfix.machine", "ncfix.compensate", "ncfix.text.reader", *ELSEWHERE}
+    assert ("ncfix_iso" in modules) == (arguments == ["--help"])
