@@ -21,7 +21,9 @@ def installed(folder: Path, name: str, points: str, metadata: str = "", suffix: 
 
 def both_ways(group: str) -> list[tuple[str, str, str, str | None, str | None]]:
     """What is found, which must be what Python finds."""
-    ours = [(p.name, p.value, p.module, p.dist.metadata["Name"], p.dist.metadata["Version"]) for p in entry_points(group)]
+    ours = [
+        (p.name, p.value, p.module, p.dist.metadata["Name"], p.dist.metadata["Version"]) for p in entry_points(group)
+    ]
     theirs = importlib.metadata.entry_points(group=group)
     assert sorted(ours, key=str) == sorted(
         ((p.name, p.value, p.module, p.dist.metadata["Name"], p.dist.metadata["Version"]) for p in theirs), key=str
@@ -36,7 +38,9 @@ def test_what_is_installed_is_found_as_python_finds_it(group: str) -> None:
 
 def test_odd_metadata_is_read_as_python_reads_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
-    points = "\n# a remark\n[other]\na = b\n[a.group]\n  one = json\n\ntwo=json.decoder : JSONDecoder [extra]\n[x]\ny = z\n"
+    points = (
+        "\n# a remark\n[other]\na = b\n[a.group]\n  one = json\n\ntwo=json.decoder : JSONDecoder [extra]\n[x]\ny = z\n"
+    )
     installed(first, "Some_Thing-1.0", points, "Metadata-Version: 2.1\nname: Some.Thing\nVersion: 1.0\n\nVersion: 9\n")
     installed(second, "some.thing-2.0", "[a.group]\nthree = json\n", "Name: some.thing\nVersion: 2.0\n")
     installed(second, "egg-3", "[a.group]\nfour = json:dumps\n", "Name: egg\nVersion: 3\n", ".egg-info")
@@ -61,9 +65,7 @@ def test_a_value_leads_to_what_python_makes_of_it(value: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["zip", "finder"])
-def test_distributions_elsewhere_are_left_to_python(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_distributions_elsewhere_are_left_to_python(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if kind == "zip":
         with ZipFile(tmp_path / "all.zip", "w") as archive:
             archive.writestr("zipped-1.dist-info/METADATA", "Name: zipped\nVersion: 1\n")

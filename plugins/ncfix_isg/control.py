@@ -10,9 +10,10 @@ each. Play, of which grids know nothing, goes into the leadscrew compensation of
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
+from ncfix.lazy_dataclass import dataclass
 from ncfix.plugin import (
     Assumption,
     Compensation,

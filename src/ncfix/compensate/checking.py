@@ -7,7 +7,7 @@ it; nothing is written.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import Message
+from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.text import stamp
 from ncfix.text.tree import Program

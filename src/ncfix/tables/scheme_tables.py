@@ -11,12 +11,13 @@ among the positions that are known. A file can say them exactly: the first one, 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.correction import poses_along, random_poses, random_ways
 from ncfix.tables.grid import Array, Grid

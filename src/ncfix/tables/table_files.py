@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
+from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 
 AGAIN = "export again"

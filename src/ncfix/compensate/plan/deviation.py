@@ -8,7 +8,6 @@ motions as densely as the error model may bend, and at its kinks.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from ncfix.compensate.plan.segments import Segments, accelerations
 from ncfix.compensate.plan.splitting import INSTANT
 from ncfix.compensate.plan.written import Known, WrittenPieces
 from ncfix.control.moves import MotionKind, Moves, Rule
+from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import Bow
