@@ -25,9 +25,11 @@ from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Program
 from ncfix.writer.block import BlockWriter
 from ncfix.writer.language import WrittenLanguage
+from ncfix.writer.target import Target
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.groups import RULES, TOOL_CHANGE
 from ncfix_iso.rs274.interpreter import RS274Interpreter
+from ncfix_iso.rs274.keywords import KeywordWriter, has_keywords
 
 if TYPE_CHECKING:
     from ncfix.control.interpreter import FlatLine
@@ -44,7 +46,7 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
     """One block, by the grammar and the rules that a grammar cannot say; raises `BlockError`."""
     squeezed = squeeze(text)
     try:
-        parsed = build(parse(dialect, squeezed.code), text, squeezed)
+        parsed = build(parse(dialect, squeezed.code), text, squeezed, keywords=dialect.keywords)
     except UnexpectedInput as error:
         raise explain(error, text, squeezed) from None
     except TooDeepError as error:
@@ -81,16 +83,21 @@ def writable(program: Program, block: int) -> Layout | None:
     return None if has_free_text(program, block) else layout_of(program, block)
 
 
-def plain(_program: Program) -> Spelling:
+def plain(program: Program) -> Spelling:
     """Numbers as they come, with a point in the place of formulas."""
-    return Spelling()
+    return Spelling(signed=program.dialect.signed)
+
+
+def writer_of(program: Program, block: int, layout: Layout, target: Target, spelling: Spelling) -> BlockWriter:
+    """What writes a motion of one block."""
+    kind = KeywordWriter if has_keywords(program.dialect) else BlockWriter
+    return kind(program, block, layout, target, spelling)
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
-    layout = (
-        writable(program, block) if any(w.address in AXIS_LETTERS for w in program.template_of(block).words) else None
-    )
+    moving = any(word.address in AXIS_LETTERS for word in program.template_of(block).words)
+    layout = writable(program, block) if moving and not has_keywords(program.dialect) else None
     found = None if layout is None else bulk_layout(program, block, layout)
     if layout is None or found is None:
         return None
@@ -101,6 +108,9 @@ def unroll(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int
     """See `FollowedLanguage`; raises SourceError where no flat program can say what is executed."""
     from ncfix_iso.rs274.flatten import RS274Flattener
 
+    if has_keywords(interpreter.dialect):
+        text = "what is written out flat is G code, which this language is not"
+        raise SourceError.of(RUNTIME, text, interpreter.place())
     flattener = RS274Flattener(interpreter.control, steps, limit)
     interpreter.watcher, interpreter.control.ends = flattener, []
     interpreter.run()
@@ -122,7 +132,7 @@ RS274 = WrittenLanguage(
     interpreter=RS274Interpreter,
     layout=writable,
     same_per_shape=True,
-    writer=BlockWriter,
+    writer=writer_of,
     spelling=plain,
     lenient=True,
     unroll=unroll,

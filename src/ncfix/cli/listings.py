@@ -58,6 +58,8 @@ def dialects(name: str | None, as_json: bool) -> None:
             lines += ["", heading, *(f"  {sentence}" for sentence in getattr(found[name], field))]
         if own := own_codes(found[name]):
             lines += ["", "codes of its own", *(f"  {sentence}" for sentence in own)]
+        if words := found[name].keywords:
+            lines += ["", "keywords", *(f"  {word}: {meaning}" for word, meaning in words)]
         console.put("".join(f"{line}\n" for line in lines))
     else:
         rows = [(name, it.title, " ".join(it.suffixes)) for name, it in found.items()]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import field
 from math import isfinite
 
 from lark import Token, Tree
@@ -69,12 +70,22 @@ class Parsed:
     comment: int
 
 
-def build(tree: Branch, text: str, squeezed: Squeezed, maker: type[TreeBuilder] | None = None) -> Parsed:
-    """Make the template of a block from its tree, by a language's own kind of builder; raises `TooDeepError`."""
+def build(
+    tree: Branch,
+    text: str,
+    squeezed: Squeezed,
+    maker: type[TreeBuilder] | None = None,
+    keywords: Iterable[tuple[str, str]] = (),
+) -> Parsed:
+    """Make the template of a block from its tree, by a language's own kind of builder; raises `TooDeepError`.
+
+    keywords  see `Dialect.keywords`
+    """
     tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
     spans = tuple(squeezed.span(*edges(token)) for token in tokens)
     slots = {edges(token): slot for slot, token in enumerate(tokens)}
-    items = (maker or TreeBuilder)(text, squeezed, slots, tuple(stop for _, stop in spans)).items(tree)
+    stops = tuple(stop for _, stop in spans)
+    items = (maker or TreeBuilder)(text, squeezed, slots, stops, dict(keywords)).items(tree)
     comment = final_comment(tree)
     place = squeezed.span(*edges(comment))[0] if comment else -1
     return Parsed(Template(items, len(tokens)), spans, tuple(map(float, tokens)), place)
@@ -109,12 +120,14 @@ class TreeBuilder:
 
     slots  edges of a number in the squeezed block -> its slot
     stops  where each number stops in the block
+    keywords  what stands for a code or an address, and which
     """
 
     text: str
     squeezed: Squeezed
     slots: dict[tuple[int, int], int]
     stops: tuple[int, ...]
+    keywords: Mapping[str, str] = field(default_factory=dict)
 
     # -- places -------------------------------------------------------------------------------------------------------
 
@@ -178,12 +191,15 @@ class TreeBuilder:
         value = self.expression(node)
         if isinstance(value, Literal) and kind(node) == "bracket":
             value = Unary("+", value)
-        return Word(str(address).upper(), value, self.span(tree), self.span(node))
+        name = str(address).upper()
+        return Word(self.keywords.get(name, name), value, self.span(tree), self.span(node))
 
     def code(self, tree: Branch) -> Word:
-        """G or M with a plain number, which is part of the shape."""
+        """G or M with a plain number, which is part of the shape; or a keyword that stands for one."""
         text = str(tree.children[0])
         start, stop = edges(tree)
+        if meaning := self.keywords.get(text.upper()):
+            return Word(meaning[0], Constant(float(meaning[1:])), self.span(tree), self.span(tree))
         return Word(
             text[0].upper(), Constant(float(text[1:])), self.between(start, stop), self.between(start + 1, stop)
         )

@@ -44,6 +44,8 @@ blocks of a contour (P and Q), or constant surface speed (G96) in a text that na
 
 CODE = re.compile(r"[GM](0|[1-9]\d{0,3})(\.[1-9])?")
 """How a code of a dialect's own is written."""
+KEYWORD, KEYWORD_MEANING = re.compile(r"[A-Z][A-Z0-9_.]*"), re.compile(rf"{CODE.pattern}|[A-FH-LP-Z]")
+"""How a keyword is written, and what it may stand for: a code, or an address that takes a number."""
 FIXED = frozenset({"G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G53", "G80", "G90", "G91"})
 """Codes whose meaning the reader and the writer rely on: no dialect may give them another."""
 
@@ -157,6 +159,11 @@ class Dialect:
     semantics           which of its language's rule sets holds, where there are several. A name that the language does
                         not know is an error (NCF508) when the language is needed
     codes, cycles       what it adds to the codes of its language, see `derive`
+    keywords            what its blocks say in words, and the G or M code or the address that each stands for: ("MOVE",
+                        "G1"), ("FEED", "F"); its grammar makes a `code` of the former, the address of a `word` of the
+                        latter
+    assign              what stands between an address and its number, as in X=10
+    signed              words that are added have a sign in any case, as in X+10
     """
 
     name: str
@@ -179,6 +186,9 @@ class Dialect:
     semantics: str = ""
     codes: tuple[tuple[str, tuple[CodeOperation, ...]], ...] = ()
     cycles: tuple[tuple[str, CycleTable], ...] = ()
+    keywords: tuple[tuple[str, str], ...] = ()
+    assign: str = ""
+    signed: bool = False
     language: str = field(kw_only=True)
 
     def cycle_of(self, code: int) -> CycleTable:
@@ -192,6 +202,7 @@ class Dialect:
         title: str,
         codes: Mapping[str, Sequence[CodeOperation]] | None = None,
         cycles: Mapping[str, CycleTable] | None = None,
+        keywords: Mapping[str, str] | None = None,
         **changes: Any,
     ) -> Dialect:
         """A dialect of a control that is a relative of this one: all as here, but for what is given.
@@ -199,19 +210,21 @@ class Dialect:
         codes    "G100", "M180", "G54.4" -> what it does, operations of `ncfix.control.operations` in order; none: it
                  moves nothing and changes no coordinates
         cycles   "G177" -> the drilling cycle that it is
+        keywords "MOVE" -> "G1", "FEED" -> "F": the words of a language whose blocks are no letters and numbers;
+                 of several for one code the first is written
         changes  of any other field. Without them its suffixes and signatures are none, so that programs are only read
                  as this if the machine file or --dialect says so
 
         Raises ValueError for what cannot be: see `complaint`, and a sign of comments that the language does not read.
         """
         if unknown := changes.keys() - {each.name for each in fields(self)}:
-            known = ("codes", "cycles", *(each.name for each in fields(self)))
+            known = ("codes", "cycles", "keywords", *(each.name for each in fields(self)))
             raise ValueError(f"{name}: a dialect has no {min(unknown)}: {nearest(min(unknown), known)}")
         for code, operations in (codes or {}).items():
             if not isinstance(operations, list | tuple):
                 raise ValueError(f"{name}: {code}: {operations!r} is no list of operations")
         own = {code: tuple(operations) for code, operations in (codes or {}).items()}
-        drills = dict(cycles or {})
+        drills, words = dict(cycles or {}), dict(keywords or {})
         if both := own.keys() & drills.keys():
             raise ValueError(f"{name}: {min(both)} cannot be a code and a cycle")
         before = {code: operations for code, operations in self.codes if code not in drills}
@@ -222,6 +235,7 @@ class Dialect:
             title=title,
             codes=tuple((before | own).items()),
             cycles=tuple((tables | drills).items()),
+            keywords=tuple((words | {word: meaning for word, meaning in self.keywords if word not in words}).items()),
             **{"suffixes": (), "signature": (), "variant_of": self.variant_of or self.name, **changes},
         )
         if complaint := made.complaint():
@@ -248,6 +262,9 @@ class Dialect:
                 return f"{code}: {table!r} is no CycleTable"
             if code.startswith("M"):
                 return f"{code!r} cannot be a code of a dialect's own: cycles are G codes"
+        for keyword, meaning in self.keywords:
+            if not KEYWORD.fullmatch(keyword) or not KEYWORD_MEANING.fullmatch(meaning):
+                return f"{keyword!r}: {meaning!r} cannot be a keyword: capital letters, and a code or an address"
         for code, operations in (*self.codes, *((code, ()) for code, _ in self.cycles)):
             if complaint := complaint_of_code(code, operations):
                 return complaint

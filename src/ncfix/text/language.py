@@ -99,7 +99,7 @@ class Language:
     renumber  a text with its blocks numbered anew; None where blocks need no numbers
     straight  a program with blocks of this shape may come in parts: they have nothing to do with others elsewhere
     semantics  the rule sets that the family has, by the names that `Dialect.semantics` may give
-    own_codes  it takes the codes and cycles that a dialect adds (`Dialect.codes`, `Dialect.cycles`)
+    own_codes  it takes the codes, cycles and keywords that a dialect adds
     """
 
     split: Callable[[bytes], NDArray[np.int64]]
@@ -140,7 +140,7 @@ def loaded(dialect: Dialect) -> Language:
     if dialect.semantics not in language.semantics:
         text = f"the dialect {dialect.name!r} has the semantics {dialect.semantics!r}, which its language does not know"
         raise useless("dialects", dialect.name, text, nearest(dialect.semantics, language.semantics))
-    if (dialect.codes or dialect.cycles) and not language.own_codes:
+    if (dialect.codes or dialect.cycles or dialect.keywords) and not language.own_codes:
         text = f"the dialect {dialect.name!r} has codes of its own, and its language takes none"
         raise useless("dialects", dialect.name, text, "languages of the RS274 and Fanuc families take them")
     return language

@@ -97,18 +97,22 @@ class BlockWriter(BlockText):
 
     def _motion_code(self) -> None:
         wanted, word = self.target.code, self.layout.motion
-        if wanted not in STRAIGHT_AND_ARCS:
+        said = self.target.active_code if word is None else round(self._value(word, np.nan) * 10)
+        if wanted not in STRAIGHT_AND_ARCS or wanted == said:
             return
         if word is not None:
-            if round(self._value(word, np.nan) * 10) != wanted:
-                self._rewrite(word, wanted / 10, 0)
-        elif wanted != self.target.active_code:
+            self._restate(word, f"{wanted // 10}")
+        else:
             self._put_code(f"{wanted // 10}")
 
     def _put_code(self, number: str) -> None:
         """Put a G code before the first axis word."""
         at = self.program.position(self.block, self.layout.code_at)
-        self.out.edits.append((at, at, self._cased("G") + number + self.layout.blank))
+        self.out.edits.append((at, at, self._code(number) + self.layout.blank))
+
+    def _code(self, number: str) -> str:
+        """How the language spells a G code."""
+        return self._cased("G") + number
 
     # -- axis words ---------------------------------------------------------------------------------------------------
 
@@ -417,7 +421,7 @@ class BlockWriter(BlockText):
         if self.target.arcs is None or wanted == self.code:
             return []
         self.code = wanted
-        return [self._cased("G") + f"{wanted // 10}"]
+        return [self._code(f"{wanted // 10}")]
 
     def _centre_of_piece(self, piece: int, begin: FloatArray) -> list[str]:
         """The centre words of a further piece that is an arc."""
@@ -488,6 +492,6 @@ class BlockWriter(BlockText):
 
     def _feed_as_before(self) -> None:
         """Back to the feed that was in force, for the blocks that follow; in inverse time each has its own."""
-        words = [] if self.target.turn_by_feed else [self._cased("G") + PER_MINUTE]
+        words = [] if self.target.turn_by_feed else [self._code(PER_MINUTE)]
         words.append(self._cased("F") + self._feed_in_force())
-        self._line([self._cased("G") + INVERSE_TIME] if self.target.back_to_inverse_time else words)
+        self._line([self._code(INVERSE_TIME)] if self.target.back_to_inverse_time else words)

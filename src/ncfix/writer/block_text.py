@@ -78,6 +78,10 @@ class BlockText:
         self.out.edits.append((start, stop, text))
         return value_of(text)
 
+    def _restate(self, word: Word, number: str) -> None:
+        """Put another G code in the place of one."""
+        self._rewrite(word, float(number), 0)
+
     def _add(self, letter: str, value: float, decimals: int) -> float:
         """Add a word; the number as written."""
         text = self.spelling.number(value, decimals)
