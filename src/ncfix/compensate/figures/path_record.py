@@ -27,7 +27,7 @@ from ncfix.text.tree import Program
 
 CUT, RAPID, REFUSED, PASSED = range(4)
 """What leads to a place: a corrected cut, a rapid, a refused motion, one passed by rule."""
-DRAWN = 24_000
+DRAWN = 12_000
 """So many places are drawn at most, about."""
 HELD = 2_000_000
 """From so many places on, those in memory are thinned."""

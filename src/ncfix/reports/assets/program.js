@@ -18,11 +18,21 @@ async function unpacked(id) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
+const context = HTMLCanvasElement.prototype.getContext;  // the library reads back what it writes: much faster without a graphics card
+HTMLCanvasElement.prototype.getContext = function (kind, more) {
+  return context.call(this, kind, kind === "2d" ? { willReadFrequently: true, ...more } : more);
+};
+
 async function library() {
   if (window.Plotly || !$("library")) return;
   const script = document.createElement("script");
-  script.textContent = new TextDecoder().decode(await unpacked("library"));
-  document.head.append(script);
+  script.src = URL.createObjectURL(new Blob([await unpacked("library")], { type: "text/javascript" }));
+  await new Promise((done, failed) => {  // compiled beside this thread
+    script.addEventListener("load", done);
+    script.addEventListener("error", () => failed(new Error("the library cannot be loaded")));
+    document.head.append(script);
+  });
+  URL.revokeObjectURL(script.src);
 }
 
 function columns(bytes) {
@@ -144,8 +154,8 @@ class Page {
   }
 
   scene() {
-    const axis = (name, range) => ({ title: { text: `${name}, mm`, font: { size: 13, color: ink("ink") } }, tickfont: { size: 11 }, range, backgroundcolor: ink("card"), gridcolor: ink("line"),
-      zerolinecolor: ink("rapid"), color: ink("soft"), showspikes: false, nticks: 7 });
+    const axis = (name, range) => ({ title: { text: name, font: { size: 13, color: ink("ink") } }, tickfont: { size: 11 }, range, backgroundcolor: ink("card"), gridcolor: ink("line"),
+      zerolinecolor: ink("rapid"), color: ink("soft"), showspikes: false, nticks: 5 });
     return { xaxis: axis("X", this.box[0]), yaxis: axis("Y", this.box[1]), zaxis: axis("Z", this.box[2]),
       aspectmode: "manual", aspectratio: this.scaled(), dragmode: "orbit", camera: this.camera ??= this.viewed() };
   }
@@ -419,18 +429,20 @@ class Page {
 }
 
 async function begin() {
-  const data = columns(await unpacked("data"));
+  const drawing = library(), data = columns(await unpacked("data"));
+  drawing.catch(() => { });  // told below
   if (!data.way.length) {
     $("trouble").textContent = "There is nothing to draw: no motion of this program was corrected.";
     $("trouble").hidden = false;
     return;
   }
-  await library();
   const page = new Page(data);
   $("at").max = page.count - 1;
   page.told();
+  await drawing;
+  await page.unroll();
+  await new Promise(shown => setTimeout(shown));  // the curve is seen before the path is drawn
   await page.drawn();
-  page.unroll();
   page.listen();
 }
 begin().then(() => { document.documentElement.dataset.ready = "yes"; document.documentElement.dataset.readyMs = Math.round(performance.now()); }, error => {
