@@ -106,7 +106,7 @@ def verify(
     `within` of the result is the verdict; its figures are in um; `messages` say what was assumed.
     """
     from ncfix.arguments import TOLERANCE_UM
-    from ncfix.compensate.figures.verification import Compared, FollowedProgram, side_by_side, told_once
+    from ncfix.compensate.figures.verification import Compared, side_by_side
     from ncfix.text.reader import read_like
 
     TOLERANCE_UM.check("tolerance_um", tolerance_um)
@@ -121,11 +121,9 @@ def verify(
         second = read_like(read_bytes(path), path, first, known.control or "")
     else:
         second = fixed
-    meant = FollowedProgram.of(first, known, own, subprograms_of(own, first))
-    done = FollowedProgram.of(second, known, own, subprograms_of(own, second, first))
-    found, said = side_by_side(meant, done, known, own, tolerance_um)
-    messages = (*_remark_of_stamp(first), *told_once(*said))
-    return replace(Compared.together([Compared.of(each) for each in found]), messages=messages)
+    resolves = subprograms_of(own, first), subprograms_of(own, second, first)
+    found = Compared.of_all(*side_by_side(first, second, known, own, tolerance_um, resolves))
+    return replace(found, messages=(*_remark_of_stamp(first), *found.messages))
 
 
 def _remark_of_stamp(program: Program) -> Iterator[Message]:
@@ -201,14 +199,12 @@ def simulate(
 def _path_errors(program: Program, machine: Machine, setup: Setup) -> PathErrors:
     import numpy as np
 
-    from ncfix.compensate.figures.simulation import Along, tip_errors
+    from ncfix.compensate.figures.simulation import Along, tip_errors_of
     from ncfix.compensate.following import follow
-    from ncfix.compensate.plan.intent import Intent
-    from ncfix.machine import State
 
     found = follow(program, machine, setup, subprograms_of(setup, program))
-    moves, along = found.trace.moves, Along()
-    parts = list(along.adding(tip_errors(Intent(found.machine, moves, State()), program.lines(moves.block))))
+    along = Along()
+    parts = list(along.adding(tip_errors_of(program, found)))
     total = along.figures()
     lines = [each.lines for each in parts]
     intended, actual = ([getattr(each, name) for each in parts] for name in ("intended", "actual"))

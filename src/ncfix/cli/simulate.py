@@ -141,16 +141,12 @@ class Errors:
 
     def whole(self) -> tuple[Iterable[bytes], Along, Sequence[Message]]:
         """The same of a program as a whole."""
-        from ncfix.compensate.figures.simulation import tip_errors
-        from ncfix.compensate.plan.intent import Intent
-        from ncfix.machine import State
+        from ncfix.compensate.figures.simulation import tip_errors_of
 
         path = self.source.path
         program = self.following.read(path, self.source.everything())
         found = self.following.on_machine(program, path)
-        moves = found.trace.moves
-        errors = tip_errors(Intent(found.machine, moves, State()), program.lines(moves.block))
-        table, along = self._gone_along(errors, self.keep and list)
+        table, along = self._gone_along(tip_errors_of(program, found), self.keep and list)
         return table, along, found.trace.messages
 
     def _gone_along(

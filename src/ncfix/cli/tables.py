@@ -67,14 +67,11 @@ def along(
     """
     import numpy as np
 
-    from ncfix.compensate.figures.simulation import Along, seems_corrected, tip_errors, tip_with
-    from ncfix.compensate.plan.intent import Intent
-    from ncfix.machine import State
+    from ncfix.compensate.figures.simulation import Along, seems_corrected, tip_errors_of, tip_with
 
     program, followed = _followed(following, path)
     names, machine, moves = followed.machine.axis_names, followed.machine, followed.trace.moves
-    intent, lines = Intent(machine, moves, State()), program.lines(moves.block)
-    before = Along.of(tip_errors(intent, lines)).figures()
+    before = Along.of(tip_errors_of(program, followed)).figures()
     if control.rewrites:
         after = rewritten(following, settings, path).report.as_dict()["error_after_um"] or before
     else:
@@ -82,7 +79,7 @@ def along(
             text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
             raise RefusedError.of("NCF438", text, Place(shown(path)), INSTEAD)
         made = tip_with(lambda q, way, length: tables.for_tool(length).at(names, q, way))
-        after = Along.of(tip_errors(intent, lines, made=made)).figures()
+        after = Along.of(tip_errors_of(program, followed, made=made)).figures()
     fixed_length = not (control.any_tool or control.rewrites) and machine.depends_on_tool_length
     used = moves.tool_length[np.isfinite(moves.tool_length)].tolist() if fixed_length else []
     others = sorted({round(each, 3) for each in used if abs(each - tool_length) > SAME})
@@ -113,17 +110,15 @@ def rewritten_file(following: Following, settings: Mapping[str, str], path: str)
 
 
 def _followed(following: Following, path: str) -> tuple[Program, Followed]:
-    from ncfix.compensate.following import follow
     from ncfix.text import stamp
 
-    assert following.machine is not None
     program = following.read(path)
     block = stamp.find(program)
     if block is not None:
         text = "the program has been corrected already: with tables of the same errors it would be corrected twice"
         place = program.place(block)
         raise RefusedError.of("NCF493", text, place, INSTEAD)
-    return program, follow(program, following.machine, following.setup, subprograms(following.setup, path))
+    return program, following.on_machine(program, path)
 
 
 @click.command()

@@ -60,15 +60,14 @@ class ProgramPair:
         return [found], tuple(each.said for each in cuts)
 
     def _as_wholes(self) -> tuple[Sequence[SideBySide], Said]:
-        from ncfix.compensate.figures.verification import FollowedProgram, side_by_side
+        from ncfix.compensate.figures.verification import side_by_side
 
         machine, setup = self.following.machine, self.following.setup
         assert machine is not None
         first, second = self.original.path, self.fixed.path
-        meant = FollowedProgram.of(self._read(self.original), machine, setup, subprograms(setup, first))
-        other = self._read(self.fixed, like=meant.program)
-        done = FollowedProgram.of(other, machine, setup, subprograms(setup, second, first))
-        return side_by_side(meant, done, machine, setup, self.tolerance_um)
+        meant = self._read(self.original)
+        resolves = subprograms(setup, first), subprograms(setup, second, first)
+        return side_by_side(meant, self._read(self.fixed, meant), machine, setup, self.tolerance_um, resolves)
 
     def _side_by_side(self) -> SideBySide:
         from ncfix.compensate.figures.comparison import SideBySide
@@ -87,12 +86,13 @@ class ProgramPair:
 def compared(following: Following, original: str, fixed: str, tolerance_um: float) -> Compared:
     """What this machine does with two programs, measured against what the first one means."""
     with source_of(original) as first, source_of(fixed) as second:
-        found, (of_first, of_second) = ProgramPair(following, first, second, tolerance_um).compared()
+        beside, messages = ProgramPair(following, first, second, tolerance_um).compared()
         tell_of_stamp(first)
-    from ncfix.compensate.figures.verification import Compared, told_once
+    from ncfix.compensate.figures.verification import Compared
 
-    console.tell_some(told_once(of_first, of_second))
-    return Compared.together([Compared.of(each) for each in found])
+    found = Compared.of_all(beside, messages)
+    console.tell_some(found.messages)
+    return found
 
 
 @click.command(cls=ProjectCommand)

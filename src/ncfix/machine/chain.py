@@ -21,6 +21,7 @@ from ncfix.machine.axes import Axis, GaugeLine, Vector
 from ncfix.machine.error_model import ErrorModel, Slot, Sort
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
+from ncfix.machine.steps import dot
 
 Weight = float | Array
 
@@ -82,13 +83,6 @@ def turn(angle: Array) -> tuple[Array, Array]:
     half = np.tan(angle / 2)
     sine: Array = 2 * half / (1 + half * half)
     return sine, half * sine
-
-
-def dot(direction: Sequence[float], vector: Array) -> Array:
-    """The scalar product of a constant direction and vectors (3, ...), summed in the order of the components."""
-    x, y, z = direction
-    result: Array = x * vector[0] + y * vector[1] + z * vector[2]
-    return result
 
 
 def cross_with(direction: Sequence[float], arm: Array) -> Array:

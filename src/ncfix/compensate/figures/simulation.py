@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from ncfix.compensate import FixOptions
-from ncfix.compensate.following import Task, looks_corrected, numbers_of
+from ncfix.compensate.following import Followed, Task, looks_corrected, numbers_of
 from ncfix.compensate.parts import Units
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, distinct, owners, slices
 from ncfix.compensate.plan.intent import Intent
@@ -27,6 +27,7 @@ from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.diagnostics import Message
 from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
+from ncfix.text.tree import Program
 
 
 class SampledErrors(Protocol):
@@ -184,6 +185,12 @@ def tip_errors(intent: Intent, lines: Index, first: int = 0, made: Tip | None = 
     made = made or actual_tip
     for rows, fraction in samples(intent, first):
         yield TipError(rows, lines[rows], fraction, intent.tip(rows, fraction), made(intent, rows, fraction))
+
+
+def tip_errors_of(program: Program, followed: Followed, made: Tip | None = None) -> Iterator[TipError]:
+    """As `tip_errors`, of a whole program that its machine has followed."""
+    moves = followed.trace.moves
+    return tip_errors(Intent(followed.machine, moves, State()), program.lines(moves.block), made=made)
 
 
 def tip_errors_on(task: Task, read: Read, said: list[Message]) -> Iterator[TipError]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ncfix.arguments import TOLERANCE_UM
@@ -54,6 +55,11 @@ class Compared:
     def within(self) -> bool:
         """Nothing is farther from the intended path than that, and nothing that may cut is left out."""
         return not self.beyond_somewhere and not self.blind
+
+    @classmethod
+    def of_all(cls, comparisons: Sequence[SideBySide], said: Sequence[Sequence[Message]]) -> Compared:
+        """The worst of several ways in which the programs may run, and what is said of following the two."""
+        return replace(cls.together([cls.of(each) for each in comparisons]), messages=tuple(told_once(*said)))
 
     @classmethod
     def of(cls, comparison: SideBySide) -> Compared:
@@ -108,34 +114,32 @@ def reason_counts(found: Mapping[Why, int]) -> dict[str, int]:
     return {why.reason: count for why, count in sorted(found.items())}
 
 
-@dataclass(frozen=True, slots=True)
-class FollowedProgram:
-    """A program as a machine follows it in all positions of block delete, or in the one that is stated."""
-
-    program: Program
-    positions: tuple[SwitchSetting, ...]
-
-    @classmethod
-    def of(cls, program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None) -> FollowedProgram:
-        """Follow a program; raises what `follow` raises."""
-        return cls(program, positions_of(setup, lambda own: follow(program, machine, own, resolve).trace))
-
-
 def side_by_side(
-    original: FollowedProgram, other: FollowedProgram, machine: Machine, setup: Setup, tolerance_um: float
+    original: Program,
+    other: Program,
+    machine: Machine,
+    setup: Setup,
+    tolerance_um: float,
+    resolves: tuple[Resolve | None, Resolve | None] = (None, None),
 ) -> tuple[list[SideBySide], tuple[Sequence[Message], Sequence[Message]]]:
     """Two programs gone along side by side, once for each position of block delete; what is said of following them.
 
-    Raises `UsageError` NCF025 for a tolerance that is none.
+    resolves  of each: gives the text of a subprogram by its name
+
+    Raises what `follow` raises, and `UsageError` NCF025 for a tolerance that is none.
     """
     TOLERANCE_UM.check("tolerance_um", tolerance_um)
-    known = placed(machine, setup)
+
+    def positions(program: Program, resolve: Resolve | None) -> tuple[SwitchSetting, ...]:
+        return positions_of(setup, lambda own: follow(program, machine, own, resolve).trace)
+
+    known, of_first, of_second = placed(machine, setup), positions(original, resolves[0]), positions(other, resolves[1])
     found: list[SideBySide] = []
-    for first, second in in_pairs(original.positions, other.positions):
+    for first, second in in_pairs(of_first, of_second):
         found.append(SideBySide(tolerance_um / 1e3, rounding(machine)))
-        cuts = whole(known, original.program, first.trace.moves, meant=True)
-        found[-1].run(cuts, whole(known, other.program, second.trace.moves))
-    return found, (messages_of(original.positions), messages_of(other.positions))
+        cuts = whole(known, original, first.trace.moves, meant=True)
+        found[-1].run(cuts, whole(known, other, second.trace.moves))
+    return found, (messages_of(of_first), messages_of(of_second))
 
 
 def told_once(of_first: Sequence[Message], of_second: Sequence[Message]) -> list[Message]:
