@@ -186,7 +186,11 @@ def load_one(point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
     """Import one plugin and let it register everything, which nobody sees unless all goes well."""
     module = import_plugin(point)
     things = registrations(point, hooks_of(point, module))
-    check_names(point, things, earlier)
+    for plugin in earlier:
+        for kind, named in things.items():
+            for name in named:
+                if name in plugin.things.get(kind, ()):
+                    raise PluginError((taken(point.name, kind, name, f"plugin {plugin.name!r}"),))
     return Plugin(point.name, point.value, *described(point.dist), things)
 
 
@@ -256,15 +260,6 @@ def registrations(point: EntryPoint, hooks: Iterable[pluggy.HookCaller]) -> Thin
             why = f"failed in {hook.name}: {describe(error)}{place}"
             raise left_out("NCF504", point, why, "tell its author") from error
     return things
-
-
-def check_names(point: EntryPoint, things: Things, earlier: Iterable[Plugin]) -> None:
-    """Refuse a plugin that takes a name that an earlier one has."""
-    for plugin in earlier:
-        for kind, named in things.items():
-            for name in named:
-                if name in plugin.things.get(kind, ()):
-                    raise PluginError((taken(point.name, kind, name, f"plugin {plugin.name!r}"),))
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,7 +88,8 @@ def key_lines(text: str) -> Mapping[Path, int]:
             _note(table, 0, number, lines)
         elif assignment := ASSIGNMENT.match(line):
             _note(table + _keys(assignment[1]), len(table), number, lines)
-        quote = _still_open(line)
+        found = QUOTES.findall(line)
+        quote = found[0] if len(found) % 2 else ""
     return lines
 
 
@@ -119,12 +120,6 @@ def _opened(keys: Path, repeated: bool, counts: dict[Path, int]) -> Path:
 
 def _keys(dotted: str) -> Path:
     return tuple(key.strip("\"'") for key in re.findall(KEY, dotted))
-
-
-def _still_open(line: str) -> str:
-    """The quotes of a many-line string that this line opens and does not close."""
-    found = QUOTES.findall(line)
-    return found[0] if len(found) % 2 else ""
 
 
 def written(header: str, table: Mapping[str, Any]) -> str:

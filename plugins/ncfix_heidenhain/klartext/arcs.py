@@ -114,7 +114,7 @@ def circular_by_radius(control: KlartextControl, step: Step) -> None:
         raise Fault(BAD_ARC, "CR needs R, the radius")
     if give_up(control, step, where):
         return
-    plane = plane_of(control, step.words)
+    plane = plane_of(step.words)
     start, end = points(control, where, plane)
     away = end[0] - start[0], end[1] - start[1]
     radius = control.stretch * step.words.values["R"]
@@ -160,7 +160,7 @@ def tangential(control: KlartextControl, step: Step) -> None:
     if control.path.tangent is None:
         do_without(control, step, where, NO_TANGENT)
         return
-    plane = control.path.plane if step.name == "ctp" else plane_of(control, step.words)
+    plane = control.path.plane if step.name == "ctp" else plane_of(step.words)
     ahead = [dot(row, control.path.tangent) for row in control.inverse] if control.is_rotated else control.path.tangent
     start, end = points(control, where, plane)
     away = end[0] - start[0], end[1] - start[1]
@@ -222,7 +222,7 @@ def known_pole(control: KlartextControl) -> tuple[float, float]:
     return control.path.pole
 
 
-def plane_of(control: KlartextControl, words: MotionWords) -> Plane:
+def plane_of(words: MotionWords) -> Plane:
     """The plane of an arc that has no pole: that of its words, else the working plane."""
     named = frozenset(i for i in range(3) if words.axes >> i & 1)
     return PLANE_OF.get(named, PLANE_OF[frozenset((0, 1))])

@@ -240,25 +240,8 @@ class KlartextFollower(AxisFollower):
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
-        keys = [word.name for word in line.codes]
-        lead = keys[0] if keys else ""
-        if lead.startswith("TOOL CALL"):
-            parts = lead.split()
-            if len(parts) > 2 and parts[2].isdigit():
-                self.tool = int(parts[2])
-                self.lead(False) if self.tcp else None
-                self.new_length(self.length_of(self.tool))
-                self.unsay()
-            else:
-                self.lost["tool"] = "a tool call without a number"
-            return None
-        if lead.startswith("BEGIN PGM"):
-            self.unit = INCH if lead.endswith("INCH") else 1.0
-            return None
-        if lead in ("M128", "M129"):
-            self.lead(lead == "M128")
-            return None
-        if lead.startswith(("BLK FORM", "END PGM", "TOOL DEF", "LBL ")):
+        lead = line.codes[0].name if line.codes else ""
+        if self._is_statement(lead):
             return None
         if line.odd:
             if line.rest.strip():
@@ -267,16 +250,40 @@ class KlartextFollower(AxisFollower):
         self._klartext_words(line)
         words = {word.name: word for word in line.path if word.name in AXES}
         if lead == "CC":
-            self._set_pole(line, words)
+            self._set_pole(words)
             return None
-        turn = line.word("PA")
-        if not words and turn is None:
+        if not words and line.word("PA") is None:
             return None
         if any(word.name == "M" and word.value in (91, 92) for word in line.codes):
             end = self.target(words, machine=True) if not self.tcp else dict.fromkeys(self.at, NAN)
             step = self.step(row, Kind.FIXED, end, line)
             self.unsay(tuple(words))
             return step
+        return self._path(row, line, lead, words)
+
+    def _is_statement(self, lead: str) -> bool:
+        """Whether a line says something of tools, units or the control of the tip, and leads nowhere."""
+        if lead.startswith("TOOL CALL"):
+            parts = lead.split()
+            if len(parts) > 2 and parts[2].isdigit():
+                self.tool = int(parts[2])
+                if self.tcp:
+                    self.lead(False)
+                self.new_length(self.length_of(self.tool))
+                self.unsay()
+            else:
+                self.lost["tool"] = "a tool call without a number"
+        elif lead.startswith("BEGIN PGM"):
+            self.unit = INCH if lead.endswith("INCH") else 1.0
+        elif lead in ("M128", "M129"):
+            self.lead(lead == "M128")
+        else:
+            return lead.startswith(("BLK FORM", "END PGM", "TOOL DEF", "LBL "))
+        return True
+
+    def _path(self, row: int, line: TextLine, lead: str, words: Mapping[str, TextWord]) -> AxisStep:
+        """A motion by a path function."""
+        turn, keys = line.word("PA"), {word.name for word in line.codes}
         if lead not in ("L", "C", "CR", "CP") or (lead == "CP") != (turn is not None):
             return self.step(row, Kind.FEED, dict(self.at), line, f"{lead} is not known to this reader")
         self.kind = Kind.RAPID if "FMAX" in keys else Kind.FEED
@@ -287,23 +294,20 @@ class KlartextFollower(AxisFollower):
         step.said = [self.said[axis] for axis in self.axes]
         if lead == "L" or step.why:
             return step
-        if "DR+" not in keys and "DR-" not in keys:
+        if keys.isdisjoint(("DR+", "DR-")):
             step.why = "an arc without its sense"
-            return step
-        radius = line.word("R")
-        if lead == "CR":
-            value = None if radius is None or radius.value is None else radius.value * self.unit
-            if value is None:
-                step.why = "an arc without a radius"
-                return step
-            return self.circle(step, {}, "DR-" in keys, value)
-        if not {"X", "Y"} <= set(self.pole) or any(math.isnan(value) for value in self.pole.values()):
+        elif lead == "CR":
+            radius = line.word("R")
+            if radius is not None and radius.value is not None:
+                return self.circle(step, {}, "DR-" in keys, radius.value * self.unit)
+            step.why = "an arc without a radius"
+        elif not {"X", "Y"} <= set(self.pole) or any(math.isnan(value) for value in self.pole.values()):
             step.why = NO_POLE
-            return step
-        found = self.circle(step, self.pole, "DR-" in keys, None)
-        if turn is not None and turn.value is not None:
-            found.sweep = math.radians(turn.value)
-        return found
+        else:
+            step = self.circle(step, self.pole, "DR-" in keys, None)
+            if turn is not None and turn.value is not None:
+                step.sweep = math.radians(turn.value)
+        return step
 
     def _turned_about_pole(self, turn: TextWord) -> dict[str, float]:
         """Where a turn about the pole leads, in the plane."""
@@ -333,7 +337,7 @@ class KlartextFollower(AxisFollower):
                     case _:
                         self.lost[f"M{word.number}"] = f"M{word.number} is not known to this reader"
 
-    def _set_pole(self, line: TextLine, words: Mapping[str, TextWord]) -> None:
+    def _set_pole(self, words: Mapping[str, TextWord]) -> None:
         if set(words) - {"X", "Y"}:
             self.lost["pole"] = "a pole in another plane"
         said = dict(self.said)

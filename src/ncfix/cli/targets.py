@@ -156,7 +156,11 @@ def targets(
     Raises `UsageError` NCF003 ... NCF016 before anything is computed or written.
     """
     folder = outputs.folder(given)
-    _check_choices(outputs, folder)
+    check_named(outputs.output)
+    if outputs.in_place and outputs.output is not None:
+        raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
+    if outputs.resume and folder is None:
+        raise UsageError.of("NCF016", "--resume goes on with a folder of outputs, and there is none", hint="-o FOLDER")
     programs = (
         program_files(given, folder) if folders else [ProgramFile(path, os.path.basename(path)) for path in given]
     )
@@ -191,14 +195,6 @@ def check_streams(printed: str | None, **outputs: OutputTarget | None) -> None:
         streamed.append(printed)
     if len(streamed) > 1:
         raise UsageError.of("NCF010", f"{' and '.join(streamed)} would both go to standard output", hint="-o FILE")
-
-
-def _check_choices(outputs: Outputs, folder: str | None) -> None:
-    check_named(outputs.output)
-    if outputs.in_place and outputs.output is not None:
-        raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
-    if outputs.resume and folder is None:
-        raise UsageError.of("NCF016", "--resume goes on with a folder of outputs, and there is none", hint="-o FOLDER")
 
 
 def _target(program: ProgramFile, outputs: Outputs, folder: str | None) -> OutputTarget:

@@ -256,7 +256,10 @@ class MotionBuilder:
             centre=centre,
             normal=normal,
             sweep=sweep,
-            frames=self._frame_table(),
+            frames=tuple(
+                Frame(np.array(offset, dtype=np.float64), np.array(rotation), unit, diameter, increments)
+                for offset, rotation, unit, diameter, increments in self._frames
+            ),
             reasons=tuple(self._reasons),
             pointing=None,
             approach=self._approach_column(len(block)),
@@ -319,12 +322,6 @@ class MotionBuilder:
         self.overturned = _first(block, rows & cuts, self.overturned)
         self.brought_back = _first(block, back & cuts, self.brought_back)
         return extremes(self.rolls, plain, end - offset)
-
-    def _frame_table(self) -> tuple[Frame, ...]:
-        return tuple(
-            Frame(np.array(offset, dtype=np.float64), np.array(rotation), unit, diameter, increments)
-            for offset, rotation, unit, diameter, increments in self._frames
-        )
 
     def _approach_column(self, count: int) -> FloatArray | None:
         if not self._approaches:

@@ -210,11 +210,7 @@ class ControlState(ABC):
         self.rotation: Rotation = IDENTITY
         self.position = zeros()
         self.unknown: UnknownAxes = {}
-        self._start(run.axes)
-
-    def _start(self, axes: tuple[str, ...]) -> None:
-        """The start position, as far as it is given."""
-        for axis in axes:
+        for axis in run.axes:
             index = INDEX[axis]
             if axis in self.setup.initial:
                 self.position[index] = self.setup.initial[axis] * (DEGREE if self.rotary[index] else 1.0)

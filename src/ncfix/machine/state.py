@@ -105,7 +105,12 @@ def flatten(q: ArrayLike, state: State, axes: tuple[Axis, ...], names: frozenset
         q = np.broadcast_to(q, (*shape, len(axes)))
     columns = np.ascontiguousarray(q.reshape(-1, len(axes)).T)
     flat = {name: np.broadcast_to(values, shape).reshape(-1) for name, values in inputs.items()}
-    return shape, Poses(columns, _column(length, shape), _directions(direction, shape, len(axes)), flat)
+    return shape, Poses(
+        columns,
+        length.reshape(1) if length.size == 1 else np.broadcast_to(length, shape).reshape(-1),
+        _directions(direction, shape, len(axes)),
+        flat,
+    )
 
 
 def _input(state: State, name: str) -> Array:
@@ -117,10 +122,6 @@ def _input(state: State, name: str) -> Array:
             hint=f"--input {name}=VALUE or [inputs] in the setup file; with measurements, a column of that name",
         )
     return np.asarray(values, dtype=np.float64)
-
-
-def _column(values: Array, shape: tuple[int, ...]) -> Array:
-    return values.reshape(1) if values.size == 1 else np.broadcast_to(values, shape).reshape(-1)
 
 
 def _directions(values: Array, shape: tuple[int, ...], n_axes: int) -> Array:

@@ -76,7 +76,7 @@ class ProgramPage:
             "edges": np.round(EDGES, 6).tolist(),
             "share": dict(zip(("before", "after"), _percent(record.share), strict=True)),
             "spots": [_flat(spot) for spot in self._spots],
-            "source": self._source(columns["line"]),
+            "source": self._source(),
         }
         values = {
             "version": escape(__version__),
@@ -209,7 +209,7 @@ class ProgramPage:
     def _code(self, line: int) -> str:
         return f"<code>{escape(self._text(line))}</code>"
 
-    def _source(self, lines: Array) -> dict[int, str]:
+    def _source(self) -> dict[int, str]:
         """The lines that the page shows as text: all of a short program, else those around the places that it lists."""
         if len(self.text) <= WHOLE:
             wanted = set(range(1, len(self._lines) + 1))
