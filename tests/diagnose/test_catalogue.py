@@ -75,14 +75,15 @@ def test_names_are_alike_if_either_shows_what_the_other_does() -> None:
     own = random.normal(size=(60, 4))
     turned, richer = own @ random.normal(size=(4, 4)), np.concatenate([own, 3 * random.normal(size=(60, 4))], axis=1)
     shown = own @ np.ones(4)
-    assert act_alike(own, shown, turned)
-    assert not act_alike(own, shown, richer)  # which shows more than this: nine tenths of its squares
+    assert act_alike(own, shown, turned, 24.0)
+    assert not act_alike(own, shown, richer, 24.0)  # which shows more than this: nine tenths of its squares
     apart = turned + 0.3 * random.normal(size=turned.shape)
     assert ((without(orthonormal(apart), shown[:, None])) ** 2).sum() > TOLD_APART
-    assert not act_alike(own, shown, apart)  # the data tell them
+    assert not act_alike(own, shown, apart, 24.0)  # the data tell them
     basis = orthonormal(own)
-    assert act_alike(own, shown, basis)
-    assert not act_alike(own, shown, basis * [1.0, 1.0, 1.0, 1e-3])  # of which the last had to be 8 mm and not 8 um
+    assert act_alike(own, shown, basis, 24.0)
+    last_had_to_be_8_mm = basis * [1.0, 1.0, 1.0, 1e-3]
+    assert not act_alike(own, shown, last_had_to_be_8_mm, 24.0)
 
 
 def test_a_spindle_that_grows_may_be_a_frame_that_drifts_where_no_tool_turns() -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import multivariate_normal
 
-from ncfix.diagnosis.evidence import SIZES, log_odds
+from ncfix.diagnosis.evidence import log_odds
 from ncfix.diagnosis.forms import principal_rotation
 from ncfix.diagnosis.joint_fit import pose_regions
 from ncfix.diagnosis.residual_data import damped
 
 ROUNDING = 1e-9
+SIZES = (1.5, 3.0, 6.0, 12.0, 24.0)
 
 
 def test_log_odds_are_those_of_two_normal_distributions() -> None:
@@ -18,7 +19,7 @@ def test_log_odds_are_those_of_two_normal_distributions() -> None:
     random = np.random.default_rng(3)
     columns, y = random.normal(size=(40, 3)), random.normal(size=40) * 1.3
     known = 1e9
-    found = log_odds(columns.T @ columns, columns.T @ y, y @ y + known, 40 + known)
+    found = log_odds(columns.T @ columns, columns.T @ y, y @ y + known, 40 + known, SIZES)
     none = multivariate_normal(np.zeros(40), np.eye(40)).logpdf(y)
     for size, odds in zip(SIZES, found, strict=True):
         there = multivariate_normal(np.zeros(40), np.eye(40) + size**2 * columns @ columns.T).logpdf(y)

@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 from ncfix.diagnosis.selection import findable_in_words, mean_odds, shows_hardly_anything
 
 DRAWS = 4000
+SIZES = (1.5, 3.0, 6.0, 12.0, 24.0)
 
 
 @pytest.mark.parametrize("size", [0.3, 1.0, 3.0])
@@ -25,9 +26,9 @@ def test_odds_are_the_mean_of_those_of_effects_of_that_size(size: float) -> None
 def test_sizes_are_said_once_and_names_that_cannot_show_count() -> None:
     sizes = {"EXX": 1.5, "EYX": 1.5, "EZX": 6.0, "drift X": np.inf}
     assert (
-        findable_in_words(sizes, 5)
+        findable_in_words(sizes, 5, SIZES)
         == "what would have been found: from 1.5 um rms on 2 of 5 effects, from 6 um rms on 3"
     )
-    assert not shows_hardly_anything(sizes, 5)
-    assert shows_hardly_anything(sizes, 7)
-    assert findable_in_words({"EXX": np.inf}, 9) == "none of 9 effects would have been found, were it 24 um rms"
+    assert not shows_hardly_anything(sizes, 5, SIZES)
+    assert shows_hardly_anything(sizes, 7, SIZES)
+    assert findable_in_words({"EXX": np.inf}, 9, SIZES) == "none of 9 effects would have been found, were it 24 um rms"

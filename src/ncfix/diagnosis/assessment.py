@@ -23,6 +23,7 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import SPINDLE
 from ncfix.machine.basis import Backlash
 from ncfix.machine.effects import runs_ahead
+from ncfix.machine.state import SUM
 
 BOUNDS: dict[str, tuple[float, float]] = {
     "curve": (100.0, 100.0),
@@ -45,6 +46,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "table stiffness": (0.0, 100.0),
     "unbalanced load": (0.0, 150.0),
     "gravity sag": (150.0, 300.0),
+    "compliance": (0.0, 1000.0),
     "trunnion twist": (0.0, 300.0),
     "tool droop": (0.0, 150.0),
     "spindle growth": (200.0, 0.0),
@@ -55,7 +57,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "rotary centre drift": (150.0, 0.0),
     "slip": (1000.0, 0.0),
 }
-"""kind -> (um, urad) that the error of the joint reaches at most where it was measured."""
+"""kind -> (um, urad) that the error of the joint reaches at most where it was measured, on a machine of a metre."""
 FIX = "fix"
 POSITIONING = ("linuxcnc", "fanuc-pitch", "heidenhain", "siemens", "isg", "fanuc", "heidenhain-kinematics")
 """Tables of one axis over itself."""
@@ -109,7 +111,10 @@ def plausibility(data: ResidualData, candidate: Candidate, effects: Sequence[Eff
     machine = data.machine.replace(effects=tuple(effects))
     errors = np.concatenate([machine.joint_errors(each.q, each.state) for each in data.problem.observations])
     shifts, tilts = 1e3 * np.abs(errors[..., :3]).max(), 1e6 * np.abs(errors[..., 3:]).max()
-    largest, bounds = (float(shifts), float(tilts)), BOUNDS.get(catalogue_row(candidate))
+    bounds = BOUNDS.get(catalogue_row(candidate))
+    if bounds:
+        bounds = data.large * bounds[0], data.large * bounds[1]
+    largest = float(shifts), float(tilts)
     return Plausibility(largest, bounds, (*_size(largest, bounds), *_sign(machine, effects)))
 
 
@@ -139,7 +144,7 @@ def carriers(machine: Machine, effects: Sequence[Effect]) -> tuple[str, ...]:
 
 def conditions(machine: Machine, effects: Sequence[Effect]) -> tuple[str, ...]:
     """What must be stated for a program because no control looks it up: temperatures, time, load."""
-    signals = {name for effect in effects for name in (effect.signal, effect.times) if name}
+    signals = {part for effect in effects for name in (effect.signal, effect.times) if name for part in name.split(SUM)}
     return tuple(sorted(signals - set(machine.axis_names)))
 
 

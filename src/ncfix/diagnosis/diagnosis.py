@@ -66,7 +66,7 @@ from ncfix.measure.measurement import Array, Measurement
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
 EXCESS_UM = 2.0
-"""What has no name decides nothing below this, rms: machines have a little of everything."""
+"""What has no name decides nothing below this, rms: machining centres have a little of everything."""
 MUCH = 1 / 3
 """Nor below this share of what all names together show."""
 LACKING = 1e-3
@@ -216,14 +216,20 @@ class Unexplained:
 
 
 def verdict_of(
-    findings: Sequence[EffectFinding], rest: Unexplained, told_um: float, floor: NoiseFloor, noise_um: float
+    findings: Sequence[EffectFinding],
+    rest: Unexplained,
+    told_um: float,
+    floor: NoiseFloor,
+    noise_um: float,
+    little: float = 1.0,
 ) -> str:
     """The verdict, where the names show `told_um`.
 
     Without repeats a smooth rest may as well be the part's or the instrument's: only a large or clear one decides.
     """
     doubtful = floor.source == "neighbours"
-    decides = rest.size_um > (max(EXCESS_UM, noise_um) if doubtful and rest.odds < CLEAR else EXCESS_UM)
+    excess = EXCESS_UM * little
+    decides = rest.size_um > (max(excess, noise_um) if doubtful and rest.odds < CLEAR else excess)
     if decides and rest.size_um >= (1.0 if doubtful else MUCH) * told_um * bool(findings):
         return UNKNOWN
     if not findings:
@@ -256,7 +262,7 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
     rest = _rest(case, selected, joint, floor, noise_um, weights[2] - weights[1])
     return Diagnosis(
         case=case,
-        verdict=verdict_of(findings, rest, visible_um(data, joint.together), floor, noise_um),
+        verdict=verdict_of(findings, rest, visible_um(data, joint.together), floor, noise_um, data.little),
         findings=findings,
         rest=rest,
         gap=_gap(case, told, joint, share, noise_um),
@@ -306,7 +312,7 @@ def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: fl
 
     Beside a name they have to matter at least half as much: the mean of a curve is a constant, too.
     """
-    if constants.odds <= 0 or constants.size_um < max(EXCESS_UM, RATHER * named_um):
+    if constants.odds <= 0 or constants.size_um < max(EXCESS_UM * case.data.little, RATHER * named_um):
         return ()
     p_value = min(constants.p_value, float(np.exp(-constants.odds)))
     if constants.whole:
@@ -349,7 +355,7 @@ def _rest(
         unnamed_um(evidence, selected, whole, keep),
         tuple(evidence.groups[selected.members[name].group].owner.title for name in selected.unnamed),
         odds,
-        beyond_noise(floor, noise_um, case.data.rms(joint.after, keep)),
+        beyond_noise(floor, noise_um, case.data.rms(joint.after, keep), case.data.little),
         lack_of_fit(floor, joint.after[keep], parameters),
     )
 
@@ -424,7 +430,7 @@ def _changes(found: Diagnosis) -> Diagnosis:
     titles = tuple(evidence.groups[members[name].group].owner.title for name in unnamed)
     rest = Unexplained(size, titles, found.rest.odds if unnamed else 0.0, 0.0, None)
     told = visible_um(found.data, np.sum([np.zeros(len(found.data.y)), *(each.shown for each in new)], axis=0))
-    verdict = verdict_of(new, rest, told, found.floor, found.gap.floor)
+    verdict = verdict_of(new, rest, told, found.floor, found.gap.floor, found.data.little)
     machine = found.machine if new else None
     proposal = found.proposal if found.proposal and found.proposal.name.startswith(CHANGE) else None
     return replace(
@@ -460,7 +466,7 @@ def _explained(
     evidence = Evidence(background, groups, len(named))
     case, scale = Case(seen, candidates, unheard_of, visible, outlying, evidence), Comparison(evidence)
     selected = _selected(scale)
-    while evidence.most > 1 and _everything_um(evidence, selected) > PLAUSIBLE_UM:
+    while evidence.most > 1 and _everything_um(evidence, selected) > PLAUSIBLE_UM * seen.large:
         evidence.most = SHARES.index(evidence.share(list(selected.members.values())))
         scale = Comparison(evidence)
         selected = _selected(scale)

@@ -48,8 +48,6 @@ SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
 """Size of everything else together, against the noise of one value."""
 PRIOR = (0.3, 0.3, 0.25, 0.12, 0.03)
 """How likely these are beforehand."""
-SIZES = (1.5, 3.0, 6.0, 12.0, 24.0)
-"""um: sizes of an effect at the tool tip that are considered."""
 FALLEN = 12.0
 """A share of the background that is less likely than another by this log likelihood adds nothing."""
 Members = Mapping[str, "Member"]
@@ -149,9 +147,10 @@ class DataProducts:
 
 @dataclass(frozen=True)
 class CandidateOdds:
-    """Log odds of every group per size beside some members, (groups, sizes)."""
+    """Log odds of every group per size (um) beside some members, (groups, sizes)."""
 
     odds: Array
+    sizes: Sequence[float]
 
     def of(self, groups: Sequence[int]) -> float:
         """Log odds of an effect with these forms, whichever form and size it has."""
@@ -162,7 +161,7 @@ class CandidateOdds:
         """Its likeliest forms, each with its likeliest size."""
         own = self.odds[list(groups)]
         order = np.argsort(-own.max(axis=1))[:count]
-        return [Member(groups[int(form)], SIZES[int(own[form].argmax())]) for form in order]
+        return [Member(groups[int(form)], self.sizes[int(own[form].argmax())]) for form in order]
 
 
 @dataclass(repr=False)
@@ -224,11 +223,12 @@ class Evidence:
         taken = solve_triangular(factor, taken, lower=True, check_finite=False)
         total, count = inner.squares - float(own @ own) + freedom, len(self.y) + freedom
         projected = inner.projected - taken.T @ own
-        odds = np.empty((len(self.groups), len(SIZES)))
+        sizes = self.background.data.sizes
+        odds = np.empty((len(self.groups), len(sizes)))
         for groups, places, blocks in self._blocks(share):
             lost = np.moveaxis(taken[:, places], 0, 1)
-            odds[groups] = log_odds(blocks - np.swapaxes(lost, 1, 2) @ lost, projected[places], total, count)
-        return CandidateOdds(odds)
+            odds[groups] = log_odds(blocks - np.swapaxes(lost, 1, 2) @ lost, projected[places], total, count, sizes)
+        return CandidateOdds(odds, sizes)
 
     def likelihood(self, members: Sequence[Member], beside: Array | None = None) -> float:
         """Log likelihood of the data with these members there and no others, whatever the share of the background."""
@@ -351,7 +351,7 @@ class Evidence:
         return widths
 
 
-def log_odds(inner: Array, projected: Array, total: float, count: float) -> Array:
+def log_odds(inner: Array, projected: Array, total: float, count: float, sizes: Sequence[float]) -> Array:
     """Log odds per size, (..., p, p) inner products of columns and (..., p) with the data -> (..., sizes).
 
     `total` is the sum of squares of the data, `count` its freedom. One Cholesky factor of [[I/s^2 + B, a], [a', total]]
@@ -363,8 +363,8 @@ def log_odds(inner: Array, projected: Array, total: float, count: float) -> Arra
     bordered[..., width, :width] = bordered[..., :width, width] = projected
     bordered[..., width, width] = total
     places = np.arange(width)
-    odds = np.empty((*inner.shape[:-2], len(SIZES)))
-    for k, size in enumerate(SIZES):
+    odds = np.empty((*inner.shape[:-2], len(sizes)))
+    for k, size in enumerate(sizes):
         own = bordered.copy()
         own[..., places, places] += size**-2
         factor = np.linalg.cholesky(own)
@@ -433,7 +433,7 @@ class Comparison:
 
     def price(self, name: str) -> float:
         """What an effect pays for what it was chosen from."""
-        chosen = np.log(len(self.evidence.forms[name]) * len(SIZES))
+        chosen = np.log(len(self.evidence.forms[name]) * len(self.evidence.background.data.sizes))
         alternatives = self.evidence.alternatives
         return float(
             chosen + (np.log(len(alternatives)) + UNNAMED if name in alternatives else np.log(len(self.names)))

@@ -269,7 +269,7 @@ def _failed(scale: Comparison, selected: Selected) -> list[str]:
     share = evidence.share(members)
     held = held_out(evidence, members, share)
     joint = fitted(evidence, members, share)
-    least = max(MATERIAL_UM, RATHER * unnamed_um(evidence, selected, joint))
+    least = max(evidence.background.data.little * MATERIAL_UM, RATHER * unnamed_um(evidence, selected, joint))
     found = []
     for k, name in enumerate(selected.members):
         mean, error = prediction_gain(held, held.less[k])

@@ -23,7 +23,7 @@ from ncfix.diagnosis.residual_data import (
 from ncfix.diagnosis.stale_tables import shifted_tables
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
-from ncfix.machine.plausible import much
+from ncfix.machine.plausible import much, times_a_machining_centre
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index, Measurement
@@ -236,6 +236,7 @@ class FirstOrder:
         free = UM * problem.nuisance(problem.start) / now.relative[:, None]
         own = UM * problem.design / now.relative[:, None]
         size = np.sqrt((own**2).mean(axis=0))
+        held_um *= times_a_machining_centre(problem.machine)
         prior = np.diag(now.noise / held_um * np.where(size > 0, size, 1.0))
         below = np.concatenate([np.zeros((len(prior), free.shape[1])), prior], axis=1)
         columns = np.concatenate([np.concatenate([free, own], axis=1), below])

@@ -26,6 +26,7 @@ from ncfix.diagnosis.residual_data import (
     AS_IT_STANDS_UM,
     TIGHT_UM,
     Misfit,
+    little_of,
     misfit,
 )
 from ncfix.diagnostics import NcfixError
@@ -141,5 +142,6 @@ def _reaches_noise(mistake: Mistake, now: Misfit) -> bool:
     """Whether the file as it stands, its constants not fitted, is at the noise once the mistake is undone."""
     fixed = misfit(mistake.measurements, mistake.machine)
     still = _weight(max(mistake.after_um, fixed.left(AS_IT_STANDS_UM)), mistake.stretch, now) - mistake.paid
-    floor = float(np.hypot(fixed.noise, A_LITTLE_UM)) / mistake.stretch
+    little = A_LITTLE_UM * little_of(mistake.machine, fixed.noise)
+    floor = float(np.hypot(fixed.noise, little)) / mistake.stretch
     return still >= _weight(floor, 1.0, now) - NAMES_COST

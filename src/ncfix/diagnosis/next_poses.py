@@ -22,6 +22,7 @@ from ncfix.diagnosis.joint_fit import Mask
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.diagnosis.selection import Selected, aliases
 from ncfix.machine import Machine
+from ncfix.machine.state import SUM
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import STATES, Array, Measurement
 
@@ -170,7 +171,8 @@ def _with_plan(proposal: Proposal, plan: Measurement, data: ResidualData) -> Pro
 def _signals(sides: Sequence[Hypothesis]) -> frozenset[str]:
     """What the effects go with."""
     effects = [effect for side in sides for group, _ in side.forms for effect in group.owner.effects]
-    return frozenset(name for effect in effects for name in (effect.signal, effect.times) if name is not None)
+    named = (name for effect in effects for name in (effect.signal, effect.times) if name is not None)
+    return frozenset(name for signal in named for name in signal.split(SUM))
 
 
 def _reason(evidence: Evidence, groups: Sequence[EffectForm]) -> str:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, eigh, lapack, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
-from ncfix.diagnosis.evidence import MISSHAPEN, SIZES, Background, entry_price, in_noise, log_odds, marginal
+from ncfix.diagnosis.evidence import MISSHAPEN, Background, entry_price, in_noise, log_odds, marginal
 from ncfix.diagnosis.forms import EffectForm, shape_variations, without_lacking_constants
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import orthonormal
@@ -54,7 +54,7 @@ ASIDE = 1e3
 FAILED = 0.02
 """Share of the rows that an instrument may spoil; where more stand out, an effect may be why."""
 LARGE = 8.0
-"""The sizes of `SIZES` times this, in noise, are those of effects that make rows stand out."""
+"""The sizes of effects times this, in noise, are those of effects that make rows stand out."""
 LIKELY = 10.0
 """Log odds that such an effect must have."""
 MOST_EFFECTS = 5
@@ -64,7 +64,7 @@ TAILS = 2.0
 TRUSTED = 0.1
 """How far a noise that was given may be off."""
 USUAL_UM = 1.0
-"""rms of the little of everything that all machines have."""
+"""rms of the little of everything that all machining centres of a metre have."""
 ASTRAY = 5.0
 """Standard deviations beyond which a repeat is not noise."""
 ENOUGH_REPEATS = 10
@@ -124,7 +124,9 @@ def estimated_background(
     inner = free.of(in_noise(everything, relative))
     if slow is not None:
         seen = free.of(slow)
-        drift = _likeliest_drift(DriftLikelihood(free, sigma * relative, data.y, inner, seen, freedom), named)
+        drift = _likeliest_drift(
+            DriftLikelihood(free, sigma * relative, data.y, inner, seen, freedom), named, data.sizes
+        )
     if drift:
         factor = np.linalg.cholesky(np.eye(left.shape[1]) + drift**2 * seen)
         left = solve_triangular(factor, left.T, lower=True).T
@@ -193,50 +195,50 @@ class DriftLikelihood:
         return self.factors[size]
 
 
-def _likeliest_drift(asked: DriftLikelihood, named: Sequence[EffectForm]) -> float:
+def _likeliest_drift(asked: DriftLikelihood, named: Sequence[EffectForm], sizes: Sequence[float]) -> float:
     """The size that explains most; with names no more of it than without, and no less than what their courses miss."""
     plain = [asked.likelihood(size) for size in DRIFT_SIZES]
     most = int(np.argmax(plain)) + 1
     courses = [group for group in named if group.owner.slow]
     seen = asked.seen([asked.y, *(group.columns for group in courses)]) if most > 1 else np.zeros((0, 1))
     whites = (asked.white(size, seen) for size in DRIFT_SIZES[:most] if most > 1)
-    beside = [_beside_names(white, asked.freedom, courses, named) for white in whites] or [(0.0, 0.0)]
+    beside = [_beside_names(white, asked.freedom, courses, named, sizes) for white in whites] or [(0.0, 0.0)]
     best = int(np.argmax([own + gained for own, (gained, _) in zip(plain, beside, strict=False)]))
     missed = MISSHAPEN * beside[best][1] / float(np.median(asked.scale))
     return max(size for size in DRIFT_SIZES[:most] if size <= max(DRIFT_SIZES[best], missed))
 
 
 def _beside_names(
-    white: Array, freedom: float, courses: Sequence[EffectForm], named: Sequence[EffectForm]
+    white: Array, freedom: float, courses: Sequence[EffectForm], named: Sequence[EffectForm], sizes: Sequence[float]
 ) -> tuple[float, float]:
     """How much log likelihood names that act by time alone add to a wandering, less what they pay; and how much the
     largest shows, um rms. `white` are the data and the columns of those names, (n, 1 + p).
     """
     forms = Counter(group.owner.name for group in named)
-    prices = np.log([len(forms) * forms[group.owner.name] * len(SIZES) for group in courses])
+    prices = np.log([len(forms) * forms[group.owner.name] * len(sizes) for group in courses])
     ends = np.cumsum([1, *(group.columns.shape[1] for group in courses)])
     gained, shown = 0.0, 0.0
     for count in range(1, MOST_COURSES + 1 if courses else 1):
-        odds = _odds(white, ends, freedom) - prices[:, None]
-        best, large = np.unravel_index(int(odds.argmax()), odds.shape)
+        odds = _odds(white, ends, freedom, sizes) - prices[:, None]
+        best, large = (int(k) for k in np.unravel_index(int(odds.argmax()), odds.shape))
         helped = float(odds[best, large]) - entry_price(count) + entry_price(count - 1)
         if helped <= 0:
             break
-        gained, shown = gained + helped, max(shown, SIZES[large])
-        white = _beside(white, SIZES[large] * white[:, ends[best] : ends[best + 1]])
+        gained, shown = gained + helped, max(shown, sizes[large])
+        white = _beside(white, sizes[large] * white[:, ends[best] : ends[best + 1]])
     return gained, shown
 
 
-def _odds(white: Array, ends: Array, freedom: float) -> Array:
+def _odds(white: Array, ends: Array, freedom: float, sizes: Sequence[float]) -> Array:
     """The log odds of every form in every size, (forms, sizes); data and columns are white, (n, 1 + p)."""
     y, widths = white[:, 0], np.diff(ends)
-    found = np.empty((len(widths), len(SIZES)))
+    found = np.empty((len(widths), len(sizes)))
     total, count = float(y @ y) + freedom, len(y) + freedom
     for width in np.unique(widths):
         alike = np.flatnonzero(widths == width)
         stack = np.stack([white[:, ends[k] : ends[k + 1]] for k in alike])
         turned = np.swapaxes(stack, 1, 2)
-        found[alike] = log_odds(turned @ stack, turned @ y, total, count)
+        found[alike] = log_odds(turned @ stack, turned @ y, total, count, sizes)
     return found
 
 
@@ -308,9 +310,9 @@ def _likeliest_effect(data: ResidualData, there: Array, wide: Array, groups: Seq
     for group in groups:
         columns = LARGE * group.columns / data.relative[:, None]
         solved = precision @ columns
-        odds = log_odds(columns.T @ solved, solved.T @ y, total, count)
+        odds = log_odds(columns.T @ solved, solved.T @ y, total, count, data.sizes)
         if odds.max() > best:
-            best, found = float(odds.max()), SIZES[int(odds.argmax())] * columns
+            best, found = float(odds.max()), data.sizes[int(odds.argmax())] * columns
     if found is None:
         return None
     solved = precision @ found
@@ -344,13 +346,13 @@ def noise_floor(data: ResidualData, background: Background, sigma_um: float, kee
     return NoiseFloor(sigma_um, "neighbours", 0)
 
 
-def beyond_noise(noise_floor: NoiseFloor, noise_um: float, left_um: float) -> float:
+def beyond_noise(noise_floor: NoiseFloor, noise_um: float, left_um: float, little: float) -> float:
     """What is left beyond the noise and what machines have of everything, um rms.
 
     Noise that comes from repeats with long tails is known to two standard deviations only, a given one to a tenth.
     """
     doubt = 2 * np.sqrt(TAILS / noise_floor.freedom) if noise_floor.freedom else TRUSTED
-    return float(np.sqrt(max(left_um**2 - (noise_um * (1 + doubt)) ** 2 - USUAL_UM**2, 0.0)))
+    return float(np.sqrt(max(left_um**2 - (noise_um * (1 + doubt)) ** 2 - (little * USUAL_UM) ** 2, 0.0)))
 
 
 def repeat_scatter(data: ResidualData, keep: NDArray[np.bool_]) -> tuple[float, int]:

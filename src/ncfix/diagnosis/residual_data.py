@@ -19,6 +19,7 @@ from ncfix.diagnosis.catalogue.candidate import MeasuredRange
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import SPINDLE, Axis
 from ncfix.machine.basis import ConstantBasis, Polynomial
+from ncfix.machine.plausible import times_a_machining_centre
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import gauss_newton, solve
 from ncfix.measure.measurement import Array, Index, Measurement
@@ -31,8 +32,13 @@ FAR = 1.0
 """How far from the middle of what was measured a workpiece is held, in times its size."""
 UNTELLABLE = 1e-5
 """Singular values below this, of the largest, are taken for what cannot be told."""
+LEAST_UM, DOUBLED = 1.5, 4
+"""The least size of an effect that is considered, and how often that is doubled on a machining centre of a metre."""
+USUAL_NOISE_UM = 3.0
+"""Noise of a value for which the least sizes that matter are stated."""
 TIGHT_UM = 4.0
-"""How far each constant of a machine file may have moved since, at the tool tip."""
+"""How far each constant of a machine file may have moved since, at the tool tip; as the next ones of a machining
+centre, and more on larger machines and arms."""
 AS_IT_STANDS_UM = 0.01
 """The same where the file itself is judged."""
 USUAL_UM = 50.0
@@ -75,6 +81,21 @@ class ResidualData:
         """Standard deviation of a plain value as the files tell it, um."""
         known = [each.sigma for each in self.problem.observations if each.noise_known]
         return UM * float(np.median(np.concatenate(known) if known else self.problem.sigma))
+
+    @cached_property
+    def sizes(self) -> tuple[float, ...]:
+        """Sizes of an effect at the tool tip that are considered, um."""
+        return tuple(LEAST_UM * 2.0**k for k in range(DOUBLED + 1 + round(np.log2(self.large))))
+
+    @cached_property
+    def large(self) -> float:
+        """How many times as large errors are as on a machining centre of a metre."""
+        return times_a_machining_centre(self.machine)
+
+    @cached_property
+    def little(self) -> float:
+        """The same of what is too small to matter: no more than the noise makes it."""
+        return little_of(self.machine, self.sigma)
 
     @property
     def machine(self) -> Machine:
@@ -244,6 +265,11 @@ def residual_data(measurements: Sequence[Measurement], machine: Machine) -> Resi
     return ResidualData(problem, coefficients, unknowns, UM * residual, base, rows_of(problem), relative)
 
 
+def little_of(machine: Machine, noise_um: float) -> float:
+    """How many times as large as on a machining centre an error is that does not matter, measured with this noise."""
+    return min(times_a_machining_centre(machine), max(1.0, noise_um / USUAL_NOISE_UM))
+
+
 def relative_noise(problem: Problem) -> Array:
     """Standard deviation of each value against the usual one, (m,); files that do not tell are like those that do."""
     known = [each.sigma for each in problem.observations if each.noise_known]
@@ -301,7 +327,7 @@ class Misfit:
 
     def left(self, prior_um: float = TIGHT_UM) -> float:
         """Root mean square of residual values, um, without the largest; what constants moved is counted as misfit."""
-        return _fitted(self.problem, self.relative, self.noise, prior_um, self.loose)[0]
+        return self._fitted(prior_um)[0]
 
     @property
     def count(self) -> int:
@@ -316,13 +342,18 @@ class Misfit:
     @property
     def constants(self) -> Array:
         """Those of the file where the data have them."""
-        return _fitted(self.problem, self.relative, self.noise, USUAL_UM, self.loose)[1]
+        return self._fitted(USUAL_UM)[1]
 
     @property
     def coefficients(self) -> Array:
         """Those that are loose."""
-        every = _fitted(self.problem, self.relative, self.noise, TIGHT_UM, self.loose)[1]
+        every = self._fitted(TIGHT_UM)[1]
         return every[len(every) - self.loose :]
+
+    def _fitted(self, prior_um: float) -> tuple[float, Array]:
+        """What is left and the constants, held as far as errors of this machine are larger than of others."""
+        large = times_a_machining_centre(self.problem.machine)
+        return _fitted(self.problem, self.relative, self.noise, large * prior_um, self.loose, large * LOOSE_UM)
 
 
 def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequence[Effect] = ()) -> Misfit:
@@ -334,7 +365,9 @@ def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequenc
     return Misfit(problem, relative_noise(problem), sigma, sum(effect.basis.size for effect in loose))
 
 
-def _fitted(problem: Problem, relative: Array, sigma: float, prior_um: float, free: int) -> tuple[float, Array]:
+def _fitted(
+    problem: Problem, relative: Array, sigma: float, prior_um: float, free: int, loose_um: float
+) -> tuple[float, Array]:
     """Least squares with a prior on the constants, on the exact model."""
     start, k = problem.selection.start, len(problem.start)
     held: Array
@@ -347,7 +380,7 @@ def _fitted(problem: Problem, relative: Array, sigma: float, prior_um: float, fr
         size = np.where(size > 0, size, 1.0)
         allowed = np.full(columns.shape[1], WIDE_UM)
         allowed[k:] = prior_um
-        allowed[len(allowed) - free :] = LOOSE_UM
+        allowed[len(allowed) - free :] = loose_um
         held = sigma / allowed * size
         y = UM * problem.residual(coefficients, unknowns) / relative
         back = -held * np.concatenate([np.zeros(k), coefficients - start])

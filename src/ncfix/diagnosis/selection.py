@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ncfix.diagnosis.evidence import SIZES, Comparison, Evidence, Member, Members, entry_price
+from ncfix.diagnosis.evidence import Comparison, Evidence, Member, Members, entry_price
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
 
@@ -52,7 +52,7 @@ WEIGHED = 5
 HELPS = 0.1
 """Log odds by which a change must help."""
 CONSTANT_UM = 300.0
-"""How far they may be off while they are free."""
+"""How far they may be off while they are free, on a machining centre."""
 FEW_SHOWN = 0.5
 """Share of all names that data must be able to show at the largest size, to show more than hardly anything."""
 
@@ -62,7 +62,8 @@ def _acts_alike(evidence: Evidence, members: Sequence[Member], own: Member, othe
     share = evidence.share(members)
     first = _white(evidence, own.group, share)
     shown = first @ evidence.numbers(members, share)[list(members).index(own)]
-    return any(act_alike(first, shown, _white(evidence, form, share)) for form in evidence.forms[other])
+    largest = evidence.background.data.sizes[-1]
+    return any(act_alike(first, shown, _white(evidence, form, share), largest) for form in evidence.forms[other])
 
 
 def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> bool:
@@ -79,17 +80,19 @@ def _white(evidence: Evidence, group: int, share: float) -> Array:
     return white
 
 
-def act_alike(first: Array, shown: Array, second: Array) -> bool:
+def act_alike(first: Array, shown: Array, second: Array, largest_um: float) -> bool:
     """Whether the second columns can show what is shown, and either what the other may show."""
-    return _unexplained(shown, second) < TOLD_APART and min(_shared(first, second), _shared(second, first)) > SAME
+    return (
+        _unexplained(shown, largest_um * second) < TOLD_APART
+        and min(_shared(first, second), _shared(second, first)) > SAME
+    )
 
 
-def _unexplained(shown: Array, by: Array) -> float:
-    """Squares of what is shown that columns of the largest size considered cannot show, and of the numbers behind them.
+def _unexplained(shown: Array, sized: Array) -> float:
+    """Squares of what is shown that columns of the largest size cannot show, and of the numbers behind them.
 
     Without the latter a combination that hardly shows could stand for anything.
     """
-    sized = SIZES[-1] * by
     seen = sized.T @ shown
     return float(shown @ shown - seen @ np.linalg.solve(np.eye(sized.shape[1]) + sized.T @ sized, seen))
 
@@ -269,9 +272,10 @@ def aliases(selected: Selected, name: str) -> list[str]:
 
 def with_constants_free(evidence: Evidence) -> Comparison:
     """A scale on which the lacking constants are as free as those that the file has."""
+    free_um = CONSTANT_UM * evidence.background.data.large
     return Comparison(
         evidence,
-        tuple(Member(evidence.forms[name][0], CONSTANT_UM) for name in evidence.names if evidence.constant(name)),
+        tuple(Member(evidence.forms[name][0], free_um) for name in evidence.names if evidence.constant(name)),
     )
 
 
@@ -303,7 +307,11 @@ def findable_sizes(scale: Comparison) -> dict[str, float]:
 def _smallest(evidence: Evidence, name: str, share: float, needed: float) -> float:
     """Of the form that shows best."""
     strengths = [evidence.strength(group, share) for group in evidence.forms[name]]
-    enough = (size for size in SIZES if max(mean_odds(size**2 * each) for each in strengths) >= needed)
+    enough = (
+        size
+        for size in evidence.background.data.sizes
+        if max(mean_odds(size**2 * each) for each in strengths) >= needed
+    )
     return next(enough, float("inf"))
 
 
@@ -312,16 +320,16 @@ def mean_odds(shown: Array) -> float:
     return 0.5 * float((shown - np.log1p(shown)).sum())
 
 
-def shows_hardly_anything(sizes: Mapping[str, float], count: int) -> bool:
+def shows_hardly_anything(findable: Mapping[str, float], count: int, sizes: Sequence[float]) -> bool:
     """Whether the data can show hardly any of so many effects."""
-    return sum(size <= SIZES[-1] for size in sizes.values()) < FEW_SHOWN * count
+    return sum(size <= sizes[-1] for size in findable.values()) < FEW_SHOWN * count
 
 
-def findable_in_words(sizes: Mapping[str, float], count: int) -> str:
+def findable_in_words(findable: Mapping[str, float], count: int, sizes: Sequence[float]) -> str:
     """How many of so many names would have been found, at which size."""
-    found = [(size, sum(own <= size for own in sizes.values())) for size in SIZES]
+    found = [(size, sum(own <= size for own in findable.values())) for size in sizes]
     steps = [(size, number) for k, (size, number) in enumerate(found) if number > (found[k - 1][1] if k else 0)]
     if not steps:
-        return f"none of {count} effects would have been found, were it {SIZES[-1]:g} um rms"
+        return f"none of {count} effects would have been found, were it {sizes[-1]:g} um rms"
     first, *others = [f"from {size:g} um rms on {number}" for size, number in steps]
     return f"what would have been found: {', '.join([f'{first} of {count} effects', *others])}"

@@ -275,6 +275,16 @@ IDLE = "no effect unless carried"
 """Said of what leaves an axis line in itself."""
 
 
+JOINTS = 3
+"""Rotary axes in one branch that make an arm."""
+
+
+def is_arm(axes: Iterable[Axis]) -> bool:
+    """Whether rotary joints in a row carry the tool or the workpiece, as in a robot."""
+    held = [each.workpiece_side for each in axes if each.rotary]
+    return max(held.count(True), held.count(False)) >= JOINTS
+
+
 def component_title(name: str, axis: Axis | None = None) -> str:
     """What an ISO 230-1 component is, e.g. "straightness of X in Y".
 
@@ -286,6 +296,11 @@ def component_title(name: str, axis: Axis | None = None) -> str:
         if about:
             return f"{'tilt' if zero else 'tilt motion'} of the spindle about {about}"
         return f"{'place' if zero else 'motion'} of the spindle in {component}"
+    if zero and axis and rotary and about:
+        own = abs(sum(a * b for a, b in zip(axis.error_axes[LINEAR.index(about)], axis.direction, strict=True)))
+        if own > 1 - SKEWED:
+            return f"zero offset of {joint}"
+        return f"tilt of the axis line of {joint}, turned about {about}"
     if zero:
         return _location_title(component, joint, rotary)
     if component == joint:

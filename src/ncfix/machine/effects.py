@@ -18,13 +18,13 @@ from typing import Protocol
 import numpy as np
 
 from ncfix.lazy_dataclass import dataclass
-from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title
-from ncfix.machine.basis import SMOOTH, Backlash, Basis, Periodic, Polynomial
+from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, is_arm
+from ncfix.machine.basis import SMOOTH, Backlash, Basis, Fourier, Periodic, Polynomial
 from ncfix.machine.error_model import dependence_of, signals_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.piecewise import PIECEWISE
 from ncfix.machine.se3 import Array
-from ncfix.machine.state import State, flatten
+from ncfix.machine.state import SUM, State, flatten
 from ncfix.plugins import called, handed, registry
 
 WARM = 20.0
@@ -71,6 +71,7 @@ def library(machine: Machine) -> dict[str, PhysicalEffect]:
     """Every physical effect that this machine can have, by name; those of plugins too."""
     found = [each for axis in machine.axes for each in _of_axis(axis)]
     found += [each for pair in _carried(machine) for each in _dead_weight(*pair)]
+    found += [each for axis in machine.axes for each in _of_joint(machine, axis)]
     known = {each.name: each for each in (*found, *_of_spindle(machine))}
     for name, plugin in registry("effects").items():
         if hasattr(plugin, "effects"):
@@ -157,6 +158,39 @@ def _of_spindle(machine: Machine) -> Iterator[PhysicalEffect]:
         yield PhysicalEffect(f"warming-{axis}", title, states, 0.03, seen, ("temp_structure", "time_s"))
 
 
+def _of_joint(machine: Machine, axis: Axis) -> Iterator[PhysicalEffect]:
+    """A gear that yields under the weight of an arm: the torque goes with the sine and cosine of how links lean."""
+    component, signals = _along(axis), leaning(machine.axes, axis)
+    if component is None or not signals:
+        return
+    effects = tuple(yielding(f"E{component}{axis.name}", axis, signal) for signal in signals)
+    title = f"joint {axis.name} that yields under the weight of what it carries"
+    yield PhysicalEffect(f"compliance-{axis.name}", title, effects, 2e-3, ("tcp", "tcp6", "points", "length"))
+
+
+def yielding(name: str, axis: Axis, signal: str) -> Effect:
+    """The angle of a joint by the weight of one link, zero until it is estimated."""
+    return Effect(name, (0.0, 0.0), Fourier(order=(1,)), input=None if signal == axis.name else signal)
+
+
+def leaning(axes: tuple[Axis, ...], axis: Axis) -> tuple[str, ...]:
+    """How the links lean whose weight a joint of an arm bears: sums of the angles of joints that turn about one
+    direction, one behind the other (B, B+C). None of other joints: what turns them is no lean.
+    """
+    if not is_arm(axes) or not axis.rotary:
+        return ()
+    branch = [each for each in axes if each.rotary and each.workpiece_side == axis.workpiece_side]
+    outwards = branch[::-1] if axis.workpiece_side else branch
+    runs: list[list[Axis]] = [[]]
+    for each in outwards:
+        if runs[-1] and np.asarray(runs[-1][0].direction) @ np.asarray(each.direction) < 1 - 1e-9:
+            runs.append([])
+        runs[-1].append(each)
+    run = next(each for each in runs if axis in each)
+    sums = tuple(SUM.join(each.name for each in run[: k + 1]) for k in range(len(run)))
+    return sums[run.index(axis) :] if len(run) > 1 else ()
+
+
 def _carried(machine: Machine) -> Iterator[tuple[Axis, Axis]]:
     """Pairs of linear axes of one branch: one, and one that it carries."""
     for held in (True, False):
@@ -224,7 +258,8 @@ def at_the_ends(machine: Machine, effect: Effect) -> Array:
 
 def _axes_of(machine: Machine, effect: Effect) -> list[int | None]:
     """The axes (columns) that an effect depends on; None for a signal that is no axis."""
-    return [signal.axis for signal in signals_of(machine.axes, effect) if signal is not None]
+    signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
+    return [axis for signal in signals for axis in (signal.axes or (None,))]
 
 
 def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array:

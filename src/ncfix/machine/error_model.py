@@ -63,7 +63,7 @@ class Dependence:
 
     def changes_with(self, axes: Sequence[int]) -> bool:
         """Whether the functions change with one of the axes."""
-        return any(signal.axis in axes for signal in self.signals)
+        return any(axis in axes for signal in self.signals for axis in signal.axes)
 
     def arguments(self, poses: Poses) -> tuple[Array, Array]:
         """u and the direction of motion (-1, 0, 1), as the basis sees them: (n,), or (1,) where neither varies."""
@@ -267,8 +267,9 @@ def _dependencies(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Iterat
     for effect in effects:
         if effect.active:
             for signal, is_factor in zip(signals_of(axes, effect), (False, True), strict=True):
-                if signal is not None and signal.axis is not None:
-                    yield effect, signal.axis, signal, is_factor
+                for axis in () if signal is None else signal.axes:
+                    assert signal is not None
+                    yield effect, axis, signal, is_factor
 
 
 MORE = 1.1
@@ -348,7 +349,7 @@ def bow_of(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...])
         span = (0.0, 0.0) if signal is None else (signal.low, signal.high)
         ends = sorted((x - effect.center) / effect.scale for x in span) if signal is not None else span
         bounds = effect.basis.bounds(effect.coefficients, *ends)
-        if bounds is None or factor is not None or (signal is not None and signal.constant_s):
+        if bounds is None or factor is not None or (signal is not None and (signal.constant_s or signal.summed)):
             return None
         kind, double = int(effect.rotational), TWICE if effect.location else 1.0
         sizes[kind] += double * bounds[0]

@@ -41,6 +41,7 @@ from ncfix.machine.basis import Basis, check_shapes
 from ncfix.machine.effects import PhysicalEffect, at_the_ends, kinds, library
 from ncfix.machine.fields import Report, TomlTable, did_you_mean
 from ncfix.machine.machine import DEFAULT_CORRECTION, DEFAULT_INCREMENT, Machine
+from ncfix.machine.state import SUM
 from ncfix.plugins import working
 from ncfix.toml_text import decoded, key_lines, parsed
 
@@ -323,6 +324,8 @@ def _signal(section: TomlTable, key: str, letters: tuple[str, ...]) -> str | Non
     name = section.text(key)
     if name is None or name in letters or INPUT.fullmatch(name):
         return name
+    if key == "input" and SUM in name and set(name.split(SUM)) <= set(letters):
+        return name
     text = f"{name!r} is neither an axis of this machine nor the name of an input"
     section.note("NCF314", key, text, "inputs are called like temp_spindle, time_s, load_kg")
     return None
@@ -360,7 +363,10 @@ def _check_fit(section: TomlTable, effect: Effect, axes: Mapping[str, Axis]) -> 
         note("basis", f"{name} has no position for {basis.name} to depend on", "give `input`")
     if basis.needs_direction and source not in axes and own is None:
         note("basis", f"{name} has no direction of motion", "give an axis as `input`")
-    axis = axes.get(source or effect.joint)
+    summed = (source or "").split(SUM) if SUM in (source or "") else []
+    if summed and (basis.kinks or not all(axes[each].rotary for each in summed)):
+        note("input", f"{source} is no sum of angles that {basis.name} can depend on", "rotary axes, no table")
+    axis = axes.get(summed[0] if summed else source or effect.joint)
     if basis.rotary_only and (axis is None or not axis.rotary) and (axis is not None or source is not None):
         note("basis", f"{basis.name} needs the angle of a rotary axis", "use `periodic` with a `period`")
     if effect.carried and not effect.location:

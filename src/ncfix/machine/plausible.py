@@ -17,7 +17,7 @@ import numpy as np
 
 from ncfix.diagnostics import Message, Place, RefusedError
 from ncfix.lazy_dataclass import dataclass
-from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, large_size
+from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, is_arm, large_size
 from ncfix.machine.effects import functions_at, travel
 from ncfix.machine.error_model import signals_of
 from ncfix.machine.machine import Machine
@@ -28,8 +28,8 @@ BEYOND = 10.0
 """Times what is much: no machine that runs is so wrong."""
 METRE = 1000.0
 """mm: the machine for which the catalogue says what is much."""
-ARM, JOINTS = 10.0, 3
-"""How much more an arm errs, and how many rotary axes in one branch make one."""
+ARM = 10.0
+"""How much more an arm errs."""
 UNLIMITED_MM = 100.0
 """Half the travel that is taken for a linear axis without a range."""
 PLANE = 0.05
@@ -97,11 +97,16 @@ def much(machine: Machine, name: str) -> float:
     Rotary joints in a row that carry the tool or the workpiece, as in a robot, make an arm.
     """
     location, axis = len(name) == 4, machine.axis(name[-1])
-    held = [each.workpiece_side for each in machine.axes if each.rotary]
-    size = float(large_size(name)) * (ARM if max(held.count(True), held.count(False)) >= JOINTS else 1.0)
+    size = float(large_size(name)) * (ARM if is_arm(machine.axes) else 1.0)
     if axis is not None and not axis.rotary and not location:
         return size * max(1.0, _travel_mm(axis) / METRE)
     return size * max(1.0, reach(machine) / METRE) if name[1] in "XYZ" else size
+
+
+def times_a_machining_centre(machine: Machine) -> float:
+    """How many times as large errors are as those of a machining centre of a metre: 1, 2, 4 ..."""
+    size = (ARM if is_arm(machine.axes) else 1.0) * max(1.0, reach(machine) / METRE)
+    return float(2.0 ** np.round(np.log2(size)))
 
 
 def reach(machine: Machine) -> float:
@@ -123,12 +128,12 @@ def functions(machine: Machine, effect: Effect) -> Array:
     """
     effect = replace(effect, time_constant_s=None)
     signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
-    axes = sorted({signal.axis for signal in signals if signal.axis is not None})
+    axes = sorted({axis for signal in signals for axis in signal.axes})
     about = {each.name: (each.center - each.scale, each.center, each.center + each.scale) for each in signals}
-    inputs = sorted({each.name for each in signals if each.axis is None})
+    inputs = sorted({each.name for each in signals if not each.axes})
     places = [travel(machine, axis) for axis in axes]
     places = [each if np.isfinite(each).all() else np.array([-1, 0, 1]) * UNLIMITED_MM for each in places]
-    places = [each[:: 6 if effect.times is not None else 1] for each in places]  # fewer where there are two
+    places = [each[:: 6 if effect.times is not None or len(axes) > 1 else 1] for each in places]
     ways = np.array([-1.0, 1.0]) if effect.basis.needs_direction else np.zeros(1)
     mesh = [each.ravel() for each in np.meshgrid(*places, *(np.asarray(about[name]) for name in inputs), ways)]
     q = np.zeros((mesh[0].size, len(machine.axes)))
@@ -145,7 +150,7 @@ def _sizes(machine: Machine) -> Iterator[Fault]:
         signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
         plain = len(signals) == 1 and not signals[0].inputs and not effect.basis.needs_direction
         same = groups.setdefault(effect.name, {})
-        same.setdefault(signals[0].axis if plain else (index,), []).append(effect)
+        same.setdefault(signals[0].name if plain else (index,), []).append(effect)
     for name, same in groups.items():
         size, limit, angle = (
             max(_largest(machine, each) for each in same.values()),

@@ -144,14 +144,17 @@ def poses_first(values: Array, shape: tuple[int, ...]) -> Array:
 
 
 TIME = "time_s"
+SUM = "+"
+"""Between rotary axes whose angles add: B+C is how an arm leans behind two parallel joints."""
 
 
 @dataclass(frozen=True, slots=True)
 class Signal:
     """One number per pose, made ready for a basis: u = (x - center) / scale, x held at the ends of the axis range.
 
-    name        axis letter or input
-    axis        index of the axis; None for a state input
+    name        axis letter, rotary axes whose angles add (B+C), or input
+    axis        index of the axis; None for a sum or a state input
+    summed      indices of the axes of a sum
     unit        internal units per unit of x
     low, high   the x beyond which the end values hold
     endless     x is an angle that may turn round and round
@@ -168,11 +171,17 @@ class Signal:
     center: float = 0.0
     scale: float = 1.0
     constant_s: float = 0.0
+    summed: tuple[int, ...] = ()
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """The indices of all axes that it is made of."""
+        return self.summed if self.axis is None else (self.axis,)
 
     @property
     def inputs(self) -> frozenset[str]:
         """The state inputs that it is made of."""
-        names = {self.name} if self.axis is None else set()
+        names = set() if self.axes else {self.name}
         return frozenset(names | {TIME} if self.constant_s else names)
 
     @property
@@ -182,8 +191,11 @@ class Signal:
 
     def raw(self, poses: Poses) -> Array:
         """x, (n,), not yet held, in the unit of the machine file."""
-        if self.axis is None:
+        if not self.axes:
             return poses.inputs[self.name]
+        if self.axis is None:
+            angle: Array = poses.positions[list(self.summed)].sum(axis=0) / self.unit
+            return angle
         position: Array = poses.positions[self.axis] / self.unit
         return position
 
@@ -204,11 +216,15 @@ def inputs_of(signals: Iterable[Signal]) -> frozenset[str]:
 
 
 def signal_called(axes: tuple[Axis, ...], name: str) -> Signal:
-    """The position of the axis with this letter, or a state input."""
+    """The position of the axis with this letter, the sum of the angles of several (B+C), or a state input."""
     for index, axis in enumerate(axes):
         if axis.name == name:
             low, high = (limit / axis.unit for limit in axis.range)
             return Signal(name, index, axis.unit, low, high, axis.endless)
+    if SUM in name:
+        names = [axis.name for axis in axes]
+        summed = tuple(names.index(each) for each in name.split(SUM))
+        return Signal(name, unit=axes[summed[0]].unit, summed=summed)
     return Signal(name)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
-from ncfix.machine.axes import COMPONENTS, NAME, SPINDLE, Axis
+from ncfix.machine.axes import COMPONENTS, NAME, SPINDLE, Axis, is_arm
 from ncfix.machine.basis import Backlash, Basis, ConstantBasis, Fourier, Polynomial
 from ncfix.machine.effects import library
 from ncfix.machine.fields import did_you_mean
@@ -159,17 +159,17 @@ def candidate_effects(machine: Machine, knots: int = 0) -> list[Effect]:
     """Every location error and error motion that can matter for this machine, zero, with its default basis."""
     found = []
     for axis in machine.axes:
-        names = [f"E{component}0{axis.name}" for component in _located(axis)]
+        names = [f"E{component}0{axis.name}" for component in _located(machine, axis)]
         names += [f"E{component}{axis.name}" for component in COMPONENTS]
         found += [default(machine, name, knots) for name in names]
     return found + [default(machine, f"E{component}0{SPINDLE}") for component in "XYAB"]
 
 
-def _located(axis: Axis) -> list[str]:
-    """Location errors that are not without effect, the zero offset apart."""
+def _located(machine: Machine, axis: Axis) -> list[str]:
+    """Location errors that are not without effect; the zero offset only of joints of an arm."""
     along = [k for k in range(3) if abs(np.asarray(axis.error_axes[k]) @ np.asarray(axis.direction)) > 1 - 1e-9]
     across = [COMPONENTS[k] for k in range(3) if k not in along]
-    turns = [COMPONENTS[3 + k] for k in range(3) if k not in along]
+    turns = [COMPONENTS[3 + k] for k in range(3) if k not in along or (axis.rotary and is_arm(machine.axes))]
     return across + turns if axis.rotary else turns
 
 

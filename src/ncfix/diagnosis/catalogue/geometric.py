@@ -30,7 +30,7 @@ from ncfix.diagnosis.catalogue.candidate import (
     zero,
 )
 from ncfix.machine import Effect
-from ncfix.machine.axes import Axis, component_title
+from ncfix.machine.axes import Axis, component_title, is_arm
 from ncfix.machine.basis import Backlash, Fourier, Periodic, Polynomial
 from ncfix.measure.measurement import Array
 
@@ -209,7 +209,7 @@ def location_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
     """
     known = {effect.name for effect in measured.machine.effects}
     for axis in (*measured.linear, *measured.rotary):
-        for name in _lines(axis):
+        for name in _lines(measured, axis):
             if name not in known:
                 title = component_title(name, axis)
                 remedy = "re-measure where the axis lies"
@@ -240,7 +240,10 @@ def _is_gain(effect: Effect, name: str) -> bool:
     return effect.name == name and isinstance(effect.basis, Polynomial) and 1 in effect.basis.degree
 
 
-def _lines(axis: Axis) -> tuple[str, ...]:
-    """The location errors that an axis line can have."""
+def _lines(measured: MeasuredRange, axis: Axis) -> tuple[str, ...]:
+    """The location errors that an axis line can have; of a joint of an arm its zero, too."""
     tilts = tuple(f"E{TURNS[k]}0{axis.name}" for k in across(axis))
+    own = along(axis)
+    if axis.rotary and own is not None and is_arm(measured.machine.axes):
+        tilts = (f"E{TURNS[own]}0{axis.name}", *tilts)
     return (*(f"E{LETTERS[k]}0{axis.name}" for k in across(axis)), *tilts) if axis.rotary else tilts

@@ -7,6 +7,7 @@ down is not in a machine file, so every way across an axis is a form of the effe
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,8 +24,9 @@ from ncfix.diagnosis.catalogue.candidate import (
     zero,
 )
 from ncfix.machine import Effect
-from ncfix.machine.axes import SPINDLE, Axis
+from ncfix.machine.axes import SPINDLE, Axis, is_arm
 from ncfix.machine.basis import Fourier, Polynomial
+from ncfix.machine.effects import leaning, yielding
 from ncfix.measure.measurement import Array
 
 POWERS = (0, 1, 2, 3, 4)
@@ -50,7 +52,10 @@ def weight_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
         if along(axis) is not None:
             yield _table(axis)
             yield from _unbalanced(measured, axis)
-            yield _sag(measured, axis)
+            if not is_arm(measured.machine.axes):
+                yield _sag(measured, axis)
+            elif leaning(measured.machine.axes, axis):
+                yield _yielding(measured, axis)
             yield from _twist(measured, axis)
     yield from _droop(measured)
 
@@ -226,6 +231,20 @@ def _sag(measured: MeasuredRange, axis: Axis) -> Candidate:
     return Candidate(
         f"gravity sag {axis.name}", title, axis.name, f"{axis.name} weight", effects, tuple(loadings),
         ("load_kg",) if len(loaded) == 2 else (), "",
+    )  # fmt: skip
+
+
+def _yielding(measured: MeasuredRange, axis: Axis) -> Candidate:
+    """The gear of an arm's joint yields under the weight of links and load: as sine and cosine of how they lean."""
+    own = along(axis) or 0
+    plain = [yielding(f"E{TURNS[own]}{axis.name}", axis, lean) for lean in leaning(measured.machine.axes, axis)]
+    loaded = "load_kg" in measured.columns
+    effects = (*plain, *(replace(each, **LOAD) for each in plain if loaded))
+    title = f"compliance of joint {axis.name}: its gear yields under the weight that it bears"
+    return Candidate(
+        f"compliance {axis.name}", title, axis.name, f"{axis.name} weight", effects,
+        (weighed((1.0,) * 2 * len(effects)),), ("load_kg",) if loaded else (),
+        "calibrate with the effect compliance, or have the control compensate the load",
     )  # fmt: skip
 
 

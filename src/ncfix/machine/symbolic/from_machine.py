@@ -22,6 +22,7 @@ from ncfix.machine.axes import COMPONENTS, SPINDLE, Axis, Effect, component_name
 from ncfix.machine.axes import Vector as Numbers
 from ncfix.machine.chain import columns, lies_on_axis
 from ncfix.machine.machine import Machine
+from ncfix.machine.state import SUM
 from ncfix.machine.symbolic.chain import (
     UNITS,
     ZERO,
@@ -171,7 +172,8 @@ def _symbol(machine: Machine, name: str) -> ErrorSymbol:
         text = f"the effects {name} of this machine differ in reference or carried: one symbol cannot stand for them"
         raise UsageError.of("NCF393", text, hint="leave it out, or give them one reference point")
     own = () if effect.location or effect.joint == SPINDLE else (effect.joint,)
-    signals = (signal for each in same for signal in (each.signal, each.times) if signal is not None)
+    named = (signal for each in same for signal in (each.signal, each.times) if signal is not None)
+    signals = (name for signal in named for name in signal.split(SUM))
     title, arguments = component_title(name, machine.axis(effect.joint)), tuple(dict.fromkeys((*own, *signals)))
     return ErrorSymbol(
         variable=Variable(name, Size.SMALL, title, rotary=effect.rotational, arguments=arguments),
