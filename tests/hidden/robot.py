@@ -23,7 +23,7 @@ ABOUT = np.array([[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 
 POINTS = np.array([[0, 0, 0], [300, 0, 600], [300, 0, 1700], [400, 0, 1900], [1700, 0, 1900], [1900, 0, 1900]], float)
 FLANGE = np.array([2000.0, 0.0, 1900.0])
 RANGES = ((-120, 120), (-70, 60), (-100, 60), (-160, 160), (-100, 100), (-170, 170))
-MASSES = ((1, 180.0, (300.0, 60.0, 1150.0)), (2, 140.0, (650.0, 0.0, 1880.0)), (4, 35.0, (1780.0, 0.0, 1900.0)))
+MASSES = ((1, 180.0, (300.0, 60.0, 1150.0)), (2, 140.0, (650.0, 0.0, 1880.0)), (4, 35.0, (1705.0, 0.0, 1900.0)))
 """Of the arm: the number of the joint that carries it, kg, and where it is with all joints at zero, mm."""
 GRAVITY = 9.81
 
@@ -45,7 +45,7 @@ class Robot:
     waves: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
     play: Mapping[str, float] = field(default_factory=dict)
 
-    def flange(self, q: Array, ways: Array, load_kg: float = 6.0) -> tuple[Array, Array]:
+    def flange(self, q: Array, ways: Array, load_kg: float = 1.5) -> tuple[Array, Array]:
         """Where the flange is and how it is turned, (n, 3) mm and (n, 3, 3), for angles (n, 6) in degrees."""
         angles = np.radians(q)
         for k, joint in enumerate(JOINTS):

@@ -11,7 +11,7 @@ import pytest
 
 from stories.story import Step, alike, headlines, run, steps, written_anew
 
-STORIES = ("worn_table", "laspas", "size_conflict")
+STORIES = ("worn_table", "laspas", "size_conflict", "robot")
 
 
 def test_all_stories_are_told(root: Path) -> None:
@@ -46,7 +46,16 @@ def the_reversal_of_z_is_named_and_its_step_goes(folder: Path, script: list[tupl
     assert found < 0.1 * model
 
 
+def joints_that_yield_are_named_and_other_poses_are_at_the_noise(
+    folder: Path, script: list[tuple[Step, list[str]]]
+) -> None:
+    assert added(folder).startswith("compliance K, compliance L, encoder J")
+    [last] = [line for line in script[-1][1] if line.startswith("verdict:")]
+    assert last.startswith("verdict: nothing-missing")
+
+
 ENDS = {
+    "robot": joints_that_yield_are_named_and_other_poses_are_at_the_noise,
     "worn_table": the_worn_table_is_named_and_the_part_gets_better,
     "laspas": the_reversal_of_z_is_named_and_its_step_goes,
     "size_conflict": lambda folder, script: None,
