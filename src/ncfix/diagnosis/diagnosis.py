@@ -216,13 +216,9 @@ class Unexplained:
 
 
 def verdict_of(
-    findings: Sequence[EffectFinding],
-    rest: Unexplained,
-    told_um: float,
-    floor: NoiseFloor,
-    noise_um: float,
+    findings: Sequence[EffectFinding], rest: Unexplained, told_um: float, floor: NoiseFloor, noise_um: float,
     little: float = 1.0,
-) -> str:
+) -> str:  # fmt: skip
     """The verdict, where the names show `told_um`.
 
     Without repeats a smooth rest may as well be the part's or the instrument's: only a large or clear one decides.

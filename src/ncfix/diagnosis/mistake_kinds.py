@@ -12,14 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ncfix.diagnosis.residual_data import (
-    TIGHT_UM,
-    UM,
-    Misfit,
-    is_free,
-    misfit,
-    rows_of,
-)
+from ncfix.diagnosis.residual_data import TIGHT_UM, UM, Misfit, is_free, misfit, rows_of
 from ncfix.diagnosis.stale_tables import shifted_tables
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
