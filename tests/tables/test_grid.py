@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
 
 from ncfix.tables.compensation import Compensation, Term
-from ncfix.tables.grid import Grid
+from ncfix.tables.grid import Grid, spline_weights
 
 EIGHT = np.arange(24.0).reshape(2, 2, 2, 3) ** 1.5
 CUBE = Grid(("X", "Y", "Z"), (np.array([0.0, 10.0]),) * 3, ("X", "Y", "Z"), EIGHT)
@@ -68,3 +69,16 @@ def test_shapes_must_fit() -> None:
         Grid(("X",), (np.array([0.0, 1.0]),), ("X",), np.zeros((3, 1)))
     with pytest.raises(ValueError, match="3 inputs"):
         CUBE.at(np.zeros((4, 2)))
+
+
+@pytest.mark.parametrize("turn", [None, 7.0])
+@pytest.mark.parametrize("count", range(2, 9))
+def test_splines_are_those_of_scipy(count: int, turn: float | None) -> None:
+    rng = np.random.default_rng(count)
+    nodes, values = np.sort(rng.uniform(0, 6, count)), rng.normal(size=(count, 3))
+    places = rng.uniform(-3, 9, 40)
+    line, curve = nodes, values
+    if turn:
+        line, curve = np.append(nodes, nodes[0] + turn), np.concatenate([values, values[:1]])
+    expected = CubicSpline(line, curve, bc_type="periodic" if turn else "not-a-knot")(places)
+    assert spline_weights(nodes, places, turn) @ values == pytest.approx(expected, rel=1e-9, abs=1e-9)

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from conftest import FULL
 from ncfix.machine import Effect, Machine, State, load
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
+from ncfix.tables import scheme_tables
 from ncfix.tables.correction import Residual, orientation_error, random_poses, ranges_of, residual, rotary_correction
 from ncfix.tables.scheme import Limits, Scheme, SchemeTask, automatic
 from ncfix.tables.scheme_tables import AxisPositions
@@ -164,3 +166,9 @@ def test_strides_are_the_widest_that_do() -> None:
     kinked = np.abs(line.fine - 40.0)
     assert line.steps // line.stride(kinked, 100, 1e-9) == 3
     assert line.steps // line.stride(np.sin(line.fine), 20, 1e-9) <= 19
+
+
+@pytest.mark.parametrize("dimensions", range(1, 13))
+def test_the_net_of_combinations_is_that_of_scipy(dimensions: int) -> None:
+    net = qmc.Sobol(dimensions, scramble=False).random_base2(scheme_tables.SAMPLES)
+    assert (scheme_tables._sobol_net(dimensions) == net).all()

@@ -126,6 +126,45 @@ def hats(places: Array, nodes: Array) -> Array:
     return found
 
 
+def spline_weights(nodes: Array, places: Array, turn: float | None = None) -> Array:
+    """The weight of every node (m >= 2) at every place (n) of the cubic spline through values at the nodes: (n, m).
+
+    The spline has no knot at the second and the last but one node, and goes on beyond the ends; with a `turn` it
+    repeats after that. SciPy's is the same, and takes long to import.
+    """
+    count, eye = len(nodes), np.eye(len(nodes))
+    line = nodes if turn is None else np.append(nodes, nodes[0] + turn)
+    values = eye if turn is None else np.concatenate([eye, eye[:1]])
+    steps = np.diff(line)
+    rises = np.diff(values, axis=0) / steps[:, None]
+    slopes, wanted = np.zeros((count, count)), np.zeros((count, count))
+    for k in range(1 if turn is None else 0, count - 1 if turn is None else count):
+        before, after = steps[k - 1], steps[k]
+        for other, share in ((k - 1, after), (k, 2 * (before + after)), ((k + 1) % count, before)):
+            slopes[k, other] += share
+        wanted[k] = 3 * (after * rises[k - 1] + before * rises[k])
+    if turn is None:
+        for end, inner, sense in ((0, 1, 1), (count - 1, count - 2, -1)):
+            first, second = (0, min(1, count - 2)) if sense > 0 else (count - 2, max(count - 3, 0))
+            if count < 4:  # a straight line, or one parabola
+                slopes[end, [end, inner]], wanted[end] = (1.0, 1.0), 2 * rises[first]
+                if count == 2:
+                    slopes[end, inner], wanted[end] = 0.0, rises[first]
+                continue
+            near, far = steps[first], steps[second]
+            slopes[end, [end, inner]] = far, near + far
+            wanted[end] = ((3 * near + 2 * far) * far * rises[first] + near**2 * rises[second]) / (near + far)
+    tangents = np.linalg.solve(slopes, wanted)
+    if turn is not None:
+        tangents, places = np.concatenate([tangents, tangents[:1]]), line[0] + np.mod(places - line[0], turn)
+    cell = np.clip(np.searchsorted(line, places, side="right") - 1, 0, len(steps) - 1)
+    width = steps[cell][:, None]
+    t = (places - line[cell])[:, None] / width
+    found: Array = (1 + 2 * t) * (1 - t) ** 2 * values[cell] + t**2 * (3 - 2 * t) * values[cell + 1]
+    found += width * (t * (1 - t) ** 2 * tangents[cell] + t**2 * (t - 1) * tangents[cell + 1])
+    return found
+
+
 def projector(places: Array, nodes: Array) -> Array:
     """What turns values at places (n) into the values at nodes (m) that come nearest to them in all: (m, n)."""
     found: Array = np.asarray(np.linalg.pinv(hats(places, nodes)), dtype=np.float64)

@@ -12,13 +12,14 @@ function of the kind leaves less at the worst than the weighted root mean square
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from itertools import combinations
+from functools import cache, reduce
+from itertools import combinations, pairwise
+from math import comb
+from string import ascii_letters
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.optimize import linprog
 
 from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
@@ -32,7 +33,7 @@ from ncfix.tables.correction import (
     poses_along,
     random_ways,
 )
-from ncfix.tables.grid import Array, hats, on_full_grid
+from ncfix.tables.grid import Array, hats, on_full_grid, spline_weights
 from ncfix.tables.volume import Volume, even_line
 
 ROUNDS = 40
@@ -80,11 +81,9 @@ class Remainder:
 
     def along(self, axis: int, positions: Array, places: NDArray[np.intp]) -> Array:
         """At positions (n,) of one axis and nodes `places` (m, n_axes) of the others, by splines: (n, m, n_outputs)."""
-        line, values = self.nodes[axis], np.moveaxis(self.values, axis, 0)
-        if self.turns[axis]:
-            line, values = np.append(line, line[0] + 2 * np.pi), np.concatenate([values, values[:1]])
-            positions = line[0] + np.mod(positions - line[0], 2 * np.pi)
-        curve = CubicSpline(line, values, bc_type="periodic" if self.turns[axis] else "not-a-knot")(positions)
+        values = np.moveaxis(self.values, axis, 0)
+        weights = spline_weights(self.nodes[axis], positions, 2 * np.pi if self.turns[axis] else None)
+        curve = (weights @ values.reshape(len(values), -1)).reshape(len(positions), *values.shape[1:])
         found: Array = curve[(slice(None), *np.delete(places, axis, axis=1).T)]
         return found
 
@@ -100,32 +99,104 @@ def least_worst(
     enough    as much may be left at the worst by the least-squares fit, which is then kept
     together  1: sums of functions of one axis each, instead of two
     """
-    axes = values.ndim - 1
-    pairs = [
-        tuple(axis for axis in range(axes) if axis not in pair)
-        for pair in combinations(range(axes), min(together, axes))
-    ]
-    weights = even = _shares(values.shape[:-1], turns)
-    best, bound, worst, least = Remainder(nodes, turns, values, 0.0), 0.0, np.inf, np.inf
-    left, weighted = values.copy(), np.empty_like(values)
+    grid = values.shape[:-1]
+    sets = list(combinations(range(len(grid)), min(together, len(grid))))
+    weights = even = _shares(grid, turns)
+    best, bound, worst, least = values, 0.0, np.inf, np.inf
+    left = np.ascontiguousarray(np.moveaxis(values, -1, 0))
     for number in range(ROUNDS):
-        totals = [weights.sum(axis=others, keepdims=True)[..., None] for others in pairs]
-        each = np.repeat(weights[..., None], values.shape[-1], axis=-1)
-        for _ in range(FIRST if number == 0 else SWEEPS):
-            for others, total in zip(pairs, totals, strict=True):
-                np.multiply(left, each, out=weighted)
-                left -= weighted.sum(axis=others, keepdims=True) / total
-        bound = max(bound, _proven(left, each, pairs))
-        found = Remainder(nodes, turns, left, bound)
-        largest = found.largest
-        product = largest * found.rms
+        functions, sums = _fitted(left, weights, sets, FIRST if number == 0 else SWEEPS)
+        left = left - _together(functions)
+        bound = max(bound, _proven(left, weights, sums))
+        squares = (left**2).sum(axis=0)
+        largest = float(np.sqrt(squares.max()))
+        product = largest * float(np.sqrt((even * squares).sum()))
         if number == 0 or product < least:
-            best, worst, least = replace(found, values=left.copy()), largest, product
-        grown = weights * np.linalg.norm(left, axis=-1)
+            best, worst, least = np.moveaxis(left, 0, -1), largest, product
+        grown = weights * np.sqrt(squares)
         if worst <= max(NEAR * bound, enough) or not grown.any():
             break
         weights = (1 - BASE) * grown / grown.sum() + BASE * even
-    return replace(best, bound=bound)
+    return Remainder(nodes, turns, np.ascontiguousarray(best), bound)
+
+
+Axes = tuple[int, ...]
+"""Axes of the grid on which something depends, in order."""
+
+
+class _Sums:
+    """Sums of values on a full grid (..., *counts) over all but some axes, each worked out from the next larger one."""
+
+    def __init__(self, values: Array, axes: int) -> None:
+        self.known = {tuple(range(axes)): values}
+        self.axes, self.before = axes, values.ndim - axes
+
+    def over(self, kept: Axes) -> Array:
+        """The sums that depend on the axes `kept`; the others are left with one place."""
+        if kept not in self.known:
+            gone = max(axis for axis in range(self.axes) if axis not in kept)
+            larger = self.over(tuple(sorted((*kept, gone))))
+            self.known[kept] = larger.sum(axis=self.before + gone, keepdims=True)
+        return self.known[kept]
+
+
+Functions = dict[Axes, Array]
+"""Functions of some axes each, (n_outputs, *counts) with one place along the others."""
+
+
+def _fitted(left: Array, weights: Array, sets: Sequence[Axes], sweeps: int) -> tuple[Functions, Functions]:
+    """Functions of some sets of axes each whose sum is near `left` (n_outputs, *counts) in the weighted mean square.
+
+    And the weighted sums, over the other axes, of what they leave.
+
+    One after the other is fitted to what the others leave, so many times. For that no more is needed of the grid than
+    the weighted sums of `left` over all but the axes of each set, and of the weights over all but those of each two.
+    """
+    totals, sums = _Sums(weights, weights.ndim), _Sums(weights * left, weights.ndim)
+    ends = np.cumsum([0, *(totals.over(kept).size for kept in sets)]).tolist()
+    places = [slice(*each) for each in pairwise(ends)]
+    wanted = np.concatenate([sums.over(kept).reshape(len(left), -1) for kept in sets], axis=1)
+    found = np.zeros_like(wanted)
+    shared = [_shared(totals, sets, places, kept, ends[-1]) for kept in sets]
+    for number in list(range(len(sets))) * sweeps:
+        place = places[number]
+        change = wanted[:, place] / totals.over(sets[number]).ravel()
+        found[:, place] += change
+        wanted -= change @ shared[number]
+    both = [
+        {kept: values[:, place].reshape(sums.over(kept).shape) for kept, place in zip(sets, places, strict=True)}
+        for values in (found, wanted)
+    ]
+    return both[0], both[1]
+
+
+def _shared(totals: _Sums, sets: Sequence[Axes], places: Sequence[slice], kept: Axes, count: int) -> Array:
+    """The weight that places of the set `kept` have in common with places of all sets, (n_kept, count)."""
+    shape = totals.over(kept).shape
+    found = np.zeros((np.prod(shape), count))
+    for other, place in zip(sets, places, strict=True):
+        both, subscripts, without = _union(kept, other, totals.axes)
+        total = totals.over(both)
+        block = found[:, place].reshape([total.shape[axis] for axis in (*kept, *other)])
+        np.einsum(subscripts, block)[...] = total[without]
+    return found
+
+
+@cache
+def _union(one: Axes, other: Axes, axes: int) -> tuple[Axes, str, tuple[Any, ...]]:
+    """The axes of both sets; how the part of a block that they have in common is named; an index without others."""
+    both = tuple(sorted({*one, *other}))
+    first, second, union = ("".join(ascii_letters[axis] for axis in each) for each in (one, other, both))
+    return both, f"{first}{second}->{union}", tuple(slice(None) if axis in both else 0 for axis in range(axes))
+
+
+def _together(functions: Functions) -> Array:
+    """The sum of functions of some axes each, those that end with one axis first: most sums are over few axes."""
+    total: Array = np.zeros(())
+    for last in sorted({kept[-1:] for kept in functions}):
+        group = [functions[kept] for kept in sorted(functions) if kept[-1:] == last]
+        total = total + reduce(np.add, group)
+    return total
 
 
 def _shares(counts: Sequence[int], turns: Sequence[bool]) -> Array:
@@ -139,17 +210,25 @@ def _shares(counts: Sequence[int], turns: Sequence[bool]) -> Array:
     return shares
 
 
-def _proven(left: Array, weights: Array, pairs: Sequence[tuple[int, ...]]) -> float:
-    """The least that can be left at the worst: what a measure sees that is blind to all functions of pairs.
+def _proven(left: Array, weights: Array, sums: Functions) -> float:
+    """The least that can be left at the worst: what a measure sees that is blind to functions of some sets of axes.
 
-    weights  as `left`, for each output
+    sums  of `weights * left` over all axes but those of each set
 
-    Means over even weights commute, so that one pass takes all of those out of the measure.
+    Taken out of the measure is what depends on the axes of a set: means over the others, less what is in several.
     """
-    measure = weights * left
-    for others in pairs:
-        measure -= measure.mean(axis=others, keepdims=True)
-    total = float(np.linalg.norm(measure, axis=-1).sum())
+    axes, order = weights.ndim, len(next(iter(sums)))
+    seen: Functions = {}
+    for kept, values in sums.items():
+        for size in range(order + 1):
+            share = (-1) ** (order - size) * (comb(axes - size - 1, order - size) if size < order else 1)
+            for fewer in combinations(kept, size):
+                others = tuple(1 + axis for axis in kept if axis not in fewer)
+                if share and fewer not in seen:
+                    count = np.prod([weights.shape[axis] for axis in range(axes) if axis not in fewer])
+                    seen[fewer] = values.sum(axis=others, keepdims=True) * (share / count)
+    measure = weights * left - _together(seen)
+    total = float(np.sqrt((measure**2).sum(axis=0)).sum())
     return float((measure * left).sum()) / total if total else 0.0
 
 
@@ -217,6 +296,8 @@ def _mixed(space: Array, chosen: Array) -> Array:
 
 def _nearest(places: Array, curve: Array, nodes: Array) -> float:
     """The least by which a function that is straight between nodes misses a curve at the worst."""
+    from scipy.optimize import linprog
+
     weights, one = hats(places, nodes), np.ones((len(places), 1))
     rows = np.block([[weights, -one], [-weights, -one]])
     cost = np.append(np.zeros(len(nodes)), 1.0)

@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.compensation import Compensation, Term
@@ -31,6 +30,11 @@ PER_FEATURE = 3
 """Steps for each length within which the errors may bend."""
 SAMPLES = 7
 """Two to this power combinations of nodes of the other axes are looked at for each position."""
+SOBOL = (
+    *((0, (1,)), (1, (1, 3)), (1, (1, 3, 1)), (2, (1, 1, 1)), (1, (1, 1, 3, 3)), (4, (1, 3, 5, 13))),
+    *((2, (1, 1, 5, 5, 17)), (4, (1, 1, 5, 5, 5)), (7, (1, 1, 7, 11, 19))),
+)
+"""From the second dimension on: the inner coefficients of a primitive polynomial, as bits, and its first numbers."""
 Slot = tuple[int, int | None]
 """A function of one axis in a layout: (star, leaf axis), (star, None) its centre, or (-1, axis) a sum."""
 Curves = dict[Slot, Array]
@@ -108,7 +112,7 @@ class TableSample:
     @classmethod
     def of(cls, nodes: Sequence[Array]) -> TableSample:
         """Spread evenly over pairs and triples of axes (a Sobol net)."""
-        unit = qmc.Sobol(len(nodes), scramble=False).random_base2(SAMPLES)
+        unit = _sobol_net(len(nodes))
         counts = np.array([len(line) for line in nodes])
         return cls(nodes, np.floor(unit * counts).astype(np.intp))
 
@@ -146,6 +150,33 @@ class TableSample:
             if axis in star.leaves:
                 slots[number, axis] = centre
         return slots, known
+
+
+def _sobol_net(dimensions: int) -> Array:
+    """The first points of Sobol's sequence, (2 ** SAMPLES, dimensions) from 0 to 1: that of SciPy, which imports much.
+
+    Direction numbers of S. Joe and F. Y. Kuo (2008).
+    """
+    if dimensions > 1 + len(SOBOL):
+        from scipy.stats import qmc
+
+        many: Array = qmc.Sobol(dimensions, scramble=False).random_base2(SAMPLES)
+        return many
+    bits = [[1] * SAMPLES]
+    for polynomial, first in SOBOL[: dimensions - 1]:
+        degree, numbers = len(first), list(first)
+        for k in range(degree, SAMPLES):
+            number = numbers[k - degree] ^ (numbers[k - degree] << degree)
+            for j in range(1, degree):
+                number ^= (polynomial >> (degree - 1 - j) & 1) * (numbers[k - j] << j)
+            numbers.append(number)
+        bits.append(numbers[:SAMPLES])
+    directions = np.array(bits) << np.arange(SAMPLES - 1, -1, -1)
+    points = np.zeros((2**SAMPLES, dimensions), dtype=np.intp)
+    for k in range(1, len(points)):
+        lowest = (k & -k).bit_length() - 1
+        points[k] = points[k - 1] ^ directions[:, lowest]
+    return points / 2**SAMPLES
 
 
 def followed(sample: TableSample, layouts: TableLayouts, along: AlongAxis) -> dict[int, list[TableLayout]]:

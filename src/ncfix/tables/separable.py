@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
+from functools import lru_cache
 from itertools import combinations, product
 
 import numpy as np
@@ -28,6 +29,10 @@ EXHAUSTIVE = 6
 """Up to so many pairs of axes every way of choosing the centres is tried."""
 ALIKE = 0.05
 """Functions whose difference is below this share of themselves are not told apart."""
+KNOWN = 10_000
+"""So many combinations are remembered."""
+SURELY = 1 + 1e-6
+"""One column that misses by more than this times what it may does not fit, however its share is rounded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,11 +232,18 @@ def _shares(part: Product, axis: int, centres: Sequence[Array], tolerance: float
     """The factor as a combination of centres, if it is one to within the tolerance; shares that do not matter are 0."""
     if not centres:
         return None
-    columns = np.stack(centres, axis=1)
-    shares = np.linalg.lstsq(columns, part.on(axis), rcond=None)[0]
-    shares[np.abs(shares) * part.size * _rms(columns) <= tolerance] = 0.0
-    missed = _rms(columns @ shares - part.on(axis)) * part.size
-    return shares.tolist() if missed <= tolerance else None
+    return _as_shares(part.on(axis).tobytes(), part.size, tuple(centre.tobytes() for centre in centres), tolerance)
+
+
+@lru_cache(KNOWN)
+def _as_shares(goal_bytes: bytes, size: float, centres: tuple[bytes, ...], tolerance: float) -> list[float] | None:
+    """What `_shares` says of a factor of a product of this size."""
+    goal, columns = np.frombuffer(goal_bytes), np.stack([np.frombuffer(centre) for centre in centres], axis=1)
+    shares = np.linalg.lstsq(columns, goal, rcond=None)[0]
+    shares[np.abs(shares) * size * _rms(columns) <= tolerance] = 0.0
+    missed = _rms(columns @ shares - goal) * size
+    found: list[float] = shares.tolist()
+    return found if missed <= tolerance else None
 
 
 def absorbed(layout: TableLayout, tolerance: float) -> TableLayout:
@@ -298,16 +310,27 @@ def _combination(values: Array, columns: Sequence[Array], tolerance: float) -> l
     """
     if not columns:
         return None
-    means, sizes = [float(column.mean()) for column in columns], [_rms(column - column.mean()) for column in columns]
-    if min(sizes) == 0.0:
+    return _combined(values.tobytes(), tuple(column.tobytes() for column in columns), tolerance)
+
+
+@lru_cache(KNOWN)
+def _combined(goal_bytes: bytes, column_bytes: tuple[bytes, ...], tolerance: float) -> list[float] | None:
+    """What `_combination` says; the search for few tables asks for the same again and again."""
+    values, together = np.frombuffer(goal_bytes), np.stack([np.frombuffer(column) for column in column_bytes])
+    mean = values.mean()
+    means = together.mean(axis=1)
+    centred, goal = together - means[:, None], values - mean
+    sizes = np.sqrt(np.mean(centred**2, axis=1))
+    if sizes.min() == 0.0:
         return None
-    design = np.stack([(c - mean) / size for c, mean, size in zip(columns, means, sizes, strict=True)], axis=1)
-    scaled = np.linalg.lstsq(design, values - values.mean(), rcond=ALIKE)[0]
-    if _rms(design @ scaled - values + values.mean()) > tolerance:
+    design = centred / sizes[:, None]
+    if len(design) == 1 and _rms(goal - np.mean(design[0] * goal) * design[0]) > SURELY * tolerance:
         return None
-    shares = (scaled / sizes).tolist()
-    constant = float(values.mean()) - sum(share * mean for share, mean in zip(shares, means, strict=True))
-    return [constant, *shares]
+    scaled = np.linalg.lstsq(design.T, goal, rcond=ALIKE)[0]
+    if _rms(design.T @ scaled - goal) > tolerance:
+        return None
+    shares = scaled / sizes
+    return [float(mean - shares @ means), *shares.tolist()]
 
 
 def _rms(values: Array) -> float:
