@@ -15,6 +15,7 @@ from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.correction import random_poses
@@ -34,6 +35,8 @@ LOOSER = 1.1
 """Times what the number of nodes suggests if there are too many."""
 EVEN = 0.3
 """Power of its number of nodes by which a face gets more of what may be missed: that saves nodes where many are."""
+SAME = 1 << 20
+"""Positions of which there may be more different ones are taken as they are."""
 MANY = 8
 """More sets than these are not shared out among faces."""
 Set = frozenset[int]
@@ -177,11 +180,11 @@ def _part(volume: Volume, face: Face, before: Sequence[Face]) -> Volume:
     def exact(positions: Array) -> Array:
         total = np.zeros((len(positions), len(face.outputs)))
         for axes, factors in recipe.items():
-            places = np.tile(middle, (len(positions), 1))
-            for column, axis in enumerate(face.inputs):
-                if axis in axes:
-                    places[:, axis] = positions[:, column]
-            total += volume.exact(places)[:, face.outputs] * factors
+            columns = [column for column, axis in enumerate(face.inputs) if axis in axes]
+            different, places = _different(positions[:, columns])
+            q = np.tile(middle, (len(different), 1))
+            q[:, [face.inputs[column] for column in columns]] = different
+            total += volume.exact(q)[places][:, face.outputs] * factors
         return total
 
     chosen = list(face.inputs)
@@ -195,6 +198,18 @@ def _part(volume: Volume, face: Face, before: Sequence[Face]) -> Volume:
         exact=exact,
         kinks=tuple(volume.kinks[axis] for axis in chosen) if volume.kinks else (),
     )
+
+
+def _different(positions: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Positions (n, k), each once, (m, k), and which of these each is, (n,): on a grid many are the same."""
+    codes, count = np.zeros(len(positions), dtype=np.intp), 1
+    for column in positions.T:
+        values, place = np.unique(column, return_inverse=True)
+        if count * len(values) > SAME:
+            return positions, np.arange(len(positions))
+        codes, count = codes * len(values) + place, count * len(values)
+    _, first, places = np.unique(codes, return_index=True, return_inverse=True)
+    return positions[first], places
 
 
 def _recipe(face: Face, before: Sequence[Face]) -> dict[Set, Array]:

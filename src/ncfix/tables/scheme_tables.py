@@ -176,7 +176,8 @@ def _sobol_net(dimensions: int) -> Array:
     for k in range(1, len(points)):
         lowest = (k & -k).bit_length() - 1
         points[k] = points[k - 1] ^ directions[:, lowest]
-    return points / 2**SAMPLES
+    net: Array = points / 2**SAMPLES
+    return net
 
 
 def followed(sample: TableSample, layouts: TableLayouts, along: AlongAxis) -> dict[int, list[TableLayout]]:

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import field
+from functools import lru_cache
 
 import numpy as np
 
@@ -30,6 +31,7 @@ TURNING = "ABC"
 DEGREE = np.pi / 180
 
 
+@lru_cache(1 << 16)
 def as_number(text: str) -> float | None:
     """A decimal number as controls write it, finite; None for anything else."""
     if not re.fullmatch(NUMBER, text):

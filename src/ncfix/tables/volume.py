@@ -48,6 +48,8 @@ GROWTH = 1.15
 """Most nodes that are looked at, and by which factor their count grows to there."""
 FINE = 1 / 8
 """Share of the target from which an axis alone is good enough."""
+SURELY = 1 / 2
+"""Of the target: a grid that misses less along all its axes together is good enough."""
 AIM = 0.95
 """Share of a target that is aimed at: poses that were not looked at may miss a little more than those that were."""
 LAST = 3
@@ -316,9 +318,8 @@ def search(volume: Volume, target: float, most: Sequence[int], points: int, equa
         fewest = max(volume.least(axis) for axis in range(len(most)))
         ladder = np.repeat(np.arange(fewest, side + 1)[:, None], len(most), axis=1)
         return _first(volume, target, ladder)
-    found = _bisected(
-        volume, target, _frontier([_along(volume, axis, target, n) for axis, n in enumerate(most)], points)
-    )
+    ladder, missed = _frontier([_along(volume, axis, target, n) for axis, n in enumerate(most)], points)
+    found = _bisected(volume, target, ladder, float(missed[-1]) <= SURELY * target)
     return _thinned(volume, found, target) if found.reached else found
 
 
@@ -333,8 +334,11 @@ def _along(volume: Volume, axis: int, target: float, most: int) -> tuple[Counts,
     return np.array(counts, dtype=np.intp), np.array(missed)
 
 
-def _frontier(axes: Sequence[tuple[Counts, Array]], points: int) -> Counts:
-    """The counts (k, n_inputs) of which none has more nodes and misses more than another, by their number of nodes."""
+def _frontier(axes: Sequence[tuple[Counts, Array]], points: int) -> tuple[Counts, Array]:
+    """The counts (k, n_inputs) of which none has more nodes and misses more than another, by their number of nodes.
+
+    And what each misses along all axes together.
+    """
     counts, missed = np.zeros((1, 0), dtype=np.intp), np.zeros(1)
     for index, (line, part) in enumerate(axes):
         rest = int(np.prod([line[0] for line, _ in axes[index + 1 :]]))
@@ -342,7 +346,7 @@ def _frontier(axes: Sequence[tuple[Counts, Array]], points: int) -> Counts:
         total = (missed[:, None] + part).reshape(-1)
         allowed = grown.prod(axis=1) * rest <= points
         counts, missed = _undominated(grown[allowed], total[allowed])
-    return counts
+    return counts, missed
 
 
 def _undominated(counts: Counts, missed: Array) -> tuple[Counts, Array]:
@@ -369,16 +373,18 @@ def _first(volume: Volume, target: float, ladder: Counts) -> Mesh:
     return best
 
 
-def _bisected(volume: Volume, target: float, ladder: Counts) -> Mesh:
+def _bisected(volume: Volume, target: float, ladder: Counts, surely: bool) -> Mesh:
     """The first of a ladder that is good enough, if they get better and better; or the best of the last few.
 
-    Those are looked at only if the last of all is not good enough, or none before it is.
+    Those are looked at only if the last of all is not good enough, or none before it is. The last is the largest by
+    far: it is not looked at first where it is good enough `surely`.
     """
-    low, high = 0, len(ladder) - 1
-    last = _at(volume, ladder[-1], target)
-    best = None if last.reached else _best_of_last(volume, target, ladder, last)
-    if best is not None and not best.reached:
-        return best
+    low, high, best = 0, len(ladder) - 1, None
+    if not surely:
+        last = _at(volume, ladder[-1], target)
+        best = None if last.reached else _best_of_last(volume, target, ladder, last)
+        if best is not None and not best.reached:
+            return best
     while low < high:
         middle = (low + high) // 2
         found = _at(volume, ladder[middle], target)
@@ -386,7 +392,7 @@ def _bisected(volume: Volume, target: float, ladder: Counts) -> Mesh:
             best, high = found, middle
         else:
             low = middle + 1
-    return best or _best_of_last(volume, target, ladder, last)
+    return best or _best_of_last(volume, target, ladder, _at(volume, ladder[-1], target))
 
 
 def _best_of_last(volume: Volume, target: float, ladder: Counts, last: Mesh) -> Mesh:
