@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ncfix.control import control
 from ncfix.control.moves import Rule, Trace
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import UsageError
@@ -38,6 +39,21 @@ def test_everything_that_is_missing_is_named_at_once() -> None:
         ("NCF202", "length of tool 12 is used and not given"),
         ("NCF201", "work offset G55 is used and not given"),
     ]
+
+
+def test_a_program_of_another_machine_is_not_followed_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(control, "FOLLOWED_IN_VAIN", 10)
+    offset, axis = (
+        ("NCF201", "work offset {} is used and not given"),
+        "the program moves the axis A, and the machine has only X Y Z",
+    )
+    first = [
+        ("NCF206", axis),
+        (offset[0], offset[1].format("G54")),
+        ("NCF203", "start position of Z matters and not given"),
+    ]
+    assert lacking("G0 X1 Y1 A2\n" + 9 * "X2\n" + "G55 X3\n") == [*first, (offset[0], offset[1].format("G55"))]
+    assert lacking("G0 X1 Y1 A2\n" + 10 * "X2\n" + "G55 X3\n") == first
 
 
 def test_each_comes_with_its_option_and_place() -> None:

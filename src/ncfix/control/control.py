@@ -41,7 +41,7 @@ from ncfix.control.setup import Run
 from ncfix.control.state import TOOL_AT_RUN_TIME, ControlState
 from ncfix.control.tcp import in_machine
 from ncfix.control.turns import ROLLED, ROLLS, may_roll
-from ncfix.diagnostics import Message
+from ncfix.diagnostics import Message, UsageError
 from ncfix.text.dialect import Dialect
 from ncfix.text.tree import Program
 
@@ -58,6 +58,8 @@ RIGHT = 42
 """The control offsets the contour to the right of the way."""
 NOT_ACCOUNTED = "nothing is known that the control would make of the word {} in this block"
 AFTER_THAT = "where the axis {{}} stands is not known after this: {}"
+FOLLOWED_IN_VAIN = 5000
+"""Blocks that are followed for what else is not given, once the program has moved an axis that the machine lacks."""
 NO_WAY = 1e-9
 """mm"""
 ALONG = 1 - 1e-12
@@ -92,6 +94,7 @@ class ProgramControl(ControlState):
         self.refusal = ""
         self.suspended: dict[str, str] = {}
         self.foreign: dict[str, Message] = {}
+        self.followed_in_vain = 0
         self.external = ""
         self.row_block = 0
         self.numbers: Sequence[float] = ()
@@ -113,6 +116,11 @@ class ProgramControl(ControlState):
 
     def take_variables(self, variables: Any) -> None:
         """Go on with variables that another process has handed on."""
+
+    @property
+    def lacking(self) -> tuple[Message, ...]:
+        """What the program used so far and the setup does not give, and axes that the machine lacks."""
+        return (*self.foreign.values(), *self.knowledge.missing.values())
 
     @property
     def closure_mm(self) -> float:
@@ -184,7 +192,13 @@ class ProgramControl(ControlState):
 
         That is the one rule for all languages: no such word is ever passed over. Interpreters call this behind every
         block; what goes through a lane makes motions only.
+
+        Raises UsageError with all that is lacking, soon after the program has moved an axis that the machine lacks.
         """
+        if self.foreign:
+            self.followed_in_vain += 1
+            if self.followed_in_vain > FOLLOWED_IN_VAIN:
+                raise UsageError.collected(self.lacking)
         words, self.block_words = self.block_words, ()
         word = self.path_word(words) if words else ""
         if word:

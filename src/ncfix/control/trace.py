@@ -296,7 +296,7 @@ class Follower:
     @property
     def lacking(self) -> tuple[Message, ...]:
         """What the program used so far and the setup does not give, and axes that the machine lacks."""
-        return (*self.control.foreign.values(), *self.control.knowledge.missing.values())
+        return self.control.lacking
 
     @property
     def messages(self) -> tuple[Message, ...]:
@@ -344,9 +344,8 @@ def finished(control: ProgramControl, program: Program, moves: Moves) -> Trace:
     """The trace of a program; raises UsageError with all that was not given."""
     check_reach(program, moves)
     control.note_rolling(program)
-    lacking = (*control.foreign.values(), *control.knowledge.missing.values())
-    if lacking:
-        raise UsageError.collected(lacking)
+    if control.lacking:
+        raise UsageError.collected(control.lacking)
     marked = stamp.find(program)
     return Trace(
         moves=moves,
