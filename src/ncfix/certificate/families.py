@@ -99,57 +99,77 @@ class WordAddressFollower(AxisFollower):
         self._other_words(line)
         for code in codes:
             match code:
-                case 0 | 10 | 20 | 30:
-                    self.kind = (Kind.RAPID, Kind.FEED, Kind.ARC, Kind.ARC)[code // 10]
-                    self.clockwise = code == 20
-                case 170 | 180 | 190:
-                    self.plane = code // 10
-                case 200 | 210 | 700 | 710 | 7000 | 7100:
-                    if code in (700, 710) and self.family is Family.WORDS:
-                        self.lost[f"G{code / 10:g}"] = f"G{code / 10:g} is not known to this reader"
-                    self.unit = INCH if code in (200, 700, 7000) else 1.0
-                case 900 | 910:
-                    self.counting = code == 910
-                case 930 | 940 | 950:
-                    self.feed_mode = code // 10
-                case 410 | 420:
-                    self.beside = True
-                case 400:
-                    self.beside = False
-                    self.unsay()
-                case 530 | 1530:
-                    fixed = True
-                case 540 | 550 | 560 | 570 | 580 | 590 if self.family is Family.WORDS or code < 580:
-                    self._system(f"G{code // 10}")
-                case 5000:
-                    self._system("G500")
                 case 40:
                     apart = "dwell"
+                case 530 | 1530:
+                    fixed = True
                 case 430 | 434 if self.family is Family.WORDS:
                     length_set = True
                     self._length_offset(line, code == 434)
-                case 490 if self.family is Family.WORDS:
-                    self.lead(False)
-                    self.new_length(0.0)
-                case 730 | 740 | 810 | 820 | 830 | 840 | 850 | 860 | 870 | 880 | 890 if self.family is Family.WORDS:
-                    if self.kind != Kind.HOLE:
-                        self.cycle = {}
-                        self.before_cycle = self.at.get("Z", NAN)
-                    self.kind = Kind.HOLE
-                case 800 if self.family is Family.WORDS:
-                    self.kind = None if self.kind == Kind.HOLE else self.kind
-                case 980 | 990:
-                    self.returns_to_level = code == 990
                 case 280 | 300 if self.family is Family.WORDS:
                     pass
-                case _ if code in QUIET:
+                case _ if self._took_mode(code) or self._took_system(code) or self._took_cycle(code) or code in QUIET:
                     pass
                 case _:
-                    apart = apart or f"G{code / 10:g} is not known to this reader"
-                    self.lost[f"G{code / 10:g}"] = f"G{code / 10:g} is not known to this reader"
+                    why = f"G{code / 10:g} is not known to this reader"
+                    apart, self.lost[f"G{code / 10:g}"] = apart or why, why
         if self.tcp and not length_set and any(code in (540, 550, 560, 570) for code in codes):
             self.unsay("XYZ")
         return apart, fixed or any(word.name == "SUPA" for word in line.codes)
+
+    def _took_mode(self, code: int) -> bool:
+        """Take in a code of motion, plane, unit, distance, feed or cutter compensation; whether it is one."""
+        match code:
+            case 0 | 10 | 20 | 30:
+                self.kind = (Kind.RAPID, Kind.FEED, Kind.ARC, Kind.ARC)[code // 10]
+                self.clockwise = code == 20
+            case 170 | 180 | 190:
+                self.plane = code // 10
+            case 200 | 210 | 700 | 710 | 7000 | 7100:
+                if code in (700, 710) and self.family is Family.WORDS:
+                    self.lost[f"G{code / 10:g}"] = f"G{code / 10:g} is not known to this reader"
+                self.unit = INCH if code in (200, 700, 7000) else 1.0
+            case 900 | 910:
+                self.counting = code == 910
+            case 930 | 940 | 950:
+                self.feed_mode = code // 10
+            case 400 | 410 | 420:
+                self.beside = code != 400
+                if not self.beside:
+                    self.unsay()
+            case _:
+                return False
+        return True
+
+    def _took_system(self, code: int) -> bool:
+        """Take in a code of a work offset, or G49; whether it is one."""
+        match code:
+            case 540 | 550 | 560 | 570 | 580 | 590 if self.family is Family.WORDS or code < 580:
+                self._system(f"G{code // 10}")
+            case 5000:
+                self._system("G500")
+            case 490 if self.family is Family.WORDS:
+                self.lead(False)
+                self.new_length(0.0)
+            case _:
+                return False
+        return True
+
+    def _took_cycle(self, code: int) -> bool:
+        """Take in a code of drilling cycles; whether it is one."""
+        match code:
+            case 730 | 740 | 810 | 820 | 830 | 840 | 850 | 860 | 870 | 880 | 890 if self.family is Family.WORDS:
+                if self.kind != Kind.HOLE:
+                    self.cycle = {}
+                    self.before_cycle = self.at.get("Z", NAN)
+                self.kind = Kind.HOLE
+            case 800 if self.family is Family.WORDS:
+                self.kind = None if self.kind == Kind.HOLE else self.kind
+            case 980 | 990:
+                self.returns_to_level = code == 990
+            case _:
+                return False
+        return True
 
     def _other_words(self, line: TextLine) -> None:
         for word in line.codes:
@@ -241,7 +261,7 @@ class KlartextFollower(AxisFollower):
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
         lead = line.codes[0].name if line.codes else ""
-        if self._is_statement(lead):
+        if self._took_statement(lead):
             return None
         if line.odd:
             if line.rest.strip():
@@ -261,8 +281,8 @@ class KlartextFollower(AxisFollower):
             return step
         return self._path(row, line, lead, words)
 
-    def _is_statement(self, lead: str) -> bool:
-        """Whether a line says something of tools, units or the control of the tip, and leads nowhere."""
+    def _took_statement(self, lead: str) -> bool:
+        """Take in a line that says something of tools, units or the control of the tip; whether it is one."""
         if lead.startswith("TOOL CALL"):
             parts = lead.split()
             if len(parts) > 2 and parts[2].isdigit():
