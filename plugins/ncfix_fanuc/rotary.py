@@ -263,7 +263,7 @@ def _rounding(request: Request, lattice: Lattice) -> float:
 
 
 def _notes(
-    request: Request, lattices: Sequence[tuple[Lattice, Mesh]], play: Compensation, said: Iterator[str]
+    request: Request, lattices: Sequence[tuple[Lattice, Mesh]], play: Compensation, more: Iterator[str]
 ) -> Iterator[str]:
     """What the lattices are, and what is left with the first one and with both."""
     tables = None
@@ -289,7 +289,7 @@ def _notes(
             yield f"Its share of the target of {1e3 * request.target:g} um is not reached with the points allowed."
     if len(lattices) == 1 and request.machine.rotary.any():
         yield "The lattice is that of rotary axes at zero; at other angles more is left."
-    yield from said
+    yield from more
     yield from reversal_note(request.machine, request.space, request.tool_length, play)
 
 

@@ -192,7 +192,7 @@ def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
     """Bottom and clearance of the cycle in force along the tool axis of the frame, mm; and why they are not known."""
     cycle, unit = control.cycle, control.stretch
     if cycle.number in OLD_DRILLING:
-        depth, gap = said(cycle.steps, DEPTH_WORDS), said(cycle.steps, GAP_WORDS)
+        depth, gap = value_of_any(cycle.steps, DEPTH_WORDS), value_of_any(cycle.steps, GAP_WORDS)
         if depth is None or gap is None or any(key.endswith(":?") for key in cycle.steps):
             return height, height, DEPTH_AT_RUN_TIME
         sign = -1.0 if depth < 0 else 1.0
@@ -207,7 +207,7 @@ def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
     return unit * (surface + depth), unit * clear, ""
 
 
-def said(steps: Mapping[str, float], names: frozenset[str]) -> float | None:
+def value_of_any(steps: Mapping[str, float], names: frozenset[str]) -> float | None:
     """What an old cycle says under one of several names."""
     return next((value for key, value in steps.items() if "".join(key.partition(":")[2].split()) in names), None)
 

@@ -158,13 +158,13 @@ class _Chain:
 
     def _direction(self, element: Element) -> complex | None:
         """In which direction a line goes, if that is said."""
-        said = None if element.angle is None else cmath.rect(1.0, element.angle)
+        stated = None if element.angle is None else cmath.rect(1.0, element.angle)
         if not element.tangential:
-            return said
+            return stated
         if self.heading is None:
             raise NoSolutionError
-        if said is not None:
-            self._agree(said, self.heading)
+        if stated is not None:
+            self._agree(stated, self.heading)
         return self.heading
 
     def _along(self, element: Element, direction: complex) -> complex | None:

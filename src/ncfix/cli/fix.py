@@ -251,12 +251,12 @@ def fix(
     return _reported(batches, as_json, json_lines)
 
 
-def _outputs(context: click.Context, programs: Sequence[str], said: Outputs) -> Outputs:
+def _outputs(context: click.Context, programs: Sequence[str], asked: Outputs) -> Outputs:
     """Where outputs are to go; what the project file says does not hold where it cannot."""
     base = group_of(context).folder if is_from_file(context, "output") else None
-    output = None if base and (said.in_place or programs == (STREAM,)) else said.output
-    outputs = replace(said, output=output, base=base)
-    if said.resume and is_from_file(context, "resume") and outputs.folder(programs) is None:
+    output = None if base and (asked.in_place or programs == (STREAM,)) else asked.output
+    outputs = replace(asked, output=output, base=base)
+    if asked.resume and is_from_file(context, "resume") and outputs.folder(programs) is None:
         return replace(outputs, resume=False)
     return outputs
 

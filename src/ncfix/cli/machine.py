@@ -61,8 +61,8 @@ def check(file: str, as_json: bool) -> int:
     console.tell(*remarks)
     name = f"{visible(shown(file))}: {visible(found.name)}"
     if as_json:
-        said = [message.as_dict() for message in remarks]
-        console.put_json(path=shown(file), ok=not impossible, name=found.name, hash=found.hash, remarks=said)
+        entries = [message.as_dict() for message in remarks]
+        console.put_json(path=shown(file), ok=not impossible, name=found.name, hash=found.hash, remarks=entries)
     elif impossible:
         console.say(f"{name}: {console.counted(impossible, 'fault')}: no machine is like this one")
     else:
@@ -76,16 +76,18 @@ def _remarks(machine: Machine, path: str) -> list[Message]:
     """What is possible and odd: a control that nobody here knows (a plugin may), play with the other sign."""
     from ncfix.machine.effects import runs_ahead
 
-    said = []
+    remarks = []
     known = registry("controls") | registry("dialects")
     if machine.control and machine.control not in known:
         text = f"control: {machine.control!r} has neither a dialect nor tables here, and is passed over"
-        said.append(Message("NCF318", text, Place(path), nearest(machine.control, known)))
+        remarks.append(Message("NCF318", text, Place(path), nearest(machine.control, known)))
     ahead = {effect.name for axis in machine.axes for effect in machine.effects if runs_ahead(axis, effect)}
     for name in sorted(ahead):
         text = f"{name}: the body is ahead of its axis on both ways; lost motion has the other sign here"
-        said.append(Message("NCF319", text, Place(path), "it stays if the control takes out more play than there is"))
-    return said
+        remarks.append(
+            Message("NCF319", text, Place(path), "it stays if the control takes out more play than there is")
+        )
+    return remarks
 
 
 @machine.command()
@@ -161,12 +163,12 @@ def _page(machine: Machine) -> Iterator[str]:
         if found:
             yield f"\nerrors of {joint}" if joint != "S" else "\nerrors of the spindle"
         for effect in found:
-            said = _effect_as_dict(machine, effect)
+            entry = _effect_as_dict(machine, effect)
             size = "size not known from the file"
-            if said["range"] is not None:
-                low, high = said["range"]
-                size = f"{low:+.3g} {said['unit']}" if low == high else f"{low:+.3g} ... {high:+.3g} {said['unit']}"
-            yield f"  {effect.name:<5} {said['title']:<44} {depends_on(effect):<28} {size}"
+            if entry["range"] is not None:
+                low, high = entry["range"]
+                size = f"{low:+.3g} {entry['unit']}" if low == high else f"{low:+.3g} ... {high:+.3g} {entry['unit']}"
+            yield f"  {effect.name:<5} {entry['title']:<44} {depends_on(effect):<28} {size}"
 
 
 @click.command()
@@ -242,9 +244,9 @@ def _nameless(machine: Machine) -> list[Row]:
     return [_row(name, getattr(each, "title", "")) for name, each in absent]
 
 
-def _row(name: str, title: str, **said: str) -> Row:
+def _row(name: str, title: str, **others: str) -> Row:
     """A row of the table, whose columns are in this order."""
-    cells = {"name": name, "title": title, **said}
+    cells = {"name": name, "title": title, **others}
     return {column: cells.get(column.replace(" ", "_"), "") for column in COLUMNS}
 
 

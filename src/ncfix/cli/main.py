@@ -99,9 +99,9 @@ class Verbs(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The verbs, each with a short line; built-in ones are not imported for that."""
         others = {name: self.get_command(ctx, name) for name in self.list_commands(ctx) if name not in VERBS}
-        said = VERBS | {name: command.get_short_help_str(60) for name, command in others.items() if command}
+        summaries = VERBS | {name: command.get_short_help_str(60) for name, command in others.items() if command}
         with formatter.section("Commands"):
-            formatter.write_dl(list(said.items()))
+            formatter.write_dl(list(summaries.items()))
 
 
 @click.command(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})

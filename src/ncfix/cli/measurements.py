@@ -117,8 +117,8 @@ def calibrate(
     console.tell(*remarks)
     target.write(dumps(calibration.machine).encode())
     if as_json:
-        said = [message.as_dict() for message in remarks]
-        console.put_json(**_as_dict(calibration, over), remarks=said, output=target.path)
+        entries = [message.as_dict() for message in remarks]
+        console.put_json(**_as_dict(calibration, over), remarks=entries, output=target.path)
     elif output != STREAM:
         _print(calibration, over)
     return ExitCode.DONE
@@ -193,9 +193,9 @@ def _rows(calibration: Calibration) -> Iterator[tuple[str, str, str, str]]:
     from ncfix.machine.effects import units
 
     machine, selection = calibration.problem.machine, calibration.problem.selection
-    said = [unit for effect in selection.estimated for unit in units(machine, effect)]
+    scales = [unit for effect in selection.estimated for unit in units(machine, effect)]
     values, sigma = calibration.estimate.coefficients.tolist(), calibration.sigma.tolist()
-    for label, value, deviation, (factor, unit) in zip(calibration.labels, values, sigma, said, strict=True):
+    for label, value, deviation, (factor, unit) in zip(calibration.labels, values, sigma, scales, strict=True):
         known = "held" if math.isnan(deviation) else f"{factor * deviation:.3g}"
         if value or known != "held":
             yield label, f"{factor * value:.4g}", known, unit

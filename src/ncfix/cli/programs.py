@@ -87,10 +87,10 @@ def _outcome(following: Following, path: str) -> tuple[int, dict[str, Any]]:
         return error.exit_code, {**entry, "errors": [message.as_dict() for message in error.messages]}
     console.tell_some(checked.findings)
     count = len(checked.findings)
-    said = console.counted(count, "finding") if count else "nothing found"
-    said += "" if following.machine else ", without a machine"
+    verdict = console.counted(count, "finding") if count else "nothing found"
+    verdict += "" if following.machine else ", without a machine"
     size = f"{console.counted(checked.blocks, 'block')}, {console.counted(checked.moves, 'motion')}"
-    console.say(f"{visible(shown(path))}: {size}, {dialect}: {said}")
+    console.say(f"{visible(shown(path))}: {size}, {dialect}: {verdict}")
     entry |= {"dialect": dialect, "blocks": checked.blocks, "moves": checked.moves}
     entry["findings"] = [message.as_dict() for message in checked.findings]
     return ExitCode.FINDINGS if count else ExitCode.DONE, entry

@@ -66,8 +66,8 @@ def report(
         _report_program(sources, machine_path, output, plot, force, given, options)
         return
     context = click.get_current_context()
-    said = [name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
-    if set(said) - {"sources", "output", "force"}:
+    named = [name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+    if set(named) - {"sources", "output", "force"}:
         raise click.UsageError("options of a program need -m MACHINE")
     from ncfix.reports.document import Document
     from ncfix.reports.rendering import form_of

@@ -110,9 +110,9 @@ def _simulate_program(following: Following, program: str, target: OutputTarget |
 def _check_apt(of_plan: bool, of_program: bool) -> None:
     """Refuse options that would say nothing."""
     context = click.get_current_context()
-    said = [name for name in OF_PLANS if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
-    if said and not of_plan:
-        raise click.UsageError(f"--{said[0].replace('_', '-')} is for a measurement (--plan), not for a program")
+    named = [name for name in OF_PLANS if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+    if named and not of_plan:
+        raise click.UsageError(f"--{named[0].replace('_', '-')} is for a measurement (--plan), not for a program")
     if of_plan and of_program:
         raise click.UsageError(
             "--dialect and the options of the set-up are for a program; a plan has columns for states"
@@ -135,9 +135,9 @@ class Errors:
         from ncfix.compensate.figures.simulation import tip_errors_on
 
         task = task_of(self.following, self.source, dialect_in(self.following, self.source))
-        said: list[Message] = []
-        table, along = self._gone_along(tip_errors_on(task, self.source.read, said), self.keep)
-        return table, along, said
+        messages: list[Message] = []
+        table, along = self._gone_along(tip_errors_on(task, self.source.read, messages), self.keep)
+        return table, along, messages
 
     def whole(self) -> tuple[Iterable[bytes], Along, Sequence[Message]]:
         """The same of a program as a whole."""

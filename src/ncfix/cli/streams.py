@@ -30,10 +30,10 @@ def part_bytes() -> int:
     """
     from ncfix.compensate.following import PART_BYTES
 
-    said = os.environ.get("NCFIX_PART_BYTES") or str(PART_BYTES)
-    if not said.isdecimal() or int(said) < 1:
-        raise UsageError.of("NCF001", f"NCFIX_PART_BYTES is {said!r}, and not a number of bytes", hint="unset it")
-    return int(said)
+    text = os.environ.get("NCFIX_PART_BYTES") or str(PART_BYTES)
+    if not text.isdecimal() or int(text) < 1:
+        raise UsageError.of("NCF001", f"NCFIX_PART_BYTES is {text!r}, and not a number of bytes", hint="unset it")
+    return int(text)
 
 
 def looked_bytes() -> int:

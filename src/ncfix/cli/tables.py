@@ -339,8 +339,8 @@ def lint(paths: tuple[str, ...], control: str, as_json: bool) -> int:
             whose = {"form": looked.owner or None, "title": looked.title or None}
             entries.append({"path": shown(path), **whose, "findings": found})
             if not as_json:
-                said = console.counted(len(messages), "finding") if messages else "nothing found"
-                console.say(f"{shown(path)}: {looked.title or 'of no known form'}: {said}")
+                verdict = console.counted(len(messages), "finding") if messages else "nothing found"
+                console.say(f"{shown(path)}: {looked.title or 'of no known form'}: {verdict}")
     if as_json:
         console.put_json(files=entries)
     return worst

@@ -153,11 +153,11 @@ def verify(
             left_where_it_stands=[{"axis": axis, "lines": lines} for axis, lines in found.left.items()],
         )
     else:
-        console.put("".join(f"{line}\n" for line in said(found, tolerance_um)))
+        console.put("".join(f"{line}\n" for line in verdict(found, tolerance_um)))
     return ExitCode.DONE if found.within else ExitCode.FINDINGS
 
 
-def said(found: Compared, tolerance_um: float) -> Iterator[str]:
+def verdict(found: Compared, tolerance_um: float) -> Iterator[str]:
     """What was found, for people."""
     yield f"tip error before: {console.error_figures(found.before)}"
     yield f"tip error after:  {console.error_figures(found.after)}"

@@ -103,7 +103,7 @@ class MotionBuilder:
         self._measured: dict[int, int] = {}
         self.rolls: NDArray[np.bool_] | None = None
         self.winding: Winding | None = None
-        self._said: list[tuple[int, int, int]] = []
+        self._directed: list[tuple[int, int, int]] = []
         self.overturned: int | None = None
         self.brought_back: int | None = None
 
@@ -195,7 +195,7 @@ class MotionBuilder:
 
     def says_the_way(self, axes: int, motions: int = 1) -> None:
         """The motions that are added next turn these axes in a way that their words say, or nothing leaves open."""
-        self._said.append((self.count, self.count + motions, axes))
+        self._directed.append((self.count, self.count + motions, axes))
 
     def extend(self, stretch: MotionColumns) -> None:
         """Many motions."""
@@ -278,7 +278,7 @@ class MotionBuilder:
         """Forget the motions so far; styles, reasons, frames and calls keep their numbers."""
         self.count, self._called = 0, {}
         self.overturned = self.brought_back = None
-        self._said, self._resting, self._circles, self._measured = [], {}, [], {}
+        self._directed, self._resting, self._circles, self._measured = [], {}, [], {}
         self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
@@ -306,13 +306,13 @@ class MotionBuilder:
         """
         if self.rolls is None:
             return None
-        said = np.repeat(styles["incremental"][:, None], len(self.columns), axis=1) if counted is None else counted
-        said = said.copy()
-        for first, stop, axes in self._said:
-            said[first:stop] |= [bool(axes >> column & 1) for column in self.columns]
+        directed = np.repeat(styles["incremental"][:, None], len(self.columns), axis=1) if counted is None else counted
+        directed = directed.copy()
+        for first, stop, axes in self._directed:
+            directed[first:stop] |= [bool(axes >> column & 1) for column in self.columns]
         free = styles["rule"] != Rule.PASS
-        rows = overturned(self.rolls, said, start, end) & free
-        back, plain = np.zeros(len(block), dtype=np.bool_), programmed & ~said
+        rows = overturned(self.rolls, directed, start, end) & free
+        back, plain = np.zeros(len(block), dtype=np.bool_), programmed & ~directed
         offset = np.array([offset for offset, *_ in self._frames] or [(0.0,) * len(self.columns)])[styles["frame"]]
         if self.winding is not None:
             back = self.winding.back(self.rolls, plain, start - offset, end - offset) & free & ~rows

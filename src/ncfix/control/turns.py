@@ -93,12 +93,12 @@ def may_roll(travel: Sequence[tuple[float, float]] | None, rotary: Mask) -> Mask
     return rolls if rolls.any() else None
 
 
-def overturned(rolls: Mask, said: Mask, start: NDArray[np.float64], end: NDArray[np.float64]) -> Mask:
+def overturned(rolls: Mask, directed: Mask, start: NDArray[np.float64], end: NDArray[np.float64]) -> Mask:
     """Motions (n,) from `start` to `end` (n, n_axes), rad, that turn such an axis by half a turn or more.
 
-    said  (n, n_axes) axes whose words say which way they turn: increments, and those that name the sense
+    directed  (n, n_axes) axes whose words say which way they turn: increments, and those that name the sense
     """
-    way = np.where(said[:, rolls], 0.0, np.abs(end[:, rolls] - start[:, rolls]))
+    way = np.where(directed[:, rolls], 0.0, np.abs(end[:, rolls] - start[:, rolls]))
     return np.asarray((way >= HALF_A_TURN).any(axis=1))
 
 

@@ -295,10 +295,10 @@ def vector(values: Sequence[float]) -> str:
 def facts(machine: Machine) -> dict[str, str]:
     """What a machine file says besides chain and errors."""
     sizes = {"least increment": machine.least_increment, "largest correction": machine.max_correction}
-    said = {"topology": machine.topology, "control": machine.control or ""}
-    said |= {name: f"{linear:g} mm, {np.degrees(rotary):g} deg" for name, (linear, rotary) in sizes.items()}
-    said |= {str(name): str(value) for name, value in machine.provenance.items()}
-    return {name: value for name, value in said.items() if value}
+    rows = {"topology": machine.topology, "control": machine.control or ""}
+    rows |= {name: f"{linear:g} mm, {np.degrees(rotary):g} deg" for name, (linear, rotary) in sizes.items()}
+    rows |= {str(name): str(value) for name, value in machine.provenance.items()}
+    return {name: value for name, value in rows.items() if value}
 
 
 def travel_of(axis: Axis) -> str:

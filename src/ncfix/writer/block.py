@@ -97,8 +97,8 @@ class BlockWriter(BlockText):
 
     def _motion_code(self) -> None:
         wanted, word = self.target.code, self.layout.motion
-        said = self.target.active_code if word is None else round(self._value(word, np.nan) * 10)
-        if wanted not in STRAIGHT_AND_ARCS or wanted == said:
+        in_force = self.target.active_code if word is None else round(self._value(word, np.nan) * 10)
+        if wanted not in STRAIGHT_AND_ARCS or wanted == in_force:
             return
         if word is not None:
             self._restate(word, f"{wanted // 10}")

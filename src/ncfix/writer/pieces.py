@@ -120,7 +120,7 @@ class _Walk:
         self.reached = len(moves)
         self.columns = [moves.axes.index(letter) if letter in moves.axes else -1 for letter in "XYZ"]
         self.passed = moves.rule == Rule.PASS
-        self.said = moves.programmed & ~moves.increments
+        self.absolute = moves.programmed & ~moves.increments
         arcs = np.flatnonzero(moves.kind == MotionKind.ARC)
         self.anchored = bound & ~self.passed
         self.anchored[arcs] |= ~self._floating(arcs) & ~self.passed[arcs]
@@ -128,7 +128,7 @@ class _Walk:
     def _floating(self, arcs: NDArray[np.intp]) -> Mask:
         """Which arcs (k,) have both end and centre that count from where they start, full circles among them."""
         moves = self.moves
-        named = [self.said[arcs, column] for column in self.columns if column >= 0]
+        named = [self.absolute[arcs, column] for column in self.columns if column >= 0]
         in_plane = np.abs(moves.normal[arcs]) < 1 - STILL
         own = np.stack(named, axis=1) & in_plane[:, [k for k, column in enumerate(self.columns) if column >= 0]]
         return np.asarray(~moves.about_fixed_point[arcs] & ~own.any(axis=1))
@@ -170,7 +170,7 @@ class _Walk:
         moves = self.moves
         if self.passed[row]:
             return np.asarray(moves.moved[row])
-        decided = self.said[row] & (moves.end[row] == moves.start[row + 1])
+        decided = self.absolute[row] & (moves.end[row] == moves.start[row + 1])
         turned = [
             column
             for column, own in zip(self.columns, moves.frames[moves.frame[row]].rotation, strict=True)

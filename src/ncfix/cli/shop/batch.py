@@ -119,8 +119,8 @@ class FixJob:
 
     def outcome_and_messages(self, target: OutputTarget, jobs: int = 1) -> Finished:
         """Fix one program elsewhere: what came of it, and what there is to say."""
-        with console.keeping() as said:
-            return self.outcome(target, jobs), said
+        with console.keeping() as lines:
+            return self.outcome(target, jobs), lines
 
     def outcome(self, target: OutputTarget, jobs: int = 1) -> FixOutcome:
         """Fix one program and say what came of it; an error, and a fault of ncfix, ends this program only."""
@@ -367,10 +367,10 @@ class Batch:
         with progress(len(targets)) as step:
             for target in targets:
                 if target in kept:
-                    outcome, said = _done_before(target, kept[target])
+                    outcome, lines = _done_before(target, kept[target])
                 else:
-                    outcome, said = next(fresh)
-                reporter.report(outcome.entry, said)
+                    outcome, lines = next(fresh)
+                reporter.report(outcome.entry, lines)
                 step()
                 yield outcome
 

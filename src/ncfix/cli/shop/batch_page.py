@@ -77,8 +77,8 @@ def _totals(summary: Summary) -> str:
     def row(count: int, outcome: str, code: str, kind: str) -> list[str]:
         title = titles[code].title if code in titles else ""
         show = f'<button type="button" data-find="{escape(code.lower())}" data-outcome="{escape(kind)}">show</button>'
-        said = f'<span class="outcome {outcome.split()[0]}">{escape(outcome)}</span>'
-        return [str(count), said, escape(code), escape(title), show]
+        badge = f'<span class="outcome {outcome.split()[0]}">{escape(outcome)}</span>'
+        return [str(count), badge, escape(code), escape(title), show]
 
     rows = [row(each["programs"], each["outcome"], each["code"] or "", each["outcome"]) for each in found["outcomes"]]
     remarks = sorted(found["remarks"].items(), key=lambda item: (-item[1], item[0]))

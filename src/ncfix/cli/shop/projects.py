@@ -68,14 +68,14 @@ class ProjectCommand(click.Command):
         return super().parse_args(ctx, args)
 
     def _groups(self, ctx: click.Context, args: list[str]) -> list[ProgramGroup]:
-        said, _, _ = self.make_parser(ctx).parse_args(args=list(args))
+        options, _, _ = self.make_parser(ctx).parse_args(args=list(args))
         first = next(param.name for param in self.params if isinstance(param, click.Argument))
-        given = said.get(first or "")
+        given = options.get(first or "")
         given = [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else []
-        ctx.meta[QUIET] = said.get("quiet") is True
-        if said.get("help") is True or said.get("no_project") is True or not given:
+        ctx.meta[QUIET] = options.get("quiet") is True
+        if options.get("help") is True or options.get("no_project") is True or not given:
             return [ProgramGroup()]
-        named = said.get("project") or os.environ.get("NCFIX_PROJECT")
+        named = options.get("project") or os.environ.get("NCFIX_PROJECT")
         return self._by_settings(given, named if isinstance(named, str) else os.environ.get("NCFIX_PROJECT"))
 
     def _by_settings(self, given: Iterable[str], named: str | None) -> list[ProgramGroup]:

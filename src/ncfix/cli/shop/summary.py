@@ -161,12 +161,12 @@ class OutcomeReporter:
     many: bool
     seen: Counter[str] = field(default_factory=Counter)
 
-    def report(self, entry: Mapping[str, Any], said: list[str]) -> None:
+    def report(self, entry: Mapping[str, Any], lines: list[str]) -> None:
         """Say what there is to say of one of them; `said`: all of it."""
         wrong = reasons(entry)
         everything = self.verbosity == Verbosity.ALL or (bool(wrong) and console.is_debugging())
         if everything or (not self.many and (self.verbosity == Verbosity.USUAL or wrong)):
-            for line in said:
+            for line in lines:
                 console.say(line)
         elif self.many and wrong:
             code = wrong[0][0]
