@@ -42,6 +42,8 @@ FIRST, CHUNK = 32, 32
 """Targets that an addition looks at first; candidates that it looks at more closely at a time."""
 STARTS, SMALL = 20, 20_000
 """Random starts besides the first choice, where candidates times predictions are few."""
+ALONE = 1e-5
+"""A pose of which no more is told by the others is not taken off by a formula."""
 EXCHANGED = 1e-3
 """A relative gain below this is none."""
 WORTHWHILE = 5e-3
@@ -293,34 +295,74 @@ def _passed(pool: Pool, start: list[int], fixed: int) -> list[int]:
     """One pass over all poses."""
     chosen = list(start)
     worst = float(variances(pool, [*range(fixed), *chosen]).max())
+    measured = Measured.of(pool, [*range(fixed), *chosen])
     for place in range(len(chosen)):
         others = [*range(fixed), *chosen[:place], *chosen[place + 1 :]]
-        better, value = best_addition(pool, others)
+        better, value = best_addition(pool, others, measured.without(pool, chosen[place]))
         if value < worst * (1 - EXCHANGED):
             chosen[place], worst = better, value
+            measured = Measured.of(pool, [*range(fixed), *chosen])
     return chosen
 
 
-def best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:
+@dataclass(frozen=True)
+class Measured:
+    """What is known once some blocks are measured, with M their information.
+
+    inverse  (p, p) M^-1
+    spread   (n, r, p) B M^-1 of every candidate
+    own      (n, r, r) B M^-1 B' of every candidate
+    """
+
+    inverse: Array
+    spread: Array
+    own: Array
+
+    @classmethod
+    def of(cls, pool: Pool, rows: Sequence[int]) -> Measured:
+        """From these blocks."""
+        n, r, p = pool.blocks.shape
+        inverse = np.linalg.inv(information(pool, rows))
+        spread = (pool.blocks.reshape(n * r, p) @ inverse).reshape(n, r, p)
+        return cls(inverse, spread, spread @ np.swapaxes(pool.blocks, 1, 2))
+
+    def without(self, pool: Pool, row: int) -> Measured | None:
+        """Without one of the blocks; None where next to nothing else tells what it tells, and rounding would spoil it.
+
+        By the formula of Woodbury: `spread` is what it was, and not used any more.
+        """
+        block = pool.blocks[row]
+        rest = np.eye(len(block)) - self.own[row]
+        if np.linalg.eigvalsh(rest)[0] < ALONE:
+            return None
+        n, r, p = self.spread.shape
+        cross = (self.spread.reshape(n * r, p) @ block.T).reshape(n, r, -1)
+        inner = np.linalg.inv(rest)
+        lost = self.spread[row].T
+        inverse = self.inverse + lost @ inner @ lost.T
+        return Measured(inverse, self.spread, self.own + (cross @ inner) @ np.swapaxes(cross, 1, 2))
+
+
+def best_addition(pool: Pool, others: list[int], measured: Measured | None = None) -> tuple[int, float]:
     """The candidate that, added to the others, leaves the smallest worst variance, and that variance.
+
+    measured  what is known of the others, if somebody has worked it out
 
     With the rows B of a candidate and the information M without it, a target t gains |L^-1 B M^-1 t|^2, where
     L L' = 1 + B M^-1 B'. What a candidate leaves of the FIRST targets that are worst without it bounds what it leaves
     of all from below: the others are worked out for the candidates that may still be best, CHUNK at a time.
     """
-    n, r, p = pool.blocks.shape
-    inverse = np.linalg.inv(information(pool, others))
-    projected = inverse @ pool.targets.T
+    measured = measured or Measured.of(pool, others)
+    projected = measured.inverse @ pool.targets.T
     present = np.einsum("tp,pt->t", pool.targets, projected)
     order = np.argsort(-present, kind="stable")
     first, rest = order[:FIRST], order[FIRST:]
-    small = (pool.blocks.reshape(n * r, p) @ inverse).reshape(n, r, p) @ np.swapaxes(pool.blocks, 1, 2)
-    white = _whitening(small)
+    white = _whitening(measured.own)
     bound = _left(pool.blocks, white, projected[:, first], present[first])
     bound[others] = np.inf
     best, worst = int(bound.argmin()), np.inf
     likely = np.argsort(bound, kind="stable")
-    for start in range(0, n, CHUNK):
+    for start in range(0, len(likely), CHUNK):
         chunk = likely[start : start + CHUNK]
         if bound[chunk[0]] >= worst:
             break
@@ -343,12 +385,23 @@ def _left(blocks: Array, white: Array, projected: Array, present: Array) -> Arra
 
 def _whitening(small: Array) -> Array:
     """L^-1, where L L' = 1 + `small`; where poses leave much open, rounding spoils that `small` is not negative."""
-    try:
-        found: Array = np.linalg.inv(np.linalg.cholesky(small + np.eye(small.shape[1])))
-    except np.linalg.LinAlgError:
-        values, ways = np.linalg.eigh(small)
-        found = np.swapaxes(ways, 1, 2) / np.sqrt(1 + np.maximum(values, 0.0))[:, :, None]
-    return found
+    r = small.shape[1]
+    left = np.moveaxis(small, 0, 2) + np.eye(r)[:, :, None]
+    found = np.zeros_like(left)
+    found[range(r), range(r)] = 1.0
+    for k in range(r):
+        if not left[k, k].min() > 0:
+            values, ways = np.linalg.eigh(small)
+            whole: Array = np.swapaxes(ways, 1, 2) / np.sqrt(1 + np.maximum(values, 0.0))[:, :, None]
+            return whole
+        size = np.sqrt(left[k, k])
+        left[k, k:] /= size
+        found[k, : k + 1] /= size
+        for j in range(k + 1, r):
+            share = left[k, j]
+            left[j, j:] -= share * left[k, j:]
+            found[j, : k + 1] -= share * found[k, : k + 1]
+    return np.ascontiguousarray(np.moveaxis(found, 2, 0))
 
 
 def information(pool: Pool, rows: Sequence[int]) -> Array:
