@@ -13,9 +13,9 @@ times the distance from where it is said to be about: six numbers for all positi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import ClassVar
 
 import numpy as np
@@ -316,9 +316,10 @@ class LatticeFilling:
             volume = self._volume(self.request.tool_length, area)
             for index in range(len(LINEAR)) if trimmed else ():
                 volume = volume.trimmed(index, LEVEL * self.request.target)
-            volume.written = partial(self._as_written, area=area, covered=volume.covered)
+            lattice = cache(partial(self._lattice, area=area, covered=volume.covered))
+            volume.made = partial(self._as_written, lattice, volume)
             mesh = search(volume, target, [SIDE] * 3, SIDE**3)
-            found.append((self._lattice(mesh.grid.counts, area, volume.covered), mesh))
+            found.append((lattice(mesh.grid.counts), mesh))
             if mesh.reached:
                 break
         return min(found, key=lambda each: each[1].left)
@@ -332,7 +333,7 @@ class LatticeFilling:
     def _anchors(self, inputs: Sequence[str]) -> tuple[float, ...]:
         return anchors(self.request, self.settings, inputs)
 
-    def _lattice(self, counts: Sequence[int], area: bool, covered: Array) -> Lattice:
+    def _lattice(self, counts: tuple[int, ...], area: bool, covered: Array) -> Lattice:
         """Tools of two lengths tell lengths from angles."""
         volumes = (replace(self._volume(length, area), covered=covered) for length in (0.0, LENGTH))
         bare, long = (volume.grid(counts) for volume in volumes)
@@ -344,11 +345,15 @@ class LatticeFilling:
         found = Lattice.of(grids, self.sign, self.units, self._anchors(LINEAR))
         return replace(found, home_minus=self.backlash.home_minus)
 
-    def _as_written(self, grid: Grid, area: bool, covered: Array) -> Grid:
+    def _as_written(
+        self, lattice: Callable[[tuple[int, ...]], Lattice], volume: Volume, counts: tuple[int, ...]
+    ) -> Grid:
         """What whole numbers make of the grid with that many points."""
-        lengths, angles = self._lattice(grid.counts, area, covered).grids()
+        lengths, angles = lattice(counts).grids()
         total = lengths.values + np.cross(angles.values, (0.0, 0.0, -self.request.tool_length))
-        return replace(grid, values=total[..., [LINEAR.index(axis) for axis in grid.outputs]])
+        values = total[..., [LINEAR.index(axis) for axis in volume.outputs]]
+        nodes = tuple(volume.nodes(index, count) for index, count in enumerate(counts))
+        return Grid(volume.inputs, nodes, volume.outputs, values)
 
     def rotary(self, share: float, most: int) -> tuple[Lattice, Mesh] | None:
         """The lattice over the rotary axes, if the machine has tables that turn and their angles matter."""

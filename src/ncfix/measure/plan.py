@@ -322,7 +322,7 @@ class Measured:
     def of(cls, pool: Pool, rows: Sequence[int]) -> Measured:
         """From these blocks."""
         n, r, p = pool.blocks.shape
-        inverse = np.linalg.inv(information(pool, rows))
+        inverse: Array = np.linalg.inv(information(pool, rows))
         spread = (pool.blocks.reshape(n * r, p) @ inverse).reshape(n, r, p)
         return cls(inverse, spread, spread @ np.swapaxes(pool.blocks, 1, 2))
 
@@ -339,7 +339,7 @@ class Measured:
         cross = (self.spread.reshape(n * r, p) @ block.T).reshape(n, r, -1)
         inner = np.linalg.inv(rest)
         lost = self.spread[row].T
-        inverse = self.inverse + lost @ inner @ lost.T
+        inverse: Array = self.inverse + lost @ inner @ lost.T
         return Measured(inverse, self.spread, self.own + (cross @ inner) @ np.swapaxes(cross, 1, 2))
 
 

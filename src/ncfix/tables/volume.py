@@ -71,6 +71,8 @@ class Volume:
     area     values at nodes are those that come nearest to the corrections all around (least squares), not those of the
              nodes themselves
     written  what a file makes of a grid, which is judged after that: as it is where the file keeps every digit
+    made     what a file makes of the grid with so many nodes along each input, where that does not follow from the
+             corrections at its nodes alone
     kinks    of each input, positions at which the corrections may have a corner
     uneven   nodes need not be evenly spaced
     covered  (n_inputs, 2) where nodes are, mm and rad; beyond, but within the ranges, the values at the ends hold
@@ -85,6 +87,7 @@ class Volume:
     exact: Callable[[Array], Array]
     area: bool = False
     written: Callable[[Grid], Grid] = lambda grid: grid
+    made: Callable[[tuple[int, ...]], Grid] | None = None
     kinks: tuple[Array, ...] = ()
     uneven: bool = False
     covered: Array = field(default_factory=lambda: np.zeros((0, 2)))
@@ -158,13 +161,13 @@ class Volume:
         key = tuple(counts)
         if key in self._grids:
             return self._grids[key]
-        found = self._grid(key)
+        found = self._grid(key) if self.made is None else self.made(key)
         if found.points <= REMEMBERED:
             self._grids[key] = found
         return found
 
     def _grid(self, counts: tuple[int, ...]) -> Grid:
-        nodes = tuple(self._nodes(index, count) for index, count in enumerate(counts))
+        nodes = tuple(self.nodes(index, count) for index, count in enumerate(counts))
         within = WITHIN if len(nodes) <= 3 else WITHIN // 2
         looked_at = tuple(self._around(index, line, within) for index, line in enumerate(nodes)) if self.area else nodes
         values = on_full_grid(self._at, looked_at)
@@ -191,7 +194,8 @@ class Volume:
         after = np.linspace(high, nodes[-1], within // 2, endpoint=False) if high - nodes[-1] > step else np.zeros(0)
         return np.concatenate([before, between(nodes, within), after[::-1]])
 
-    def _nodes(self, index: int, count: int) -> Array:
+    def nodes(self, index: int, count: int) -> Array:
+        """The positions of so many nodes along one input, as files can say them."""
         if self.uneven:
             line = self._bends(index).uneven()[count][0] / self.units[index]
         else:
@@ -233,7 +237,7 @@ class Volume:
     def bending(self, index: int, count: int) -> float:
         """The largest correction that `count` nodes along one input miss on random lines along it, mm."""
         bends = self._bends(index)
-        return bends.uneven()[count][1] if self.uneven else bends.missed(self._nodes(index, count))
+        return bends.uneven()[count][1] if self.uneven else bends.missed(self.nodes(index, count))
 
     def trimmed(self, index: int, allowed: float) -> Volume:
         """Nodes of one input only where the corrections change: at either end by no more than is allowed, mm."""

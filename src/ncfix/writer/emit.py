@@ -86,6 +86,8 @@ def emit(
 class _Emitter:
     """The walk over the motions; `run()` is called once.
 
+    forgets      (n,) motions after which the level R of a canned cycle counts no more
+    relies       (n,) motions that rely on the motion code in force, where they stay as they are
     position     (n_axes,) the command at which the control stands, as emitted
     jumps        (n, n_axes) where a motion does not start where the one before ended
     replaced     the motion code in force, in tenths, where it is not the program's own; else None
@@ -119,6 +121,8 @@ class _Emitter:
         self.bulk = bulk or Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
         self.first_piece = self.bulk.first_piece
         self.kind, self.rotary = view(moves.kind), tuple(moves.rotary.tolist())
+        plain = np.isin(moves.kind, (MotionKind.RAPID, MotionKind.FEED, MotionKind.ARC)) & (moves.rule != Rule.PASS)
+        self.forgets, self.relies = (view(mask) for mask in (moves.kind != MotionKind.DWELL, plain))
         self.wordless, self.increments = moves.wordless, moves.increments
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
@@ -242,7 +246,7 @@ class _Emitter:
 
     def _keep(self, row: int) -> None:
         moves = self.moves
-        if self.kind[row] != MotionKind.DWELL:
+        if self.forgets[row]:
             self.levels.forget()
         moved, began, ended = self.moved[row], self.reading.start, self.reading.end
         if began is not None and ended is not None:  # a departure goes on along a line that is now a corrected one
@@ -250,9 +254,8 @@ class _Emitter:
         passed = passed_through(moves, row, self.position, self.kinematics) if began is None else None
         self.position = np.where(moved, self._kept_end(row), self.position) if passed is None else passed
         self.end[self.first_piece[row]] = self.position
-        if self.kind[row] not in (MotionKind.RAPID, MotionKind.FEED, MotionKind.ARC) or moves.rule[row] == Rule.PASS:
-            return
-        self._check_code(row)
+        if self.relies[row]:
+            self._check_code(row)
 
     def _kept_end(self, row: int) -> FloatArray:
         moves = self.moves

@@ -246,7 +246,8 @@ def _of_axes(written: WrittenPieces, code: str, text: str, beyond: Array) -> Fin
     most = beyond[np.arange(len(beyond)), axis]
     rows = np.flatnonzero((most > FUZZ) & ~kept)
     units = np.where(machine.rotary, 180 / np.pi, 1.0)[axis[rows]]
-    names = tuple(machine.axis_names[j] for j in axis[rows])
+    letters = machine.axis_names
+    names = tuple(letters[j] for j in axis[rows].tolist())
     return Finding(code, rows, most[rows] * units, text, names, turns=tuple(machine.rotary[axis[rows]].tolist()))
 
 
