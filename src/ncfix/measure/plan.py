@@ -322,7 +322,7 @@ class Measured:
     def of(cls, pool: Pool, rows: Sequence[int]) -> Measured:
         """From these blocks."""
         n, r, p = pool.blocks.shape
-        inverse: Array = np.linalg.inv(information(pool, rows))
+        inverse = np.asarray(np.linalg.inv(information(pool, rows)), dtype=np.float64)
         spread = (pool.blocks.reshape(n * r, p) @ inverse).reshape(n, r, p)
         return cls(inverse, spread, spread @ np.swapaxes(pool.blocks, 1, 2))
 
