@@ -63,6 +63,7 @@ from ncfix.machine.axes import component_title
 from ncfix.measure.least_squares import orthonormal
 from ncfix.measure.least_squares import without as without_base
 from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.motion import with_motion
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
 EXCESS_UM = 2.0
@@ -389,6 +390,7 @@ def diagnose(
     Raises `UsageError` NCF630, NCF637 and NCF650 ... NCF659 where the data cannot carry a diagnosis.
     """
     checks.before(measurements, machine)
+    measurements = [with_motion(each, machine) for each in measurements]
     if since:
         if len(measurements) < 2:
             raise UsageError.of("NCF650", "one file: what changed since takes one of each date")

@@ -32,6 +32,8 @@ REGIONS = 16
 FOLDS = 4
 BLIND = 1e2
 """Times the noise: a value predicted no better than this has a set-up that nothing else shares; it does not count."""
+SHARP = 6.0
+"""What drives do at a few places only counts by its largest value over this, if that is more than its rms."""
 MATERIAL_UM = 0.8
 """An effect that moves the tool tip by less is not worth a name."""
 RATHER = 0.5
@@ -125,7 +127,7 @@ def machine_with(
 
 def effects_of(group: EffectForm, numbers: Array, spread: Array) -> tuple[Effect, ...]:
     """The effects of a form with their coefficients, without those that are zero; none for what is no error."""
-    if group.owner.grows:
+    if group.owner.kept_out:
         return ()
     values = group.loading @ numbers
     covariance = group.loading @ spread @ group.loading.T
@@ -274,7 +276,12 @@ def _failed(scale: Comparison, selected: Selected) -> list[str]:
     for k, name in enumerate(selected.members):
         mean, error = prediction_gain(held, held.less[k])
         predicts = mean > error or _stands_behind(scale, selected, name)
-        if name in selected.named and (visible_um(evidence.background.data, joint.shown[k]) < least or not predicts):
+        shown = joint.shown[k]
+        size = visible_um(evidence.background.data, shown)
+        if evidence.groups[members[k].group].owner.dynamic:
+            size = max(size, float(np.abs(shown).max()) / SHARP)
+        matters = size >= least
+        if name in selected.named and not (matters and predicts):
             found.append(name)
     return found
 

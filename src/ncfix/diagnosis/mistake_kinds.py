@@ -284,6 +284,8 @@ def points_of_axes(measurements: tuple[Measurement, ...], machine: Machine) -> l
 def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
     """Mistakes of positions, tools and axes, whose effect is not of first order."""
     yield from points_of_axes(measurements, machine)
+    if any("radius" in each.columns for each in measurements):
+        return  # circles: the bar's length says where the axes were
     yield from _units(measurements, machine)
     yield from _exchanged_axes(measurements, machine)
     for axis in machine.axes:

@@ -102,8 +102,8 @@ def proposed(scale: Comparison, selected: Selected, sigma: float) -> Proposal | 
     ordered = sorted(runners_up, key=lambda n: -runners_up[n])
     near = aliases(selected, name) or [n for n in ordered if runners_up[n] > selected.odds[name] - NEAR]
     owners = {group.owner.name: group.owner for group in evidence.groups}
-    near = [n for n in near if not owners[n].grows][:RIVALS_MOST]
-    if not near or owners[name].grows:
+    near = [n for n in near if not owners[n].kept_out][:RIVALS_MOST]
+    if not near or owners[name].kept_out:
         return None
     others = {key: member for key, member in selected.members.items() if key != name}
     sides = [_side(scale, others, each) for each in (name, *near)]

@@ -52,7 +52,8 @@ GENEROUS_SHARE = 2.5
 ASIDE = 1e3
 """Factor on the standard deviation of what is put aside."""
 FAILED = 0.02
-"""Share of the rows that an instrument may spoil; where more stand out, an effect may be why."""
+"""Share of the rows that an instrument may spoil; where more stand out, an effect may be why. What drives do for a
+moment only may be why in any case."""
 LARGE = 8.0
 """The sizes of effects times this, in noise, are those of effects that make rows stand out."""
 LIKELY = 10.0
@@ -259,9 +260,9 @@ def downweighted(
     there = GENEROUS_SHARE**2 * in_noise(everything, data.relative)
     z = np.abs(leave_one_out(data, there))
     for _ in range(MOST_EFFECTS):
-        if _standing_out(data, z).mean() <= FAILED:
-            break
-        effect = _likeliest_effect(data, there, np.maximum(1.0, z / TAIL), groups)
+        few = _standing_out(data, z).mean() <= FAILED
+        offered = [group for group in groups if group.owner.dynamic] if few else groups
+        effect = _likeliest_effect(data, there, np.maximum(1.0, z / TAIL), offered) if len(offered) else None
         if effect is None:
             break
         there = there + effect @ effect.T

@@ -18,7 +18,10 @@ Index = NDArray[np.int64]
 
 DIGITS = 9
 """Decimals of mm, degree and rad in files: below any instrument."""
-STATES = re.compile(r"time_s|load_kgm?|feed_mm_min|spindle_rpm|tool_length|spindle_deg|temp_[a-z0-9_]+")
+STATES = re.compile(
+    r"time_s|load_kgm?|feed_mm_min|spindle_rpm|tool_length|spindle_deg|temp_[a-z0-9_]+"
+    r"|(?:spike|settling)_[a-z]|(?:speed|accel|slave)_[a-z]_[a-z]"
+)
 """Optional columns of the state that are numbers; directions and labels are apart."""
 NOTES = ("instrument", "date", "origin", "operator", "note")
 """Header lines for people."""

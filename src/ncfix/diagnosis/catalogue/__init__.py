@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from ncfix.diagnosis.catalogue.candidate import Candidate, MeasuredRange
+from ncfix.diagnosis.catalogue.dynamic import dynamic_candidates
 from ncfix.diagnosis.catalogue.geometric import linear_candidates, location_candidates, rotary_candidates
 from ncfix.diagnosis.catalogue.thermal import thermal_candidates
 from ncfix.diagnosis.catalogue.weight import weight_candidates
@@ -19,7 +20,10 @@ def catalogue(measured: MeasuredRange) -> tuple[Candidate, ...]:
 
     A plugin's effect (hook `register_effects`) with a method `candidates(measured)` brings candidates of its own.
     """
-    parts = (linear_candidates, rotary_candidates, weight_candidates, thermal_candidates, location_candidates)
+    parts = (
+        linear_candidates, rotary_candidates, weight_candidates, thermal_candidates, dynamic_candidates,
+        location_candidates,
+    )  # fmt: skip
     found = [candidate for candidates in parts for candidate in candidates(measured)]
     for name, plugin in registry("effects").items():
         if hasattr(plugin, "candidates"):

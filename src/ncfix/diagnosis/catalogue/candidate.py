@@ -49,6 +49,7 @@ class Candidate:
     grows     it belongs to the measurement: what stands on the table expands; `effects` then only say what drives it
     lead      how many of the effects are the effect itself, the rest only comes with it; 0: all
     constant  a constant of the machine that its file does not have: it goes before all that is not one
+    dynamic   it is of the drives while axes move: where they stand it is not there
     """
 
     name: str
@@ -62,6 +63,12 @@ class Candidate:
     grows: bool = False
     lead: int = 0
     constant: bool = False
+    dynamic: bool = False
+
+    @property
+    def kept_out(self) -> bool:
+        """Whether nothing of it is added to a machine file."""
+        return self.grows or self.dynamic
 
     @property
     def slow(self) -> bool:

@@ -1,0 +1,52 @@
+"""Circles run at a feed: what the axes did, and the names of what their drives do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.hidden import ballbar
+
+from ncfix.diagnosis.diagnosis import diagnose
+from ncfix.machine import loads
+from ncfix.measure.measurement import Measurement
+from ncfix.measure.motion import with_motion
+from ncfix.measure.reader import reads
+
+RADIUS, FEED = 150.0, 1800.0  # 30 mm/s
+
+
+def circle(way: int) -> Measurement:
+    angle = way * np.linspace(0, 2 * np.pi, 181)
+    rows = [f"{RADIUS * np.cos(a)},{RADIUS * np.sin(a)},0,0,0,0,{RADIUS},{RADIUS},{FEED}" for a in angle]
+    text = "# ncfix-measurement: 1\n# kind: length\n# noise_um: 1\nX,Y,Z,cx,cy,cz,radius,length,feed_mm_min\n"
+    return reads((text + "\n".join(rows) + "\n").encode(), loads(ballbar.MACHINE))
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_speed_acceleration_and_direction_are_those_of_a_circle(way: int) -> None:
+    moved = with_motion(circle(way), loads(ballbar.MACHINE)).columns
+    angle, inside = way * np.linspace(0, 2 * np.pi, 181), slice(2, -2)
+    assert np.allclose(moved["speed_x_y"][inside], -30.0 * way * np.sin(angle)[inside], atol=0.02)
+    assert np.allclose(moved["accel_x_y"][inside], -6.0 * np.cos(angle)[inside], atol=0.02)  # (30 mm/s)^2 / 150 mm
+    assert (moved["dir_Y"][5:40] == way).all()
+    assert (moved["dir_Y"][50:130] == -way).all()
+    assert moved["spike_y"][46] * -way > 0.2  # 1 degree, 0.09 s, after Y turned at 90 degrees
+    assert abs(moved["spike_y"][60]) < 1e-3
+    assert not moved["speed_x_z"].any()
+
+
+def test_poses_of_a_ball_bar_are_no_circle() -> None:
+    file, machine = circle(1), loads(ballbar.MACHINE)
+    mixed = file.rows(np.random.default_rng(1).permutation(len(file)))
+    assert with_motion(mixed, machine) is mixed
+
+
+@pytest.mark.parametrize("kind", ["_mismatch", "_lag"])
+def test_drives_are_named_and_nothing_is_added(kind: str, tmp_path: Path) -> None:
+    rng, mill, machine = np.random.default_rng(4), ballbar.Mill(), loads(ballbar.MACHINE)
+    [wanted] = getattr(ballbar, kind)(rng, mill)
+    found = diagnose([reads(ballbar.measured(mill, rng).encode(), machine)], machine)
+    assert found.findings[0].candidate.name == wanted.strip("^")
+    assert found.findings[0].effects == ()
