@@ -19,6 +19,8 @@ SLACK = 3e-6
 """mm; numbers agree to that, apart from digits: the correction is solved to 1 nm."""
 FULL = 0.2
 """mm within which commands are taken for those of a correction that turns rotary axes, too."""
+KEPT = 1000
+"""Answers that are kept for the same question soon again."""
 PoseColumns = tuple[Mask, Array, Array]
 """Of motions: under tool-centre-point control (n,), the length of the tool (n,) mm, directions (n, n_axes)."""
 
@@ -43,7 +45,11 @@ class Expected:
         self.theirs = {step.row: step for step in theirs.run(second)}
         self.our_ends, self.their_ends = self._ends(self.ours), self._ends(self.theirs)
         self._halves: dict[tuple[Any, ...], Array] = {}
+        self._near: dict[float, list[float]] = {}
+        self._leads: dict[tuple[int, int], bool] = {}
         self._expect()
+        self.sure = {row for row, place in self.expected.items() if np.isfinite(place).all()}
+        """Lines of which it is known where their correction should end."""
 
     def _expect(self) -> None:
         """Work out where corrected motions should end."""
@@ -96,19 +102,29 @@ class Expected:
 
     def leads_there(self, row: int, at: int) -> bool:
         """Whether a corrected line leads where the correction of an original one should."""
+        found = self._leads.get((row, at))
+        if found is None:
+            if len(self._leads) > KEPT:
+                self._leads.clear()
+            found = self._leads[row, at] = self._is_there(row, at)
+        return found
+
+    def _is_there(self, row: int, at: int) -> bool:
         step, other = self.ours.get(row), self.theirs.get(at)
         if step is None or other is None:
             return step is None and other is None
-        expected = self.expected.get(row)
-        if expected is None or any(map(math.isnan, other.end)) or not np.isfinite(expected).all():
+        if row not in self.sure or any(map(math.isnan, other.end)):
             return self._alike(self.first.lines[row], self.second.lines[at], step.unit)
-        off = np.abs(self.their_ends[at] - expected)
         if (step.kind == Kind.RAPID) != (other.kind == Kind.RAPID):
             return False
-        near = 3 * self.half_steps(step, True) + SLACK
-        if self.strategy == "full":
-            near = np.where(self.machine.rotary, self.machine.max_correction[1], FULL)
-        return bool((off[step.said] <= near[step.said]).all())
+        near = self._near.get(step.unit)
+        if near is None:
+            reach = 3 * self.half_steps(step, True) + SLACK
+            if self.strategy == "full":
+                reach = np.where(self.machine.rotary, self.machine.max_correction[1], FULL)
+            near = self._near[step.unit] = reach.tolist()
+        places = zip(step.said, self.their_ends[at].tolist(), self.expected[row].tolist(), near, strict=True)
+        return all(abs(there - wanted) <= reach for said, there, wanted, reach in places if said)
 
     def _alike(self, line: TextLine, other: TextLine, unit: float) -> bool:
         """Whether the numbers of two lines differ by corrections only, word by word."""
@@ -154,8 +170,7 @@ class Expected:
         step = self.ours.get(row)
         if step is None:
             return True
-        sure = not self.machine.depends_on_direction or self.sure_of_side(step)
-        return sure and row in self.expected and bool(np.isfinite(self.expected[row]).all())
+        return row in self.sure and (not self.machine.depends_on_direction or self.sure_of_side(step))
 
     def _ends(self, steps: Mapping[int, AxisStep]) -> dict[int, Array]:
         """The ends of steps, mm and rad, by line."""

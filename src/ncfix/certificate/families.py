@@ -42,9 +42,13 @@ class WordAddressFollower(AxisFollower):
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
+        if line.plain and line.path and not self.lost and self._leads_straight(line):
+            return self.straight(row, line)
         codes = [round(10 * word.value) for word in line.codes if word.name == "G" and word.value is not None]
         if line.odd and (codes or line.path):
             self.lost["odd"] = line.odd
+        if self._shifted(line, codes):
+            return None
         apart, fixed = self._modes(line, codes)
         words = {word.name: word for word in line.path if word.name in AXES}
         if apart:
@@ -70,6 +74,57 @@ class WordAddressFollower(AxisFollower):
         if self.kind == Kind.ARC and not step.why:
             return self._arc_of_words(step, line, start)
         return step
+
+    def _shifted(self, line: TextLine, codes: Sequence[int]) -> bool:
+        """Take in a shift by G52, G92, G92.1, TRANS or ATRANS that stands alone in its line; False if it is none."""
+        names = [word.name for word in line.codes if word.name != "N"]
+        if self.family is Family.WORDS:
+            how = codes[0] if names == ["G"] and codes in ([520], [920], [921]) else 0
+        else:
+            how = {"TRANS": 1, "ATRANS": 2}.get(" ".join(names), 0)
+        values = {word.name: word.value for word in line.path if not word.counted}
+        if not how or self.lost or line.odd or self.tcp or self.beside or self.counting or line.doubled():
+            return False
+        if len(values) < len(line.path) or not values.keys() <= self.at.keys() or None in values.values():
+            return False
+        numbers = {axis: (value or 0.0) * self.scale(axis) for axis, value in values.items()}
+        match how:
+            case 520 if values and not any(self.shifts.get(axis) for axis in numbers):
+                self.local |= numbers
+            case 920 if values and not any(math.isnan(self.at[axis]) for axis in numbers):
+                for axis, value in numbers.items():
+                    self.local[axis] = self.shifts[axis] = 0.0
+                    self.shifts[axis] = self.at[axis] - value - self.offset(axis)
+                self.unsay(tuple(numbers))
+            case 921 if not values and not any(self.local.values()):
+                self.shifts = {}
+                self.unsay()
+            case 1:
+                self.shifts = numbers
+            case 2:
+                for axis, value in numbers.items():
+                    self.shifts[axis] = self.shifts.get(axis, 0.0) + value
+            case _:
+                return False
+        return True
+
+    def _leads_straight(self, line: TextLine) -> bool:
+        """Whether a line only brings axes straight to places; takes in its motion and feed if so."""
+        kind, feed = self.kind, self.feed
+        for name, _, value, _ in line.codes:
+            if name == "G" and (value == 0 or value == 1):
+                kind = Kind.FEED if value else Kind.RAPID
+            elif name == "F":
+                feed = value
+            elif name != "N":
+                return False
+        if kind is not Kind.RAPID and kind is not Kind.FEED:
+            return False
+        for name, *_ in line.path:
+            if name not in self.at:
+                return False
+        self.kind, self.feed = kind, feed
+        return True
 
     def _arc_of_words(self, step: AxisStep, line: TextLine, start: Mapping[str, float]) -> AxisStep:
         radius = line.word("R") or line.word("CR")
@@ -260,6 +315,8 @@ class KlartextFollower(AxisFollower):
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
+        if line.plain and line.path and not self.lost and self._leads_straight(line):
+            return self.straight(row, line)
         lead = line.codes[0].name if line.codes else ""
         if self._took_statement(lead):
             return None
@@ -328,6 +385,22 @@ class KlartextFollower(AxisFollower):
             if turn is not None and turn.value is not None:
                 step.sweep = math.radians(turn.value)
         return step
+
+    def _leads_straight(self, line: TextLine) -> bool:
+        """Whether a line only brings axes straight to places; takes in its motion and feed if so."""
+        for name, *_ in line.path:
+            if name not in self.at:
+                return False
+        kind, feed = Kind.FEED, self.feed
+        for name, _, value, _ in line.codes[1:]:
+            if name == "F":
+                feed = value
+            elif name == "FMAX":
+                kind = Kind.RAPID
+            else:
+                return False
+        self.kind, self.feed = kind, feed
+        return True
 
     def _turned_about_pole(self, turn: TextWord) -> dict[str, float]:
         """Where a turn about the pole leads, in the plane."""

@@ -123,6 +123,10 @@ class AxisFollower:
         self.returns_to_level = False
         self.before_cycle = NAN
         self.pole: dict[str, float] = {}
+        self.shifts: dict[str, float] = {}
+        """What the program itself adds to the numbers of axes, mm or degree: G92, TRANS."""
+        self.local: dict[str, float] = {}
+        """The same by G52."""
         self.lost: dict[str, str] = {}
         self.foreign: set[int] = set()
         """Lines that a correction may rewrite otherwise."""
@@ -135,7 +139,7 @@ class AxisFollower:
             self.lost["jumps"] = JUMPS
         steps: list[AxisStep] = []
         for row, line in enumerate(text.lines):
-            if line.odd or any(REWRITTEN.match(key) for key in self.lost):
+            if line.odd or (self.lost and any(map(REWRITTEN.match, self.lost))):
                 self.foreign.add(row)
             if line.skipped and self.given.skip is None and (line.path or line.codes):
                 self._perhaps(line)
@@ -184,6 +188,8 @@ class AxisFollower:
             shift = system.get(axis, 0.0)
         if axis == "Z" and not self.tcp:
             shift += NAN if self.length is None else self.length
+        if self.shifts or self.local:
+            shift += self.shifts.get(axis, 0.0) + self.local.get(axis, 0.0)
         return shift
 
     def length_of(self, tool: int | str) -> float | None:
@@ -195,6 +201,8 @@ class AxisFollower:
         """Tool-centre-point control goes on or off: the same place has other numbers."""
         if on == self.tcp:
             return
+        if any(self.shifts.values()) or any(self.local.values()):
+            self.lost["shift"] = "a shift under tool-centre-point control"
         self.tcp = on
         known = [self.at[axis] for axis in self.axes]
         length = self.length_of(self.tool)
@@ -202,14 +210,15 @@ class AxisFollower:
         self.at.update(zip(self.axes, numbers, strict=True))
         self.unsay("XYZ")
 
-    def _scale(self, axis: str) -> float:
+    def scale(self, axis: str) -> float:
+        """Mm, or degree, in a unit of the words of an axis."""
         return self.unit if axis in "XYZUVW" else 1.0
 
     def target(self, words: Mapping[str, TextWord], machine: bool = False) -> dict[str, float]:
         """Where the words lead, and which axes they say."""
         end = dict(self.at)
         for axis, word in words.items():
-            value = NAN if word.value is None else word.value * self._scale(axis)
+            value = NAN if word.value is None else word.value * self.scale(axis)
             counted = word.counted == "+" or (word.counted == "" and self.counting)
             if machine:
                 end[axis] = value
@@ -254,6 +263,37 @@ class AxisFollower:
         )
         self.at = end
         return step
+
+    def straight(self, row: int, line: TextLine) -> AxisStep:
+        """The step of a line that only brings axes straight to places, as `step` gives it: nothing else is in force."""
+        at, said, counting = self.at, self.said, self.counting
+        start = list(at.values())
+        named = {}
+        for word in line.path:
+            name, _, value, counted = word
+            named[name] = word
+            scaled = value * (self.unit if name in "XYZUVW" else 1.0)  # type: ignore[operator]  # plain words have one
+            if counted == "+" or (counting and not counted):
+                at[name] += scaled
+            else:
+                at[name] = self.offset(name) + scaled
+                said[name] = True
+        length = self.length_of(self.tool)
+        return AxisStep(
+            row,
+            self.kind or Kind.RAPID,
+            start,
+            list(at.values()),
+            list(said.values()),
+            named,
+            "",
+            self.tcp,
+            NAN if length is None else length,
+            self.feed,
+            self.feed_mode,
+            self.unit,
+            unsteady=self.beside,
+        )
 
     def circle(self, step: AxisStep, centre: Mapping[str, float], clockwise: bool, radius: float | None) -> AxisStep:
         """Give a step the circle that its words describe."""

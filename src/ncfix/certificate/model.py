@@ -15,6 +15,10 @@ from ncfix.machine import Machine, State
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 FLAT = 1e-6
+LEVER = 100.0
+"""mm; what a turn counts beside lengths where the nearest place of a motion is looked for, as of a table that large."""
+SHORT_MM, SHORT_RAD = 2.0, 0.02
+"""Straight motions that lead no axis farther are short."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +132,12 @@ class Ways:
             model.columns,
         )
 
+    def is_short(self, rotary: Mask) -> Mask:
+        """Which motions are straight and lead no axis far, (n,)."""
+        far = np.abs(self.end - self.start) > np.where(rotary, SHORT_RAD, SHORT_MM)
+        short: Mask = ~(far.any(axis=1) | self.arc)
+        return short
+
     def at(self, row: NDArray[np.intp], share: Array) -> Array:
         """The commands at shares (k,) of motions (k,), shape (k, n_axes)."""
         begin, end = self.start[row], self.end[row]
@@ -147,12 +157,12 @@ class Ways:
             found[on, columns[two]] = middle[each, two] + radius * np.sin(angle)
         return found
 
-    def share(self, row: NDArray[np.intp], place: Array) -> Array:
+    def share(self, row: NDArray[np.intp], place: Array, rotary: Mask) -> Array:
         """Where on motions (k,) a place (k, n_axes) is nearest, as a share; of arcs by the angle."""
-        way = self.end[row] - self.start[row]
-        square = np.einsum("ij,ij->i", way, way)
+        way, weight = self.end[row] - self.start[row], np.where(rotary, LEVER**2, 1.0)
+        square = np.einsum("ij,ij,j->i", way, way, weight)
         with np.errstate(all="ignore"):
-            share: Array = np.einsum("ij,ij->i", place - self.start[row], way) / square
+            share: Array = np.einsum("ij,ij,j->i", place - self.start[row], way, weight) / square
         on = np.flatnonzero(self.arc[row])
         if on.size:
             here, each, columns = row[on], np.arange(len(on)), np.array(self.columns)

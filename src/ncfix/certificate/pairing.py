@@ -77,6 +77,8 @@ class Pairing:
         """What a line holds besides a path and its pace; None for a line that holds nothing else."""
         if line.odd:
             return line.rest
+        if line.plain and line.path and not line.rest:
+            return None
         motion = MOTION.get(self.original.family, MOTION[Family.WORDS])
         bare = motion.sub("", STOPS.sub("", line.rest)) if line.path else line.rest
         if not PACE.sub("", bare).strip() and (line.path or PACE.search(line.rest)):
@@ -180,6 +182,10 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
     head, last = pieces[0], pieces[-1]
     if line.odd:
         return []
+    if line.plain and head.plain and pair.first == pair.last and (line.rest, line.block) == (head.rest, head.block):
+        ours_first = zip(line.path, head.path, strict=False)
+        if len(head.path) >= len(line.path) and all(one.name == other.name for one, other in ours_first):
+            return []
     found: list[str] = []
     twice = "" if line.doubled() else next((piece.doubled() for piece in pieces if piece.doubled()), "")
     if line.path and twice:

@@ -8,15 +8,17 @@ with the reason.
 
 from __future__ import annotations
 
+import gc
 import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ncfix.certificate.expected import SLACK, Expected, PoseColumns
+from ncfix.certificate.deviations import Deviations
+from ncfix.certificate.expected import SLACK
 from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, AxisStep, Given, Kind
 from ncfix.certificate.model import Array, Ways
 from ncfix.certificate.pairing import BlockFault, LinePair, Pairing, text_faults
@@ -25,10 +27,8 @@ from ncfix.machine import Machine
 
 TURNED = 1e-9
 """rad, the same of rotary axes."""
-SAMPLES = np.arange(1, 12) / 12
-"""Where on a motion, or a piece of one, its way is looked at."""
-WIDER = 1.05
-"""Of the tolerance: a way farther out is beyond it for sure."""
+MANY, FEW = 11, 3
+"""At so many places on a motion, or a piece of one, its way is looked at: on long and on short ones."""
 PLAIN_STRATEGIES = frozenset(("rotary-then-linear", "position"))
 AS_IF = 4e-4
 """mm; where the program has not said where an axis stands, the others are corrected as if it stood in its place."""
@@ -93,21 +93,39 @@ def prove(
     dialect       its name, by which the family of the language is known; empty: found out
     tolerance_um  of the way; the stamp of the corrected program wins
     """
-    family = Family.of(original, dialect)
-    first, second = Text.of(original, family), Text.of(corrected, family)
-    if second.is_renumbered and second.block_numbers != first.block_numbers:
-        first, second = first.without_block_numbers(), second.without_block_numbers()
-    return Prover(first, second, machine, given, tolerance_um).run()
+    collects = gc.isenabled()
+    gc.disable()  # there is nothing to collect, only a million of words to look through
+    try:
+        family = Family.of(original, dialect)
+        first, second = Text.of(original, family), Text.of(corrected, family)
+        if second.is_renumbered and second.block_numbers != first.block_numbers:
+            first, second = first.without_block_numbers(), second.without_block_numbers()
+        return Prover(first, second, machine, given, tolerance_um).run()
+    finally:
+        if collects:
+            gc.enable()
 
 
-class Prover(Expected):
+class MovedPair(NamedTuple):
+    """A motion of the original, and the pieces in its place."""
+
+    pair: LinePair
+    step: AxisStep
+    pieces: list[AxisStep]
+
+    @property
+    def begins(self) -> bool:
+        """Whether it is known where it begins, in both programs."""
+        return not any(map(math.isnan, (*self.step.start, *self.pieces[0].start)))
+
+
+class Prover(Deviations):
     """Judges two programs."""
 
     def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float) -> None:
-        super().__init__(first, second, machine, given)
+        super().__init__(first, second, machine, given, tolerance_um)
         self.machine_hash = machine.hash
         self.proof = BlockProof(stamp=second.stamp)
-        self.tolerance = (second.stamp.tolerance_um if second.stamp else tolerance_um) / 1e3
         self.polar = {row for row, line in enumerate(second.lines) if line.word("PA")}
         """Lines of the corrected program whose digits are those of an angle about a pole."""
 
@@ -142,6 +160,9 @@ class Prover(Expected):
             if step is None:
                 if line.odd and self._changed(pair):
                     self.proof.leave(line.odd, line.number)
+                elif line.path and self.first.family is not Family.KLARTEXT and self._changed(pair):
+                    text = "the numbers of a line that moves nothing have changed"
+                    self.proof.fault(text, self.second.lines[pair.first].number, line.number)
                 else:
                     self.proof.proved += 1
                 continue
@@ -245,7 +266,7 @@ class Prover(Expected):
 
     def _motions(self, pairs: Sequence[LinePair]) -> None:
         """Judge motions that this reader can follow."""
-        ways: list[LinePair] = []
+        moved: list[MovedPair] = []
         for pair in pairs:
             step, number = self.ours[pair.row], self.first.lines[pair.row].number
             if step.kind == Kind.FIXED:
@@ -263,7 +284,12 @@ class Prover(Expected):
             if not pieces or not self._same_kind(step, pieces):
                 self.proof.fault("the block does not move as it did", line, number)
                 continue
-            verdict, proved = self._end(step, pieces, pair)
+            moved.append(MovedPair(pair, step, pieces))
+        ways: list[MovedPair] = []
+        for each, right in zip(moved, self._right_ends(moved), strict=True):
+            pair, step, pieces = each
+            line, number = self.second.lines[pair.last].number, self.first.lines[pair.row].number
+            verdict, proved = ("", False) if right else self._end(step, pieces, pair)
             if verdict and proved:
                 self.proof.leave(verdict, number)
             elif verdict:
@@ -271,8 +297,31 @@ class Prover(Expected):
             elif pace := self._pace(step, pieces):
                 self.proof.fault(pace, line, number)
             else:
-                ways.append(pair)
+                ways.append(each)
         self._ways(ways)
+
+    def _right_ends(self, moved: Sequence[MovedPair]) -> list[bool]:
+        """Whether nothing is wrong with the ends of motions, all at once; where that is not sure `_end` says more."""
+        if not moved or self.strategy == "full" or self.model is None:
+            return [False] * len(moved)
+        rows, lasts = [each.step.row for each in moved], [each.pieces[-1].row for each in moved]
+        meant = np.array([self.our_ends[row] for row in rows])
+        done = np.array([self.their_ends[row] for row in lasts])
+        expected = np.array([self.expected[row] for row in rows])
+        rotary, (low, high) = self.machine.rotary, self.machine.ranges.T
+        halves = np.array([self.half_steps(each.step, len(each.pieces) > 1) for each in moved])
+        right = (np.abs(done - expected) <= halves * 1.002 + np.where(rotary, TURNED, SLACK)).all(axis=1)
+        right &= np.array([all(each.step.said) for each in moved])
+        added = np.where(rotary, 0.0, np.abs(done - meant))
+        least = np.where(rotary, np.inf, self.machine.least_increment[0] / 2)
+        right &= (added <= self.machine.max_correction[0] + least).all(axis=1)
+        there = done
+        tcp = np.array([each.step.tcp for each in moved])
+        if tcp.any():
+            there = self.model.joints(done, tcp, np.array([each.step.length for each in moved]))
+        right &= ((there >= low) & (there <= high)).all(axis=1)
+        self.proof.largest_um = max(self.proof.largest_um, 1e3 * float(added[right].max(initial=0.0)))
+        return right.tolist()  # type: ignore[no-any-return]
 
     def _pieces(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
         """Why what stands for a motion cannot be followed."""
@@ -281,7 +330,7 @@ class Prover(Expected):
                 return piece.why
             if any(map(math.isnan, piece.end)):
                 return "where an axis stands is not known"
-        if self.expected.get(step.row) is None or not np.isfinite(self.expected[step.row]).all():
+        if step.row not in self.sure:
             return "the machine model has no answer"
         if self.machine.depends_on_direction and not self.sure_of_side(step):
             return "play: the side of an axis is not known to this reader"
@@ -343,6 +392,8 @@ class Prover(Expected):
 
     def _pace(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
         """What is wrong with the feed; turns of rotary axes alone get another one."""
+        if len(pieces) == 1 and (pieces[0].feed, pieces[0].feed_mode) == (step.feed, step.feed_mode):
+            return ""
         if step.kind not in (Kind.FEED, Kind.ARC):
             return ""
         turn = all(name in "ABC" for name in step.named)
@@ -357,16 +408,14 @@ class Prover(Expected):
             return "" if abs(theirs - ours) <= 2e-3 * ours else "the pieces take another time than the block"
         return "" if all(feed == step.feed for feed in feeds) else "the feed has changed"
 
-    def _ways(self, pairs: Sequence[LinePair]) -> None:
+    def _ways(self, moved: Sequence[MovedPair]) -> None:
         """Judge the ways of motions whose ends are right."""
-        self.proof.proved += len(pairs)
-        self.proof.proved_motions += len(pairs)
-        cutting = [pair for pair in pairs if self.ours[pair.row].kind in (Kind.FEED, Kind.ARC)]
-        cutting = [pair for pair in cutting if self._starts(pair)]
+        self.proof.proved += len(moved)
+        self.proof.proved_motions += len(moved)
+        cutting = [each for each in moved if each.step.kind in (Kind.FEED, Kind.ARC) and each.begins]
         if not cutting or self.model is None:
             return
-        steps = [self.ours[pair.row] for pair in cutting]
-        pieces = [[self.theirs[row] for row in range(p.first, p.last + 1) if row in self.theirs] for p in cutting]
+        steps, pieces = [each.step for each in cutting], [each.pieces for each in cutting]
         counts = np.array([len(each) for each in pieces])
         owner = np.repeat(np.arange(len(steps)), counts)
         meant, done = Ways.of(self.model, steps), Ways.of(self.model, [step for each in pieces for step in each])
@@ -375,25 +424,25 @@ class Prover(Expected):
         share = np.ones(len(owner))
         inner = np.setdiff1d(np.arange(len(owner)), last)
         if inner.size:
-            share[inner] = self._shares(meant, done, owner, inner, (tcp, length, direction))
+            share[inner] = self.shares(meant, done, owner, inner, (tcp, length, direction))
         before = np.concatenate([[0.0], share[:-1]])
         before[np.concatenate([[0], last[:-1] + 1])] = 0.0
         bad: dict[int, str] = {}
         for k in inner[share[inner] < before[inner] - 1e-2].tolist():
             bad.setdefault(int(owner[k]), "the pieces of the block are not one behind the other")
-        each = np.repeat(np.arange(len(owner)), len(SAMPLES))
-        part = np.tile(SAMPLES, len(owner))
-        at = (before + 0.0)[each] + part * (share - before)[each]
-        rows = owner[each]
         given = (tcp, length, direction)
-        gap = self._gaps(meant.at(rows, at), done.at(each, part), rows, given).reshape(len(owner), -1).max(axis=1)
-        if inner.size:
-            places = self._gaps(meant.at(owner[inner], share[inner]), done.end[inner], owner[inner], given)
-            gap[inner] = np.maximum(gap[inner], places)
-        allowed = np.array([self._allowed(step) for step in steps])[owner]
+        allowed = np.array([self.allowed(step) for step in steps])[owner]
         opens = np.concatenate([[0], last[:-1] + 1])
-        here = np.arange(len(steps))
-        allowed[opens] += self._gaps(meant.start, done.start[opens], here, given)
+        allowed[opens] += self.gaps(meant.start, done.start[opens], np.arange(len(steps)), given)
+        counts = np.where(done.is_short(self.machine.rotary), FEW, MANY)
+        first = np.cumsum(counts) - counts
+        each = np.repeat(np.arange(len(owner)), counts)
+        part = (np.arange(len(each)) - first[each] + 1) / (counts + 1)[each]
+        at = before[each] + part * (share - before)[each]
+        gap = np.maximum.reduceat(self.gaps(meant.at(owner[each], at), done.at(each, part), owner[each], given), first)
+        if inner.size:
+            places = self.gaps(meant.at(owner[inner], share[inner]), done.end[inner], owner[inner], given)
+            gap[inner] = np.maximum(gap[inner], places)
         for k in np.flatnonzero(~(gap <= allowed)).tolist():
             text = f"the tip leaves the intended way by {1e3 * gap[k]:.2f} um between the ends of the block"
             bad.setdefault(int(owner[k]), text)
@@ -401,7 +450,7 @@ class Prover(Expected):
         if good.any():
             self.proof.farthest_um = max(self.proof.farthest_um, 1e3 * float(gap[good].max()))
         for k, text in sorted(bad.items()):
-            pair = cutting[k]
+            pair = cutting[k].pair
             self.proof.proved -= 1
             self.proof.proved_motions -= 1
             number = self.first.lines[pair.row].number
@@ -413,55 +462,6 @@ class Prover(Expected):
                 self.proof.leave(f"the way of a motion, because of {why}", number)
                 continue
             self.proof.fault(text, self.second.lines[pair.first].number, number)
-
-    def _gaps(self, meant: Array, done: Array, rows: NDArray[np.intp], given: PoseColumns) -> Array:
-        """How far the tip is from where it is meant to be, mm; with play, on the better side of each axis."""
-        assert self.model is not None
-        tcp, length, direction = given[0][rows], given[1][rows], given[2][rows]
-        sides = [direction]
-        for column in self.machine.directed:
-            turned = np.where(np.arange(direction.shape[1]) == column, -1.0, 1.0)
-            sides += [side * turned for side in sides]
-        gap: Array = np.min([self.model.gaps(meant, done, tcp, length, side) for side in sides], axis=0)
-        return gap
-
-    def _starts(self, pair: LinePair) -> bool:
-        """Whether it is known where a motion begins, in both programs."""
-        step = self.ours[pair.row]
-        piece = next(self.theirs[row] for row in range(pair.first, pair.last + 1) if row in self.theirs)
-        return not any(map(math.isnan, (*step.start, *piece.start)))
-
-    def _allowed(self, step: AxisStep) -> float:
-        """How far the tip may be from the intended way, mm: the tolerance, and what digits add."""
-        halves = self.half_steps(step, True)[~self.machine.rotary]
-        digits = float(np.linalg.norm(halves))
-        if step.kind == Kind.ARC:
-            digits *= 3
-        return WIDER * self.tolerance + digits + SLACK
-
-    def _shares(
-        self,
-        meant: Ways,
-        done: Ways,
-        owner: NDArray[np.intp],
-        inner: NDArray[np.intp],
-        given: PoseColumns,
-    ) -> Array:
-        """Where on the original motions pieces end: there the expected command is nearest to the written one."""
-        assert self.model is not None
-        rows, place = owner[inner], done.end[inner]
-        tcp, length, direction = given[0][rows], given[1][rows], given[2][rows]
-        share = np.clip(meant.share(rows, place), 0.0, 1.0)
-        turned = place if self.strategy == "full" else None
-        for _ in range(3):
-            here = meant.at(rows, share)
-            expected = self.model.aimed(here, tcp, length, direction, turned)
-            off = np.where(np.isfinite(expected), place - expected, 0.0)
-            ahead = meant.at(rows, np.clip(share + 1e-4, 0, 1)) - meant.at(rows, np.clip(share - 1e-4, 0, 1))
-            way = ahead / np.maximum(np.clip(share + 1e-4, 0, 1) - np.clip(share - 1e-4, 0, 1), 1e-9)[:, None]
-            square = np.maximum(np.einsum("ij,ij->i", way, way), 1e-12)
-            share = np.clip(share + np.einsum("ij,ij->i", off, way) / square, 0.0, 1.0)
-        return share
 
 
 def same(line: TextLine, other: TextLine) -> bool:

@@ -1,0 +1,69 @@
+"""The second reader reads lines of one shape at once as it reads them one by one, and follows them alike."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from certificate.planting import GIVEN, cases
+from ncfix.certificate.expected import Expected
+from ncfix.certificate.following import Given
+from ncfix.certificate.proof import prove
+from ncfix.certificate.reading import READERS, Family, Shapes, Text
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
+from ncfix.control.setup import Setup
+from ncfix.machine import load
+from ncfix.text.dialect import get
+from ncfix.text.reader import read
+
+PIECES = {
+    Family.WORDS: "N10|G1|G0|g01|X1.5|X-.25|Y+3|Y 4.|Z#1|Z[1+2]|A-90.|C5|I1.|R2|F100|M3|T1|H2|"
+    "(a)|(a 5)|;x|%|/|X1.2.3|O5|*|E2|{x}",
+    Family.SINUMERIK: "N10|G1|g0|X1.5|X=2|X=IC(3)|Y-.5|Z=R1|A3=1|F500|M30|T1|D1|;a|;a 2|TRAORI|"
+    "CYCLE81(1,2)|I4|CR=5|AX1|/|R5",
+    Family.KLARTEXT: "12|L|C|CC|X+1.5|X-,5|IY+2|Z3|A+Q5|B-4|FMAX|F500|FQ1|R0|RL|R5|R10|M3|M128|DR+|;a|;a 5|"
+    "PA+30|/|BEGIN PGM 5 MM|5.",
+}
+BLANKS = ("", " ", " ", " ", "  ", "\t")
+
+
+@pytest.mark.parametrize("family", Family)
+def test_lines_of_a_shape_are_read_as_one_by_one(family: Family) -> None:
+    rng, shapes, plain = random.Random(7), Shapes(family), 0
+    for number in range(30_000):
+        pieces = rng.choices(PIECES[family].split("|"), k=rng.randint(0, 5))
+        if family is Family.KLARTEXT and rng.random() < 0.7:
+            pieces = [*rng.choice((["12", "L"], ["L"])), *pieces]
+        text = "".join(rng.choice(BLANKS) + piece for piece in pieces) + rng.choice(BLANKS)
+        found = shapes.line(number, text)
+        plain += found.plain
+        assert replace(found, plain=False) == READERS[family](number, text), text
+        if found.plain:
+            assert READERS[family](number, text).doubled() == ""
+    assert plain > 1000
+
+
+def test_lines_of_a_shape_are_followed_as_one_by_one() -> None:
+    for case in cases(25, 3):
+        family = Family.of(case.original, case.language)
+        for source in (case.original, case.corrected):
+            text = Text.of(source, family)
+            slow = replace(text, lines=[replace(line, plain=False) for line in text.lines])
+            assert any(line.plain for line in text.lines)
+            steps = [Expected(each, each, case.machine, GIVEN).ours for each in (text, slow)]
+            assert repr(steps[0]) == repr(steps[1])  # NaN is NaN
+
+
+def test_a_long_turn_of_a_table_in_a_short_motion_is_proved() -> None:
+    text = b"G21 G90 G94 G17\nG0 X275.4098 Y0. Z-15.9096 B1.2211 C5.\nG1 X276.3466 B1.1 C350. F2400.\nX260. C20.\nM2\n"
+    mill = load(str(Path(__file__).parents[2] / "benchmarks" / "five_axis.toml"))
+    done = fix_program(read(text, "part.nc", get("linuxcnc")), mill, Setup(assume_zero=True), FixOptions())
+    proof = prove(text, done.text, mill, Given(assume_zero=True), "linuxcnc")
+    assert done.text.count(b"\n") > text.count(b"\n") + 8
+    assert (proof.faults, proof.unproved) == ([], 0)
+    lines = done.text.splitlines(keepends=True)
+    assert prove(text, b"".join(lines[:8] + lines[9:]), mill, Given(assume_zero=True), "linuxcnc").faults
