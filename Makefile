@@ -42,8 +42,8 @@ accuracy:        ## work out docs/accuracy.md (an hour), or STUDIES="plans ..." 
 bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md; SIZES="1000000" RUNS=5 LONG=10000000 OTHERS=200000 VERBS="100000 1000000"
 	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/run.py $(if $(filter-out undefined,$(origin SIZES)),--sizes $(SIZES)) $(if $(RUNS),--runs $(RUNS)) $(if $(LONG),--long $(LONG)) $(if $(OTHERS),--others $(OTHERS)) $(if $(filter-out undefined,$(origin VERBS)),--verbs $(VERBS))
 
-batch:           ## time batches, again and on a cluster, into docs/performance.md (minutes); PROGRAMS=2000
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) benchmarks/batch.py $(if $(PROGRAMS),--programs $(PROGRAMS))
+batch:           ## time batches, again and on a cluster, into docs/performance.md (minutes); PROGRAMS=2000 KILLS=20 workers of the cluster
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) benchmarks/batch.py $(if $(PROGRAMS),--programs $(PROGRAMS)) $(if $(KILLS),--kills $(KILLS))
 
 same-bytes:      ## correct programs in all ways, compare, into docs/performance.md (an hour; MOST=20000 ten minutes)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) benchmarks/same_bytes.py $(if $(MOST),--most $(MOST))
