@@ -60,6 +60,12 @@ def test_json_has_the_object_of_the_contract(shop: Any, ncfix: Any) -> None:
     assert {warning["code"] for warning in entry["warnings"]} <= {"NCF205", "NCF409"}
 
 
+def test_the_dialect_is_in_json_and_said_on_demand(shop: Any, ncfix: Any) -> None:
+    result = fixed(shop, ncfix, "--json", "-v")
+    assert result.json()["files"][0]["dialect"] == "linuxcnc"
+    assert "  dialect             linuxcnc\n" in result.err
+
+
 def test_the_input_is_never_changed(shop: Any, ncfix: Any) -> None:
     before = shop.program.read_bytes(), shop.program.stat().st_mtime_ns
     fixed(shop, ncfix)

@@ -21,6 +21,7 @@ PROMISED: dict[str, dict[str, Any]] = {
         "files": [
             {
                 "path": str,
+                "dialect": str,
                 "output": str,
                 "blocks": int,
                 "moves": int,

@@ -174,7 +174,9 @@ def _executors() -> Iterable[str]:
 @click.option("--time-limit-s", type=Positive(), metavar="S", help="Seconds that one program may take.")
 @click.option("--memory-limit-mb", type=click.IntRange(1), metavar="MB", help="Memory that one program may take.")
 @click.option("-q", "--quiet", is_flag=True, help="Say only of which programs nothing was written, and why.")
-@click.option("-v", "--verbose", is_flag=True, help="Of many programs, say all of each.")
+@click.option(
+    "-v", "--verbose", is_flag=True, help="Of many programs, say all of each; and as which dialect it was read."
+)
 @project_options
 @json_option
 @click.option("--json-lines", is_flag=True, help="Print one JSON object for each program as soon as it is done.")
@@ -236,7 +238,7 @@ def fix(
     machine = sound(load_machine(machine_path), machine_path, force)
     options = FixOptions(**choices, force=force)
     limits = ProgramLimits(time_limit_s, memory_limit_mb)
-    job = FixJob(machine, given.load(machine), dialect, options, limits, pages)
+    job = FixJob(machine, given.load(machine), dialect, options, limits, pages, verbose=verbose)
     if certificate:
         job = replace(job, certify=machine_path)
     if looks:

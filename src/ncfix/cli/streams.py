@@ -45,12 +45,14 @@ def looked_bytes() -> int:
 class FixedText:
     """A corrected program: what of it is not written yet, whether it differs from the original, and the report.
 
-    page  what its page is made of, if there is to be one
+    dialect  as which it was read
+    page     what its page is made of, if there is to be one
     """
 
     text: bytes | Iterable[bytes]
     changed: bool
     report: FixReport
+    dialect: str
     page: ProgramPage | None = None
 
 

@@ -94,6 +94,7 @@ class FixJob:
     journal  where outputs are announced; None: nowhere
     certify  the machine file, if a certificate is to stand beside each output; empty: none
     basis    a digest of all that a result depends on besides program and subprograms, with a journal
+    verbose  the dialect of each program is said, too
     """
 
     machine: Machine
@@ -105,6 +106,7 @@ class FixJob:
     journal: str | None = None
     basis: str = ""
     certify: str = ""
+    verbose: bool = False
 
     def noted_in(self, journal: str) -> FixJob:
         """The same with a journal."""
@@ -167,7 +169,7 @@ class FixJob:
         found = fixed(program, self.machine, self.setup, self.options, find, look)
         report = self._remarked(found.report, program.dialect)
         page = self._page(_recorded(seen, found), report, text) if self.pages else None
-        return FixedText(found.text, found.changed, report, page)
+        return FixedText(found.text, found.changed, report, program.dialect.name, page)
 
     def _remarked(self, report: FixReport, dialect: Dialect) -> FixReport:
         """With a remark (NCF106) where the program shows another control than the machine file names."""
@@ -221,10 +223,10 @@ class FixJob:
         source.check_unchanged()
         report = self._remarked(done.report, dialect)
         page = None if record is None else self._page(record, report, source.everything())
-        return FixedText(outlet.remaining(done.stamp), report.changed, report, page)
+        return FixedText(outlet.remaining(done.stamp), report.changed, report, dialect.name, page)
 
     def _written(self, fixed: FixedText, target: OutputTarget) -> FixOutcome:
-        entry: dict[str, Any] = fixed.report.as_dict()
+        entry: dict[str, Any] = {"path": "", "dialect": fixed.dialect, **fixed.report.as_dict()}
         digest = ""
         console.tell_some([*fixed.report.warnings, *fixed.report.refusals], partial(_with_lines, source=target.source))
         refused = bool(entry["refused"]) and not self.options.allow_refused
@@ -241,6 +243,8 @@ class FixJob:
             entry["output"] = target.path
         for line in _summary(entry, refused, bool(self.machine.effects)):
             console.say(line)
+        if self.verbose:
+            console.say(f"  dialect             {fixed.dialect}")
         if refused:
             console.say(f"  {ACCEPT if self.options.flatten else FLATTEN + ACCEPT}")
         code = ExitCode.REFUSED if refused else ExitCode.DONE
