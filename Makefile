@@ -2,7 +2,7 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: demo test full lint docs release share screenshots format accuracy bench batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
-	goldens goldens-update planted fuzz ci clean
+	goldens goldens-update planted fuzz mutation ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -86,6 +86,10 @@ planted:         ## 1,000 faults in corrected programs and 1,000 good ones, judg
 fuzz:            ## damaged files for all readers; what goes wrong is kept in tests/robustness/found; SECONDS=600 ONLY=machine
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) -m robustness.readers \
 		--seconds $(or $(SECONDS),600) $(if $(ONLY),--only $(ONLY))
+
+mutation:        ## faults put into the code of limits, account, state and writer, and which of them tests find (needs: pip install -e '.[mutation]'); COUNT=30 of each ONLY=limits SEED=1
+	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) -m robustness.mutation \
+		--count $(or $(COUNT),30) $(if $(ONLY),--only $(ONLY)) $(if $(SEED),--seed $(SEED))
 
 ci:              ## what the server runs
 	.ci/run

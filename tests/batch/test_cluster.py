@@ -14,14 +14,15 @@ from typing import Any
 import pytest
 
 from cli.conftest import LONG_X, THREE_AXIS, ncfix
-from conftest import PATIENCE_S, require_module, until
+from conftest import FULL, PATIENCE_S, require_module, until
 from ncfix.batch import cluster as clusters
 from ncfix.batch.journal import JOURNAL, Journal
 from ncfix.batch.work import executor_of, results_in_order
 from ncfix.diagnostics import ExitCode, UsageError
 
 __all__ = ["ncfix"]
-COUNT = 12
+KILLS = 20 if FULL else 2
+COUNT = 8 + 2 * KILLS
 
 
 @pytest.fixture(autouse=True)
@@ -38,18 +39,16 @@ class Cluster:
         host = ("--host", "127.0.0.1")
         self.scheduler = self._started("scheduler", *host, "--port", "0", "--no-dashboard", "--no-show")
         until(lambda: self.file.exists() and bool(self.file.read_text()))
-        self.workers: list[subprocess.Popen[bytes]] = []
-        for _ in range(2):
-            self.add()
+        self.workers = [self.worker() for _ in range(2)]
 
     @property
     def address(self) -> str:
         place: str = json.loads(self.file.read_text())["address"]
         return place.replace("tcp://", "dask://")
 
-    def add(self) -> None:
+    def worker(self) -> subprocess.Popen[bytes]:
         more = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
-        self.workers.append(self._started("worker", *more))
+        return self._started("worker", *more)
 
     def _started(self, kind: str, *more: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "dask", kind, "--scheduler-file", str(self.file), *more]
@@ -111,11 +110,15 @@ def test_what_the_work_raises_is_raised(cluster: Cluster) -> None:
         list(results_in_order(int, ["1", "x"], executor_of(cluster.address), 2, lambda task: -1))
 
 
-def test_a_worker_is_killed_and_then_the_scheduler(ncfix: Any, parts: Path, cluster: Cluster) -> None:
+def test_workers_are_killed_and_then_the_scheduler(ncfix: Any, parts: Path, cluster: Cluster) -> None:
     ncfix(*COMMAND, "whole")
     running = started("out", "--executor", cluster.address)
-    until(lambda: len(list(Path("out").glob("*.ngc"))) >= 2)
-    os.kill(cluster.workers[0].pid, signal.SIGKILL)
+    for kill in range(KILLS):
+        until(lambda: len(list(Path("out").glob("*.ngc"))) >= 2 + 2 * kill)  # noqa: B023  # at once
+        cluster.workers[kill % 2].kill()
+        if kill < KILLS - 1:
+            cluster.workers[kill % 2].wait()
+            cluster.workers[kill % 2] = cluster.worker()
     _, said = running.communicate(timeout=PATIENCE_S)
     assert running.returncode == ExitCode.DONE, said
     assert contents(parts / "out") == contents(parts / "whole")
