@@ -185,6 +185,13 @@ def test_a_play_of_a_tenth_is_a_jump_and_a_slope_of_a_twentieth_too_steep() -> N
     assert "NCF407" not in found(steep, moves, corrected(steep, moves))
 
 
+@pytest.mark.parametrize(("slope", "refused"), [(0.015, False), (0.05, True)])
+def test_a_correction_that_changes_by_a_twentieth_of_the_way_is_too_fast(slope: float, refused: bool) -> None:
+    machine = perfect("w F X Y Z t").replace(effects=(Effect("EXX", (slope,), Polynomial((1,)), 0.0, 1.0),))
+    moves = motions(machine, (0, 0, 0), [(0, 0, 0), (9.0, 0, 0)])
+    assert found(machine, moves, corrected(machine, moves)) == ({"NCF407": [1]} if refused else {})
+
+
 def test_kept_motions_are_not_looked_at() -> None:
     machine = shifted(5.0)
     moves = motions(machine, (0, 0, 0), [(10.0, 0, 0), (STROKE + 5, 0, 0)])

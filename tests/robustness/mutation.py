@@ -9,6 +9,7 @@ about that module. It prints the share that is found, and every mutant that is n
 from __future__ import annotations
 
 import argparse
+import ast
 import os
 import random
 import shutil
@@ -46,6 +47,17 @@ def clone(folder: Path) -> None:
         shutil.copy2(path, folder / path.relative_to(ROOT))
 
 
+def annotated(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Where annotations stand, from and to (line, column): what is changed there changes nothing that runs."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        for name in ("annotation", "returns"):
+            part = getattr(node, name, None)
+            if isinstance(part, ast.expr):
+                found.append(((part.lineno, part.col_offset), (part.end_lineno or 0, part.end_col_offset or 0)))
+    return found
+
+
 def survivors(folder: Path, module: str, count: int, rng: random.Random) -> Iterator[str]:
     """Mutants of a module that no test finds: differences of its text, empty for one that is found."""
     from cosmic_ray.work_db import WorkDB, use_db
@@ -64,8 +76,15 @@ def survivors(folder: Path, module: str, count: int, rng: random.Random) -> Iter
 
     cosmic("init", config.name, session.name)
     with use_db(str(session), WorkDB.Mode.open) as database:
-        mutants = sorted(database.work_items, key=lambda item: item.job_id)
-        mutants.sort(key=lambda item: str(item.mutations))
+        idle = annotated((folder / module).read_text())
+        mutants = [
+            item
+            for item in database.work_items
+            if not any(begin <= each.start_pos < end for each in item.mutations for begin, end in idle)
+        ]
+        mutants.sort(
+            key=lambda item: [(each.start_pos, each.operator_name, each.occurrence) for each in item.mutations]
+        )
         database.clear()
         database.add_work_items(rng.sample(mutants, min(count, len(mutants))))
     cosmic("baseline", config.name)
