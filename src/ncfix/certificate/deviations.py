@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.expected import SLACK, Expected, PoseColumns
 from ncfix.certificate.following import AxisStep, Given, Kind
 from ncfix.certificate.model import LEVER, Array, Ways
+from ncfix.certificate.pairing import LinePair
 from ncfix.certificate.reading import Text
 from ncfix.machine import Machine
 
+MANY, FEW = 11, 3
+"""At so many places on a motion, or a piece of one, its way is looked at: on long and on short ones."""
 WIDER = 1.05
 """Of the tolerance: a way farther out is beyond it for sure."""
+
+
+class MovedPair(NamedTuple):
+    """A motion of the original, and the pieces in its place."""
+
+    pair: LinePair
+    step: AxisStep
+    pieces: list[AxisStep]
+
+    @property
+    def begins(self) -> bool:
+        """Whether it is known where it begins, in both programs."""
+        return not any(map(math.isnan, (*self.step.start, *self.pieces[0].start)))
 
 
 class Deviations(Expected):

@@ -13,11 +13,10 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
-from ncfix.certificate.deviations import Deviations
+from ncfix.certificate.deviations import FEW, MANY, Deviations, MovedPair
 from ncfix.certificate.expected import SLACK
 from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, AxisStep, Given, Kind
 from ncfix.certificate.model import Array, Ways
@@ -27,8 +26,6 @@ from ncfix.machine import Machine
 
 TURNED = 1e-9
 """rad, the same of rotary axes."""
-MANY, FEW = 11, 3
-"""At so many places on a motion, or a piece of one, its way is looked at: on long and on short ones."""
 PLAIN_STRATEGIES = frozenset(("rotary-then-linear", "position"))
 AS_IF = 4e-4
 """mm; where the program has not said where an axis stands, the others are corrected as if it stood in its place."""
@@ -104,19 +101,6 @@ def prove(
     finally:
         if collects:
             gc.enable()
-
-
-class MovedPair(NamedTuple):
-    """A motion of the original, and the pieces in its place."""
-
-    pair: LinePair
-    step: AxisStep
-    pieces: list[AxisStep]
-
-    @property
-    def begins(self) -> bool:
-        """Whether it is known where it begins, in both programs."""
-        return not any(map(math.isnan, (*self.step.start, *self.pieces[0].start)))
 
 
 class Prover(Deviations):
