@@ -22,9 +22,20 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 MODULES = {
     "src/ncfix/compensate/plan/limits.py": ("compensate/test_limits.py", "compensate/test_long_motions.py"),
-    "src/ncfix/compensate/account.py": ("classes/test_accounting.py", "compensate/test_account_left.py"),
-    "src/ncfix/control/state.py": ("program/test_trace_motion.py", "program/test_trace_knowledge.py"),
-    "src/ncfix/writer/block.py": ("program/test_emit.py", "program/test_number_style.py"),
+    "src/ncfix/compensate/account.py": (
+        "compensate/test_account.py",
+        "cli/test_no_figure.py",
+        "compensate/test_wordless.py",
+    ),
+    "src/ncfix/control/state.py": (
+        *("program/test_trace_motion.py", "program/test_trace_knowledge.py", "program/test_trace_offsets.py"),
+        *("program/test_frames.py", "program/test_pointing.py", "program/test_fanuc.py", "program/test_pinning.py"),
+        *("program/siemens/test_following.py", "program/klartext/test_following.py", "program/test_trace_arcs.py"),
+    ),
+    "src/ncfix/writer/block.py": (
+        *("program/test_emit.py", "program/test_number_style.py", "compensate/test_arcs.py", "program/test_fanuc.py"),
+        *("program/siemens/test_writing.py", "program/klartext/test_writing.py", "compensate/test_rounding.py"),
+    ),
 }
 """Module -> the tests that are about it."""
 TIMEOUT_S = 120
