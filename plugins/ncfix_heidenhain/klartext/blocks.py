@@ -20,17 +20,15 @@ from ncfix.control.expressions import Fault, Unknown
 from ncfix.text.build import MAX_DEPTH, Branch, Node, Parsed, TooDeepError, TreeBuilder, edges, kind, tokens_of
 from ncfix.text.dialect import Dialect
 from ncfix.text.grammar import Squeezed, parse
-from ncfix.text.numbers import fill, find_numbers, is_numeric, table
+from ncfix.text.numbers import table
 from ncfix.text.reach import UNREAD
 from ncfix.text.shapes import (
-    NUMBER_MARK,
     ODD,
     Scan,
     block_of,
     in_slices,
-    odd_blocks,
+    scan_beside,
     scan_compiled,
-    shape_keys,
     split_blocks,
 )
 from ncfix.text.spelling import value_of
@@ -113,16 +111,7 @@ def scan_plain(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
     comments = np.array([match.span() for match in COMMENT.finditer(source)], dtype=np.int64).reshape(-1, 2)
     comments = comments[inside(blocks, comments[:, 0])]
-    numeric = is_numeric(text)
-    fill(numeric, comments, False)
-    numbers = find_numbers(text, numeric, FIXED)
-    comment = np.full(len(blocks), -1, dtype=np.int64)
-    comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
-    marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
-    keys = shape_keys(text, blocks, numbers.spans, comments, marks, numbers.covered)
-    broken = block_of(blocks, numbers.spans[numbers.broken, 0]).tolist()
-    apart = {*broken, *odd_blocks(text, blocks), *of_several_lines(text, blocks)}
-    return Scan.of(keys, blocks, comment, numbers, apart)
+    return scan_beside(text, blocks, comments, comments, fixed=FIXED, apart=of_several_lines(text, blocks))
 
 
 def inside(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.bool_]:

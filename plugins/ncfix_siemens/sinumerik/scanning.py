@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from ncfix.control.moves import Moves, Rule
 from ncfix.diagnostics import RefusedError
-from ncfix.text.numbers import fill, find_numbers, is_numeric, runs_of, table
-from ncfix.text.shapes import NUMBER_MARK, Scan, block_of, in_slices, matches, odd_blocks, shape_keys
+from ncfix.text.numbers import fill, runs_of, table
+from ncfix.text.shapes import Scan, block_of, in_slices, matches, scan_beside
 from ncfix.text.tree import Program, Template
 from ncfix_siemens.sinumerik.vocabulary import POLAR, POLES
 
@@ -51,19 +51,9 @@ def scan_slice(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     quiet = np.array([match.span() for match in passive], dtype=np.int64).reshape(-1, 2)
     final = [match.span() for match in passive if match["comment"] is not None]
     comments = np.array(final, dtype=np.int64).reshape(-1, 2)
-    numeric = is_numeric(text)
-    numeric &= ~in_names(text, source)
-    fill(numeric, quiet, False)
-    numbers = find_numbers(text, numeric, FIXED)
-    comment = np.full(len(blocks), -1, dtype=np.int64)
-    comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
-    marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
-    keys = shape_keys(text, blocks, numbers.spans, comments, marks, numbers.covered)
     paths = PATH.finditer(source) if b";" in source else ()
-    heads = np.array([match.start() for match in paths], dtype=np.int64)
-    broken = block_of(blocks, numbers.spans[numbers.broken, 0])
-    apart = {*broken.tolist(), *odd_blocks(text, blocks), *block_of(blocks, heads).tolist()}
-    return Scan.of(keys, blocks, comment, numbers, apart)
+    heads = block_of(blocks, np.array([match.start() for match in paths], dtype=np.int64)).tolist()
+    return scan_beside(text, blocks, quiet, comments, fixed=FIXED, named=in_names(text, source), apart=heads)
 
 
 def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:

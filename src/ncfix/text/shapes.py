@@ -7,7 +7,7 @@ language: it only says where numbers would be. Whether they are is checked once 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial, reduce
 from itertools import pairwise
@@ -167,20 +167,44 @@ def in_slices(source: bytes, blocks: NDArray[np.int64], scan: PlainScan) -> Scan
 
 def scan_any(source: bytes, blocks: NDArray[np.int64], pointless: bool) -> Scan:
     """As `scan`, of any text, with numpy alone."""
-    text = np.frombuffer(source, dtype=np.uint8)
     starts, stops, last = comments_of(source)
+    comments = np.stack((starts, stops), axis=1)
+    return scan_beside(np.frombuffer(source, dtype=np.uint8), blocks, comments, comments[last], pointless=pointless)
+
+
+def scan_beside(
+    text: NDArray[np.uint8],
+    blocks: NDArray[np.int64],
+    silent: NDArray[np.int64],
+    final: NDArray[np.int64],
+    *,
+    fixed: NDArray[np.bool_] = FIXED,
+    named: NDArray[np.bool_] | None = None,
+    apart: Iterable[int] = (),
+    pointless: bool = False,
+) -> Scan:
+    """The numbers and shapes of a text, whose language says where there are none.
+
+    silent     (k, 2) start and stop of what holds no numbers: comments, strings
+    final      (m, 2) those of comments that end their block
+    fixed      (256,) bytes behind which a number belongs to the shape
+    named      (n,) digits that belong to names; None: none do
+    apart      blocks that must be taken as they are, besides those that hold what no shape can
+    pointless  numbers without a point make another shape
+    """
     numeric = is_numeric(text)
-    fill(numeric, np.stack((starts, stops), axis=1), False)
-    numbers = find_numbers(text, numeric, FIXED)
+    if named is not None:
+        numeric &= ~named
+    fill(numeric, silent, False)
+    numbers = find_numbers(text, numeric, fixed)
     comment = np.full(len(blocks), -1, dtype=np.int64)
-    comment[block_of(blocks, starts[last])] = starts[last]
+    comment[block_of(blocks, final[:, 0])] = final[:, 0]
     marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
     if pointless:
         marks[without_point(text, numbers.spans)] = POINTLESS_MARK
-    ending = np.stack((starts[last], stops[last]), axis=1)
-    keys = shape_keys(text, blocks, numbers.spans, ending, marks, numbers.covered)
-    apart = {*block_of(blocks, numbers.spans[numbers.broken, 0]).tolist(), *odd_blocks(text, blocks)}
-    return Scan.of(keys, blocks, comment, numbers, apart)
+    keys = shape_keys(text, blocks, numbers.spans, final, marks, numbers.covered)
+    broken = block_of(blocks, numbers.spans[numbers.broken, 0]).tolist()
+    return Scan.of(keys, blocks, comment, numbers, {*broken, *odd_blocks(text, blocks), *apart})
 
 
 def scan_compiled(
