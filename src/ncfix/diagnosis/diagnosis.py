@@ -432,14 +432,7 @@ def _changes(found: Diagnosis) -> Diagnosis:
     machine = found.machine if new else None
     proposal = found.proposal if found.proposal and found.proposal.name.startswith(CHANGE) else None
     return replace(
-        found,
-        verdict=verdict,
-        findings=new,
-        rest=rest,
-        machine=machine,
-        proposal=proposal,
-        steady=steady,
-        dates=True,
+        found, verdict=verdict, findings=new, rest=rest, machine=machine, proposal=proposal, steady=steady, dates=True
     )
 
 
