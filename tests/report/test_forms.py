@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ncfix.diagnostics import UsageError
-from ncfix.reports.document import Document, Dots, Line, Paragraph, Plot, ReportSection, Table
+from ncfix.reports.document import ArrowMap, Document, Dots, Line, Paragraph, Plot, ReportSection, Table
 from ncfix.reports.rendering import HEIGHT, UP, WIDTH, PlotAxes, form_of, html, markdown, ticks
 
 X = np.linspace(-10.0, 10.0, 5)
@@ -76,6 +76,21 @@ def test_markdown_has_rows_of_one_width_and_the_extremes_of_curves() -> None:
     assert "<script>" not in text
     assert "up +0 to +100; down -100 to -0" in text
     assert "residual -13 to +7" in text
+
+
+def test_a_map_of_arrows_has_a_panel_for_each_title_and_one_scale() -> None:
+    shifts = {"before": np.tile([3.0, 4.0], (5, 1)), "after": np.tile([0.0, 0.5], (5, 1))}
+    part = ArrowMap("Residuals.", "X, mm", "Y, mm", X, -X, shifts, "um")
+    text = html(Document("a", [ReportSection("b", [part])])).decode()
+    page = Balanced()
+    page.feed(text)
+    assert (page.open, page.wrong) == ([], [])
+    assert "The longest arrow is 5.0 um" in text
+    ends = [tuple(map(float, each)) for each in re.findall(r'<line x1="(.*?)" y1="(.*?)" x2="(.*?)" y2="(.*?)"', text)]
+    lengths = [float(np.hypot(c - a, d - b)) for a, b, c, d in ends]
+    assert len(ends) == 10
+    assert lengths[0] / lengths[-1] == pytest.approx(10, rel=0.05)  # tenths of a pixel
+    assert "before up to 5.0 um; after up to 0.5 um" in markdown(Document("a", [ReportSection("b", [part])])).decode()
 
 
 def test_the_suffix_says_the_form() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import combinations
 
 import numpy as np
 
@@ -26,9 +27,10 @@ from ncfix.diagnosis.presentation import (
     why,
 )
 from ncfix.machine import Effect
+from ncfix.machine.basis import Periodic
 from ncfix.machine.effects import with_unit
 from ncfix.measure.measurement import Array
-from ncfix.reports.document import Bars, Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
+from ncfix.reports.document import ArrowMap, Bars, Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
 
 HOUR = 3600.0
 CURVES = 4
@@ -124,7 +126,10 @@ def _finding(diagnosis: Diagnosis, finding: EffectFinding) -> ReportSection:
         for said in (constants(finding), odd(finding), carried(diagnosis, finding))
         if said
     ]
-    return ReportSection(candidate.name, [*parts, *_curve(diagnosis, finding), *_runners(diagnosis, finding)])
+    return ReportSection(
+        candidate.name,
+        [*parts, *_curve(diagnosis, finding), *_folded(diagnosis, finding), *_runners(diagnosis, finding)],
+    )
 
 
 def _runners(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
@@ -171,7 +176,41 @@ def _where(diagnosis: Diagnosis) -> ReportSection:
 
 
 def _residuals(diagnosis: Diagnosis) -> ReportSection:
-    return ReportSection("Residuals before and after", list(_maps(diagnosis)))
+    return ReportSection("Residuals before and after", [*_arrows(diagnosis), *_maps(diagnosis)])
+
+
+def _arrows(diagnosis: Diagnosis) -> Iterator[Part]:
+    """Residuals as arrows over each plane of linear axes, before and after, where they are shifts of the tip."""
+    data, names = diagnosis.data, np.array(diagnosis.data.names)
+    letters = [axis.name for axis in data.measured.linear if axis.name in "XYZ"]
+    for first, second in combinations(letters, 2):
+        parts = [np.flatnonzero((names == f"d{each.lower()}") & diagnosis.case.kept) for each in (first, second)]
+        rows = np.intersect1d(data.row[parts[0]], data.row[parts[1]])
+        if not len(rows):
+            continue
+        at = np.stack([own[np.searchsorted(data.row[own], rows)] for own in parts], axis=1)
+        x, y = (data.q[rows, data.machine.axis_names.index(each)] for each in (first, second))
+        shifts = {"before": diagnosis.before[at], "after": diagnosis.after[at]}
+        caption = f"What is measured beyond the model in the plane of {first} and {second}, {len(rows)} poses."
+        yield ArrowMap(caption, f"{first}, mm", f"{second}, mm", x, y, shifts, "um")
+
+
+def _folded(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
+    """What a cyclic error leaves without it, over one pitch: all turns of the screw one upon the other."""
+    waves = [effect for effect in finding.effects if isinstance(effect.basis, Periodic) and effect.times is None]
+    axis = diagnosis.data.machine.axis(finding.candidate.axis)
+    if not waves or axis is None:
+        return
+    [wave, *_], data = waves, diagnosis.data
+    assert isinstance(wave.basis, Periodic)
+    own = np.abs(finding.shown) > 0
+    own &= diagnosis.case.kept
+    place = data.q[data.row[own], data.machine.axis_names.index(axis.name)] / axis.unit
+    phase, rest = np.mod(place, wave.basis.period), (diagnosis.after + finding.shown)[own]
+    caption = (
+        f"um over {axis.name}, mm, folded by the pitch of {wave.basis.period:g} mm: with everything else taken off"
+    )
+    yield Plot(caption, [Dots(phase, rest, "measured"), Dots(phase, finding.shown[own], "model")])
 
 
 def _maps(diagnosis: Diagnosis) -> Iterator[Part]:

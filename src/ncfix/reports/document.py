@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ncfix.machine.se3 import Array
@@ -64,7 +64,25 @@ class Bars:
     values: Sequence[float]
 
 
-Part = Paragraph | Table | Plot | Bars
+@dataclass(frozen=True, slots=True)
+class ArrowMap:
+    """Small shifts at places of a plane, a panel for each title, all to one scale.
+
+    across, up  names of the two axes, with their units
+    x, y        (n,) places
+    shifts      title -> (n, 2), in the unit that `unit` names
+    """
+
+    caption: str
+    across: str
+    up: str
+    x: Array
+    y: Array
+    shifts: Mapping[str, Array]
+    unit: str
+
+
+Part = Paragraph | Table | Plot | Bars | ArrowMap
 
 
 @dataclass(frozen=True, slots=True)

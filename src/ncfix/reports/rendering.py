@@ -17,13 +17,15 @@ import numpy as np
 from ncfix.diagnostics import Place, UsageError
 from ncfix.machine.se3 import Array
 from ncfix.plugins import called, registry
-from ncfix.reports.document import Bars, Document, Dots, Line, Paragraph, Part, Plot, Table
+from ncfix.reports.document import ArrowMap, Bars, Document, Dots, Line, Paragraph, Part, Plot, Table
 
 WIDTH, HEIGHT = 520, 190
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 10, 24
 """Pixels round the axes, for the numbers."""
 NAMES, VALUES, BAR = 150, 60, 24
 """Pixels for the names and the values of bars, and from one bar to the next."""
+PANEL, EDGE, LONGEST = 300, 44, 40.0
+"""Pixels of a map of arrows, of its edge, and of the longest arrow."""
 ACROSS, UP = 7, 5
 """Ticks that there are about."""
 ROUND = (1.0, 2.0, 5.0, 10.0)
@@ -35,6 +37,9 @@ STYLE = (
     "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.2em .8em;border-bottom:1px solid #ccc;text-align:left}"
     "td.n{text-align:right}svg{background:#fafafa}figure{display:inline-block;margin:.4em 1em .6em 0}"
     "figcaption{font-size:13px;color:#444}"
+    "@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}svg{background:#1e2126}"
+    "figcaption{color:#aaa}td,th{border-color:#3a3d42}svg text{fill:#aaa}"
+    "svg .grid{stroke:#33373d}svg .zero{stroke:#888}}"
     "@media print{section{break-inside:avoid}}"
 )
 Rendering = Callable[[Document], bytes]
@@ -73,6 +78,8 @@ def _html_part(part: Part) -> str:
             return html_plot(part)
         case Bars():
             return _html_bars(part)
+        case ArrowMap():
+            return _html_arrows(part)
 
 
 def _html_table(table: Table) -> str:
@@ -109,6 +116,36 @@ def _html_bars(bars: Bars) -> str:
     height = BAR * len(bars.names)
     picture = f'<svg width="{WIDTH}" height="{height}" font-size="12" role="img">{"".join(drawn)}</svg>'
     return f"<figure>{picture}<figcaption>{escape(bars.caption)}</figcaption></figure>"
+
+
+def _html_arrows(part: ArrowMap) -> str:
+    """A square panel for each title; the longest arrow of all is `LONGEST` pixels."""
+    inner, scale = PANEL - 2 * EDGE, LONGEST / (max(map(_longest, part.shifts.values())) or 1.0)
+    wide = max(float(np.ptp(part.x)), float(np.ptp(part.y))) or 1.0
+    x = EDGE + inner / 2 + inner * (part.x - (part.x.max() + part.x.min()) / 2) / wide
+    y = PANEL - EDGE - inner / 2 - inner * (part.y - (part.y.max() + part.y.min()) / 2) / wide
+    drawn = []
+    for k, (title, shifts) in enumerate(part.shifts.items()):
+        left, ends = PANEL * k, np.stack([x, y], axis=1) + shifts * [scale, -scale]
+        drawn.append(f'<text x="{left + PANEL / 2}" y="14" text-anchor="middle">{escape(title)}</text>')
+        for a, b, (c, d) in zip(x.tolist(), y.tolist(), ends.tolist(), strict=True):
+            drawn.append(
+                f'<line x1="{left + a:.1f}" y1="{b:.1f}" x2="{left + c:.1f}" y2="{d:.1f}" stroke="{COLOURS[k]}"/>'
+                f'<circle cx="{left + a:.1f}" cy="{b:.1f}" r="1.2" fill="{COLOURS[k]}"/>'
+            )
+        drawn.append(
+            f'<text x="{left + PANEL / 2}" y="{PANEL - 4}" text-anchor="middle">{escape(part.across)}</text>'
+            f'<text x="{left + 12}" y="{PANEL / 2}" text-anchor="middle" '
+            f'transform="rotate(-90 {left + 12} {PANEL / 2})">{escape(part.up)}</text>'
+        )
+    size = f'width="{PANEL * len(part.shifts)}" height="{PANEL}"'
+    said = f"{part.caption} The longest arrow is {LONGEST / scale:.1f} {part.unit}; both panels have one scale."
+    picture = f'<svg {size} font-size="11" fill="#555" role="img">{"".join(drawn)}</svg>'
+    return f"<figure>{picture}<figcaption>{escape(said)}</figcaption></figure>"
+
+
+def _longest(shifts: Array) -> float:
+    return float(np.linalg.norm(shifts, axis=1).max(initial=0.0))
 
 
 def _drawn(frame: PlotAxes, what: Line | Dots, colour: str) -> str:
@@ -149,6 +186,9 @@ def _markdown_part(part: Part) -> str:
             return "\n".join(f"| {' | '.join(map(_escaped, row))} |" for row in cells)
         case Plot(caption, drawn):
             return f"{_escaped(caption)}: {'; '.join(map(_extremes, drawn))}"
+        case ArrowMap(caption, shifts=shifts, unit=unit):
+            sizes = (f"{_escaped(title)} up to {_longest(each):.1f} {unit}" for title, each in shifts.items())
+            return f"{_escaped(caption)}: {'; '.join(sizes)}"
         case Bars(caption, names, values):
             listed = "; ".join(f"{_escaped(name)} {value:.2f}" for name, value in zip(names, values, strict=True))
             return f"{_escaped(caption)}: {listed}"
@@ -201,11 +241,11 @@ class PlotAxes:
         floor = HEIGHT - BOTTOM
         across, up = ticks(*self.across, ACROSS), ticks(*self.up, UP)
         for value, x in zip(across.tolist(), self._x(across).tolist(), strict=True):
-            yield f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{floor}" stroke="#e4e4e4"/>'
+            yield f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{floor}" class="grid" stroke="#e4e4e4"/>'
             yield f'<text x="{x:.1f}" y="{floor + 15}" text-anchor="middle">{value:g}</text>'
         for value, y in zip(up.tolist(), self._y(up).tolist(), strict=True):
-            colour = "#e4e4e4" if value else "#999"
-            yield f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}" stroke="{colour}"/>'
+            colour, kind = ("#e4e4e4", "grid") if value else ("#999", "zero")
+            yield f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}" class="{kind}" stroke="{colour}"/>'
             yield f'<text x="{LEFT - 5}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
 
 
