@@ -20,6 +20,12 @@ def test_work_offsets_come_from_the_setup() -> None:
     assert ends(followed) == [[11, 1, 0, 100], [1, 1, -4, 100]]
 
 
+@pytest.mark.parametrize(("dialect", "text"), [("linuxcnc", "M6\nG43 G0 X1 Z5"), ("siemens", "G54\nM6\nG0 X1 Z5")])
+def test_a_tool_change_without_a_tool_is_to_the_one_that_the_setup_calls_0(dialect: str, text: str) -> None:
+    followed = follow(text, dialect=dialect, tools={0: Tool(3.0, 0.0)})
+    assert reasons(followed) == [""]
+
+
 def test_frames_lead_from_numbers_to_commands() -> None:
     followed = follow("G10 L2 P1 X1 R30\nG92 X5\nG43.1 Z7\nG20\nG0 X2 Y3 Z4", axes="XYZ")
     moves = followed.moves

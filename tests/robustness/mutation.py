@@ -30,6 +30,7 @@ MODULES = {
     "src/ncfix/control/state.py": (
         *("program/test_trace_motion.py", "program/test_trace_knowledge.py", "program/test_trace_offsets.py"),
         *("program/test_frames.py", "program/test_pointing.py", "program/siemens/test_following.py"),
+        *("program/test_contour.py", "compensate/test_block_delete.py", "classes/test_planes_by_steps.py"),
     ),
     "src/ncfix/writer/block.py": (
         *(
