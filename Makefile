@@ -2,7 +2,7 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: demo test full lint docs release share screenshots format accuracy bench batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
-	goldens goldens-update planted fuzz mutation ci clean
+	goldens goldens-update planted fuzz fuzz-core mutation ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -90,6 +90,9 @@ fuzz:            ## damaged files for all readers; what goes wrong is kept in te
 mutation:        ## faults put into the code of limits, account, state and writer, and which of them tests find (needs: pip install -e '.[mutation]'); COUNT=30 of each ONLY=limits SEED=1
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) -m robustness.mutation \
 		--count $(or $(COUNT),30) $(if $(ONLY),--only $(ONLY)) $(if $(SEED),--seed $(SEED))
+
+fuzz-core:       ## the compiled core under sanitizers, fed with damaged programs (needs gcc's libasan); SECONDS=600 SEED=7
+	$(PYTHON) tests/core/fuzz.py --seconds $(or $(SECONDS),600) $(if $(SEED),--seed $(SEED))
 
 ci:              ## what the server runs
 	.ci/run
