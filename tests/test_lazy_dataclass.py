@@ -94,8 +94,8 @@ def facts(cls: Any) -> list[Any]:
         seen += [[number == of(partial(hash, other)) for other in made], repr(copy.copy(one))]
         seen += [dataclasses.asdict(one), dataclasses.astuple(one)]
         seen += [repr(of(partial(dataclasses.replace, one, x=9)))]
-        seen += [of(partial(setattr, copy.copy(one), name, 3)) for name in ("x", "not_there")]
-        seen += [of(partial(delattr, copy.copy(one), "x"))]
+        if "x" in seen[2]:  # Python stumbles over other names of frozen classes with slots
+            seen += [of(partial(setattr, copy.copy(one), "x", 3)), of(partial(delattr, copy.copy(one), "x"))]
     return seen
 
 
@@ -149,8 +149,9 @@ def test_classes_derived_from_each_other_work_and_can_be_pickled(cls: type) -> N
     assert one.rest == [2]
     assert cls(1).rest is not cls(1).rest
     assert (one == Base(1, [2])) == (cls is Base)
-    with pytest.raises(FrozenInstanceError):
-        one.x = 2
+    for name in ("x", "not_there"):
+        with pytest.raises(FrozenInstanceError if name == "x" or cls is Base else (AttributeError, TypeError)):
+            setattr(one, name, 2)
     with pytest.raises(TypeError, match="unhashable"):
         hash(one)
 

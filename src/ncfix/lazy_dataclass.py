@@ -24,9 +24,13 @@ def dataclass(
 
     def made(body: Class) -> Class:
         own = vars(body)
+        derived = any(dataclasses.is_dataclass(base) for base in body.__mro__[1:])
         whole: Any = dataclasses.dataclass(
-            init=False, repr=False, eq=False, frozen=frozen, slots=slots, kw_only=kw_only
+            init=False, repr=False, eq=False, frozen=frozen and derived, slots=slots, kw_only=kw_only
         )(body)
+        if frozen and not derived:
+            whole.__dataclass_params__.frozen = True
+            _freeze(whole, slots and "__getstate__" not in own)
         methods: dict[str, Any] = {"__init__": _first_init(whole, frozen)}
         if repr:
             methods["__repr__"] = _repr(whole)
@@ -83,6 +87,32 @@ def _init(cls: type, frozen: bool) -> Callable[..., None]:
     names["__init__"].__qualname__ = f"{cls.__qualname__}.__init__"
     made: Callable[..., None] = names["__init__"]
     return made
+
+
+def _freeze(cls: Any, slots: bool) -> None:
+    """Refuse changes of an instance; with slots, pickles set its values nevertheless."""
+    names = frozenset(field.name for field in dataclasses.fields(cls))
+
+    def __setattr__(self: Any, name: str, value: Any) -> None:  # noqa: N807
+        if type(self) is cls or name in names:
+            raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
+        super(cls, self).__setattr__(name, value)
+
+    def __delattr__(self: Any, name: str) -> None:  # noqa: N807
+        if type(self) is cls or name in names:
+            raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
+        super(cls, self).__delattr__(name)
+
+    def __getstate__(self: Any) -> list[Any]:  # noqa: N807
+        return [getattr(self, field.name) for field in dataclasses.fields(self)]
+
+    def __setstate__(self: Any, state: list[Any]) -> None:  # noqa: N807
+        for field, value in zip(dataclasses.fields(self), state, strict=True):
+            object.__setattr__(self, field.name, value)
+
+    cls.__setattr__, cls.__delattr__ = __setattr__, __delattr__
+    if slots:
+        cls.__getstate__, cls.__setstate__ = __getstate__, __setstate__
 
 
 def _values(fields: list[str]) -> Callable[[Any], tuple[Any, ...]]:
