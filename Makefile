@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test full lint docs release share screenshots format accuracy bench batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
+.PHONY: demo test full lint docs release share screenshots format accuracy bench bench-real batch same-bytes tables study hidden metamorphic refusals inserted-blocks \
 	goldens goldens-update planted fuzz fuzz-core mutation ci clean
 
 demo:            ## fix the shipped five-axis example
@@ -41,6 +41,9 @@ accuracy:        ## work out docs/accuracy.md (an hour), or STUDIES="plans ..." 
 
 bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md; SIZES="1000000" RUNS=5 LONG=10000000 OTHERS=200000 VERBS="100000 1000000"
 	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/run.py $(if $(filter-out undefined,$(origin SIZES)),--sizes $(SIZES)) $(if $(RUNS),--runs $(RUNS)) $(if $(LONG),--long $(LONG)) $(if $(OTHERS),--others $(OTHERS)) $(if $(filter-out undefined,$(origin VERBS)),--verbs $(VERBS))
+
+bench-real:      ## time ncfix and rs274 on the largest real programs of the corpus, into docs/performance.md; COUNT=20 RUNS=3
+	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/real_programs.py $(if $(COUNT),--count $(COUNT)) $(if $(RUNS),--runs $(RUNS))
 
 batch:           ## time batches, again and on a cluster, into docs/performance.md (minutes); PROGRAMS=2000 KILLS=20 workers of the cluster
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) benchmarks/batch.py $(if $(PROGRAMS),--programs $(PROGRAMS)) $(if $(KILLS),--kills $(KILLS))
