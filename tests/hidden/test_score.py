@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hidden import __main__ as entry
-from hidden import tally
+from hidden import promises, tally
 from hidden.candidate import Answer, Program, Reported, ask, read_answer
 from hidden.families import FAMILIES, Task
 from hidden.intervals import bootstrap, wilson
@@ -205,3 +205,12 @@ def test_scenarios_can_be_written_out(tmp_path: Path) -> None:
     assert (tmp_path / "handed" / "clutter-000" / "machine.toml").exists()
     assert (tmp_path / "truth" / "clutter-000" / "truth.json").exists()
     assert set(FAMILIES) >= {"single", "clean", "mistake"}
+
+
+def test_promises_are_counted_by_what_was_stated() -> None:
+    rows = promises.table([(0.95, True), (0.92, True), (0.5, False)]).splitlines()[2:]
+    assert [row.split("|")[1:5] for row in rows] == [
+        [" 0.3 to 0.6 ", " 1 ", " 0.50 ", " 0 "],
+        [" 0.9 to 1.0 ", " 2 ", " 0.94 ", " 2 "],
+        [" all ", " 3 ", " 0.79 ", " 2 "],
+    ]
