@@ -43,7 +43,9 @@ FIRST, CHUNK = 32, 32
 STARTS, SMALL = 20, 20_000
 """Random starts besides the first choice, where candidates times predictions are few."""
 ALONE = 1e-5
-"""A pose of which no more is told by the others is not taken off by a formula, nor any while the ridge tells more."""
+"""A pose of which no more is told by the others is not taken off by a formula."""
+RIDDEN = 1e-2
+"""Nor is any where the ridge has more than this share in what is known least."""
 EXCHANGED = 1e-3
 """A relative gain below this is none."""
 WORTHWHILE = 5e-3
@@ -333,7 +335,7 @@ class Measured:
         """
         block = pool.blocks[row]
         rest = np.eye(len(block)) - self.own[row]
-        if np.trace(self.inverse) * RIDGE * pool.power > ALONE or np.linalg.eigvalsh(rest)[0] < ALONE:
+        if np.trace(self.inverse) * RIDGE * pool.power > RIDDEN or np.linalg.eigvalsh(rest)[0] < ALONE:
             return None
         n, r, p = self.spread.shape
         cross = (self.spread.reshape(n * r, p) @ block.T).reshape(n, r, -1)
