@@ -18,6 +18,7 @@ from ncfix.compensate.plan.deviation import bounds, deviations_seen, path_error,
 from ncfix.compensate.plan.ends import corrected
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.path import plan
+from ncfix.compensate.plan.sampling import bends
 from ncfix.compensate.plan.segments import Segments
 from ncfix.compensate.plan.splitting import STRETCH, PathNodes, fewest
 from ncfix.compensate.plan.strategies import get_strategy
@@ -101,7 +102,10 @@ def test_no_look_finds_more_than_the_bound(root: Path, step: float, passing: flo
     start = np.concatenate([moves.start[:1], done[:-1]])
     real = replace(Segments.of_moves(moves, intent.columns), start=start, end=done)
     rows, uneasy = np.arange(1, len(moves)), uneasy_starts(intent, np.zeros(len(moves), dtype=bool))
-    bound, found = bounds(intent, real, rows, uneasy), deviations_seen(intent, real, rows, uneasy, 8, 15)
+    bound, found = (
+        bounds(intent, real, rows, uneasy),
+        deviations_seen(intent, real, rows, uneasy, 8, 15, bends(intent, rows)),
+    )
     assert (found <= bound).all()
     assert (bound < 2.5e-3).mean() >= passing
     assert found.max() > 1e-8
@@ -120,7 +124,10 @@ def test_no_look_at_a_led_tip_finds_more_than_the_bound(root: Path, name: str, s
     done = corrected(intent, get_strategy("position"), np.arange(len(moves))).wanted
     real = replace(Segments.of_moves(moves, intent.columns), start=np.vstack((moves.start[:1], done[:-1])), end=done)
     uneasy = uneasy_starts(intent, np.zeros(len(moves), dtype=bool))
-    bound, found = bounds(intent, real, rows, uneasy), deviations_seen(intent, real, rows, uneasy, 8, 15)
+    bound, found = (
+        bounds(intent, real, rows, uneasy),
+        deviations_seen(intent, real, rows, uneasy, 8, 15, bends(intent, rows)),
+    )
     assert np.isfinite(bound).mean() > 0.5
     assert (found <= bound).all()
     assert found.max() > 1e-8

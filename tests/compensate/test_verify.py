@@ -10,7 +10,8 @@ import pytest
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions
 from ncfix.compensate.driver import fix_program
-from ncfix.compensate.plan.deviation import FigureTally, PathSamples, path_error
+from ncfix.compensate.plan.deviation import path_error
+from ncfix.compensate.plan.figure_tally import FigureTally, PathSamples
 from ncfix.compensate.plan.path import plan, untouched
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import MotionKind, Rule

@@ -14,7 +14,7 @@ from ncfix.batch.programs import subprograms
 from ncfix.cli import console
 from ncfix.cli.options import dialect_of, load_machine, read_program
 from ncfix.cli.setup_options import SetupOptions
-from ncfix.cli.streams import Source, looked_bytes
+from ncfix.cli.streams import Source, part_bytes
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import DifferenceError, NcfixError, UsageError
 from ncfix.lazy_dataclass import dataclass
@@ -136,7 +136,7 @@ def task_of(following: Following, source: Source, dialect: Dialect, *beside: str
 
     assert following.machine is not None
     find, path = subprograms(following.setup, source.path, *beside), shown(source.path)
-    return Task(following.machine, following.setup, OPTIONS, find, path, dialect, looked_bytes(), source.head)
+    return Task(following.machine, following.setup, OPTIONS, find, path, dialect, part_bytes(), source.head)
 
 
 def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Parts, Iterator[Part]]:
@@ -158,7 +158,7 @@ def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Pa
         axes = axes_of(PartReader(reader.path, dialect, source.head).read(source.first_lines).templates)
         find = subprograms(following.setup, source.path)
         follower = follower_of(dialect, Run(following.setup, axes, frozenset(ROTARY), find))
-    parts = Parts(OPTIONS, reader, follower, source.read, looked_bytes())
+    parts = Parts(OPTIONS, reader, follower, source.read, part_bytes())
 
     def found() -> Iterator[Part]:
         for part in parts.parts():

@@ -13,7 +13,7 @@ from click.shell_completion import CompletionItem
 from ncfix import core
 from ncfix.arguments import TOLERANCE_UM, TOOL_LENGTH, NumberRange
 from ncfix.cli import console
-from ncfix.cli.streams import part_bytes
+from ncfix.cli.streams import long_bytes
 from ncfix.cli.targets import STREAM, read, shown
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ def read_program(
     from ncfix.text.reader import read_like
 
     source = read(path) if text is None else text
-    if len(source) >= part_bytes():
+    if len(source) >= long_bytes():
         core.forewarn(console.forewarn)
     if dialect is None and like is not None:
         return read_like(source, shown(path), like, (machine and machine.control) or "")

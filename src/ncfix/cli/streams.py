@@ -23,11 +23,12 @@ if TYPE_CHECKING:
     from ncfix.reports.program_page import ProgramPage
 
 
-def part_bytes() -> int:
-    """Bytes of a part: `NCFIX_PART_BYTES` if that is set; the output does not depend on it.
+LONG_BYTES = 3 << 20
+"""A program of so many bytes is long: a shorter one is read as a whole, where `NCFIX_PART_BYTES` does not say more."""
 
-    A program of so many is long: a shorter one is read as a whole.
-    """
+
+def part_bytes() -> int:
+    """Bytes of a part: `NCFIX_PART_BYTES` if that is set; the output does not depend on it."""
     from ncfix.compensate.following import PART_BYTES
 
     text = os.environ.get("NCFIX_PART_BYTES") or str(PART_BYTES)
@@ -36,9 +37,9 @@ def part_bytes() -> int:
     return int(text)
 
 
-def looked_bytes() -> int:
-    """Bytes of a part of a program that is only looked at: half as much is as fast there, and takes less memory."""
-    return max(part_bytes() // 2, 1)
+def long_bytes() -> int:
+    """Bytes of which a program is long: corrected and looked at in parts."""
+    return part_bytes() if os.environ.get("NCFIX_PART_BYTES") else LONG_BYTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,12 +110,12 @@ class Source:
     def looked_into(self, named: bool = False) -> bool:
         """Read the first bytes, which `read` gives once more; whether there are so many that the program is long.
 
-        named  its dialect was said: of a pipe no more than a part is waited for; else, and of a file, there are enough
-               of them to tell what the text is, whatever the size of a part
+        named  its dialect was said: of a pipe no more than that is waited for; else, and of a file, there are enough of
+               them to tell what the text is
         """
         from ncfix.text.dialect import PROBE_BYTES
 
-        many = part_bytes()
+        many = long_bytes()
         self.head = self._read(many if named and self.kept is not None else max(many, PROBE_BYTES))
         self.stamp = self._stamp(self.head[:PROBE_BYTES].splitlines())
         return len(self.head) >= many

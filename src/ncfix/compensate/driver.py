@@ -50,7 +50,8 @@ from ncfix.compensate.parts import PartProof, ProgramPart, Units
 from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.plain_figures import figures, largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
-from ncfix.compensate.plan.deviation import PathError, path_error
+from ncfix.compensate.plan.deviation import path_error
+from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.offset import is_offset
 from ncfix.compensate.report import FixReport, Tally, in_lines

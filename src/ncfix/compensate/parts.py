@@ -16,7 +16,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.block_delete import Readings, Together
 from ncfix.compensate.following import Task, placed, refuse_stamped, with_tool_lengths
 from ncfix.compensate.plan.arrays import Index, Mask
-from ncfix.compensate.plan.deviation import PathError
+from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.solve import SelfCheckError, WrittenPlan, differences
@@ -157,7 +157,7 @@ class Parts:
     @property
     def _wanted(self) -> int:
         """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
-        return self.size // 8 if self.tcp else self.size
+        return self.size // 3 if self.tcp else self.size
 
     def _texts(self) -> Iterator[tuple[Program, bool, PartCheckpoint | None]]:
         """The text in parts that end between two blocks of plain words; True with the last one.

@@ -49,6 +49,7 @@ from ncfix.compensate.plan.written import on_digits, rounding
 from ncfix.compensate.solve import WrittenPlan, accepted_plan
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
 from ncfix.control.trace import taken
+from ncfix.control.turns import turns_alone
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import MORE
@@ -459,12 +460,10 @@ def _may_be_planned(moves: Moves) -> bool:
 
 
 def _are_straight(moves: Moves) -> Mask:
-    """(n,) straight motions; at feed only those along which linear axes move."""
-    rapid, cut = (
-        (moves.kind == MotionKind.RAPID) & (moves.modal == 0),
-        (moves.kind == MotionKind.FEED) & (moves.modal == 10),
-    )
-    straight: Mask = rapid | (cut & some((moves.start != moves.end)[:, ~moves.rotary]))
+    """(n,) straight motions but those at feed that turn rotary axes alone."""
+    rapid = (moves.kind == MotionKind.RAPID) & (moves.modal == 0)
+    cut = (moves.kind == MotionKind.FEED) & (moves.modal == 10)
+    straight: Mask = rapid | (cut & ~turns_alone(moves))
     return straight
 
 

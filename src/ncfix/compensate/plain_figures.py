@@ -25,7 +25,8 @@ from ncfix.compensate.plan.arrays import (
     places,
     squares,
 )
-from ncfix.compensate.plan.deviation import BATCH, STRAIGHT, FigureTally, PathError, PathSamples, errors_at, samples
+from ncfix.compensate.plan.deviation import BATCH, STRAIGHT, errors_at, samples
+from ncfix.compensate.plan.figure_tally import FigureTally, PathError, PathSamples
 from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends_closely, even, features, passed
 from ncfix.compensate.plan.segments import Segments
 from ncfix.compensate.plan.written import TURNED, Known, WrittenPieces, standing_still

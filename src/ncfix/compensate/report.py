@@ -22,7 +22,7 @@ from ncfix.compensate.account import (
 from ncfix.compensate.block_delete import Together, worst_findings
 from ncfix.compensate.following import LOOKED, Numbers, numbers_of, numbers_together
 from ncfix.compensate.plan.arrays import Mask, lengths
-from ncfix.compensate.plan.deviation import PathError
+from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.findings import Notes
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.strategies import get_strategy

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
 from ncfix.control.moves import Arc, CycleCall, Frame, MotionKind, Moves, Pass, Rule
-from ncfix.control.turns import Winding, doubtful, extremes, overturned
+from ncfix.control.turns import Winding, extremes, half_turns
 from ncfix.lazy_dataclass import dataclass
 
 FloatArray = NDArray[np.float64]
@@ -283,12 +283,14 @@ class MotionBuilder:
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
         """The columns of what styles hold, one row per motion."""
-        rows, used = list(self._styles), np.flatnonzero(np.bincount(style)).tolist()
-        columns: dict[str, NDArray[Any]] = {}
+        rows, columns = list(self._styles), dict[str, NDArray[Any]]()
+        same = rows[style[0]] if len(style) and (style == style[0]).all() else None
         for index, name in enumerate(MotionStyle._fields):
-            kind, values = DTYPES.get(name, np.bool_), {rows[each][index] for each in used}
-            of_styles = np.array([row[index] for row in rows], dtype=kind)
-            columns[name] = np.full(len(style), values.pop(), kind) if len(values) == 1 else of_styles.take(style)
+            kind = DTYPES.get(name, np.bool_)
+            if same is not None:
+                columns[name] = np.full(len(style), same[index], kind)
+            else:
+                columns[name] = np.array([row[index] for row in rows], dtype=kind).take(style)
         return columns
 
     def _keep_whole(
@@ -306,22 +308,32 @@ class MotionBuilder:
         """
         if self.rolls is None:
             return None
-        directed = np.repeat(styles["incremental"][:, None], len(self.columns), axis=1) if counted is None else counted
-        directed = directed.copy()
-        for first, stop, axes in self._directed:
-            directed[first:stop] |= [bool(axes >> column & 1) for column in self.columns]
-        free = styles["rule"] != Rule.PASS
-        rows = overturned(self.rolls, directed, start, end) & free
-        back, plain = np.zeros(len(block), dtype=np.bool_), programmed & ~directed
-        offset = np.array([offset for offset, *_ in self._frames] or [(0.0,) * len(self.columns)])[styles["frame"]]
+        turning, free = np.flatnonzero(self.rolls), styles["rule"] != Rule.PASS
+        start, end = start[:, turning], end[:, turning]
+        directed = (
+            np.broadcast_to(styles["incremental"][:, None], end.shape) if counted is None else counted[:, turning]
+        )
+        if self._directed:
+            directed = directed.copy()
+            for first, stop, axes in self._directed:
+                directed[first:stop] |= [bool(axes >> self.columns[column] & 1) for column in turning]
+        plain, cuts = programmed[:, turning] & ~directed, styles["kind"] != MotionKind.RAPID
+        offsets = np.array([offset for offset, *_ in self._frames] or [(0.0,) * len(self.columns)])[:, turning]
+        offset = offsets if len(offsets) == 1 else offsets[styles["frame"]]
+        rows = np.zeros(len(block), dtype=np.bool_)
+        if found := half_turns(directed, start, end):
+            over, doubtful = found
+            rows = over & free
+            styles["rotary_as_programmed"] = styles["rotary_as_programmed"] | doubtful
+            self.overturned = _first(block, rows & cuts, self.overturned)
         if self.winding is not None:
-            back = self.winding.back(self.rolls, plain, start - offset, end - offset) & free & ~rows
-        styles["compensated"] = styles["compensated"] | rows | back
-        styles["rotary_as_programmed"] = styles["rotary_as_programmed"] | doubtful(self.rolls, start, end)
-        cuts = styles["kind"] != MotionKind.RAPID
-        self.overturned = _first(block, rows & cuts, self.overturned)
-        self.brought_back = _first(block, back & cuts, self.brought_back)
-        return extremes(self.rolls, plain, end - offset)
+            back = self.winding.back(turning, plain, start - offset, end - offset) & free & ~rows
+            rows |= back
+            self.brought_back = _first(block, back & cuts, self.brought_back)
+        styles["compensated"] = styles["compensated"] | rows
+        angles = np.full((len(self.columns), 2), np.nan)
+        angles[turning] = extremes(plain, end - offset)
+        return angles
 
     def _approach_column(self, count: int) -> FloatArray | None:
         if not self._approaches:

@@ -34,10 +34,12 @@ UNTIMED = "rotary axes turn alone, and the time that takes is not known: their f
 
 
 def turns_alone(moves: Moves) -> NDArray[np.bool_]:
-    """(n,) motions at feed in which no linear axis moves: whether `turn_alone` can be other than 0."""
+    """(n,) motions at feed in which rotary axes move and no linear axis does: those whose `turn_alone` is not 0."""
     alone: NDArray[np.bool_] = moves.kind == MotionKind.FEED
     for column in np.flatnonzero(~moves.rotary):
         alone &= moves.end[:, column] - moves.start[:, column] == 0
+    rows = np.flatnonzero(alone)
+    alone[rows] = (moves.end[rows] != moves.start[rows])[:, moves.rotary].any(axis=1)
     return alone
 
 
@@ -93,13 +95,20 @@ def may_roll(travel: Sequence[tuple[float, float]] | None, rotary: Mask) -> Mask
     return rolls if rolls.any() else None
 
 
-def overturned(rolls: Mask, directed: Mask, start: NDArray[np.float64], end: NDArray[np.float64]) -> Mask:
-    """Motions (n,) from `start` to `end` (n, n_axes), rad, that turn such an axis by half a turn or more.
+def half_turns(directed: Mask, start: FloatArray, end: FloatArray) -> tuple[Mask, Mask] | None:
+    """Motions (n,) that turn an axis by half a turn or more, and those about half a turn long; None: there are none.
 
-    directed  (n, n_axes) axes whose words say which way they turn: increments, and those that name the sense
+    A correction of the angle might turn the latter round; those before them count as such, too.
+
+    directed        (n, k) axes whose words say which way they turn: increments, and those that name the sense
+    start, end  (n, k) rad, of the axes that may roll over
     """
-    way = np.where(directed[:, rolls], 0.0, np.abs(end[:, rolls] - start[:, rolls]))
-    return np.asarray((way >= HALF_A_TURN).any(axis=1))
+    way = np.abs(end - start)
+    if not (way >= math.pi - BESIDE).any():
+        return None
+    over: Mask = np.any((way >= HALF_A_TURN) & ~directed, axis=1)
+    near: Mask = np.any(np.abs(way - math.pi) < BESIDE, axis=1)
+    return over, near | np.append(near[1:], False)
 
 
 @dataclass(slots=True)
@@ -111,40 +120,36 @@ class Winding:
 
     wound: Mask
 
-    def back(self, rolls: Mask, plain: Mask, start: NDArray[np.float64], end: NDArray[np.float64]) -> Mask:
-        """Motions (n,) whose plain words bring such an axis back from beyond 0 and 360 degrees.
+    def back(self, turning: NDArray[np.intp], plain: Mask, start: FloatArray, end: FloatArray) -> Mask:
+        """Motions (n,) whose plain words bring an axis back from beyond 0 and 360 degrees.
 
-        plain       (n, n_axes) axes with words that are absolute angles and do not say which way to go
-        start, end  (n, n_axes) rad, in the numbers of the program
+        turning     (k,) the axes that may roll over
+        plain       (n, k) those with words that are absolute angles and do not say which way to go
+        start, end  (n, k) rad, in the numbers of the program
         """
         found = np.zeros(len(plain), dtype=bool)
-        for column in np.flatnonzero(rolls).tolist():
+        for column, axis in enumerate(turning.tolist()):
             there, angle = plain[:, column], start[:, column]
+            if there.all() and not self.wound[axis]:
+                continue
             rows = np.flatnonzero(there | (end[:, column] != angle))
             if not rows.size:
                 continue
             wound = ~there[rows]
-            before = np.append(self.wound[column], wound[:-1])
+            before = np.append(self.wound[axis], wound[:-1])
             outside = (angle[rows] < -BESIDE_ZERO) | (angle[rows] >= 2 * math.pi - BESIDE_ZERO)
             found[rows] |= ~wound & before & outside
-            self.wound[column] = wound[-1]
+            self.wound[axis] = wound[-1]
         return found
 
 
-def doubtful(rolls: Mask, start: NDArray[np.float64], end: NDArray[np.float64]) -> Mask:
-    """Motions (n,) about half a turn long, and those before them: a correction of the angle might turn them round."""
-    way = np.abs(end[:, rolls] - start[:, rolls])
-    near: Mask = np.any(np.abs(way - math.pi) < BESIDE, axis=1)
-    return np.asarray(near | np.append(near[1:], False))
+def extremes(plain: Mask, end: FloatArray) -> FloatArray:
+    """The smallest and the largest angle (k, 2), rad, to which plain words lead axes; 0 is one of them.
 
-
-def extremes(rolls: Mask, plain: Mask, end: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The smallest and the largest angle (n_axes, 2), rad, to which plain words lead axes that may roll over.
-
-    plain  (n, n_axes) axes with such words
-    end    (n, n_axes) rad, in the numbers of the program
+    plain  (n, k) axes with such words
+    end    (n, k) rad, in the numbers of the program
     """
-    named = plain & rolls & np.isfinite(end)
-    low = np.min(end, axis=0, where=named, initial=0.0)
-    high = np.max(end, axis=0, where=named, initial=0.0)
-    return np.where(rolls[:, None], np.column_stack((low, high)), np.nan)
+    named = end if plain.all() else np.where(plain, end, 0.0)
+    if not np.isfinite(named).all():
+        named = np.where(np.isfinite(named), named, 0.0)
+    return np.stack((named.min(axis=0, initial=0.0), named.max(axis=0, initial=0.0)), axis=1)

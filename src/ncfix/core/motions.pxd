@@ -5,7 +5,7 @@ cdef extern from "math.h" nogil:
     cpdef double ceil(double)
     cpdef double sqrt(double)
 
-@cython.locals(letters=int64_t, letter=int64_t, row=int64_t, shape=int64_t, number=int64_t, slot=int64_t, step=double)
+@cython.locals(n=int64_t, known=int64_t, least=int64_t, widths=int64_t, letters=int64_t, letter=int64_t, row=int64_t, shape=int64_t, number=int64_t, slot=int64_t, step=double)
 cpdef int64_t followed(
     const double[::1] numbers, const int64_t[::1] first, const int32_t[::1] shapes,
     const int64_t[:, ::1] slots, const int64_t[::1] feeds, const int64_t[::1] motions, const int64_t[::1] masks,
@@ -20,50 +20,26 @@ cdef double deviation(
     const double[::1] fraction, const double[:, ::1] command, const double[:, :, ::1] follow, int64_t a, int64_t b
 ) except? -1 nogil
 
-@cython.locals(first=int64_t, motion=int64_t, at=int64_t, last=int64_t, usual=int64_t, stop=int64_t, near=int64_t, far=int64_t, step=int64_t, trial=int64_t, reached=double, off=double, fresh=bint)
+@cython.locals(nodes=int64_t, first=int64_t, motion=int64_t, at=int64_t, last=int64_t, usual=int64_t, stop=int64_t, near=int64_t, far=int64_t, step=int64_t, trial=int64_t, reached=double, off=double, fresh=bint)
 cpdef int64_t fewest(
     const int64_t[::1] counts, const double[::1] fraction, const double[:, ::1] command,
     const double[:, :, ::1] follow, double tolerance, int64_t stretch, uint8_t[::1] ends, double[::1] worst,
 ) except -1 nogil
 
-@cython.final
-cdef class CurveColumns:
-    cdef const double[:, ::1] parabolas
-    cdef const double[::1] lengths
-    cdef const double[::1] ways
-    cdef const uint8_t[::1] opens
-    cdef const int64_t[::1] upto
-    cdef const int64_t[::1] lying
-    cdef double share, gap, push
-
-    @cython.locals(low=int64_t, high=int64_t, middle=int64_t)
-    cdef int64_t place(self, double way) except -1 nogil
-    @cython.locals(at=int64_t, after=int64_t, end=double)
-    cdef int64_t hop(self, int64_t piece, double push, bint one) except -1 nogil
-    @cython.locals(x=double, y=double, z=double, u=double, v=double, w=double, square=double, size=double, ahead=double, bowed=double, outside=bint)
-    cdef int64_t newton(
-        self, double px, double py, double pz, int64_t k, double share, double close, int64_t steps
-    ) except -1 nogil
-    @cython.locals(row=int64_t, x=double, y=double, z=double, piece=int64_t, new=int64_t, start=double, share=double, gap=double, push=double, one=bint)
-    cpdef int64_t down(
-        self, const double[:, ::1] points, const double[::1] expected, double near, double close,
-        int64_t steps, int64_t hops, int64_t[::1] pieces, double[::1] shares, double[::1] gaps,
-    ) except -1 nogil
-
-@cython.locals(row=int64_t, before=int64_t, axis=int64_t, square=double, change=double, here=double, there=double, off=double, step=double, beyond=double)
+@cython.locals(axes=int64_t, row=int64_t, before=int64_t, axis=int64_t, square=double, change=double, here=double, there=double, off=double, step=double, beyond=double)
 cpdef bint within_limits(
     const double[:, ::1] meant, const double[:, ::1] done, const double[::1] low, const double[::1] high,
     const double[::1] most, const double[::1] linear, double together, double jump, double fuzz,
 ) except -1 nogil
 
-@cython.locals(arm=double, most=double, axis=int64_t, row=int64_t, way=double, angle=double, shifting=double, turning=double, second=double, before=double, after=double, change=double, here=double, there=double, along=double, step=double, first=double, last=double, swing=double, leaning=double, bow=double)
+@cython.locals(axes=int64_t, arm=double, most=double, axis=int64_t, row=int64_t, way=double, angle=double, shifting=double, turning=double, second=double, before=double, after=double, change=double, here=double, there=double, along=double, step=double, first=double, last=double, swing=double, leaning=double, bow=double)
 cpdef int64_t bounds(
     const double[:, ::1] meant, const double[:, ::1] done, const double[::1] linear,
     const double[:, ::1] slopes, const double[:, ::1] curvatures,
     double moved, double turned, double least_arm, double more, double corner, double close, double[::1] bound,
 ) except -1 nogil
 
-@cython.locals(row=int64_t, piece=int64_t, axis=int64_t, i=int64_t, j=int64_t, bends=double, turns=double, chord=double, here=double, step=double, square=double, off=double, way=double, after=double)
+@cython.locals(n=int64_t, axes=int64_t, pieces=int64_t, rows=int64_t, widths=int64_t, right=bint, row=int64_t, piece=int64_t, axis=int64_t, i=int64_t, j=int64_t, bends=double, turns=double, chord=double, here=double, step=double, square=double, off=double, way=double, after=double)
 cpdef int64_t at_ends(
     const double[:, ::1] start, const double[:, ::1] end, const double[::1] before_all,
     const double[:, ::1] written, const int64_t[::1] first, const double[:, ::1] wanted, const double[::1] before,

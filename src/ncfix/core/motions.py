@@ -1,7 +1,11 @@
-"""Loops over blocks, motions and points of a path, one after the other.
+# cython: boundscheck=False
+"""Loops over blocks and motions, one after the other.
 
 They do what the columns of `control.lanes`, `compensate.plan` and `compensate.figures` do, operation by operation, so
 that the results are the same; a test holds them together.
+
+No index is looked at again inside: each function looks at the sizes of what it is given, and at numbers that say where
+to look in that.
 """
 
 from __future__ import annotations
@@ -50,15 +54,27 @@ def followed(
     offset, scale, incremental    the frame (letters,), and whether words are increments
     path, feed_of, fed, motion_of, coded, mask  room for what `BlockRows` holds
     """
-    letters = position.shape[0]
+    letters, n, known = position.shape[0], first.shape[0], slots.shape[0]
+    least = min(shapes.shape[0], path.shape[0] - 1, feed_of.shape[0], fed.shape[0], motion_of.shape[0], coded.shape[0])
+    widths = min(slots.shape[1], path.shape[1], offset.shape[0], scale.shape[0])
+    if (
+        min(least, mask.shape[0]) < n
+        or widths < letters
+        or min(feeds.shape[0], motions.shape[0], masks.shape[0]) < known
+    ):
+        raise IndexError("columns of other shapes")
     for letter in range(letters):
         path[0, letter] = position[letter]
-    for row in range(first.shape[0]):
+    for row in range(n):
         shape, number = shapes[row], first[row]
+        if not 0 <= shape < known or number < 0 or number + feeds[shape] >= numbers.shape[0]:
+            raise IndexError("there is no such shape or number")
         for letter in range(letters):
             slot = slots[shape, letter]
             if slot < 0:
                 path[row + 1, letter] = path[row, letter]
+            elif number + slot >= numbers.shape[0]:
+                raise IndexError("there is no such number")
             else:
                 step = scale[letter] * numbers[number + slot]
                 path[row + 1, letter] = (path[row, letter] if incremental else offset[letter]) + step
@@ -99,8 +115,15 @@ def fewest(
 
     As `splitting.fewest`; `tolerance` in mm, `stretch` is `splitting.STRETCH`.
     """
+    nodes = min(fraction.shape[0], command.shape[0], ends.shape[0])
+    if follow.shape[0] > 1:
+        nodes = min(nodes, follow.shape[0])
+    if follow.shape[0] < 1 or follow.shape[2] < command.shape[1] or worst.shape[0] < counts.shape[0]:
+        raise IndexError("columns of other shapes")
     first = 0
     for motion in range(counts.shape[0]):
+        if counts[motion] < 0 or first + counts[motion] > nodes:
+            raise IndexError("there are no such nodes")
         at, last, usual = first, first + counts[motion] - 1, 1
         stop = at
         while at < last:
@@ -132,102 +155,6 @@ def fewest(
     return 0
 
 
-# -- the nearest point of a path --------------------------------------------------------------------------------------
-
-
-class CurveColumns:
-    """What a `Curve` calls by the same names."""
-
-    def __init__(self, parabolas: Array, lengths: Array, ways: Array, opens: Bytes, upto: Ints, lying: Ints) -> None:
-        self.parabolas, self.lengths, self.ways = parabolas, lengths, ways
-        self.opens, self.upto, self.lying = opens, upto, lying
-        self.share = self.gap = self.push = 0.0
-
-    def place(self, way: float) -> int:
-        """The parabola in which a way ends: as `Curve.place`."""
-        low, high = 0, self.lengths.shape[0]
-        while low < high:
-            middle = (low + high) // 2
-            if self.lengths[middle] <= way:
-                low = middle + 1
-            else:
-                high = middle
-        return max(low - 1, 0)
-
-    def hop(self, piece: int, push: float, one: bool) -> int:
-        """Where to look next: as `Search._hop`."""
-        end = self.lengths[piece] + (self.ways[piece] if push > 0 else 0.0)
-        at, after = self.upto[self.place(end + (0.0 if one else push))] - 1, self.upto[piece]
-        at = max(at, after) if push > 0 else min(at, after - (1 if self.ways[piece] > 0 else 0) - 1)
-        return int(self.lying[min(max(at, 0), self.lying.shape[0] - 1)])
-
-    def newton(self, px: float, py: float, pz: float, k: int, share: float, close: float, steps: int) -> int:
-        """The nearest point of parabola k: put down its share, its distance, and how far the way to it goes on.
-
-        As `nearest._newton`.
-        """
-        p = self.parabolas
-        while True:
-            x = px - p[0, k] - share * (p[3, k] + share * p[6, k])
-            y = py - p[1, k] - share * (p[4, k] + share * p[7, k])
-            z = pz - p[2, k] - share * (p[5, k] + share * p[8, k])
-            u, v, w = p[3, k] + 2 * share * p[6, k], p[4, k] + 2 * share * p[7, k], p[5, k] + 2 * share * p[8, k]
-            square = u * u + v * v + w * w
-            size = sqrt(square)
-            ahead = (x * u + y * v + z * w) / (size if size > 0 else 1.0)
-            outside = (share == 1 and ahead > 0) or (share == 0 and ahead < 0)
-            if outside or not abs(ahead) > close or steps == 0:
-                self.share, self.gap = share, sqrt(x * x + y * y + z * z)
-                self.push = ahead if outside else 0.0
-                return 0
-            bowed = square - 2 * (x * p[6, k] + y * p[7, k] + z * p[8, k])
-            share += ahead * size / (bowed if bowed > square / 4 else square)
-            share, steps = min(max(share, 0.0), 1.0), steps - 1
-
-    def down(
-        self,
-        points: Array,
-        expected: Array,
-        near: float,
-        close: float,
-        steps: int,
-        hops: int,
-        pieces: Ints,
-        shares: Array,
-        gaps: Array,
-    ) -> int:
-        """The nearest points that are reached without going away from `points` (3, n): as `Search._down`.
-
-        expected              (n,) mm, the way along the path from where to look
-        near, close           `Search.near` and `nearest.CLOSE`
-        steps, hops           `nearest.STEPS` and `HOPS`
-        pieces, shares, gaps  room for parabolas, shares, and distances (n,) mm
-        """
-        for row in range(expected.shape[0]):
-            x, y, z, piece = points[0, row], points[1, row], points[2, row], self.place(expected[row])
-            start = (expected[row] - self.lengths[piece]) / (self.ways[piece] if self.ways[piece] > 0 else 1.0)
-            self.newton(x, y, z, piece, min(max(start, 0.0), 1.0), close, steps)
-            share, gap, push = self.share, self.gap, self.push
-            if gap > near and share == 1 and self.opens[min(piece + 1, self.opens.shape[0] - 1)]:
-                push += close
-            if gap > near and share == 0 and self.opens[piece]:
-                push -= close
-            one = False
-            for _ in range(hops if self.lying.shape[0] else 0):
-                if push == 0:
-                    break
-                new = self.hop(piece, push, one)
-                self.newton(x, y, z, new, 0.0 if push > 0 else 1.0, close, steps)
-                if self.gap < gap:
-                    piece, share, gap, push, one = new, self.share, self.gap, self.push, False
-                elif one:
-                    break
-                else:
-                    one = True
-            pieces[row], shares[row], gaps[row] = piece, share, gap
-        return 0
-
-
 # -- limits and bounds ------------------------------------------------------------------------------------------------
 
 
@@ -251,9 +178,14 @@ def within_limits(
     jump       largest change of one
     fuzz       how far on a limit is on it
     """
+    axes = linear.shape[0]
+    if meant.shape[0] < done.shape[0] or min(meant.shape[1], done.shape[1]) < axes:
+        raise IndexError("columns of other shapes")
+    if min(low.shape[0], high.shape[0], most.shape[0]) < axes:
+        raise IndexError("columns of other shapes")
     for row in range(done.shape[0]):
         before, square, change = max(row - 1, 0), 0.0, 0.0
-        for axis in range(linear.shape[0]):
+        for axis in range(axes):
             here, there = meant[row, axis], done[row, axis]
             off = there - here
             step = off - (done[before, axis] - meant[before, axis])
@@ -288,8 +220,12 @@ def bounds(
     least_arm           the arm with all axes at zero, mm
     more, corner        a factor for products of errors, and `deviation.CORNER`
     """
-    arm = 0.0
-    for axis in range(linear.shape[0]):
+    axes, arm = linear.shape[0], 0.0
+    if min(meant.shape[0], done.shape[0]) <= bound.shape[0] or min(meant.shape[1], done.shape[1]) < axes:
+        raise IndexError("columns of other shapes")
+    if min(slopes.shape[0], curvatures.shape[0]) < 2 or min(slopes.shape[1], curvatures.shape[1]) < axes:
+        raise IndexError("columns of other shapes")
+    for axis in range(axes):
         most = 0.0
         for row in range(done.shape[0]):
             most = max(most, abs(done[row, axis]))
@@ -298,7 +234,7 @@ def bounds(
     for row in range(bound.shape[0]):
         way, angle, shifting, turning = 0.0, 0.0, 0.0, 0.0
         second, before, after, change = 0.0, 0.0, 0.0, 0.0
-        for axis in range(linear.shape[0]):
+        for axis in range(axes):
             here, there, along = done[row, axis], done[row + 1, axis], linear[axis]
             step, first, last = abs(there - here), here - meant[row, axis], there - meant[row + 1, axis]
             way, angle = way + along * step, angle + (1 - along) * step
@@ -357,11 +293,24 @@ def at_ends(
     places                      how many ends, and where the largest are
     counts                      at how many places inside each motion has to be looked at (n,)
     """
-    for row in range(end.shape[0]):
+    n, axes, pieces = end.shape[0], linear.shape[0], written.shape[0]
+    rows = min(start.shape[0], wanted.shape[0], first.shape[0] - 1, before.shape[0], shown.shape[0], apart.shape[0])
+    widths = min(
+        start.shape[1], end.shape[1], written.shape[1], wanted.shape[1], before_all.shape[0], features.shape[0]
+    )
+    right = min(rows, followed.shape[0], counts.shape[0]) >= n and widths >= axes and columns.shape[0] >= 3
+    right = right and min(ways.shape[0], ways.shape[1]) >= 3 and sums.shape[0] >= 5 and places.shape[0] >= 3
+    for i in range(3 if right else 0):
+        right = right and 0 <= columns[i] < axes
+    if not right:
+        raise IndexError("columns of other shapes")
+    for row in range(n):
         if not shown[row] or apart[row]:
             continue
+        if not 0 <= first[row] < pieces:
+            raise IndexError("there is no such piece")
         bends, turns, chord, piece = 0.0, 0.0, 0.0, first[row]
-        for axis in range(linear.shape[0]):
+        for axis in range(axes):
             here = written[piece - 1, axis] if piece else before_all[axis]
             step = written[piece, axis] - here
             bends += abs(end[row, axis] - start[row, axis]) / features[axis]

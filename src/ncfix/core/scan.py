@@ -1,6 +1,9 @@
+# cython: boundscheck=False, cdivision=True
 """The scan of a text: numbers, comments and shapes of its blocks in one pass over the bytes.
 
 It finds what `text.shapes.scan` finds by columns, to the last bit; a test holds the two together.
+
+No index is looked at again inside: `Scanner` looks at its tables, and `scan` at the blocks and at the room before them.
 """
 
 from __future__ import annotations
@@ -27,8 +30,8 @@ CHARACTER, CHILD, SIBLING, SHAPE = 0, 1, 2, 3
 """Columns of the tree of shapes, a row for each beginning of one: its last character, the first of the rows that go on
 from it (0: none), the next row that goes on from where this one does, and the number of the shape that ends there (-1:
 none does). Row 0 is the beginning of all."""
-POINT, ZERO, MINUS, OPEN, CLOSE, TAIL = 46, 48, 45, 40, 41, 59
-"""The characters . 0 - ( ) ;"""
+POINT, ZERO, NINE, MINUS, OPEN, CLOSE, TAIL = 46, 48, 57, 45, 40, 41, 59
+"""The characters . 0 9 - ( ) ;"""
 
 
 class Scanner:
@@ -50,6 +53,8 @@ class Scanner:
         self.start = self.past = self.size = 0
         self.pointed = False
         self.value = 0.0
+        if min(len(kinds), len(fixed), len(unsigned_after), len(blank)) < 256 or len(powers) <= digits:
+            raise IndexError("these are not the tables of a text")
 
     def scan(
         self,
@@ -83,11 +88,18 @@ class Scanner:
         behind         (n + 1,) the shape that came behind each when it was met last, -1 if none did without a comment
         tree           see `CHARACTER`
         """
-        count, known, end, latest = 0, 0, 0, 0
+        count, known, end, latest, place, n = 0, 0, 0, 0, 0, blocks.shape[0]
+        least = min(first.shape[0] - 1, starts.shape[0] - 1, behind.shape[0] - 1, group.shape[0], comment.shape[0])
+        if least < n or blocks.shape[1] != 2 or tree.shape[0] < 1 or tree.shape[1] != 4 or spans.shape[1] != 2:
+            raise IndexError("there is no room for what is found in a text")
+        if shapes.shape[0] <= text.shape[0] or spans.shape[0] < values.shape[0]:
+            raise IndexError("there is no room for what is found in a text")
         behind[0] = NONE
         self.size, starts[0] = 1, 0
         tree[0, CHILD], tree[0, SHAPE] = 0, NONE
-        for block in range(blocks.shape[0]):
+        for block in range(n):
+            if not place <= blocks[block, 0] <= blocks[block, 1] <= text.shape[0]:
+                raise IndexError("blocks overlap, or lie outside the text")
             first[block], end, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
             row, row_at_sign, end_at_sign = 0, 0, end
             if max(count - values.shape[0], self.size - tree.shape[0]) + stop - place > 0:
@@ -101,7 +113,7 @@ class Scanner:
                         count, spans, values,
                     )  # fmt: skip
                 if found >= 0:
-                    count, latest, group[block] = found, guess, guess
+                    count, place, latest, group[block] = found, stop, guess, guess
                     continue
             commented = False
             while place < stop:
@@ -146,7 +158,7 @@ class Scanner:
             if not commented:
                 behind[latest] = group[block]
             latest = group[block]
-        first[blocks.shape[0]] = count
+        first[n] = count
         return known
 
     def alike(
@@ -169,14 +181,14 @@ class Scanner:
         """
         place = begin
         while at < end and place < stop:
-            character, mark = text[place], shapes[at]
+            mark = shapes[at]
             at += 1
             if mark != number_mark and mark != pointless_mark:
-                if character != mark:
+                if text[place] != mark:
                     return NONE
                 place += 1
                 continue
-            signed = self.kinds[character] == SIGN
+            signed = self.kinds[text[place]] == SIGN
             digits = place + 1 if signed else place
             if digits >= stop or self.kinds[text[digits]] != NUMERIC:
                 return NONE
@@ -195,19 +207,20 @@ class Scanner:
 
         Put down where it starts, with a sign before it, and ends, whether it has a point, and its value.
         """
-        past, points, point, mantissa = place, 0, stop, 0
-        while past < stop:
-            character = text[past]
-            if ZERO <= character <= ZERO + 9:
-                if past - place - points <= self.digits:  # more are broken anyhow
-                    mantissa = 10 * mantissa + (character - ZERO)
-            elif character == POINT:
-                points += 1
-                point = min(point, past)
-            else:
-                break
+        past, points, decimals, mantissa = place, 0, 0, 0
+        while past < stop and ZERO <= text[past] <= NINE:
+            mantissa = 10 * mantissa + (text[past] - ZERO)
             past += 1
-        digits, decimals = past - place - points, past - point - 1 if points else 0
+        digits = past - place
+        if past < stop and text[past] == POINT:
+            point, points, past = past, 1, past + 1
+            while past < stop and ZERO <= text[past] <= NINE:
+                mantissa = 10 * mantissa + (text[past] - ZERO)
+                past += 1
+            decimals = past - point - 1
+            digits += decimals
+            while past < stop and (text[past] == POINT or ZERO <= text[past] <= NINE):
+                points, past = 2, past + 1
         self.start, self.past, self.pointed, self.value = place, past, points > 0, 0.0
         at = self.before(text, place)
         leader = text[at] if at >= 0 else 0

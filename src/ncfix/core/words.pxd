@@ -4,7 +4,7 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint64_t
 cdef extern from "math.h" nogil:
     cpdef double copysign(double, double)
 
-cdef int64_t POINT, ZERO, MINUS, PLUS, LED_HEAD, MOST_STEPS
+cdef int64_t POINT, ZERO, MINUS, PLUS, LED_HEAD, MOST_STEPS, ROOM
 
 @cython.final
 cdef class NumberRules:
@@ -41,13 +41,18 @@ cdef class Pen:
     cdef bint signed, point, plus
     cdef int64_t at, own, whole
     cdef public int64_t edits, size
+    cdef readonly int64_t room
     cdef double read
 
-    @cython.locals(row=int64_t, axis=int64_t, piece=int64_t, block=int64_t, shape=int64_t, number=int64_t, several=bint, clear=bint, place=int64_t, lead=int64_t, begun=int64_t, edits=int64_t, size=int64_t, done=int64_t, first_piece=int64_t, last_piece=int64_t)
+    @cython.locals(axes=int64_t, room=int64_t, row=int64_t, axis=int64_t, piece=int64_t, block=int64_t, shape=int64_t, number=int64_t, several=bint, clear=bint, place=int64_t, lead=int64_t, begun=int64_t, edits=int64_t, size=int64_t, done=int64_t, first_piece=int64_t, last_piece=int64_t)
     cpdef int64_t write(
         self, const int32_t[::1] rows, const double[:, ::1] ends, const int64_t[::1] pieces, double[:, ::1] commands,
         int64_t[::1] start, int64_t[::1] stop, int64_t[::1] length, uint8_t[::1] data,
     ) except -1 nogil
+    @cython.locals(text=int64_t, begin=int64_t, end=int64_t, axis=int64_t, word=int64_t, first=int64_t, last=int64_t)
+    cdef inline bint fits(self, int64_t block, int64_t shape, int64_t number) except -1 nogil
+    @cython.locals(lead=int64_t, around=int64_t)
+    cdef inline int64_t most(self, int64_t block, int64_t shape, int64_t number, int64_t further) except -1 nogil
     cdef inline int64_t arrive(self, double[:, ::1] commands, int64_t piece) except -1 nogil
     @cython.locals(place=int64_t)
     cdef inline int64_t place_of(self, int64_t slot, int64_t beyond, int64_t block, int64_t number) except -1 nogil

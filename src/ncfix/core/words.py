@@ -1,6 +1,10 @@
+# cython: boundscheck=False, cdivision=True
 """A stretch of corrected motions as text: one pass over its words, digits put where they belong.
 
 What `writer.block.BlockWriter` does block by block, so that the bytes are the same; a test holds the two together.
+
+No index is looked at again inside: `Pen` looks at its tables, and `write` at what it uses of them for a motion before
+it writes that.
 """
 
 from __future__ import annotations
@@ -41,6 +45,8 @@ class NumberRules:
     def __init__(self, powers: Floats, longest: int, decimals: int, largest: float, tie: float, rounded: float) -> None:
         self.powers, self.longest, self.decimals = powers, longest, decimals
         self.largest, self.tie, self.rounded = largest, tie, rounded
+        if len(powers) <= MOST_STEPS or longest + MOST_STEPS + 4 > ROOM:
+            raise IndexError("these are not the rules of numbers that are written here")
 
 
 class Pen:
@@ -56,6 +62,7 @@ class Pen:
     half       (axes,) half output steps
     signed     numbers carry signs
     here       (axes,) where the control stands
+    room       bytes that a word takes at most
     wanted, now, told  room (axes,): the numbers that a piece shall have, those that lead where the axes are told to go,
                and whether they are told
     """
@@ -94,8 +101,30 @@ class Pen:
         self.line_end, self.offset, self.scale, self.least, self.half = line_end, offset, scale, least, half
         self.signed, self.here, self.wanted, self.now, self.told = signed, here, wanted, now, told
         self.edits = self.size = self.at = self.own = self.whole = 0
+        self.room = ROOM
         self.point = self.plus = False
         self.read = 0.0
+        axes, shapes = len(here), len(slots)
+        sizes: tuple[int, ...] = (
+            edges.shape[1] - 2,
+            spans.shape[1] - 2,
+            len(spans) - len(values),
+            len(by_letter) - axes,
+        )
+        for table in (by_place, anchors, heads, leads, openings, closings):
+            sizes += (len(table) - shapes,)
+        for table in (slots, by_place, heads):
+            sizes += (table.shape[1] - axes,)
+        for row in (offset, scale, least, half, wanted, now, told):
+            sizes += (len(row) - axes,)
+        sizes += (anchors.shape[1] - 2, leads.shape[1] - 2, heads.shape[2] - 2)
+        right = not any(sizes) and len(first) >= len(edges) and len(template) >= len(edges)
+        for k in range(axes if right else 0):
+            right = right and 0 <= by_letter[k] < axes and least[k] >= 0
+            for shape in range(shapes):
+                right = right and -1 <= by_place[shape, k] < axes
+        if not right:
+            raise IndexError("these are not the tables of a program")
 
     def write(
         self, rows: Rows, ends: Floats, pieces: Ints, commands: Floats, start: Ints, stop: Ints, length: Ints,
@@ -109,11 +138,21 @@ class Pen:
         commands  room for the commands at the ends of the pieces written
         start, stop, length, data  room for what changes in the source, as in `Splices`; see `edits` and `size`
         """
-        done = 0
+        done, axes, room = 0, self.here.shape[0], min(start.shape[0], stop.shape[0], length.shape[0])
+        if pieces.shape[0] <= rows.shape[0] or ends.shape[1] != axes or commands.shape[1] != axes:
+            raise IndexError("there is no room for what is written")
         for row in range(rows.shape[0]):
             block, edits, size = rows[row], self.edits, self.size
             first_piece, last_piece = pieces[row], pieces[row + 1] - 1
+            if not 0 <= block < self.edges.shape[0]:
+                raise IndexError("there is no such block")
+            if not 0 <= first_piece <= last_piece < min(ends.shape[0], commands.shape[0]):
+                raise IndexError("there is no such piece")
             shape, number, several = self.template[block], self.first[block], first_piece < last_piece
+            if not self.fits(block, shape, number) or edits + axes >= room:
+                raise IndexError("there is no room for a block")
+            if size + self.most(block, shape, number, last_piece - first_piece) > data.shape[0]:
+                raise IndexError("there is no room for a block")
             for axis in range(self.here.shape[0]):
                 self.now[axis] = (self.here[axis] - self.offset[axis]) / self.scale[axis]
                 self.wanted[axis] = (ends[first_piece, axis] - self.offset[axis]) / self.scale[axis]
@@ -142,6 +181,26 @@ class Pen:
             for axis in range(self.here.shape[0]):
                 self.here[axis] = commands[last_piece, axis]
         return done
+
+    def fits(self, block: int, shape: int, number: int) -> bool:
+        """Whether a block, its words, and the places where others go lie in the text."""
+        text, begin, end = self.text.shape[0], self.edges[block, 0], self.edges[block, 1]
+        if not (0 <= begin <= end <= text and 0 <= shape < self.slots.shape[0] and number >= 0):
+            return False
+        for axis in range(self.here.shape[0]):
+            word = number + self.slots[shape, axis]
+            if self.slots[shape, axis] < 0:
+                continue
+            if word >= self.values.shape[0] or not 0 <= self.spans[word, 0] < self.spans[word, 1] <= text:
+                return False
+        first, last = self.anchors[shape, 0], self.leads[shape, 0]
+        return bool(min(first, last) >= -2 and number + max(first, last) < self.spans.shape[0])
+
+    def most(self, block: int, shape: int, number: int, further: int) -> int:
+        """Bytes that the motion of a block and so many further pieces take at most."""
+        lead = self.place_of(self.leads[shape, 0], self.leads[shape, 1], block, number) - self.edges[block, 0]
+        around = self.line_end.shape[0] + self.openings.shape[1] + self.closings.shape[1]
+        return int((further + 1) * (self.here.shape[0] * ROOM + around) + further * max(lead, 0))
 
     def arrive(self, commands: Floats, piece: int) -> None:
         """Commands of the numbers `now` of axes that were told to move; the others stay `here`."""

@@ -339,6 +339,8 @@ class Program:
 
     def line(self, block: int) -> int:
         """The line number (from 1) on which the block starts."""
+        if self.lines_ended + (not self.source.endswith(b"\n")) == len(self.blocks):
+            return self.first_line + block  # each block is a line
         character = "\n" if b"\n" in self.source else "\r"
         return self.first_line + self.lines_ended_before(int(self.blocks[block, 0]), character)
 

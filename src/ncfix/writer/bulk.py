@@ -194,7 +194,6 @@ class Bulk:
         ends, axes = self.pieces.end[pieces[0] : pieces[-1]], len(position)
         edits = (stop - row) * (axes + 1)
         blocks = self.moves.block[row:stop]
-        commands, data = np.empty_like(ends), np.empty(self._room(pieces, blocks, axes * words.ROOM), dtype=np.uint8)
         start, end, length = (np.empty(edits, dtype=np.int64) for _ in range(3))
         pen = words.Pen(
             rules(),
@@ -216,6 +215,7 @@ class Bulk:
             np.empty(axes),
             np.empty(axes, dtype=np.int64),
         )
+        commands, data = np.empty_like(ends), np.empty(self._room(pieces, blocks, axes * pen.room), dtype=np.uint8)
         done = pen.write(blocks, ends, pieces - pieces[0], commands, start, end, length, data)
         if not done:
             return None

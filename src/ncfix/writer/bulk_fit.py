@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
+from ncfix.control.turns import turns_alone
 from ncfix.text.tree import Program
 from ncfix.writer.bulk_arcs import whole_arcs
 from ncfix.writer.bulk_layouts import NONE, Layouts
@@ -18,13 +19,10 @@ Mask = NDArray[np.bool_]
 def qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
     """(n,) straight motions and arcs that may be written in bulk; `first_piece` (n + 1,) as in `Bulk`."""
     first = first_piece[:-1]
-    turns = moves.kind == MotionKind.FEED
-    for column in np.flatnonzero(~moves.rotary):
-        turns &= moves.end[:, column] == moves.start[:, column]
     fit: Mask = ((moves.kind == MotionKind.RAPID) & (moves.modal == 0)) | (
         (moves.kind == MotionKind.FEED) & (moves.modal == 10)
     )
-    fit &= ~turns & _writable_pieces(program, moves, pieces, first_piece, layouts)
+    fit &= ~turns_alone(moves) & _writable_pieces(program, moves, pieces, first_piece, layouts)
     fit |= whole_arcs(program, moves, pieces, first, layouts)
     fit &= layouts.known[program.template[moves.block]] & sound(moves, pieces, first_piece)
     rising = moves.block[1:] > moves.block[:-1]

@@ -22,7 +22,7 @@ from ncfix.cli import console
 from ncfix.cli.console import owned
 from ncfix.cli.options import dialect_of
 from ncfix.cli.shop.summary import OutcomeReporter, Verbosity, brief, progress
-from ncfix.cli.streams import FixedText, Outlet, Source, outlet_for, part_bytes, source_of
+from ncfix.cli.streams import FixedText, Outlet, Source, long_bytes, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
 from ncfix.host import limited
@@ -190,7 +190,7 @@ class FixJob:
         from ncfix.compensate.driver import Stream
         from ncfix.compensate.following import Task
 
-        if source.size is None or source.size >= part_bytes():
+        if source.size is None or source.size >= long_bytes():
             core.forewarn(console.forewarn)
         path = shown(source.path)
         with outlet_for(

@@ -180,12 +180,12 @@ class Search:
 
     def _down_compiled(self, points: Array, expected: Array) -> Nearest:
         """As `_down`."""
-        from ncfix.core import motions
+        from ncfix.core import nearest
 
         n, path = len(expected), self.curve
         found = Nearest(np.empty(n, dtype=np.intp), np.empty(n), np.empty(n))
         opens = path.opens.view(np.uint8)
-        columns = motions.CurveColumns(path.parabolas, path.lengths, path.ways, opens, path.upto, path.lying)
+        columns = nearest.CurveColumns(path.parabolas, path.lengths, path.ways, opens, path.upto, path.lying)
         columns.down(points, expected, self.near, CLOSE, STEPS, HOPS, found.piece, found.share, found.gap)
         return found
 

@@ -20,7 +20,7 @@ from ncfix.compensate.parts import Units
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, distinct, owners, slices
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import commands_from_joints
-from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, closely, even, merged, with_kinks
+from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends, closely, even, merged, with_kinks
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.workers import Read
 from ncfix.control.moves import MotionKind, Moves, Rule
@@ -217,7 +217,7 @@ def samples(intent: Intent, first: int = 0) -> Iterator[tuple[Index, Array]]:
     hole = moves.kind == MotionKind.CYCLE
     rows = np.flatnonzero(known & (hole | np.isfinite(moves.start).all(axis=1)))
     counts, along = np.zeros(len(rows), dtype=np.intp), np.flatnonzero(~hole[rows])
-    counts[along] = closely(intent, rows[along], DENSITY, LEAST, MOST_SHOWN)
+    counts[along] = closely(bends(intent, rows[along]), DENSITY, LEAST, MOST_SHOWN)
     for some in batches(counts + 2, BATCH):
         yield _samples(intent, rows[some], counts[some])
 

@@ -28,14 +28,14 @@ from ncfix.compensate.plan.arrays import (
     some,
     vector_product,
 )
+from ncfix.compensate.plan.figure_tally import FigureTally, PathError, PathSamples
 from ncfix.compensate.plan.intent import Intent, correctable, lacking
 from ncfix.compensate.plan.offset import beside_contours
-from ncfix.compensate.plan.sampling import DENSITY, MOST, MOST_SHOWN, bends, bends_closely, interior, merged, passed
+from ncfix.compensate.plan.sampling import DENSITY, MOST, MOST_SHOWN, bends_closely, interior, merged, passed
 from ncfix.compensate.plan.segments import Segments, accelerations
 from ncfix.compensate.plan.splitting import INSTANT
 from ncfix.compensate.plan.written import Known, WrittenPieces
 from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import Bow
@@ -70,15 +70,15 @@ def deviations(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolera
 
 def looked_at(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolerance: float) -> Array:
     """As `deviations`, of motions that no bound speaks for."""
-    worst = np.full(len(rows), np.inf)
-    samples = DENSITY * bends(intent, rows) + LEAST
+    worst, often = np.full(len(rows), np.inf), bends_closely(intent, rows)
+    samples = DENSITY * often + LEAST
     seen = np.flatnonzero(samples < MOST)
     for part in batches(np.ceil(samples[seen]).astype(np.intp), MOST):
         now = seen[part]
-        worst[now] = deviations_seen(intent, real, rows[now], uneasy, FIRST, 1)
+        worst[now] = deviations_seen(intent, real, rows[now], uneasy, FIRST, 1, often[now])
         doubtful = now[~(worst[now] <= SURE * tolerance)]
         if doubtful.size:
-            closer = deviations_seen(intent, real, rows[doubtful], uneasy, DENSITY, LEAST)
+            closer = deviations_seen(intent, real, rows[doubtful], uneasy, DENSITY, LEAST, often[doubtful])
             worst[doubtful] = np.maximum(worst[doubtful], closer)
     return worst
 
@@ -155,9 +155,14 @@ def straight_bounds(
     return most
 
 
-def deviations_seen(intent: Intent, real: Segments, rows: Index, uneasy: Mask, per_bend: float, least: int) -> Array:
-    """As `deviations`, (k,) mm, by samples alone: at least so many, and so many for each time the error may bend."""
-    counts, fraction = interior(intent, real, rows, per_bend, least)
+def deviations_seen(
+    intent: Intent, real: Segments, rows: Index, uneasy: Mask, per_bend: float, least: int, often: Array
+) -> Array:
+    """As `deviations`, (k,) mm, by samples alone: at least so many, and so many for each time the error may bend.
+
+    often  (k,) times that it may bend along each motion
+    """
+    counts, fraction = interior(intent, real, rows, per_bend, least, often)
     starts = np.flatnonzero(uneasy[rows])
     if starts.size:
         counts, fraction = merged(len(rows), (owners(counts), fraction), (starts, np.full(len(starts), INSTANT)))
@@ -218,52 +223,6 @@ STRAIGHT = 0.05
 is once, so that in between the error is within 0.0002 of itself of the straight line between those at the ends."""
 START = 1e-6
 """Fraction of a motion at which its start is looked at."""
-
-
-@dataclass(frozen=True, slots=True)
-class Figures:
-    """Tip errors along a path.
-
-    max       mm
-    rms       mm, by length of way
-    move      the motion in which the largest is, -1 if there is none
-    fraction  where on it
-    tilt      largest angle between the actual and the intended tool direction at the ends of pieces, rad
-    """
-
-    max: float
-    rms: float
-    move: int
-    fraction: float
-    tilt: float
-
-
-@dataclass(frozen=True, slots=True)
-class PathError:
-    """Before and after a correction.
-
-    before, after             figures over all motions looked at
-    samples                   how many places were looked at
-    way                       mm that they stand for
-    """
-
-    before: Figures
-    after: Figures
-    samples: int
-    way: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class PathSamples:
-    """Places on a path, flat: motion, fraction, tip error before and after (mm), share of the way (mm); tilts (rad)."""
-
-    move: Index
-    fraction: Array
-    before: Array
-    after: Array
-    weight: Array
-    tilt_before: float
-    tilt_after: float
 
 
 def path_error(
@@ -454,47 +413,3 @@ def _way(written: WrittenPieces, piece: Index) -> Array:
         radius = np.linalg.norm(vector_product(segments.normal[arc], spoke), axis=1)
         way[on_arc] = np.hypot(way[on_arc], radius * np.abs(segments.sweep[arc]))
     return np.repeat(way / counts, counts)
-
-
-def _early(at: tuple[float, int, float]) -> tuple[float, int, float]:
-    """Orders errors (mm) in motions and at fractions of these: of equal ones the first on the path is the largest."""
-    error, move, fraction = at
-    return error, -move, -fraction
-
-
-class FigureTally:
-    """Figures gathered batch by batch."""
-
-    def __init__(self) -> None:
-        self.squares = [0.0, 0.0]
-        self.tilts = [0.0, 0.0]
-        self.at: list[tuple[float, int, float]] = [(0.0, -1, 0.0), (0.0, -1, 0.0)]
-        self.way = 0.0
-        self.samples = 0
-
-    def add(self, part: PathSamples) -> None:
-        """Take in a batch; places at which an error is not known do not count."""
-        self.way += float(part.weight.sum())
-        self.samples += int(np.count_nonzero(np.isfinite(part.after)))
-        for side, error in enumerate((part.before, part.after)):
-            known = np.nan_to_num(error)
-            self.squares[side] += float((part.weight * known**2).sum())
-            self.tilts[side] = max(self.tilts[side], (part.tilt_before, part.tilt_after)[side])
-            best = int(known.argmax())
-            there = float(known[best]), int(part.move[best]), float(part.fraction[best])
-            self.at[side] = max(self.at[side], there, key=_early)
-
-    def take(self, way: float, samples: int, squares: list[float], most: list[tuple[float, int, float]]) -> None:
-        """Take in what was added up elsewhere; of both sides way times squares and the most: mm, motion, fraction."""
-        self.way += way
-        self.samples += samples
-        self.squares = [own + more for own, more in zip(self.squares, squares, strict=True)]
-        self.at = [max(own, other, key=_early) for own, other in zip(self.at, most, strict=True)]
-
-    def result(self) -> PathError:
-        """The figures of all batches."""
-        before, after = (
-            Figures(value, float(np.sqrt(squares / self.way)) if self.way else 0.0, move, fraction, tilt)
-            for (value, move, fraction), squares, tilt in zip(self.at, self.squares, self.tilts, strict=True)
-        )
-        return PathError(before, after, self.samples, self.way)

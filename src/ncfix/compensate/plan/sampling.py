@@ -20,6 +20,8 @@ MOST_SHOWN = 1 << 14
 """Samples on one motion for figures: of all motions of a program at once, and of programs that nobody checked."""
 MOST_TURNS = MOST / DENSITY * EIGHTH
 """rad; a motion that turns an axis by more cannot be looked at."""
+SHARES = 16
+"""Of a motion that turns far, looked at each by itself."""
 BISECTIONS = 40
 """How often the stretch in which an axis turns round is halved to find where."""
 
@@ -54,7 +56,8 @@ def bends(intent: Intent, rows: Index) -> Array:
 def bends_closely(intent: Intent, rows: Index) -> Array:
     """As `bends`, but under tool-centre-point control by what the linear axes have to go, and not by what they might.
 
-    An axis whose acceleration is at most a, per motion squared, goes up and down by no more than a / 3 beside its way.
+    An axis whose acceleration is at most a, per motion squared, goes up and down by no more than a / 3 beside its way;
+    of a k-th of the motion a is a k-th of a k-th. Motions that turn far are looked at in `SHARES` shares.
     """
     often, machine = bends(intent, rows), intent.machine
     led = np.flatnonzero(intent.moves.tcp[rows] & ~intent.segments.arc[rows])
@@ -64,9 +67,16 @@ def bends_closely(intent: Intent, rows: Index) -> Array:
     begin, end = (intent.joints_at(on, np.full(len(on), place)) for place in (0.0, 1.0))
     longest = float(np.nanmax(np.abs(intent.lengths(on)), initial=0.0))
     acceleration = accelerations(machine, begin, end, longest)
-    if acceleration is not None:
-        way = np.abs(end - begin) + np.where(machine.rotary, 0.0, acceleration[:, None] / 3)
-        often[led] = np.fmin(often[led], (way / features(machine)).sum(axis=1))
+    if acceleration is None:
+        return often
+    beside = np.where(machine.rotary, 0.0, acceleration[:, None] / 3) / features(machine)
+    often[led] = np.fmin(often[led], (np.abs(end - begin) / features(machine) + beside).sum(axis=1))
+    far = np.flatnonzero(often[led] > SHARES)
+    if far.size:
+        places = np.tile(np.arange(SHARES + 1) / SHARES, len(far))
+        on_way = intent.joints_at(np.repeat(on[far], SHARES + 1), places).reshape(len(far), SHARES + 1, -1)
+        way = np.abs(np.diff(on_way, axis=1)).sum(axis=1)
+        often[led[far]] = np.fmin(often[led[far]], (way / features(machine) + beside[far] / SHARES).sum(axis=1))
     return often
 
 
@@ -106,20 +116,22 @@ def even(counts: Index) -> Array:
     return (places(counts) + 1) / np.repeat(counts + 1, counts)
 
 
-def interior(intent: Intent, real: Segments, rows: Index, per_bend: float, least: int) -> tuple[Index, Array]:
+def interior(
+    intent: Intent, real: Segments, rows: Index, per_bend: float, least: int, often: Array | None = None
+) -> tuple[Index, Array]:
     """Fractions at which to look at motions, ends left out: counts (k,) and flat fractions, ascending.
 
     `per_bend` samples for each time that the error may bend, from `least` to `MOST`, and one wherever an axis passes a
-    kink or a jump of the error model, done as `real` has the motions. Those that are too long get the least.
+    kink or a jump of the error model, done as `real` has the motions. Those that are too long get the least. `often`:
+    how many times it may bend, (k,), if that is known better than `bends` has it.
     """
-    counts = closely(intent, rows, per_bend, least)
+    counts = closely(bends(intent, rows) if often is None else often, per_bend, least)
     return with_kinks(intent, real, rows, counts, even(counts))
 
 
-def closely(intent: Intent, rows: Index, per_bend: float, least: int, most: int = MOST) -> Index:
-    """At how many places inside of motions to look, kinks apart, (k,): see `interior`."""
-    often = bends(intent, rows)
-    often[DENSITY * often >= MOST] = 0.0
+def closely(often: Array, per_bend: float, least: int, most: int = MOST) -> Index:
+    """At how many places inside of motions to look, along which the error may bend so often, (k,): see `interior`."""
+    often = np.where(DENSITY * often >= MOST, 0.0, often)
     return np.clip(np.ceil(per_bend * often), least, most).astype(np.intp)
 
 
