@@ -100,7 +100,7 @@ def half_turns(directed: Mask, start: FloatArray, end: FloatArray) -> tuple[Mask
 
     A correction of the angle might turn the latter round; those before them count as such, too.
 
-    directed        (n, k) axes whose words say which way they turn: increments, and those that name the sense
+    directed    (n, k) axes whose words say which way they turn: increments, and those that name the sense
     start, end  (n, k) rad, of the axes that may roll over
     """
     way = np.abs(end - start)
