@@ -192,6 +192,14 @@ def test_a_correction_that_changes_by_a_twentieth_of_the_way_is_too_fast(slope: 
     assert found(machine, moves, corrected(machine, moves)) == ({"NCF407": [1]} if refused else {})
 
 
+def test_a_step_between_a_kept_motion_and_a_corrected_one_is_no_jump() -> None:
+    machine = shifted(0.4)
+    moves = motions(machine, (0, 0, 0), [(10.0, 0, 0), (10.5, 0, 0)])
+    for keep in ([True, False], [False, True]):
+        result = plan(machine, moves, get_strategy("position"), 1e-3, keep=np.array(keep))
+        assert found(machine, moves, result) == {}
+
+
 def test_kept_motions_are_not_looked_at() -> None:
     machine = shifted(5.0)
     moves = motions(machine, (0, 0, 0), [(10.0, 0, 0), (STROKE + 5, 0, 0)])
