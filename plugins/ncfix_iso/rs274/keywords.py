@@ -32,6 +32,7 @@ class KeywordWriter(BlockWriter):
         return super()._cased(self.spelled.get(address, address)) + self.program.dialect.assign
 
     def _code(self, number: str) -> str:
+        """A G code as the language says it; a conflict where it has no word for that."""
         if not self.program.dialect.keywords:
             return super()._cased("G") + number
         word = self.spelled.get(f"G{number}", "")
@@ -46,6 +47,7 @@ class KeywordWriter(BlockWriter):
             super()._restate(word, number)
 
     def _opening(self, wanted: int) -> list[str]:
+        """What a further line begins with: the motion, as nothing is in force there."""
         if not self.program.dialect.keywords:
             return super()._opening(wanted)
         self.code = self.code if self.target.arcs is None else wanted
