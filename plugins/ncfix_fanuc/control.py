@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import (

@@ -16,12 +16,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ncfix.diagnostics import UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.axis_tables import reversals
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Assumption, Files, Option, Request, SettingForm, number, one_of

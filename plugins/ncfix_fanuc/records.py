@@ -10,6 +10,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from string import Formatter
 from typing import Any
 
@@ -17,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid, full_grid
 from ncfix.tables.table_files import DEGREE, Remarks, unit_of

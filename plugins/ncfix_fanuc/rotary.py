@@ -14,14 +14,13 @@ times the distance from where it is said to be about: six numbers for all positi
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import ClassVar
 
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import NOTHING, Compensation, Tables

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import dumps, loads
 from ncfix.plugin import (
     Array,

@@ -12,10 +12,10 @@ it has gained.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Axis, Machine, State
 from ncfix.tables.axis_tables import nodes_needed
 from ncfix.tables.compensation import Compensation, Term

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array
 from ncfix.tables.table_files import ORDER, Remarks, as_number

@@ -10,10 +10,9 @@ each. Play, of which grids know nothing, goes into the leadscrew compensation of
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.plugin import (
     Assumption,
     Compensation,

@@ -14,12 +14,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.plugin import Array, Files, Grid, Remarks, Reversal, Term, as_number, full_grid, own_terms, unit_of
 
 LETTERS = tuple("XYZABC")

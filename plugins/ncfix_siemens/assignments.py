@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.grid import Array
 from ncfix.tables.table_files import Remarks
 

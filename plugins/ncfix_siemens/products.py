@@ -7,11 +7,10 @@ The files of a folder are taken as the control would: CEC and EEC tables, with w
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.diagnostics import RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.tables.control import Assumption, Option, Properties, one_of, whole, wrong_setting
 from ncfix.tables.scheme import Limits

@@ -7,10 +7,10 @@ are errors.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import Remarks
 from ncfix_siemens.assignments import ArrayAssignment, Assigned, FileRow, assignments

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
 
 from ncfix.control.coordinates import INDEX, Vector
 from ncfix.control.setup import POINTLESS, Run
 from ncfix.diagnostics import Message
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.dialect import Dialect
 from ncfix.text.tree import Template
 from ncfix_fanuc.macro.variables import MacroVariables

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z, mask_of
 from ncfix.control.expressions import Fault, Unknown, Value, nominal
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import coordinates, system, tilt
 from ncfix_fanuc.macro.blocks import CORNER, G15, G16, is_angle, is_scaled

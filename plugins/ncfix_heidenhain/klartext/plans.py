@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 from ncfix.control.expressions import FUNCTIONS, SUMS, Evaluate, Expressions, Unknown, Value, nominal
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.reach import UNREAD, Deletable, deletable
 from ncfix.text.tree import (
     Assignment,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ncfix.control import control as shared
 from ncfix.control.coordinates import INCH, LETTERS
 from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
 from ncfix.control.setup import Run
 from ncfix.control.state import Saved
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.dialect import Dialect
 from ncfix_iso.rs274.groups import ARCS, RULES, Rules, with_own_codes
 from ncfix_iso.rs274.parameters import NumberedParameters, Store

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.control.expressions import (
     ARITHMETIC,
@@ -28,7 +28,6 @@ from ncfix.control.expressions import (
     power,
     remainder,
 )
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.tree import NamedParameter, NumberedParameter
 
 EQUAL = 1e-6

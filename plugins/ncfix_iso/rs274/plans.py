@@ -6,7 +6,7 @@ Everything that does not depend on numbers is settled once per shape, so that a 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from ncfix.control.expressions import Evaluate, Fault
 from ncfix.control.interpreter import TextUnit
 from ncfix.control.lanes.lane_tables import Lane
 from ncfix.control.state import NO_MOTION
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.dialect import tenths
 from ncfix.text.reach import UNREAD, Deletable, deletable
 from ncfix.text.tree import (

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from lark import Token, UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.build import (
     MAX_DEPTH,
     NUMBERS,

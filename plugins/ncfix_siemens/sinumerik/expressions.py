@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import product
 
 from ncfix.control.expressions import (
@@ -27,7 +27,6 @@ from ncfix.control.expressions import (
     number,
     power,
 )
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.tree import Binary, Constant, Expression, NumberedParameter
 from ncfix_siemens.sinumerik.blocks import BRACKET
 

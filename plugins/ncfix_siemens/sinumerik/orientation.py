@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
@@ -36,7 +36,6 @@ from ncfix.control.moves import FeedMode, MotionEnd, MotionKind, Pass, Passing
 from ncfix.control.pointing import Pointing, Triple, Ways, dot, nearest
 from ncfix.control.posture import FAR, WayRules, normal_of
 from ncfix.control.tcp import rotary_at_zero
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.tree import StringLiteral
 from ncfix_siemens.sinumerik.plans import Calling, plain_text
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
 from ncfix.control.expressions import Evaluate, left_out
 from ncfix.control.lanes.lane_tables import Lane
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.reach import Deletable, deletable
 from ncfix.text.tree import (
     Assignment,

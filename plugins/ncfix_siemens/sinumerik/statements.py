@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.control.coordinates import INDEX
 from ncfix.control.expressions import Evaluate, Fault, number
 from ncfix.control.frames import WORLD
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.tree import Expression, FunctionCall, NamedParameter
 from ncfix_siemens.sinumerik import framing, motion
 from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle

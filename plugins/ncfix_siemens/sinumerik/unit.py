@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from ncfix.control.expressions import Fault
 from ncfix.control.interpreter import TextUnit
 from ncfix.control.pointing import FloatArray, Pointing, Ways, to_each
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.text.tree import StringLiteral as Label
 from ncfix_siemens.sinumerik.plans import Branching, SinumerikPlan, plan_of

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import CycleCall
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.layout import (
     CENTRE_LETTERS,
     CODES_AFTER_MOTION,

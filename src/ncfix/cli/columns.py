@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -12,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.cli import console
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.spelling import MINUS, ZERO, without_zeros
 
 DIGITS = 9

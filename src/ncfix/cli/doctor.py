@@ -8,6 +8,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 
@@ -17,7 +18,6 @@ from ncfix import core, host
 from ncfix.cli import console
 from ncfix.cli.options import json_option
 from ncfix.diagnostics import ExitCode, NcfixError, visible
-from ncfix.lazy_dataclass import dataclass
 from ncfix.plugins import load_plugins
 from ncfix.version import __version__
 

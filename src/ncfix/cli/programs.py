@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -17,7 +18,6 @@ from ncfix.cli.shop.projects import ProjectCommand, after_next_groups, group_of,
 from ncfix.cli.streams import Keep, Source, source_of
 from ncfix.cli.targets import Outputs, shown, targets
 from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
-from ncfix.lazy_dataclass import dataclass
 
 if TYPE_CHECKING:
     from ncfix.cli.columns import Columns

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ncfix.cli.options import PATH
-from ncfix.lazy_dataclass import dataclass
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup

@@ -6,6 +6,7 @@ import errno
 import os
 import sys
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from typing import IO
 from weakref import WeakSet
 
@@ -14,7 +15,6 @@ from ncfix.batch.programs import ProgramFile, program_files
 from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
 from ncfix.inputs import identities, identity
-from ncfix.lazy_dataclass import dataclass
 from ncfix.outputs import check_named, check_output, check_target, folded_name
 
 STREAM = "-"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.control.moves import PASS_RULES, MotionKind, Moves, Pass, Rule
 from ncfix.diagnostics import Message, Place
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.tree import Program
 
 REFUSED = "refused"

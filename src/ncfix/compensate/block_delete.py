@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -32,7 +32,6 @@ from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.state import BLOCK_DELETE, named_switches
 from ncfix.diagnostics import Message, NcfixError, Place, RefusedError, SourceError, UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Skip

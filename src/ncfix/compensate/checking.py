@@ -7,7 +7,7 @@ it; nothing is written.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import Message
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.text import stamp
 from ncfix.text.tree import Program

@@ -16,7 +16,7 @@ way raises `NotInPartsError`, and the caller takes the program as a whole. Sever
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Protocol
 
@@ -62,7 +62,6 @@ from ncfix.control.setup import Setup
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Message, Place
 from ncfix.files import put_at
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.text import stamp
 from ncfix.text.language import Language, language_of

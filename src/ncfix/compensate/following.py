@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -29,7 +29,6 @@ from ncfix.control.moves import Kinematics, Moves, Rule, TcpState, Trace
 from ncfix.control.setup import PROBED, Run, Setup
 from ncfix.control.trace import Follower, NotInPartsError, trace
 from ncfix.diagnostics import Message, Place, RefusedError, UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.text import stamp
 from ncfix.text.dialect import Dialect

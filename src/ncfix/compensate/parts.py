@@ -6,7 +6,7 @@ Each part begins behind the last motion of the one before, which is written alre
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,6 @@ from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.trace import Follower, NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
 from ncfix.diagnostics import Message, NcfixError, UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices, left_alone

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +30,6 @@ from ncfix.compensate.plan.written import rounding_along
 from ncfix.compensate.solve import WrittenPlan, increments
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 

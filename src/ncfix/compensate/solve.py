@@ -15,7 +15,7 @@ What was written is read again. The new text must say what the plan meant (`diff
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -32,7 +32,6 @@ from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding, without_idle
 from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import language_of

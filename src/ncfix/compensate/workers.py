@@ -19,7 +19,7 @@ import pickle
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import combinations
 from queue import SimpleQueue
 from threading import Thread
@@ -28,7 +28,6 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 from ncfix.compensate.solve import PrecedingMotion
 from ncfix.control.trace import Checkpoint
 from ncfix.host import tie
-from ncfix.lazy_dataclass import dataclass
 from ncfix.plugins import blamed
 
 if TYPE_CHECKING:

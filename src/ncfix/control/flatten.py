@@ -8,6 +8,7 @@ them only. In the flat program each execution is a block of its own. It is writt
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,6 @@ from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule
 from ncfix.control.setup import Resolve, Run
 from ncfix.control.trace import interpreter_of, trace
 from ncfix.diagnostics import RefusedError, SourceError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.language import language_of
 from ncfix.text.reader import read
 from ncfix.text.tree import Assignment, Command, Item, Opaque, OWordLine, Program, Span, Word

@@ -15,6 +15,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, TypeVar
 
@@ -31,7 +32,6 @@ from ncfix.control.lanes.lane_tables import LaneTables
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Run
 from ncfix.diagnostics import Place, SourceError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.language import Language
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Span, Template, view

@@ -19,11 +19,11 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Set
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.moves import Motion, MotionEnd, MotionKind
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.dialect import NO_WORDS, is_letters
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import PurePath
 from typing import Any
@@ -25,7 +25,6 @@ from ncfix.control.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
 from ncfix.inputs import MOST_SAID
-from ncfix.lazy_dataclass import dataclass
 from ncfix.toml_text import Path, decoded, key_lines, parsed, place_of
 
 NOT_TOML = "NCF381"

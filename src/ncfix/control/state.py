@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Hashable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.control.coordinates import (
     DEGREE,
@@ -35,7 +35,6 @@ from ncfix.control.pointing import Pair
 from ncfix.control.posture import NEAREST, SQUARE, MachinePosture, Postures, WayRules, normal_of
 from ncfix.control.setup import Knowledge, Run
 from ncfix.diagnostics import Message, Place
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.dialect import Dialect
 from ncfix.text.reach import Deletable
 

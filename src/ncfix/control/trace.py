@@ -9,7 +9,7 @@ A `Checkpoint` is the state of the control between two parts.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from ncfix.control.interpreter import FollowedLanguage, Interpreter
 from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Run, Setup
 from ncfix.diagnostics import Message, SourceError, UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text import stamp
 from ncfix.text.dialect import Dialect, check_content, check_zeros, header_length
 from ncfix.text.language import Language, language_of

@@ -7,13 +7,12 @@ change it by parts in ten thousand only, so each pass gains about as many digits
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine.route import Route, SplitRoute, Turns, batch_of
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, behind_each_other, some

@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import se3
 from ncfix.machine.basis import Basis, ConstantBasis
 from ncfix.machine.se3 import Array
@@ -197,7 +196,7 @@ class Effect:
 
     name: str
     coefficients: tuple[float, ...]
-    basis: Basis = ConstantBasis()
+    basis: Basis = ConstantBasis()  # noqa: RUF009 (it is frozen)
     center: float = 0.0
     scale: float = 1.0
     covariance: Matrix | None = None

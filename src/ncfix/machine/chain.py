@@ -11,11 +11,11 @@ a direction, shape () or (m, 1). A pose is carried as four columns, three direct
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix import core
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import se3
 from ncfix.machine.axes import Axis, GaugeLine, Vector
 from ncfix.machine.error_model import ErrorModel, Slot, Sort

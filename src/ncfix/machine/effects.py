@@ -9,7 +9,7 @@ section 2.5, rule 1).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 from math import nan
@@ -17,7 +17,6 @@ from typing import Protocol
 
 import numpy as np
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, is_arm
 from ncfix.machine.basis import SMOOTH, Backlash, Basis, Fourier, Periodic, Polynomial
 from ncfix.machine.error_model import dependence_of, signals_of

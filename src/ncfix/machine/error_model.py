@@ -8,14 +8,13 @@ reference point.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine.axes import BASE_AXES, SPINDLE, Axis, Effect, GaugeLine, Vector
 from ncfix.machine.basis import Basis
 from ncfix.machine.se3 import Array

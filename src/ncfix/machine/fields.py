@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, TypeGuard
 
 from ncfix.diagnostics import Message
-from ncfix.lazy_dataclass import dataclass
 from ncfix.toml_text import Path, line_of, place_of
 
 LARGEST = 1e12

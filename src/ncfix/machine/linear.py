@@ -11,10 +11,10 @@ nearer to the foundation at zero; the joint's Jacobian wants it at its reference
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, GaugeLine
 from ncfix.machine.chain import advance, columns, cross, turned_with
 from ncfix.machine.error_model import Dependence, Slot, Sort, dependence_of, joint_index, slot_of, unit_motion

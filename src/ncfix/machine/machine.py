@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import error_model, linear, se3
 from ncfix.machine.aim import Aim, aimed, aimed_ahead, gaps
 from ncfix.machine.axes import ORIGIN, Axis, Effect, GaugeLine, Vector, degrees
@@ -55,7 +54,7 @@ class Machine:
     name: str
     topology: str
     axes: tuple[Axis, ...]
-    tool: GaugeLine = GaugeLine()
+    tool: GaugeLine = GaugeLine()  # noqa: RUF009 (it is frozen)
     effects: tuple[Effect, ...] = ()
     control: str | None = None
     least_increment: tuple[float, float] = DEFAULT_INCREMENT

@@ -8,13 +8,12 @@ Outside the first and last place of a table, spline or step the end values hold.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine.basis import Basis, columns_like, distinct, key, powers
 from ncfix.machine.se3 import Array
 

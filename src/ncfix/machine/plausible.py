@@ -10,13 +10,12 @@ machine of a metre.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 import numpy as np
 
 from ncfix.diagnostics import Message, Place, RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, is_arm, large_size
 from ncfix.machine.effects import functions_at, travel
 from ncfix.machine.error_model import signals_of

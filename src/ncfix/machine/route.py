@@ -11,14 +11,13 @@ whatever they are, and are added up with the rest.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ncfix import core
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import se3, steps
 from ncfix.machine.axes import Axis, GaugeLine, Vector
 from ncfix.machine.basis import ConstantBasis, Fourier, Polynomial

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ncfix import core
 from ncfix.diagnostics import UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine.axes import Axis
 from ncfix.machine.se3 import Array
 

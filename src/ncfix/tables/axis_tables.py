@@ -16,12 +16,11 @@ that do not know the way.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.tables.compensation import NOTHING, Compensation, Term, own_terms
 from ncfix.tables.correction import (

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from ncfix.arguments import TARGET_UM, TOOL_LENGTH
 from ncfix.diagnostics import Message, UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.plugins import called, nearest, registry, useless
 from ncfix.tables.compensation import Compensation, Tables, class_of

@@ -8,13 +8,13 @@ error of the tool tip over random poses, with the tables off and with them on.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import RefusedError, UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.tables.compensation import Tables
 from ncfix.tables.grid import Array, full_grid

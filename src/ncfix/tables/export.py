@@ -8,13 +8,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.plugins import called, handed, useless
 from ncfix.tables.compensation import Tables

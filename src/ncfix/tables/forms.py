@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import pairwise
 
 from ncfix.diagnostics import Message, Place
-from ncfix.lazy_dataclass import dataclass
 from ncfix.plugins import called
 from ncfix.tables.control import Control, Files, controls, get_control
 from ncfix.tables.export import SHEET, SIDE_FILE, linted, read_manifest

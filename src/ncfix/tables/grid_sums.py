@@ -11,13 +11,12 @@ middle of their range, the second what it lacks there, and so on: where the sum 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.tables.correction import random_poses
 from ncfix.tables.grid import Array, Grid, on_full_grid
 from ncfix.tables.volume import CHECKS, Volume, search

@@ -12,6 +12,7 @@ function of the kind leaves less at the worst than the weighted root mean square
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache, reduce
 from itertools import combinations, pairwise
 from math import comb
@@ -21,7 +22,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.tables.control import Least
 from ncfix.tables.correction import (

@@ -15,11 +15,11 @@ The coefficients are the least squares of the exact correction over the working 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.diagnostics import RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.tables.compensation import Compensation
 from ncfix.tables.correction import linear_axes, random_poses

@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 
 AGAIN = "export again"

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from math import isfinite
 
 from lark import Token, Tree
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.faults import BlockError
 from ncfix.text.grammar import Squeezed
 from ncfix.text.tree import (

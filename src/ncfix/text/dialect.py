@@ -6,12 +6,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import PurePath
 from typing import Any, ClassVar, Literal, Protocol
 
 from ncfix.diagnostics import Message, Place, SourceError, UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.plugins import nearest, registry, working
 
 FOREIGN: tuple[tuple[str, bytes], ...] = (

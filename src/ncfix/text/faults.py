@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from lark import UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.grammar import Squeezed
 
 FLOW = re.compile(r"/?(n[\d.]*)?o(<[^<>]*>|\d+|\[.*?\](?=[a-z])|#\d+)(?P<keyword>[a-z]*)", re.IGNORECASE | re.DOTALL)

@@ -10,13 +10,13 @@ import os
 import re
 import sys
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ncfix.host import cache_folders
-from ncfix.lazy_dataclass import dataclass
 from ncfix.plugins import describe, working
 
 if TYPE_CHECKING:

@@ -7,12 +7,11 @@ line is kept as opaque text of the kind `UNREAD`; whoever gets to it after all, 
 from __future__ import annotations
 
 import re
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.tree import Comment, Constant, OWordLine, Skip, Template, Word
 
 UNREAD = "unread"

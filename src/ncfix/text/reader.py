@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from operator import itemgetter
 from typing import Generic, NamedTuple, TypeVar
@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import Place, SourceError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.build import Parsed
 from ncfix.text.dialect import Dialect, check_content, detect, get, header_length
 from ncfix.text.faults import BlockError

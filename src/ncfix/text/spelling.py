@@ -10,14 +10,13 @@ outputs that a product of doubles cannot tell which of them is nearer is marked,
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
 
 if TYPE_CHECKING:

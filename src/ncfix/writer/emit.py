@@ -8,6 +8,7 @@ the same each time; where it does not, the block is reported as a conflict, and 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 from ncfix.control.moves import FeedMode, Kinematics, MotionKind, Moves, Rule
 from ncfix.control.tcp import jumps, passed_through, renamed
 from ncfix.control.turns import UNTIMED, minutes, turn_alone, turns_alone
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.language import BlockLayout, language_of
 from ncfix.text.tree import Program, view
 from ncfix.text.writer import Edit, Splices, overlong

@@ -9,7 +9,7 @@ import gc
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,6 @@ from ncfix.cli.streams import FixedText, Outlet, Source, long_bytes, outlet_for,
 from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
 from ncfix.host import limited
-from ncfix.lazy_dataclass import dataclass
 from ncfix.plugins import load_plugins
 from ncfix.version import __version__
 

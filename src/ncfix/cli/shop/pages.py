@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ncfix import files
 from ncfix.cli.targets import STREAM, OutputTarget
 from ncfix.diagnostics import Place, UsageError
 from ncfix.inputs import identities
-from ncfix.lazy_dataclass import dataclass
 from ncfix.outputs import check_target, exists_already, folded_name
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,7 +18,6 @@ from ncfix.batch.programs import program_files
 from ncfix.cli import console
 from ncfix.cli.options import FOLDER, PATH, PathName, force_option
 from ncfix.diagnostics import ConfigError, UsageError, visible
-from ncfix.lazy_dataclass import dataclass
 from ncfix.outputs import exists_already
 
 if TYPE_CHECKING:

@@ -10,6 +10,8 @@ such an axis turns round where its rounded numbers do; so close to a turn both s
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +21,6 @@ from ncfix.compensate.plan.arrays import Array, Index, finite, some
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import REST, Signs, carried, signs
 from ncfix.compensate.plan.sampling import BISECTIONS
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import State
 
 LATERAL = 1e-5

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -37,7 +37,6 @@ from ncfix.compensate.workers import Read
 from ncfix.control.moves import Moves
 from ncfix.control.trace import joined_moves, taken
 from ncfix.diagnostics import DifferenceError, Message
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 

@@ -9,7 +9,7 @@ path is measured, and stands in the result. Figures, histogram and lists are of 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.compensate.solve import WrittenPlan
 from ncfix.control.moves import MotionKind, Moves
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -25,7 +25,6 @@ from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.workers import Read
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.diagnostics import Message
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ncfix.arguments import TOLERANCE_UM
@@ -14,7 +14,6 @@ from ncfix.compensate.following import Resolve, follow, placed
 from ncfix.compensate.plan.written import rounding
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.text.tree import Program
 

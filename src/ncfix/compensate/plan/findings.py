@@ -6,14 +6,13 @@ Findings of the parts of a program are put together in `Notes`: the first few ar
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place, RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.text.tree import Program
 
 MOST = 20

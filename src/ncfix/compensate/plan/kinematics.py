@@ -14,13 +14,14 @@ taken to keep the side of its play that it last had.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.compensate.plan.findings import pose_error
 from ncfix.diagnostics import RefusedError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import FLAT
 from ncfix.machine.steps import dot, volume

@@ -10,7 +10,7 @@ are split only if asked. Canned cycles are corrected at their end. Nothing is sp
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,7 +47,6 @@ from ncfix.compensate.plan.splitting import INSTANT, Cutter, Split, joined, may_
 from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.plan.written import Known
 from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine, State
 from ncfix.writer.pieces import Pieces
 

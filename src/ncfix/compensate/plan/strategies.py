@@ -7,6 +7,7 @@ the machine. A strategy is stateless; `solve` tells for each pose how it went, `
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -25,7 +26,6 @@ from ncfix.compensate.plan.kinematics import (
     steered,
 )
 from ncfix.diagnostics import UsageError
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Axis, Effect, Machine, State
 
 APART = 1.0

@@ -14,7 +14,7 @@ arm has changed.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -25,7 +25,6 @@ from ncfix.compensate.plan.intent import Intent, lacking
 from ncfix.compensate.plan.sampling import reach
 from ncfix.compensate.plan.segments import Segments, sweep_between
 from ncfix.control.moves import MotionKind, Moves
-from ncfix.lazy_dataclass import dataclass
 from ncfix.machine import Machine
 from ncfix.text.spelling import decimals_for
 from ncfix.writer.emit import Emission
