@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from tests.hidden import ballbar
 
+from ncfix.diagnosis.catalogue.dynamic import with_motion
 from ncfix.diagnosis.diagnosis import diagnose
 from ncfix.machine import loads
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.motion import with_motion
 from ncfix.measure.reader import reads
 
 RADIUS, FEED = 150.0, 1800.0  # 30 mm/s

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ncfix.diagnosis import checks
 from ncfix.diagnosis.assessment import plausibility
 from ncfix.diagnosis.catalogue import Candidate, catalogue, without
+from ncfix.diagnosis.catalogue.dynamic import with_motion
 from ncfix.diagnosis.compound import EffectFinding, compound
 from ncfix.diagnosis.constants import ConstantsVerdict, FileLikelihood, MovedConstant, judged_constants, names_of
 from ncfix.diagnosis.evidence import SHARES, Comparison, Evidence, Member, entry_price
@@ -63,7 +64,6 @@ from ncfix.machine.axes import component_title
 from ncfix.measure.least_squares import orthonormal
 from ncfix.measure.least_squares import without as without_base
 from ncfix.measure.measurement import Array, Measurement
-from ncfix.measure.motion import with_motion
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
 EXCESS_UM = 2.0
