@@ -18,7 +18,7 @@ from ncfix.compensate.plan.deviation import bounds, deviations_seen, path_error,
 from ncfix.compensate.plan.ends import corrected
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.path import plan
-from ncfix.compensate.plan.sampling import bends
+from ncfix.compensate.plan.sampling import bends, bends_closely, features
 from ncfix.compensate.plan.segments import Segments
 from ncfix.compensate.plan.splitting import STRETCH, PathNodes, fewest
 from ncfix.compensate.plan.strategies import get_strategy
@@ -131,6 +131,30 @@ def test_no_look_at_a_led_tip_finds_more_than_the_bound(root: Path, name: str, s
     assert np.isfinite(bound).mean() > 0.5
     assert (found <= bound).all()
     assert found.max() > 1e-8
+
+
+@pytest.mark.parametrize(
+    "name", ["benchmarks/five_axis", "examples/machines/angle_head", "examples/machines/wCAYFXZSt"]
+)
+@pytest.mark.parametrize("step", [3.0, 60.0, 300.0])
+def test_a_led_tip_is_looked_at_as_often_as_its_axes_have_to_go(root: Path, name: str, step: float) -> None:
+    """What `bends_closely` says is never less than the way that axes go, seen in 2,000 places of each motion.
+
+    But for what `bends` says: that is rough, and counts the way of the tip, where the axes go along other directions.
+    """
+    machine = load(root / f"{name}.toml")
+    wound = winding(machine, 40, step)
+    intent = replace(wound, moves=replace(wound.moves, tcp=np.ones(len(wound.moves), dtype=bool)))
+    rows, places = np.arange(1, len(wound.moves)), np.linspace(0.0, 1.0, 2001)
+    on_way = intent.joints_at(np.repeat(rows, len(places)), np.tile(places, len(rows))).reshape(
+        len(rows), len(places), -1
+    )
+    gone = (np.abs(np.diff(on_way, axis=1)).sum(axis=1) / features(machine)).sum(axis=1)
+    closely, roughly = bends_closely(intent, rows), bends(intent, rows)
+    assert (closely >= np.minimum(gone, roughly) - 1e-9).all()  # rounding, 2,000 times
+    assert (closely <= roughly).all()
+    if step == 300.0 and name == "benchmarks/five_axis":
+        assert (closely < roughly / 2).mean() > 0.5
 
 
 def largest_on_each(written: WrittenPieces, known: Known | None) -> Array:
