@@ -2,6 +2,7 @@ cimport cython
 from libc.stdint cimport int32_t, int64_t, uint8_t
 
 cdef extern from "math.h" nogil:
+    cpdef double atan2(double, double)
     cpdef double ceil(double)
     cpdef double sqrt(double)
 
@@ -13,6 +14,13 @@ cpdef int64_t followed(
     const double[::1] offset, const double[::1] scale, bint incremental,
     double[:, ::1] path, double[::1] feed_of, uint8_t[::1] fed, double[::1] motion_of, uint8_t[::1] coded,
     int64_t[::1] mask,
+) except -1 nogil
+
+cdef double TURN
+
+@cython.locals(n=int64_t, row=int64_t, begin=double, end=double, angle=double)
+cpdef int64_t sweeps(
+    const double[:, ::1] centre, const double[:, ::1] step, const uint8_t[::1] clockwise, double fuzz, double[::1] out
 ) except -1 nogil
 
 @cython.locals(most=double, share=double, square=double, off=double, here=double, node=int64_t, seen=int64_t, i=int64_t, j=int64_t)

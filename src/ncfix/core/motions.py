@@ -10,7 +10,7 @@ to look in that.
 
 from __future__ import annotations
 
-from math import ceil, sqrt
+from math import atan2, ceil, pi, sqrt
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -84,6 +84,29 @@ def followed(
         if motions[shape] >= 0:
             motion = float(motions[shape])
         feed_of[row], motion_of[row] = feed, motion
+    return 0
+
+
+TURN = 2 * pi
+
+
+def sweeps(centre: Array, step: Array, clockwise: Bytes, fuzz: float, out: Array) -> int:
+    """The signed angles of arcs with centres and ends (k, 2) relative to their starts: as `arcs.sweep_angle`.
+
+    fuzz  `arcs.FUZZ`
+    """
+    n = out.shape[0]
+    if min(centre.shape[0], step.shape[0], clockwise.shape[0]) < n or min(centre.shape[1], step.shape[1]) < 2:
+        raise IndexError("columns of other shapes")
+    for row in range(n):
+        begin = atan2(-centre[row, 1], -centre[row, 0])
+        end = atan2(step[row, 1] - centre[row, 1], step[row, 0] - centre[row, 0])
+        angle = begin - end if clockwise[row] else end - begin
+        while angle < fuzz:
+            angle += TURN
+        if angle > TURN + fuzz:
+            angle -= TURN
+        out[row] = -angle if clockwise[row] else angle
     return 0
 
 

@@ -1,7 +1,7 @@
 """Arcs in the fast lane: the circles of all arcs of a stretch, as the interpreters find that of one block.
 
-What blocks say is read as columns; where a centre lies, whether the control accepts the arc, and how far it turns, is
-asked of `arcs`, arc by arc.
+What blocks say is read as columns. Where a centre lies that R says, and whether the control accepts an arc that does
+not surely close, is asked of `arcs`, arc by arc.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
+from ncfix import core
+from ncfix.control.arcs import CLOCKWISE, COUNTER, FUZZ, ZERO_RADIUS, centre_from_radius, check_closure
 from ncfix.control.builder import Circles
 from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import IDENTITY, X
@@ -34,21 +35,27 @@ def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockR
     columns = [plane.first, plane.second]
     begin, end = stage.path[rows], stage.path[rows + 1]
     centre, radius = said(control, unit, block + rows, begin)
-    found = []
-    step, clockwise = (end - begin)[:, columns].tolist(), (stage.motion[rows] == CLOCKWISE).tolist()
-    for way, middle, size, right in zip(step, centre.tolist(), radius.tolist(), clockwise, strict=True):
+    step, clockwise = (end - begin)[:, columns], stage.motion[rows] == CLOCKWISE
+    for k in np.flatnonzero(~(np.isnan(radius) & closes(control, step, centre))).tolist():
+        way, point = step[k].tolist(), centre[k].tolist()
         try:
-            point = on_circle(control, way, middle, size, clockwise=right)
+            centre[k] = on_circle(control, way, point, float(radius[k]), clockwise=bool(clockwise[k]))
         except Fault:
+            count, rows = int(rows[k]), rows[:k]
             break
-        found.append((*point, control.handedness * sweep_angle(point, way, 1, clockwise=right)))
-    if len(found) < len(rows):
-        rows, begin, count = rows[: len(found)], begin[: len(found)], int(rows[len(found)])
-    table = np.array(found, dtype=np.float64).reshape(-1, 3)
-    local = np.zeros((len(rows), 3))
-    local[:, columns] = table[:, :2]
+    local, sweep = np.zeros((len(rows), 3)), np.empty(len(rows))
+    local[:, columns] = centre[: len(rows)]
+    core.loops("motions").sweeps(centre, np.ascontiguousarray(step), clockwise.view(np.uint8), FUZZ, sweep)
     fixed = np.logical_or(*unit.lanes.fixed[unit.program.template[block + rows]][:, columns].T)
-    return Circles(rows, begin[:, :3] + local, IDENTITY[plane.across], table[:, 2], fixed), count
+    middle = begin[: len(rows), :3] + local
+    return Circles(rows, middle, IDENTITY[plane.across], control.handedness * sweep, fixed), count
+
+
+def closes(control: ProgramControl, step: FloatArray, centre: FloatArray) -> Mask:
+    """(k,) arcs that surely close, from their start to `step` about `centre`; of the others `on_circle` says it."""
+    start, end = np.hypot(*centre.T), np.hypot(*(step - centre).T)
+    sure: Mask = (np.minimum(start, end) > 2 * ZERO_RADIUS) & (np.abs(start - end) < control.closure_mm / 2)
+    return sure
 
 
 def on_circle(
