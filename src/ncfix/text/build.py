@@ -235,10 +235,14 @@ class TreeBuilder:
     def expression(self, node: Node, depth: int = 0) -> Expression:
         """The expression that a tree, or the terminal of a number, stands for."""
         if isinstance(node, Token):
-            return Literal(self.slots[edges(node)])
+            return self.literal(node)
         if depth > MAX_DEPTH:
             raise TooDeepError(edges(node)[0])
         return self.compound(node, depth + 1)
+
+    def literal(self, token: Token) -> Literal:
+        """A number; other languages tell more of it apart."""
+        return Literal(self.slots[edges(token)])
 
     def compound(self, tree: Branch, depth: int) -> Expression:
         """The expression that a tree stands for."""
