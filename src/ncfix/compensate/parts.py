@@ -156,6 +156,8 @@ class Parts:
     @property
     def _wanted(self) -> int:
         """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
+        if not self.found:
+            return self.size // 8
         return self.size // 3 if self.tcp else self.size
 
     def _texts(self) -> Iterator[tuple[Program, bool, PartCheckpoint | None]]:
