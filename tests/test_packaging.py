@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 import release
 
-from conftest import require_core
+from conftest import require_core, require_module
 from ncfix import __version__
 
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
@@ -151,7 +151,7 @@ def test_the_example_with_tables_installs_and_works(root: Path, tmp_path: Path) 
 
 
 def test_the_bill_of_materials_of_a_release(wheel: Path) -> None:
-    pytest.importorskip("cyclonedx_py")
+    require_module("cyclonedx_py")
     bill = json.loads(release.bill_of_materials(sys.executable, __version__, [wheel]))
     subject = bill["metadata"]["component"]
     assert (bill["bomFormat"], subject["name"], subject["version"]) == ("CycloneDX", "ncfix", __version__)

@@ -12,14 +12,14 @@ from urllib.parse import unquote
 
 import pytest
 
+from conftest import require_module
 from ncfix.cli.listings import all_codes
-
-pytest.importorskip("mkdocs")
-pytest.importorskip("mkdocstrings")
 
 
 @pytest.fixture(scope="module")
 def site(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    for name in ("mkdocs", "mkdocstrings"):
+        require_module(name)
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-q", "-d", str(folder)]
     done = subprocess.run(
