@@ -10,13 +10,14 @@ import pytest
 from compensate.machines_at_random import STROKE, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, interpolated, motions
 from ncfix.compensate.plan.findings import Finding
-from ncfix.compensate.plan.limits import FUZZ, findings
+from ncfix.compensate.plan.limits import FUZZ, findings, led_astray
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Place
-from ncfix.machine import Effect, Machine
+from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash, Polynomial
+from ncfix.writer.pieces import Pieces
 
 XYZ = [0, 1, 2]
 
@@ -159,6 +160,101 @@ def test_a_table_in_the_wrong_unit_is_refused(factor: float) -> None:
     assert found(machine, moves, corrected(machine, moves)) == {"NCF406": [0, 1]}
 
 
+JUMP, PER_MM, PER_RAD = 0.05, 0.02, 1.0
+"""mm: how much a correction may change at once, and besides that per mm and per rad of the way."""
+
+
+def test_findings_are_what_their_definitions_say() -> None:
+    """Random straight motions with random corrections, near all limits, against the definitions one by one.
+
+    Each has one piece. Some are kept: nothing is said of these. Axes that get no word do not count as jumping.
+    """
+    rng = np.random.default_rng(22)
+    machine = perfect("w C B F X Y Z S t").replace(max_correction=(0.5, 0.02))
+    count = dict.fromkeys(("NCF404", "NCF405", "NCF406", "NCF407", "NCF408"), 0)
+    for _ in range(150):
+        moves, pieces, start = _near_all_limits(machine, rng, 12)
+        told = {
+            (each.code, row): (pytest.approx(value, rel=1e-9, nan_ok=True), *each.axes[k : k + 1])
+            for each in findings(machine, moves, pieces, start)
+            for k, (row, value) in enumerate(zip(each.moves.tolist(), each.values.tolist(), strict=True))
+        }
+        expected = _by_definition(machine, moves, pieces)
+        assert told == expected
+        for code, _ in expected:
+            count[code] += 1
+    assert min(count.values()) > 30
+
+
+def _near_all_limits(machine: Machine, rng: np.random.Generator, n: int) -> tuple[Moves, Pieces, np.ndarray]:
+    """Straight motions that end within, on and beyond limits, with corrections of all sizes."""
+    low, high = (np.nan_to_num(side, posinf=7.0, neginf=-7.0) for side in np.array(machine.ranges).T)
+    corner = np.choose(rng.choice(3, 5, p=(0.6, 0.2, 0.2)), (np.zeros(5), low, high))
+    away = rng.uniform(-1.5, 1.5, (n, 5)) * np.where(machine.rotary, 0.03, 1.0)
+    ends = corner + np.where(rng.random((n, 5)) < 0.2, rng.choice([-0.01, 0.0, 0.01], (n, 5)), away)
+    moves = motions(machine, ends[0], ends)
+    size = rng.choice([0.0, 1e-4, 0.03, 0.3, 0.6], (n, 1)) * np.where(machine.rotary, 0.04, 1.0)
+    corrected = moves.end + size * rng.uniform(-1.0, 1.0, (n, 5))
+    corrected[rng.random(n) < 0.03, rng.integers(5)] = np.nan
+    silent = rng.random((n, 5)) < (0.3 if rng.random() < 0.5 else 0.0)
+    moves = changed(moves, placed=~silent, programmed=moves.programmed & ~silent)
+    kept = rng.random(n) < 0.2
+    none = np.full((n, 3), np.nan)
+    pieces = Pieces(np.arange(n), np.ones(n), corrected, np.zeros(n, dtype=bool), none, kept)
+    return moves, pieces, np.vstack((moves.start[:1], corrected[:-1]))
+
+
+def _by_definition(machine: Machine, moves: Moves, pieces: Pieces) -> dict[tuple[str, int], tuple[object, ...]]:
+    """(code, motion) -> its figure, and its axis if the finding is about one."""
+    found: dict[tuple[str, int], tuple[object, ...]] = {}
+    low, high = np.array(machine.ranges).T
+    shift = pieces.end - moves.end
+    for row in np.flatnonzero(~pieces.kept).tolist():
+        if not np.isfinite(pieces.end[row]).all():
+            found["NCF408", row] = (0.0,)
+        begun, ended, corrected = (
+            np.nan_to_num(np.maximum(low - place, place - high), nan=-np.inf)
+            for place in (moves.start[row], moves.end[row], pieces.end[row])
+        )
+        comes_back = np.where(corrected > FUZZ, begun, -np.inf)
+        if max(ended.max(), comes_back.max()) > FUZZ:
+            found["NCF405", row] = _worst_axis(machine, ended if ended.max() > FUZZ else comes_back)
+        led = np.where(np.maximum(ended, comes_back) > FUZZ, -np.inf, corrected)
+        if led.max() > FUZZ:
+            found["NCF404", row] = _worst_axis(machine, led)
+        linear, turns = shift[row, ~machine.rotary], np.abs(shift[row, machine.rotary])
+        share = np.maximum(np.linalg.norm(linear) / 0.5, turns.max() / 0.02)
+        if share > 1 + FUZZ:
+            found["NCF406", row] = (share,)
+        if row and not pieces.kept[row - 1]:
+            way = np.abs(moves.end[row] - moves.start[row])
+            change = np.where(moves.wordless[row - 1], 0.0, shift[row] - shift[row - 1])
+            jump = np.linalg.norm(change[~machine.rotary])
+            if jump > JUMP + PER_MM * way[~machine.rotary].sum() + PER_RAD * way[machine.rotary].sum():
+                found["NCF407", row] = (jump,)
+    return found
+
+
+def test_increments_are_led_astray_where_they_stay_and_begin_elsewhere() -> None:
+    """Of motions left as they are only increments end elsewhere because they begin elsewhere."""
+    rng, count = np.random.default_rng(4), 0
+    machine = perfect("w C B F X Y Z S t")
+    low, high = np.array(machine.ranges).T
+    for _ in range(60):
+        moves, pieces, start = _near_all_limits(machine, rng, 12)
+        moves = changed(moves, incremental=rng.random(12) < 0.6)
+        beyond = [(np.maximum(low - places, places - high) > FUZZ) for places in (pieces.end, moves.end)]
+        expected = np.flatnonzero(moves.incremental & pieces.kept & (beyond[0] & ~beyond[1]).any(axis=1))
+        assert led_astray(machine, moves, pieces, start, State()).tolist() == expected.tolist()
+        count += len(expected)
+    assert count > 10
+
+
+def _worst_axis(machine: Machine, beyond: np.ndarray) -> tuple[float, str]:
+    axis = int(np.argmax(beyond))
+    return beyond[axis] * (180 / np.pi if machine.rotary[axis] else 1.0), machine.axis_names[axis]
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_no_number_gets_through(bad: float) -> None:
     machine = shifted(0.01)
@@ -166,6 +262,16 @@ def test_no_number_gets_through(bad: float) -> None:
     result = corrected(machine, moves)
     result.pieces.end[-1, 1] = bad
     assert 1 in found(machine, moves, result)["NCF408"]
+
+
+def test_an_arc_needs_a_centre_and_a_line_none() -> None:
+    machine = shifted(0.01)
+    moves = motions(machine, (8, 0, 0), [Arc((0, 0, 0), (0, 0, 1), 1.0), (8, 1, 0), Arc((0, 1, 0), (0, 0, 1), 1.0)])
+    arc = np.array([True, False, True])
+    pieces = Pieces(np.arange(3), np.ones(3), moves.end, arc, moves.centre.copy(), np.zeros(3, dtype=bool))
+    assert findings(machine, moves, pieces) == ()
+    pieces.centre[2, 1] = np.nan
+    assert [(each.code, each.moves.tolist()) for each in findings(machine, moves, pieces)] == [("NCF408", [2])]
 
 
 def test_an_error_model_that_gives_no_number_is_refused_by_the_plan() -> None:
