@@ -122,6 +122,18 @@ def test_inside_a_tcp_block_axes_go_farther_than_at_its_ends() -> None:
     assert found(machine, moves, result) == {"NCF404": [1]}
 
 
+@pytest.mark.parametrize(("beyond", "code"), [(0.005, "NCF404"), (-0.005, "NCF405"), (0.02, "")])
+def test_inside_an_arc_under_tcp_axes_go_farther_than_at_its_ends(beyond: float, code: str) -> None:
+    """Half a circle from Y- to Y+ about a centre 8 mm within the limit of X, which is corrected by 10 um."""
+    machine = perfect("w F X Y Z B t")
+    centre = np.array([STROKE - 8.0 - beyond, 0, 0])
+    moves = motions(machine, (centre[0], -8, 0, 0), [Arc(centre, (0, 0, 1), np.pi)], tcp=True)
+    shift, whole = np.array([0.01, 0, 0, 0]), np.ones(1, dtype=bool)
+    pieces = Pieces(np.arange(1), np.ones(1), moves.end + shift, whole, moves.centre + shift[:3], ~whole)
+    against = findings(machine, moves, pieces, moves.start + shift)
+    assert [(each.code, each.moves.tolist()) for each in against] == ([(code, [0])] if code else [])
+
+
 def test_outside_the_calibrated_range_is_told_once_and_not_as_over_travel() -> None:
     machine = shifted(0.01)
     moves = motions(machine, (0, 0, 0), [(STROKE + 1.0, 0, 0), (0, 0, 0)])

@@ -1,0 +1,178 @@
+"""What is written is what the control will understand: corrected programs, read and followed again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
+from ncfix.text.tree import Program
+from ncfix.text.writer import apply
+from ncfix.writer.emit import Emission, emit
+from ncfix.writer.pieces import Pieces, SecondReading
+from program.arcs import full_of_arcs
+
+AXES, ROTARY = ("X", "Y", "Z", "B", "C"), frozenset("BC")
+STEP = np.array([1e-3, 1e-3, 1e-3, np.radians(1e-3), np.radians(1e-3)])
+XYZ = slice(0, 3)
+SAME, ROUND = 1e-9, 1e-4
+"""mm and rad: rounding of the arithmetic; and how much of it an R near half the chord makes."""
+HALF = 0.51 * np.sqrt(3) * STEP
+"""Half an output step of each axis, or of three where a frame is turned."""
+PROGRAMS = 10
+HEAD = ["G90 G94 F1000.", "G0 X0. Y0. Z0. B0. C0."]
+COMMON = {
+    "inch": (["G20 F40."], ["G21 F1000."]),
+    "increments": (["G91"], ["G90"]),
+    "inverse time": (["G93"], ["G94 F900."]),
+}
+FRAMES = {
+    "linuxcnc": COMMON
+    | {
+        "turned": (["G10 L2 P1 R30."], ["G10 L2 P1 R0"]),
+        "diameters": (["G7"], ["G8"]),
+        "shifted": (["G92 X1. Y-2.5"], ["G92.1"]),
+        "centres from the origin": (["G90.1"], ["G91.1"]),
+    },
+    "fanuc": COMMON | {"turned": (["G68 X1. Y2. R30."], ["G69"]), "shifted": (["G52 X1. Y-2.5"], ["G52 X0. Y0."])},
+    "siemens": {
+        "inch": (["G700 F40."], ["G710 F1000."]),
+        "increments": (["G91"], ["G90"]),
+        "turned": (["ROT RPL=30"], ["ROT"]),
+        "shifted": (["TRANS X1 Z-2.5"], ["TRANS"]),
+        "other plane": (["G18"], ["G17"]),
+    },
+}
+"""What is in force for a part of a program: the blocks before it and behind it."""
+
+
+def followed(source: bytes, dialect: str) -> tuple[Program, Moves]:
+    program = read(source, "part.nc", dialect)
+    return program, trace(program, Setup(assume_zero=True, initial=dict.fromkeys(AXES, 0.0)), AXES, ROTARY).moves
+
+
+def text_of(rng: np.random.Generator, dialect: str) -> str:
+    """Parts of lines, arcs and holes in frames of all kinds; each begins at a place of its own."""
+    lines = list(HEAD)
+    for _ in range(4):
+        before, behind = FRAMES[dialect][str(rng.choice(list(FRAMES[dialect])))]
+        modal = before[0] in ("G91", "G93", "G90.1")
+        start = ["G1 X0.5 Y0.25 Z1. B5. C-10."]
+        kind = rng.choice(["lines", "arcs", "expressions", "lines" if before[0] == "G91" else "holes"])
+        body = {
+            "lines": _lines(rng, "G93" in before, 8),
+            "arcs": _arcs(rng, before[0], dialect),
+            "holes": _holes(rng, dialect),
+            "expressions": ["#1=3.", "G1 X[#1+2.] Y#1", "Z[-#1] X1."]
+            if dialect != "siemens"
+            else ["R1=3", "G1 X=R1+2 Y=R1"],
+        }["lines" if before[0] == "G93" else str(kind)]
+        lines += [*start, *before, *body, *behind] if modal else [*before, *start, *body, *behind]
+    return "\n".join([*lines, "M30\n"])
+
+
+def _lines(rng: np.random.Generator, timed: bool, count: int) -> list[str]:
+    lines = []
+    for k in range(count):
+        named = [letter for letter in "XYZBC" if rng.random() < 0.4]
+        named = named if {*named} & {*"XYZ"} else ["X", *named]
+        code = str(rng.choice(["", "G1", "G0", "G01"])) if k and not timed else "G1"
+        words = [letter + f"{rng.uniform(-9, 9):.{rng.integers(1, 5)}f}" for letter in named]
+        feed = [f"F{rng.uniform(1, 9):.2f}"] if timed else [str(rng.choice(["", "", "F500.", "M8", "S1000"]))]
+        text = str(rng.choice(["", " ", " "])).join(filter(None, [str(rng.choice(["", "N10 "])), code, *words, *feed]))
+        lines.append(text.lower() if rng.random() < 0.2 else text)
+    return lines
+
+
+def _arcs(rng: np.random.Generator, before: str, dialect: str) -> list[str]:
+    if before in ("G91", "G90.1", "G7"):
+        half = "G2 X2. Y0. I1. J0." if before != "G90.1" else "G2 X2.5 Y.25 I1.5 J.25"
+        return ["G17", half, "G1 X1. Y1."] if before != "G7" else ["G18", "G2 X.5 Z5. I0 K2.", "G17", "G1 X1. Y1."]
+    place = ["G17", "G0 X0. Y0. Z0."]
+    return [*place, *full_of_arcs(int(rng.integers(10_000)), 8, sinumerik=dialect == "siemens"), "G17"]
+
+
+def _holes(rng: np.random.Generator, dialect: str) -> list[str]:
+    if dialect == "siemens":
+        return ["G1 X1 F100", "X2 Y1"]
+    ways = [f"{code} G81 X1. Y2. Z-3. R{rng.uniform(0.5, 2):.2f} F100." for code in ("G98", "G99")]
+    return ["G17 G0 Z3.", ways[rng.integers(2)], "X4.", "Y1. R1.5", "X2. Z-4.", "G80", "G1 Z5."]
+
+
+def corrected(rng: np.random.Generator, moves: Moves, size: float) -> Pieces:
+    """Corrections that wander along the path, some motions in two pieces; arcs still close."""
+    n = len(moves)
+    shift = size * np.cumsum(rng.normal(size=moves.end.shape), axis=0) / 10 * np.where(moves.rotary, 0.01, 1.0)
+    shift[:, moves.rotary] *= rng.integers(0, 2)
+    is_arc, kept = moves.kind == MotionKind.ARC, (moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)
+    way = (moves.end - moves.start)[:, XYZ]
+    way = way - moves.normal * np.sum(way * moves.normal, axis=1)[:, None]
+    round_ = is_arc & (np.abs(np.nan_to_num(way)).max(axis=1) < 0.05)
+    for row in np.flatnonzero(round_ | kept).tolist():
+        shift[row] = shift[row - 1]
+    straight = np.isin(moves.kind, (MotionKind.RAPID, MotionKind.FEED))
+    straight &= np.abs(moves.end - moves.start)[:, XYZ].max(axis=1) > 0.1
+    counts = np.where((rng.random(n) < 0.2) & straight & ~kept, 2, 1)
+    move = np.repeat(np.arange(n), counts)
+    last = np.append(np.diff(move) != 0, True)
+    end = (moves.end + shift)[move]
+    end[~last] = ((moves.start + moves.end) / 2 + shift)[move[~last]]
+    centre = moves.centre[move].copy()
+    for piece in np.flatnonzero(is_arc[move]).tolist():
+        row = move[piece]
+        start, way = end[piece - 1, XYZ], end[piece, XYZ] - end[piece - 1, XYZ]
+        way = way - moves.normal[row] * (way @ moves.normal[row])
+        centre[piece] += shift[row, XYZ]
+        if not round_[row]:
+            off = (centre[piece] - start - way / 2) @ way
+            centre[piece] -= way * off / (way @ way)
+    approach = None if moves.approach is None else moves.approach[move] + shift[move]
+    fraction = np.where(last, 1.0, 0.5)
+    return Pieces(move, fraction, end, is_arc[move], centre, kept[move], approach=approach)
+
+
+@pytest.mark.parametrize("dialect", list(FRAMES))
+@pytest.mark.parametrize("size", [0.0, 0.02])
+def test_what_is_written_is_what_is_read_again(dialect: str, size: float) -> None:
+    """Each piece is a motion that ends, and turns about, where it is said to, within an output step of the plan."""
+    rng, understood = np.random.default_rng(7), 0
+    for _program in range(PROGRAMS):
+        program, moves = followed(text_of(rng, dialect).encode(), dialect)
+        pieces = corrected(rng, moves, size)
+        reading: SecondReading | None = None
+        for _attempt in range(8):  # G92 and the like count from where the axes stand: from where they were led
+            emission = emit(program, moves, pieces, STEP, reading)
+            if emission.conflicts:
+                break
+            written = apply(program.source, emission.edits)
+            _, again = followed(written, dialect)
+            if np.abs(again.end - emission.end).max() < SAME:
+                assert_understood(moves, pieces, emission, again)
+                understood += 1
+                break
+            reading = SecondReading.of(again, pieces)
+        if size == 0 and len(pieces) == len(moves):
+            assert written == program.source
+    assert understood >= PROGRAMS - 2
+
+
+def assert_understood(moves: Moves, pieces: Pieces, emission: Emission, again: Moves) -> None:
+    """What the control makes of it is what was meant; times of blocks in inverse time are kept."""
+    row, arc = pieces.move, pieces.arc
+    assert np.abs(again.end - emission.end).max() < SAME
+    assert ((again.kind == MotionKind.ARC) == arc).all()
+    off = again.centre[arc] - emission.centre[arc]
+    off -= again.normal[arc] * np.sum(off * again.normal[arc], axis=1)[:, None]
+    assert np.abs(off).max(initial=0.0) < ROUND
+    assert np.abs(again.sweep - moves.sweep[row])[arc].max(initial=0.0) < 0.5
+    free = ~(pieces.kept | arc)[:, None] & ~moves.wordless[row]
+    assert (np.abs(emission.end - pieces.end) < HALF)[free].all()
+    assert np.abs(emission.centre - pieces.centre)[arc].max(initial=0.0) < 2.1 * STEP[0]
+    timed = moves.feed_mode[row] == FeedMode.INVERSE_TIME
+    assert np.allclose(again.feed[~timed], moves.feed[row][~timed], equal_nan=True)
+    minutes = np.bincount(row[timed], 1 / again.feed[timed], len(moves))
+    whole = moves.feed_mode == FeedMode.INVERSE_TIME
+    assert np.allclose(minutes[whole], 1 / moves.feed[whole], rtol=1e-3)
