@@ -41,6 +41,7 @@ KLARTEXT = Spelling(signed=True, comma=True, point=False, trimmed=False)
     [
         (Spelling(), 12.34, "12.3400", "12.34", "12.34"),
         (Spelling(), -12.0, "-12.0000", "-12.", "-12."),
+        (Spelling(), 0.25, "0.2500", "0.25", "0.25"),
         (Spelling(point=False), -1e-9, "-0.0000", "0", "0"),
         (KLARTEXT, 12.34, "+12,3400", "+12,34", "+12,3400"),
         (KLARTEXT, -1e-9, "+0,0000", "+0", "+0,0000"),
@@ -64,7 +65,9 @@ def test_what_had_a_sign_or_a_comma_keeps_it(spelling, was, value, expected):
     assert value_of(expected) == value
 
 
-@pytest.mark.parametrize(("step", "decimals"), [(0.001, 3), (0.0001, 4), (0.0005, 4), (0.001 / 25.4, 5), (1.0, 0)])
+@pytest.mark.parametrize(
+    ("step", "decimals"), [(0.001, 3), (0.0001, 4), (0.0005, 4), (0.001 / 25.4, 5), (1.0, 0), (20.0, 0)]
+)
 def test_decimals_that_a_least_increment_needs(step, decimals):
     assert decimals_for(step) == decimals
 

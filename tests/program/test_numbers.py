@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 from ncfix.text.numbers import NUMERIC, find_numbers, table
 from ncfix.text.shapes import FIXED
 
-DECIMALS = st.from_regex(r"[0-9]{1,25}\.?[0-9]{0,25}|\.[0-9]{1,25}", fullmatch=True)
+
+def with_point(digits: str, at: int) -> str:
+    """The digits with a point before the one at `at`; without one if there are fewer."""
+    return digits if at > len(digits) else f"{digits[:at]}.{digits[at:]}"
+
+
+LONG = st.integers(0, 10**30).map(str)
+DIGITS = st.one_of(LONG, st.integers(0, 10**9).map(str), st.builds(str.zfill, LONG, st.integers(1, 30)))
+DECIMALS = st.builds(with_point, DIGITS, st.integers(0, 40))
 
 
 def numbers(text: bytes) -> list[tuple[str, float]]:
@@ -24,6 +32,15 @@ def numbers(text: bytes) -> list[tuple[str, float]]:
 def test_values_are_exactly_those_of_python(written: list[tuple[str, str]]) -> None:
     text = "X".join(["", *(sign + digits for sign, digits in written)])
     assert numbers(text.encode()) == [(sign + digits, float(sign + digits)) for sign, digits in written]
+
+
+@pytest.mark.parametrize("digits", range(13, 19))
+def test_as_many_digits_as_a_double_holds_and_more_are_rounded_once(digits: int) -> None:
+    """Sixteen digits are more than a double holds: the whole number, and its quotient, would each be rounded."""
+    rng = np.random.default_rng(digits)
+    wholes = map(str, rng.integers(10 ** (digits - 1), 10**digits, 500).tolist())
+    written = list(map(with_point, wholes, rng.integers(0, digits, 500).tolist()))
+    assert numbers("X".join(["", *written]).encode()) == [(each, float(each)) for each in written]
 
 
 @pytest.mark.parametrize(

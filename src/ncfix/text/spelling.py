@@ -36,7 +36,7 @@ def decimals_for(step: float) -> int:
     return max(0, math.ceil(-math.log10(step) - 1e-9))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NumberStyle:
     """The manner of one written number.
 
@@ -48,8 +48,8 @@ class NumberStyle:
     """
 
     decimals: int = 0
-    point: bool = True
-    plus: bool = False
+    point: bool
+    plus: bool
     leading_zero: bool = True
     width: int = 0
 
