@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from ncfix.compensate.following import kinematics_of, rotary_names
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
-from ncfix.control.setup import Setup
+from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
+from ncfix.machine import load
 from ncfix.text.reader import read
 from ncfix.text.tree import Program
 from ncfix.text.writer import apply
@@ -176,3 +180,54 @@ def assert_understood(moves: Moves, pieces: Pieces, emission: Emission, again: M
     minutes = np.bincount(row[timed], 1 / again.feed[timed], len(moves))
     whole = moves.feed_mode == FeedMode.INVERSE_TIME
     assert np.allclose(minutes[whole], 1 / moves.feed[whole], rtol=1e-3)
+
+
+TILTED = {
+    "siemens": ("T1 D1 M6\nG54\nTRAORI\nG0 X0 Y0 Z40 B5 C5\nROT RPL=30\nG1 F900", "G1 ", "A3={} B3={} C3={}", 4.0),
+    "fanuc": ("T1 M6\nG54 G90 G94 F900.\nG0 X0. Y0. Z40. B5. C5.\nG43.5 H1", "G1 ", "I{} J{} K{}", 4.0),
+    "heidenhain": (
+        *("BEGIN PGM P MM\nTOOL CALL 1 Z S1000\nL X+0 Y+0 Z+40 B+5 C+5 R0 F900\nM128", "LN "),
+        *("TX{} TY{} TZ{}", 1.0),
+    ),
+}
+"""The first blocks, how a straight line begins, the words of a direction, and how long a vector it may be."""
+
+
+@pytest.mark.parametrize("dialect", list(TILTED))
+def test_directions_of_the_tool_are_read_again(dialect: str, root: Path) -> None:
+    """Vectors, and rotary axes between them, lead where they are said to lead: to some 1e-6 rad where they should."""
+    head, begin, words, longest = TILTED[dialect]
+    rng, lines = np.random.default_rng(5), head.split("\n")
+    form = "{:+.3f}" if dialect == "heidenhain" else "{:.3f}"
+    for _ in range(40):
+        tilt, turn, length = rng.uniform(0.05, 0.6), rng.uniform(-1, 1), rng.uniform(1, longest)
+        vector = length * np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)])
+        numbers = [form.format(number) for number in rng.uniform(-20, 20, 5)]
+        place = "X{} Y{} Z{}".format(*numbers)
+        if dialect != "fanuc" and rng.random() < 0.2:
+            lines.append(f"{begin.replace('N', '')}{place} B{numbers[3]} C{numbers[4]}")
+        else:
+            lines.append(f"{begin}{place} " + words.format(*map(form.replace("3", "6").format, vector)))
+    machine = load(root / "examples/machines/wCBXFZYSt.toml")
+
+    def follow(source: bytes) -> tuple[Program, Moves]:
+        program = read(source, "part.nc", dialect)
+        setup = Setup(tools={1: Tool(80.0)}, assume_zero=True, no_point="calculator")
+        kinematics = kinematics_of(machine)
+        return program, trace(program, setup, machine.axis_names, rotary_names(machine), None, kinematics).moves
+
+    program, moves = follow("\n".join([*lines, ""]).encode())
+    count = np.where(rng.random(len(moves)) < 0.3, 2, 1)
+    count[0] = 1
+    row = np.repeat(np.arange(len(moves)), count)
+    last = np.append(np.diff(row) != 0, True)
+    end = np.where(last[:, None], moves.end[row], (moves.start + moves.end)[row] / 2)
+    end += rng.normal(size=end.shape) * np.where(machine.rotary, 1e-4, 0.02)
+    fraction, none = np.where(last, 1.0, 0.5), np.zeros(len(row), dtype=bool)
+    step = np.where(machine.rotary, np.radians(1e-3), 1e-3)
+    emission = emit(program, moves, Pieces(row, fraction, end, none, moves.centre[row], none), step)
+    assert not emission.conflicts
+    _, again = follow(apply(program.source, emission.edits))
+    assert len(again) == len(row)
+    assert np.abs(again.end - emission.end).max() < SAME
+    assert (np.abs(emission.end - end) < 0.51 * np.sqrt(3) * step).all()
