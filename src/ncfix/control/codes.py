@@ -277,6 +277,13 @@ CODES: dict[str, Code] = {
         "numbers have too many digits. A control stops at them.",
         "Check the numbers of the block, and the increments, shifts and scales before it.",
     ),
+    "NCF249": Code(
+        "Blocks behind the end of the program",
+        "Behind the end of the program (M30, M2, %, END PGM) the file has blocks that name axes, and the program never "
+        "goes through them. They are another program in the same file, a subprogram that nothing calls, or what an "
+        "editor has left there. What is corrected is the first program and what it calls.",
+        "Correct each program in a file of its own; delete what is left over.",
+    ),
     "NCF381": Code(
         "The setup file is no TOML",
         "The file cannot be read as TOML; the message says where.",

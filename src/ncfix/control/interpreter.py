@@ -11,6 +11,7 @@ What it walks through is a `TextUnit`: a program, one of several that stand in a
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,7 +32,7 @@ from ncfix.control.lanes.lane import run_lane
 from ncfix.control.lanes.lane_tables import LaneTables
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Run
-from ncfix.diagnostics import Place, SourceError
+from ncfix.diagnostics import Message, Place, SourceError
 from ncfix.text.language import Language
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Span, Template, view
@@ -135,6 +136,12 @@ class TextUnit(ABC, Generic[P]):
 
 
 NO_END = "NCF234"
+BEHIND = "NCF249"
+NAMES_AN_AXIS = re.compile(
+    rb"(?i)(?:\([^)\r\n]*\)|[^(;%\r\n])*?(?<![A-Z0-9_$#<])I?[XYZABCUVW][ \t]*=?[ \t]*[-+]?[ \t]*"
+    rb"(?:[.,]?\d|[#\[]|Q[LR]?\d|R\d)"
+)
+"""A block with an axis word that is not in a comment, in any of the languages."""
 RUNTIME = "NCF237"
 """What is executed is known only at run time, so that no flat program can say it."""
 
@@ -151,6 +158,7 @@ class Interpreter(ABC, Generic[U]):
     watcher   writes blocks down as they are executed, if the program is to be written out flat
     in_parts  the text comes part by part; `first` and `last`: this is the first, the last of them
     ended     the program has ended
+    behind    the block of the main text behind which the program has ended; None: where it ends is not known
     """
 
     main: U
@@ -166,6 +174,7 @@ class Interpreter(ABC, Generic[U]):
         self.watcher: Any = None
         self.first = self.last = True
         self.ended = False
+        self.behind: int | None = None
         self._recurrence = Recurrence()
         control.budget.left = run.budget(program)
         control.locate = self.place
@@ -213,6 +222,28 @@ class Interpreter(ABC, Generic[U]):
         """The motions of the program, when it has been followed."""
         moves: Moves = self.control.moves()
         return moves
+
+    def note_behind(self, program: Program, moves: Moves) -> None:
+        """Say which blocks behind the end of the program name axes though it never goes through them.
+
+        They are those of other programs in the file, and of subprograms that nothing calls. `program` and `moves`: what
+        was followed last, with the end of the program.
+        """
+        if self.behind is None or self.behind >= len(program):
+            return
+        executed = set(moves.block[moves.block >= self.behind].tolist())
+        source, spans = program.source, program.blocks[self.behind :].tolist()
+        names = (NAMES_AN_AXIS.match(source, start, stop) is not None for start, stop in spans)
+        found = [block for block, named in enumerate(names, self.behind) if named and block not in executed]
+        if found:
+            text = (
+                f"{len(found)} blocks behind the end of the program name axes, and the program never goes through them"
+            )
+            if len(found) == 1:
+                text = "a block behind the end of the program names axes, and the program never goes through it"
+            hint = "they stay as they are: correct another program in a file of its own"
+            place = program.place(found[0])
+            self.control.messages[text] = Message(BEHIND, text, place, hint)
 
     # -- what a language says of parts --------------------------------------------------------------------------------
 
@@ -277,6 +308,7 @@ class Interpreter(ABC, Generic[U]):
             if not flow.arrive():
                 if (self.last or flow.calls) and self.end_of_text():
                     continue
+                self.behind = flow.block
                 return False
             unit, block = flow.unit, flow.block
             plan = unit.plan(block)
@@ -294,6 +326,7 @@ class Interpreter(ABC, Generic[U]):
             ended = self.execute(plan, unit, block)
             control.leave_block()
             if ended:
+                self.behind = flow.calls[0].back[1] if flow.calls else flow.block
                 return True
             if flow.unit is unit and flow.block <= block:
                 self._look_round(block)

@@ -259,6 +259,7 @@ class Follower:
         moves = control.moves()
         check_reach(program, moves)
         control.note_rolling(program)
+        interpreter.note_behind(program, moves)
         interpreter.check_motions(program, moves)
         self.unchanged = begun is not None and begun == control.lasting()
         return moves
@@ -381,7 +382,9 @@ def trace(
         raise UsageError.of(NO_LETTER, f"the axis {strangers[0]} has no letter that a program can move")
     interpreter = interpreter_of(program, Run(setup, axes, rotary, resolve, kinematics))
     interpreter.run()
-    return finished(interpreter.control, program, interpreter.moves())
+    moves = interpreter.moves()
+    interpreter.note_behind(program, moves)
+    return finished(interpreter.control, program, moves)
 
 
 def interpreter_of(program: Program, run: Run) -> Interpreter[Any]:
