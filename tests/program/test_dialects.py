@@ -121,3 +121,30 @@ def test_a_parser_leaves_no_files(tmp_path: Path, root: Path) -> None:
         shutil.copy(root / "grammars" / file, tmp_path)
     parser(str(tmp_path / "iso.lark")).parse("G1X1")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["common.lark", "iso.lark"]
+
+
+@pytest.mark.parametrize("dialect", ["iso", "linuxcnc", "fanuc"])
+@pytest.mark.parametrize(
+    ("line", "foreign"),
+    [
+        ("(RPT N10,N20)N3", True),
+        ("N5 (IF P1 EQ 0 GOTO N10)", True),
+        ("( GOTO N100 )", True),
+        ("(P1=P1+1)", True),
+        ("(SUB 12)\nX1\n(RET)", True),
+        ("(SUB 12)", False),
+        ("(RET)", False),
+        ("(P1=5)", False),
+        ("(GOTO10)", False),
+        ("(IF[#1EQ#0]GOTO10)", False),
+        ("(IF LOOSE GOTO N10)", False),
+        ("; (RPT N10,N20)N3", False),
+    ],
+)
+def test_statements_of_fagor_are_no_comments(dialect: str, line: str, foreign: bool) -> None:
+    source = f"G21 G90\nG1 X1 F100\n{line}\nG1 X2\nM30\n".encode()
+    if foreign:
+        with pytest.raises(NcfixError, match="NCF103: this is Fagor code"):
+            read(source, "part.nc", dialect)
+    else:
+        read(source, "part.nc", dialect)

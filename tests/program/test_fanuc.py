@@ -325,6 +325,22 @@ def test_g53_in_increments_is_passed_and_loses_its_axes() -> None:
     assert reasons(found)[2] == ""
 
 
+@pytest.mark.parametrize(
+    ("dialect", "block"),
+    [
+        ("haas", "G70I20.J45.L4"),
+        ("haas", "G72I5.J0L3"),
+        ("mitsubishi", "G34X0Y0I20.J0K6"),
+        ("mitsubishi", "G37.1X0Y0I9.P3J9.K3"),
+    ],
+)
+def test_rows_of_holes_that_the_control_makes_up_are_refused(dialect: str, block: str) -> None:
+    text = f"G0X0Y0Z9.\nG81Z-5.R2.F100.L0\n{block}\nG80\nG0X5.Y5.Z9."
+    why = reasons(follow(text, dialect=dialect, no_point="calculator", assume_zero=True))
+    assert why[0] == why[2] == ""
+    assert why[1].startswith(("holes", "a grid of holes"))
+
+
 def test_additional_work_offsets_of_haas() -> None:
     setup = Setup(work_offsets={"G54.1P3": {"X": 5.0, "Y": 0.0, "Z": 0.0}}, initial=dict.fromkeys("XYZ", 0.0))
     assert last(follow("G154P3\nG0X1.", setup=setup, dialect="haas")) == [6, 0, 0]

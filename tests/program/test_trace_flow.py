@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError
 from ncfix.text.reader import read
@@ -138,8 +139,33 @@ def codes_of(source: bytes, dialect: str = "linuxcnc") -> list[str]:
 
 def test_the_end_is_m2_m30_m99_or_tape() -> None:
     for end in (b"M2", b"M30", b"M99", b"G0 X2 M30"):
-        assert codes_of(b"G0 X1\n" + end + b"\nG0 X9\n") == []
+        assert codes_of(b"G0 X1\n" + end + b"\nS900\n") == []
     assert codes_of(b"%\nG0 X1\n%\nnot looked at\n") == []
+
+
+@pytest.mark.parametrize(
+    ("dialect", "text", "lines"),
+    [
+        ("linuxcnc", "G0 X1\nM2\nG0 X9\n", 1),
+        ("linuxcnc", "%\nG0 X1\n%\n(X9)\n; X9\nG0 X9\n%\n", 1),
+        ("linuxcnc", "o1 call\nG0 X1\nM2\no1 sub\nG0 X9\no1 endsub\n", 0),
+        ("iso", "O1\nM98 P2\nM30\nO2\nG0 X1\nM99\n", 0),
+        ("fanuc", "%\nO1\nG0 X1.\nM30\nO2\nG0 X9.\nX#1\nM99\n%\n", 2),
+        ("fanuc", "%\nO1\nG0 X1.\nM30\n%\n%\nO2\nG0X9.\nM30\n%\n", 1),
+        ("fanuc", "O1\nG0 X1.\nIF [1 EQ 2] GOTO 5\nGOTO 6\nN5 X2.\nN6 M30\n", 0),
+        ("siemens", "%_N_A_MPF\nG90 G0 X1\nM30\n%_N_B_MPF\nG0 X9\nX=R1\nM30\n", 2),
+        ("siemens", "sent by DNC\n%_N_A_MPF\nG90 G0 X1\nM30\n", 1),
+        ("siemens", "%_N_A_MPF\nG90 G0 X1\nSUB1\nM30\n%_N_SUB1_SPF\nG0 X9\nM17\n", 0),
+        ("heidenhain", "BEGIN PGM A MM\nL X+1 FMAX\nEND PGM A MM\nBEGIN PGM B MM\nL IX+9\nL X+Q1\nEND PGM B MM\n", 2),
+        ("heidenhain", "BEGIN PGM A MM\nCALL LBL 1\nM30\nLBL 1\nL X+1 FMAX\nLBL 0\nEND PGM A MM\n", 0),
+    ],
+)
+def test_motions_that_the_program_never_goes_through_are_a_remark(dialect: str, text: str, lines: int) -> None:
+    program = read(text.encode(), "part", dialect)
+    known = Setup(initial={"X": 0.0}, work_offsets={"G500": {}}, assume_zero=True)
+    said = [each for each in trace(program, known, ("X",), frozenset()).messages if each.code == "NCF249"]
+    assert len(said) == (lines > 0)
+    assert not said or said[0].text.startswith(str(lines) if lines > 1 else "a block")
 
 
 def test_a_missing_end_is_a_remark() -> None:

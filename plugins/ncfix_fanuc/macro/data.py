@@ -31,6 +31,13 @@ MADE = {
     130: "a circular pocket (G13)",
     1500: "a pocket (G150)",
     290: "return from the reference point (G29)",
+    700: "holes on a bolt circle (G70)",
+    710: "holes on an arc (G71)",
+    720: "holes along a line (G72)",
+    340: "holes on a bolt circle (G34)",
+    350: "holes along a line (G35)",
+    360: "holes on an arc (G36)",
+    371: "a grid of holes (G37.1)",
 }
 """Motions that the control makes up."""
 

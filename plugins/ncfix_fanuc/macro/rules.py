@@ -150,8 +150,8 @@ FANUC = Rules(
 HAAS_OFFSETS = (1540, *range(1100, 1300, 10))
 """G154 P, and its first twenty by their own names G110 to G129."""
 
-HAAS_MADE = (120, 130, 470, 1500)
-"""Circular pockets, engraving, pockets: G12, G13, G47, G150."""
+HAAS_MADE = (120, 130, 470, 700, 710, 720, 1500)
+"""Circular pockets, engraving, rows of holes, pockets: G12, G13, G47, G70 to G72, G150."""
 
 HAAS = replace(
     FANUC,
@@ -174,7 +174,8 @@ HAAS = replace(
 """Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), mills texts and pockets by itself,
 and pecks by I J K."""
 
-MITSUBISHI_MADE = (120, 130)
+MITSUBISHI_MADE = (120, 130, 340, 350, 360, 371)
+"""Circular pockets and rows of holes: G12, G13, G34 to G37.1."""
 MITSUBISHI = replace(
     FANUC,
     g_groups=FANUC_G | dict.fromkeys(MITSUBISHI_MADE, groups.NON_MODAL),
@@ -183,7 +184,7 @@ MITSUBISHI = replace(
     scales_named=True,
     offset_group=12,
 )
-"""Mitsubishi mills circles by itself, too, and counts the groups of modal codes otherwise."""
+"""Mitsubishi mills circles and drills rows of holes by itself, too, and counts the groups of modal codes otherwise."""
 
 RULES = {"fanuc": FANUC, "haas": HAAS, "mitsubishi": MITSUBISHI}
 """By `Dialect.semantics`."""

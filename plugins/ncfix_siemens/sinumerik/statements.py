@@ -140,8 +140,10 @@ ANGLE_KINDS = frozenset({"orieuler", "orirpy", "orirpy2", "orivirt1", "orivirt2"
 
 STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
 
+WORKING_AREA = frozenset({250, 260})
+"""G25 and G26: their words are the limits of the working area, or of the spindle."""
 FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
-TAKES_WORDS = frozenset({40, 740, 750, 250, 260, 580, 590}) | POLES
+TAKES_WORDS = frozenset({40, 740, 750, 580, 590}) | POLES | WORKING_AREA
 
 
 @dataclass(slots=True)
@@ -392,6 +394,8 @@ def takes_words(control: Sinumerik, turn: Turn, code: int) -> None:
         control.claim_words()
     elif code in (580, 590):
         framing.programmed_shift(control, turn.words, code)
+        control.claim_words()
+    elif code in WORKING_AREA:
         control.claim_words()
 
 

@@ -138,7 +138,7 @@ class TextUnit(ABC, Generic[P]):
 NO_END = "NCF234"
 BEHIND = "NCF249"
 NAMES_AN_AXIS = re.compile(
-    rb"(?i)(?:\([^)\r\n]*\)|[^(;%\r\n])*?(?<![A-Z0-9_$#<])I?[XYZABCUVW][ \t]*=?[ \t]*[-+]?[ \t]*"
+    rb"(?i)(?:\([^)\r\n]*\)|[^(;%\r\n])*?(?<![A-Z_$#<])I?[XYZABCUVW][ \t]*=?[ \t]*[-+]?[ \t]*"
     rb"(?:[.,]?\d|[#\[]|Q[LR]?\d|R\d)"
 )
 """A block with an axis word that is not in a comment, in any of the languages."""

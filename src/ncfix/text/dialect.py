@@ -13,6 +13,13 @@ from typing import Any, ClassVar, Literal, Protocol
 from ncfix.diagnostics import Message, Place, SourceError, UsageError
 from ncfix.plugins import nearest, registry, working
 
+FAGOR = (
+    rb"[ \t]*(?:RPT[ \t]+N\d+[ \t]*,[ \t]*N\d+|GOTO[ \t]+N\d+|P\d+[ \t]*=[^()\r\n]*P\d[^()\r\n]*"
+    rb"|IF[ \t]+P\d[^()\r\n]*[ \t](?:GOTO[ \t]+N|P?CALL[ \t]+|RPT[ \t]+N)\d[^()\r\n]*"
+    rb"|SUB[ \t]*\d+[ \t]*\)(?=(?s:.*?)\([ \t]*RET[ \t]*\))|RET)[ \t]*\)?"
+)
+"""Statements of Fagor controls: to all others they are comments, and the program is another one."""
+
 FOREIGN: tuple[tuple[str, bytes], ...] = (
     ("Heidenhain Klartext", rb"(?im)^[ \t]*(?:\d+[ \t]*)?BEGIN[ \t]+PGM\b"),
     ("Heidenhain DIN/ISO", rb"(?im)^[ \t]*%[ \t]*[\w.-]+[ \t]+G7[01][ \t]*(?:\*[ \t]*)?\r?$"),
@@ -23,6 +30,7 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
         rb"|A?(?:TRANS|ROT|MIRROR|SCALE)\b|MSG[ \t]*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+[ \t]*\(|R\d+[ \t]*=)",
     ),
     ("Okuma OSP code", rb"(?im)^[^(;\n]*(?<![A-Z])(?:G1[56][ \t]*H[ \t]*\d|VC\d+[ \t]*=|CALL[ \t]+O[A-Z\d])"),
+    ("Fagor code (statements in brackets)", rb"(?i)\((?![ \t]*RET[ \t]*\))" + FAGOR),
 )
 """Other families of controls: what people call their language, and what shows it; for `Dialect.foreign`.
 
@@ -355,9 +363,11 @@ OTHER_FILES = {
 PROBE_BYTES = 1 << 16
 """How much of a text is looked at to find out what it is."""
 
-COMMENT_TEXT = re.compile(rb"(?<=\()(?:[^()\r\n]|\([^()\r\n]*\))+|(?<=;)(?![ \t]*\$PATH)[^\r\n]+")
+COMMENT_TEXT = re.compile(
+    rb"(?<=\()(?!(?i:" + FAGOR + rb"))(?:[^()\r\n]|\([^()\r\n]*\))+|(?<=;)(?![ \t]*\$PATH)[^\r\n]+"
+)
 """What a comment says, up to its closing bracket or the end of the line; in `;$PATH=` SINUMERIK says where a program
-is kept."""
+is kept, and Fagor's statements stand in brackets."""
 
 
 def check_content(source: bytes, path: str, dialect: Dialect) -> None:

@@ -119,6 +119,11 @@ def test_formulas() -> None:
     assert ends(body + "\nL X+Q4 Y-Q5 Z+Q3") == [[2, -5, 3]]
 
 
+@pytest.mark.parametrize("angle", ["+4 ANG-Q1", "+4 ANG -Q1", "+4 ANG -4", "+4 ANG-4"])
+def test_the_angle_of_two_sides(angle: str) -> None:
+    assert ends(f"Q1 = 4\nFN 13: Q2 = {angle}\nL X+Q2") == [[pytest.approx(135.0), 0, 0]]
+
+
 def test_called_programs_are_followed() -> None:
     moves = follow(
         "L X+5 F100\nCALL PGM TNC:\\SUB.H\nL Y+2", files={"SUB.H": "BEGIN PGM SUB MM\nL IX+1\nEND PGM SUB MM"}
