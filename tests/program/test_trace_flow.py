@@ -153,6 +153,7 @@ def test_the_end_is_m2_m30_m99_or_tape() -> None:
         ("fanuc", "%\nO1\nG0 X1.\nM30\nO2\nG0 X9.\nX#1\nM99\n%\n", 2),
         ("fanuc", "%\nO1\nG0 X1.\nM30\n%\n%\nO2\nG0X9.\nM30\n%\n", 1),
         ("fanuc", "O1\nG0 X1.\nIF [1 EQ 2] GOTO 5\nGOTO 6\nN5 X2.\nN6 M30\n", 0),
+        ("fanuc", "O1\nG0 X1.\nG65 P2\nM30\nO2\nX#24\nM99\n", 0),
         ("siemens", "%_N_A_MPF\nG90 G0 X1\nM30\n%_N_B_MPF\nG0 X9\nX=R1\nM30\n", 2),
         ("siemens", "sent by DNC\n%_N_A_MPF\nG90 G0 X1\nM30\n", 1),
         ("siemens", "%_N_A_MPF\nG90 G0 X1\nSUB1\nM30\n%_N_SUB1_SPF\nG0 X9\nM17\n", 0),

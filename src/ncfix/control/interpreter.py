@@ -159,6 +159,7 @@ class Interpreter(ABC, Generic[U]):
     in_parts  the text comes part by part; `first` and `last`: this is the first, the last of them
     ended     the program has ended
     behind    the block of the main text behind which the program has ended; None: where it ends is not known
+    in_calls  the blocks of the main text that subprograms have executed
     """
 
     main: U
@@ -175,6 +176,7 @@ class Interpreter(ABC, Generic[U]):
         self.first = self.last = True
         self.ended = False
         self.behind: int | None = None
+        self.in_calls: set[int] = set()
         self._recurrence = Recurrence()
         control.budget.left = run.budget(program)
         control.locate = self.place
@@ -231,7 +233,7 @@ class Interpreter(ABC, Generic[U]):
         """
         if self.behind is None or self.behind >= len(program):
             return
-        executed = set(moves.block[moves.block >= self.behind].tolist())
+        executed = self.in_calls.union(moves.block[moves.block >= self.behind].tolist())
         source, spans = program.source, program.blocks[self.behind :].tolist()
         names = (NAMES_AN_AXIS.match(source, start, stop) is not None for start, stop in spans)
         found = [block for block, named in enumerate(names, self.behind) if named and block not in executed]
@@ -321,6 +323,8 @@ class Interpreter(ABC, Generic[U]):
             control.numbers, control.first = unit.numbers, unit.first[block]
             if not unit.external:
                 control.row_block = block
+                if flow.calls:
+                    self.in_calls.add(block)
             if plan.skip is not None and control.is_deleted(plan.skip):
                 continue
             ended = self.execute(plan, unit, block)
