@@ -183,6 +183,13 @@ NUMBERS = frozenset({"NUMBER", "BLOCK_NUMBER"})
 WHOLE = re.compile(r"(?P<number>[ \t]*(?:/[ \t]*)?\d+)?[ \t]*(?P<text>[;*].*)?\Z", re.DOTALL)
 """A block that is a comment or a structuring remark, with what `~` continues, or nothing at all."""
 
+BLOCK_BEHIND = re.compile(
+    r"\n[ \t]*(?:/?[ \t]*\d+[ \t]+[A-Z]"
+    r"|(?:L|LN|LP|CC?|CP|CR|CTP?|RND|CHF|APPR|DEP|CALL|LBL|TOOL|CYCL|PLANE|STOP)[ \t])",
+    re.IGNORECASE,
+)
+"""A line behind a remark that looks like a block of its own: whether `~` makes it part of the remark nobody says."""
+
 BLANKED = re.compile(r'"[^"\n]*"|;[^\n]*|~(?=[ \t\r]*(?:\n|\Z))')
 """Strings, which are left alone, and what counts as blank: comments, and `~` at the end of a line."""
 
@@ -195,7 +202,7 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
     """One block, by the grammar; what is not Klartext, or nested too deep, is opaque."""
     remark = WHOLE.match(text)
     if remark is not None:
-        return remark_block(text, remark)
+        return unread_block() if BLOCK_BEHIND.search(text) else remark_block(text, remark)
     code = BLANKED.sub(lambda found: found[0] if found[0][0] == '"' else " " * len(found[0]), text)
     try:
         tree = parse(dialect, code)

@@ -147,6 +147,13 @@ def test_a_comment_goes_on_after_a_tilde() -> None:
     assert not any(isinstance(item, Word) and item.address == "X" for item in source.items_of(1))
 
 
+@pytest.mark.parametrize("remark", ["; note ~", "* - headline ~", "5 ;note ~"])
+def test_whether_a_remark_swallows_a_block_nobody_says(remark: str) -> None:
+    assert unread(one(f"{remark}\nL X+1 F100\nL X+2")) == [2]
+    assert unread(one(f"{remark}\n6 CALL LBL 1\nL X+2")) == [2]
+    assert unread(one(f"{remark}\n goes on, as in X+1\nL X+2")) == []
+
+
 def test_a_line_that_is_no_klartext_is_kept_and_named() -> None:
     assert unread(one("L X+1\nG91 G28 Z0.0\nL X+100 FAMX")) == [3, 4]
 
