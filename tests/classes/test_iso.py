@@ -54,6 +54,8 @@ LINUXCNC = [
     case("subprogram, flat", "o1 sub\nG91 G0 Z5.\nG90\no1 endsub\no1 call\nG0 X9.\no1 call", flat=True, L0=R),
 ]
 FANUC = [
+    case("a dwell by X", "G4 X1.\nG1 X5. F100.", L4=R),
+    case("a dwell beside an axis", "G4 P1. X5.\nG1 X6. Y6. Z6. F100.", L3=N, L4=N),
     case("number without a point", "G1 X5 Y6 F100", L3=R),
     case("canned cycle with repeats", "G91 G81 X5. Z-3. R-45. K3 F100.\nG80\nG90 G0 X1. Y1. Z50.", L3=N, L5=R),
     case(

@@ -65,7 +65,7 @@ COMPUTED_ALIAS = "the code {} is computed, and takes words under other addresses
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 UNREADABLE = "NCF236"
 DWELL_TIME = "PUX"
-"""The words of G4 on ISO controls."""
+"""The words of G4 on ISO controls; beside P, X is a motion to some."""
 
 INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not followed"
 
@@ -183,7 +183,8 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             self.unknown_codes(plan, codes)
         motion = self.motion_of(plan, codes)
         if codes.takes or (motion is None and codes.g.get(LENGTH) in DYNAMIC_OFFSETS):
-            control.claim_words(DWELL_TIME if codes.g.get(NON_MODAL) == DWELL else None)
+            dwells, by_p = codes.g.get(NON_MODAL) == DWELL, "P" in plan.letters
+            control.claim_words(None if not dwells else "P" if by_p else DWELL_TIME)
         check_words(plan, codes, motion, control.rules)
         if plan.command is not None:
             self.command(plan.command)
