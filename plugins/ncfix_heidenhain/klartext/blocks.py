@@ -20,7 +20,7 @@ from ncfix.control.expressions import Fault, Unknown
 from ncfix.text.build import MAX_DEPTH, Branch, Node, Parsed, TooDeepError, TreeBuilder, edges, kind, tokens_of
 from ncfix.text.dialect import Dialect
 from ncfix.text.grammar import Squeezed, parse
-from ncfix.text.numbers import table
+from ncfix.text.numbers import POINT, SIGN, table
 from ncfix.text.reach import UNREAD
 from ncfix.text.shapes import (
     ODD,
@@ -93,7 +93,7 @@ def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
         text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
         found = scan_compiled(text, blocks, False, b";", FIXED, WITHIN_NONE)
         if found is not None:
-            return found
+            return found.setting_apart(misnumbered(text, blocks, found))
         if len(source) > SMALL and len(blocks) > 1:
             return in_halves(source, blocks)
     return in_slices(source, blocks, scan_plain)
@@ -111,7 +111,20 @@ def scan_plain(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
     comments = np.array([match.span() for match in COMMENT.finditer(source)], dtype=np.int64).reshape(-1, 2)
     comments = comments[inside(blocks, comments[:, 0])]
-    return scan_beside(text, blocks, comments, comments, fixed=FIXED, apart=of_several_lines(text, blocks))
+    found = scan_beside(text, blocks, comments, comments, fixed=FIXED, apart=of_several_lines(text, blocks))
+    return found.setting_apart(misnumbered(text, blocks, found))
+
+
+def misnumbered(text: NDArray[np.uint8], blocks: NDArray[np.int64], found: Scan) -> list[int]:
+    """The blocks that begin with a number that is no block number: it has a sign or a point."""
+    rows = np.flatnonzero(np.diff(found.first_number))
+    spans, begins = found.spans[found.first_number[rows]], blocks[rows, 0]
+    points = np.append(np.flatnonzero(text == POINT), len(text))
+    pointed = points[np.searchsorted(points, spans[:, 0])] < spans[:, 1]
+    apart = (spans[:, 0] == begins) | BEFORE_NUMBER[text[spans[:, 0] - 1]]
+    suspicious = np.flatnonzero(apart & (pointed | SIGN[text[spans[:, 0]]]))
+    leading = text.tobytes() if len(suspicious) else b""
+    return [int(rows[row]) for row in suspicious if not leading[begins[row] : spans[row, 0]].strip(BEFORE_NUMBERS)]
 
 
 def inside(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -126,6 +139,10 @@ def of_several_lines(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list
     owner = block_of(blocks, places)
     return list(map(int, owner[places < blocks[owner, 1]]))
 
+
+BEFORE_NUMBERS = b" \t\x0b\x0c\xa0/"
+BEFORE_NUMBER = table(BEFORE_NUMBERS)
+"""What may stand before a block number: blanks, and the mark of a block that may be skipped."""
 
 # -- block numbers: nothing refers to them, jumps go to labels ---------------------------------------------------------
 

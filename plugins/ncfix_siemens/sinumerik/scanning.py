@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ncfix.control.moves import Moves, Rule
 from ncfix.diagnostics import RefusedError
-from ncfix.text.numbers import fill, runs_of, table
+from ncfix.text.numbers import BLANK, SIGN, fill, runs_of, table
 from ncfix.text.shapes import Scan, block_of, in_slices, matches, scan_beside
 from ncfix.text.tree import Program, Template
 from ncfix_siemens.sinumerik.vocabulary import POLAR, POLES
@@ -53,7 +53,10 @@ def scan_slice(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     comments = np.array(final, dtype=np.int64).reshape(-1, 2)
     paths = PATH.finditer(source) if b";" in source else ()
     heads = block_of(blocks, np.array([match.start() for match in paths], dtype=np.int64)).tolist()
-    return scan_beside(text, blocks, quiet, comments, fixed=FIXED, named=in_names(text, source), apart=heads)
+    found = scan_beside(text, blocks, quiet, comments, fixed=FIXED, named=in_names(text, source), apart=heads)
+    signs = np.flatnonzero(SIGN[text[found.spans[:, 0]]])
+    loose = signs[BLANK[text[found.spans[signs, 0] + 1]]]  # `- 5`: a sign, and a number
+    return found.setting_apart(block_of(blocks, found.spans[loose, 0]).tolist())
 
 
 def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:

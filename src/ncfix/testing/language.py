@@ -16,10 +16,11 @@ from itertools import combinations, product
 from ncfix.compensate.driver import fix_program
 from ncfix.control.operations import Like
 from ncfix.control.setup import Setup
+from ncfix.diagnostics import SourceError
 from ncfix.machine import Machine
 from ncfix.testing.judging import OPTIONS, SETUP, Judged, judged, shifted_machine
 from ncfix.text.dialect import Dialect, get
-from ncfix.text.reader import read
+from ncfix.text.reader import read, shapes_of, texts_of
 
 NUMBERS: dict[str, float] = {
     "5.": 5.0,
@@ -35,6 +36,8 @@ NUMBERS: dict[str, float] = {
 WORDS_AT_ONCE = 4
 SIZES = (0, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4)
 """How many words a block has that is put together at random."""
+READ_AGAIN = 12
+"""Blocks at random that are read after others."""
 TOLD = 5
 """Faults that are told, of all that are found."""
 
@@ -166,7 +169,8 @@ def check_language(
     count       programs at random of each sort; 0: all there are, which takes long
 
     Bytes are kept: a program is what it was read from; a machine with no error to speak of changes nothing; comments
-    stay and mean nothing; numbers mean what they say however they are written. Every statement with every subset of
+    stay and mean nothing; numbers mean what they say however they are written; a block means the same whatever was
+    read before it. Every statement with every subset of
     its words, behind every mode, with block delete on and off; and frames, cutter compensation, cycles and machine
     coordinates across one another: each line is right, passed by a rule, or refused.
     """
@@ -174,10 +178,12 @@ def check_language(
     sample = gcode_statements(dialect) if statements is None else statements
     check_bytes(dialect, sample)
     check_numbers(dialect, sample)
+    chosen = random.Random(seed)
+    some = (" ".join((head, *words)).strip() for _, head, words in _blocks(sample, READ_AGAIN, chosen))
+    check_order(dialect, sample, (*sample.motions, *some), chosen)
     found: dict[str, int] = {}
     faults: list[str] = []
     machine = shifted_machine()
-    chosen = random.Random(seed)
     crosses = list(_crosses(sample))
     programs = [
         *_statements(sample, _blocks(sample, count, chosen)),
@@ -260,6 +266,39 @@ def check_numbers(dialect: Dialect, sample: Statements) -> None:
     first = next(iter(places))
     for text, place in places.items():
         assert abs(place - places[first]) < 1e-9, f"{dialect.name}: {text!r} and {first!r} do not mean what they say"
+
+
+WRITTEN = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)")
+RESPELLED = ("5", "+5", "-5.", " 5.5", " +5", " - 5", "+ 5", "-\t5", ".5", "05.0", "- .5", "  7")
+"""What is put where a block has a number; not all of it is right in each language."""
+
+
+def check_order(dialect: Dialect, sample: Statements, blocks: Iterable[str], chosen: random.Random) -> None:
+    """A block is read as the same, or cannot be read, whatever was read before it."""
+    for block in blocks:
+        texts = [block, *(WRITTEN.sub(lambda _: chosen.choice(RESPELLED), block) for _ in RESPELLED)]
+        alone = []
+        for text in texts:
+            shapes_of.cache_clear()
+            texts_of.cache_clear()
+            alone.append(_read_block(dialect, sample, text))
+        order = chosen.sample(range(len(texts)), len(texts))
+        for at, row in enumerate(order):
+            before = [texts[each] for each in order[:at]]
+            found = _read_block(dialect, sample, texts[row])
+            told = f"{dialect.name}: {texts[row]!r} is read as {found} after {before}, and as {alone[row]} without"
+            assert found == alone[row], told
+
+
+def _read_block(dialect: Dialect, sample: Statements, text: str) -> tuple[object, ...]:
+    """What a block is read as: its items and the places of its numbers, or the code of the error."""
+    lines = (sample.begin[0], text, *sample.end)
+    try:
+        program = read("\n".join(lines).encode("latin-1"), "part", dialect)
+    except SourceError as error:
+        return (error.code,)
+    items, numbers = program.templates[program.template[1]].items, slice(*program.first_number[1:3].tolist())
+    return items, program.number_spans[numbers].tolist(), program.numbers[numbers].tolist()
 
 
 # -- statements -------------------------------------------------------------------------------------------------------

@@ -252,13 +252,7 @@ class ProgramReading:
         if limit and len(blocks) == 1 and lengths[0] > limit:
             return ONE_UNSCANNED
         found = self.language.scan(self.source[start:end], moved_by(blocks, -start))
-        long = np.flatnonzero(lengths > limit) if limit else ()
-        if not len(long):
-            return found
-        found = found.expanded()
-        for row in long:
-            found.shapes[row] = None
-        return found
+        return found.setting_apart(np.flatnonzero(lengths > limit).tolist()) if limit else found
 
     def learn(self, first: int, row: int, scan: Scan, exact: dict[int, Parsed]) -> int:
         """The template of a block that is the first of its shape here, or that has to be taken as it is."""

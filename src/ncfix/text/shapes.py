@@ -111,6 +111,16 @@ class Scan:
             return self
         return replace(self, shapes=[self.shapes[index] for index in self.group.tolist()], group=None)
 
+    def setting_apart(self, blocks: Sequence[int]) -> Scan:
+        """The same, where some blocks must be taken as they are."""
+        if not len(blocks):
+            return self
+        found = self.expanded()
+        shapes = list(found.shapes)
+        for block in blocks:
+            shapes[block] = None
+        return replace(found, shapes=shapes)
+
 
 def split_blocks(source: bytes) -> NDArray[np.int64]:
     """Start and stop byte of each line, shape (n, 2), line ends not included.
