@@ -38,8 +38,7 @@ class Deviations(Expected):
     """What ways are judged by."""
 
     def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float) -> None:
-        super().__init__(first, second, machine, given)
-        self.tolerance = (second.stamp.tolerance_um if second.stamp else tolerance_um) / 1e3
+        super().__init__(first, second, machine, given, tolerance_um)
         self._digits: dict[float, float] = {}
 
     def gaps(self, meant: Array, done: Array, rows: NDArray[np.intp], given: PoseColumns) -> Array:

@@ -19,6 +19,8 @@ SLACK = 3e-6
 """mm; numbers agree to that, apart from digits: the correction is solved to 1 nm."""
 FULL = 0.2
 """mm within which commands are taken for those of a correction that turns rotary axes, too."""
+WHOLE_TURN = 2 * math.pi - 1e-9
+"""rad; an arc that turns farther is a full circle: it ends where it begins, which is right to the digit there only."""
 KEPT = 1000
 """Answers that are kept for the same question soon again."""
 PoseColumns = tuple[Mask, Array, Array]
@@ -29,11 +31,13 @@ class Expected:
     """The steps of an original and of its correction, by line, and where the correction of each should end.
 
     expected    line of the original -> command (n_axes,), mm and rad
-    directions  line of the original -> the last direction of each axis; 0 where it is not sure
+    directions  line of the original -> the last direction of each axis; 0 where it has not moved yet, or is not sure
+    one_sided   lines of the original at whose ends it is known of every axis with play how it came there, or that it
+                has not moved yet: then `fix` and this reader take the middle
     """
 
-    def __init__(self, first: Text, second: Text, machine: Machine, given: Given) -> None:
-        self.first, self.second = first, second
+    def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float = 1.0) -> None:
+        self.first, self.second, self.given = first, second, given
         x, y, z = (a + b for a, b in zip(machine.workpiece_offset, given.workpiece_offset, strict=True))
         self.machine = machine.replace(workpiece_offset=(x, y, z), conditions=dict(given.inputs))
         self.model = TipModel.of(self.machine)
@@ -44,6 +48,7 @@ class Expected:
         self.foreign = ours.foreign
         self.theirs = {step.row: step for step in theirs.run(second)}
         self.our_ends, self.their_ends = self._ends(self.ours), self._ends(self.theirs)
+        self.tolerance = (second.stamp.tolerance_um if second.stamp else tolerance_um) / 1e3
         self._halves: dict[tuple[Any, ...], Array] = {}
         self._near: dict[float, list[float]] = {}
         self._leads: dict[tuple[int, int], bool] = {}
@@ -55,6 +60,7 @@ class Expected:
         """Work out where corrected motions should end."""
         self.expected: dict[int, Array] = {}
         self.directions: dict[int, NDArray[np.int8]] = {}
+        self.one_sided: set[int] = set()
         model = self.model
         if model is None:
             return
@@ -74,21 +80,36 @@ class Expected:
         last = np.zeros(len(self.machine.axes), dtype=np.int8)
         if not self.machine.depends_on_direction:
             self.directions = dict.fromkeys((step.row for step in steps), last)
+            self.one_sided = set(self.directions)
             return
         ways, rows = Ways.of(self.model, steps), np.arange(len(steps))
         tcp = np.array([step.tcp for step in steps])
         length = np.nan_to_num(np.array([step.length for step in steps]))
-        before = self.model.joints(ways.at(rows, np.full(len(steps), 1 - 1e-4)), tcp, length)
-        way = self.model.joints(ways.end, tcp, length) - before
+        end = self.model.joints(ways.end, tcp, length)
+        way, lately, at_last = (
+            end - self.model.joints(ways.at(rows, np.full(len(steps), 1 - share)), tcp, length)
+            for share in (1e-4, 1e-2, 1e-6)
+        )
         signs = np.where(np.isfinite(way) & (np.abs(way) > 1e-11), np.sign(way), 0).astype(np.int8)
-        found = {step.row: sign for step, sign in zip(steps, signs, strict=True)}
-        tcp_before = False
+        clear = np.isfinite(way) & ((np.abs(lately) < 1e-9) | ((lately > 0) == (at_last > 1e-11)))
+        clear &= (np.abs(lately) < 1e-9) | ((lately < 0) == (at_last < -1e-11))  # it does not turn round at the end
+        found = {step.row: (sign, at) for step, sign, at in zip(steps, signs, clear, strict=True)}
+        tcp_before, sure = False, np.ones(len(last), dtype=bool)
+        placed = np.array([name in self.given.initial for name in self.machine.axis_names])
+        """Axes of which it is not only assumed where they stood before they moved for the first time."""
+        directed = list(self.machine.directed)
         for row in sorted(self.ours):
-            sign, tcp_now = found.get(row), self.ours[row].tcp
-            sign = None if tcp_now != tcp_before else sign
-            last = np.zeros_like(last) if sign is None else np.where(sign != 0, sign, last)
+            sign, known = found.get(row, (None, sure))
+            tcp_now = self.ours[row].tcp
+            if sign is None or tcp_now != tcp_before:
+                last, sure = np.zeros_like(last), np.zeros_like(sure)
+            else:
+                last, sure = np.where(sign != 0, sign, last), known & (placed | (sign == 0)) & (sure | (sign != 0))
+                placed = placed | (sign != 0)
             tcp_before = tcp_now
             self.directions[row] = last
+            if sure[directed].all():
+                self.one_sided.add(row)
 
     def columns(self, steps: Sequence[AxisStep]) -> tuple[Array, Mask, Array, Array]:
         """Ends (n, n_axes), under tool-centre-point control (n,), tool lengths (n,), directions (n, n_axes)."""
@@ -123,6 +144,8 @@ class Expected:
             if self.strategy == "full":
                 reach = np.where(self.machine.rotary, self.machine.max_correction[1], FULL)
             near = self._near[step.unit] = reach.tolist()
+        if abs(step.sweep) > WHOLE_TURN:
+            near = [max(reach, self.tolerance) for reach in near]
         places = zip(step.said, self.their_ends[at].tolist(), self.expected[row].tolist(), near, strict=True)
         return all(abs(there - wanted) <= reach for said, there, wanted, reach in places if said)
 
@@ -161,16 +184,16 @@ class Expected:
 
     def sure_of_side(self, step: AxisStep) -> bool:
         """Whether the direction of every axis is known on which an error depends."""
-        return step.row in self.directions and all(
-            self.directions[step.row][column] != 0 for column in self.machine.directed
-        )
+        return step.row in self.one_sided
 
     def is_followed(self, row: int) -> bool:
         """Whether it is known where a line should lead, or that it leads nowhere."""
         step = self.ours.get(row)
         if step is None:
             return True
-        return row in self.sure and (not self.machine.depends_on_direction or self.sure_of_side(step))
+        if row not in self.sure or not all(step.said[self.machine.axis_names.index(name)] for name in step.named):
+            return False
+        return not self.machine.depends_on_direction or (self.sure_of_side(step) and abs(step.sweep) <= WHOLE_TURN)
 
     def _ends(self, steps: Mapping[int, AxisStep]) -> dict[int, Array]:
         """The ends of steps, mm and rad, by line."""

@@ -216,7 +216,7 @@ class WordAddressFollower(AxisFollower):
             case 730 | 740 | 810 | 820 | 830 | 840 | 850 | 860 | 870 | 880 | 890 if self.family is Family.WORDS:
                 if self.kind != Kind.HOLE:
                     self.cycle = {}
-                    self.before_cycle = self.at.get("Z", NAN)
+                    self.before_cycle, self.said_before = self.at.get("Z", NAN), self.said.get("Z", False)
                 self.kind = Kind.HOLE
             case 800 if self.family is Family.WORDS:
                 self.kind = None if self.kind == Kind.HOLE else self.kind
@@ -273,6 +273,8 @@ class WordAddressFollower(AxisFollower):
         tool = int(number) if number is not None else self.tool
         if any(word.name == "H" and word.value is None for word in line.codes):
             self.lost["H"] = "a length offset is a formula"
+        if self.tcp and tcp:
+            self.at.update(dict.fromkeys("XYZ", NAN))  # the same place has other numbers for another tool
         self.tool = tool
         self.lead(tcp)
         self.new_length(self.length_of(tool))
@@ -305,8 +307,13 @@ class WordAddressFollower(AxisFollower):
         self.said["Z"] = True
         step = self.step(row, Kind.HOLE, bottom, line)
         level = self.cycle.get("R", NAN)
-        back = level if self.returns_to_level else max(level, self.before_cycle)
+        back = level
+        if not self.returns_to_level and not level >= self.before_cycle:
+            back = (
+                NAN if self.returns_to_level is None else self.before_cycle
+            )  # the control has its own way at the start
         self.at = {**bottom, "Z": back}
+        self.said["Z"] = self.said_before or back != self.before_cycle
         return step
 
 

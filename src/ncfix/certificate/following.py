@@ -120,8 +120,9 @@ class AxisFollower:
         self.feed: float | None = None
         self.feed_mode = 94
         self.cycle: dict[str, float] = {}
-        self.returns_to_level = False
-        self.before_cycle = NAN
+        self.returns_to_level: bool | None = None
+        self.before_cycle, self.said_before = NAN, False
+        """Where Z stood before the cycles, and whether the program has brought it there."""
         self.pole: dict[str, float] = {}
         self.shifts: dict[str, float] = {}
         """What the program itself adds to the numbers of axes, mm or degree: G92, TRANS."""

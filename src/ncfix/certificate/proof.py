@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix.certificate.deviations import FEW, MANY, Deviations, MovedPair
-from ncfix.certificate.expected import SLACK
+from ncfix.certificate.expected import SLACK, WHOLE_TURN
 from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, AxisStep, Given, Kind
 from ncfix.certificate.model import Array, Ways
 from ncfix.certificate.pairing import BlockFault, LinePair, Pairing, text_faults
@@ -295,7 +295,7 @@ class Prover(Deviations):
         rotary, (low, high) = self.machine.rotary, self.machine.ranges.T
         halves = np.array([self.half_steps(each.step, len(each.pieces) > 1) for each in moved])
         right = (np.abs(done - expected) <= halves * 1.002 + np.where(rotary, TURNED, SLACK)).all(axis=1)
-        right &= np.array([all(each.step.said) for each in moved])
+        right &= (np.array([each.step.said for each in moved]) | rotary).all(axis=1)
         added = np.where(rotary, 0.0, np.abs(done - meant))
         least = np.where(rotary, np.inf, self.machine.least_increment[0] / 2)
         right &= (added <= self.machine.max_correction[0] + least).all(axis=1)
@@ -341,15 +341,20 @@ class Prover(Deviations):
             side = self.directions[step.row][None].astype(np.float64)
             expected = self.model.aimed(meant[None], tcp, length, side, done[None])[0]
             expected = np.where(rotary, done, expected)
-        said = np.array(step.said)
+        said = np.array(step.said) | (rotary if not full else False)  # no other strategy turns rotary axes
         off = np.where(said, np.abs(done - expected), 0.0)
         loose = full or any(row in self.polar for row in range(pair.first, pair.last + 1))
+        loose = loose or abs(step.sweep) > WHOLE_TURN
         if not said.all() and self._changed(pair):
             most = self.half_steps(step, True) + np.where(rotary, TURNED, AS_IF)
             return (UNSAID, True) if loose or (off <= most).all() else (OFF.format(*self._worst(off, most)), False)
-        allowed = self.half_steps(step, len(pieces) > 1) * 1.002 + np.where(
-            rotary, TURNED, self.tolerance if loose else SLACK
-        )
+        halves = self.half_steps(step, len(pieces) > 1)
+        if len(pieces) == 1:  # less than a digit of the control is left out
+            left = [
+                name in step.named and pieces[0].named.get(name) == step.named[name] for name in self.machine.axis_names
+            ]
+            halves = np.where(left, self.half_steps(step, True), halves)
+        allowed = halves * 1.002 + np.where(rotary, TURNED, self.tolerance if loose else SLACK)
         added = np.where(said & ~rotary, np.abs(done - meant), 0.0)
         if (off > allowed).any():
             if not self._changed(pair):

@@ -1,0 +1,60 @@
+"""What the second reader takes for known where a program begins: axes that it never names, sides of play, cycles."""
+
+from __future__ import annotations
+
+import pytest
+
+from certificate.planting import machine
+from ncfix.certificate.following import Given
+from ncfix.certificate.proof import BlockProof, prove
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
+from ncfix.control.setup import Setup
+from ncfix.text.dialect import get
+from ncfix.text.reader import read
+
+
+def proof_of(text: bytes, name: str, initial: dict[str, float], dialect: str = "linuxcnc") -> BlockProof:
+    """The proof of the correction of a program on a machine of the goldens."""
+    setup, given = Setup(initial=initial, assume_zero=True), Given(initial=initial, assume_zero=True)
+    options = FixOptions(verify=False, allow_refused=True)
+    known = machine(name)
+    fixed = fix_program(read(text, "part", get(dialect)), known, setup, options).text
+    return prove(text, fixed, known, given, dialect)
+
+
+LINES = b"G21 G90 G17 G40\nG0 X10. Y20. Z30.\nG1 X15. Y10. Z5. F300.\nX-20.\nY-3.\nG2 X-10. Y7. I10. J0.\nM30\n"
+
+
+@pytest.mark.parametrize("name", ["three", "table", "head"])
+def test_rotary_axes_that_a_program_never_names_do_no_harm(name: str) -> None:
+    proof = proof_of(LINES, name, {})
+    assert (proof.faults, proof.unproved, proof.proved_motions) == ([], 0, 5)
+
+
+def test_axes_with_play_that_have_not_moved_are_in_the_middle() -> None:
+    place = {"X": 0.0, "Y": 0.0, "Z": 200.0}
+    proof = proof_of(LINES[: LINES.index(b"G2 ")] + b"M30\n", "play", place)
+    assert (proof.faults, proof.unproved) == ([], 0)
+    unknown = proof_of(LINES[: LINES.index(b"G2 ")] + b"M30\n", "play", {})
+    assert unknown.faults == []
+    assert [*unknown.reasons] == ["play: the side of an axis is not known to this reader"]
+
+
+def test_an_arc_that_ends_where_an_axis_turns_round_is_not_called_faulty() -> None:
+    text = b"G21 G90 G17\nG0 X10. Y0. Z5.\nG1 Y-5. F200.\nG3 X15. Y0. I0. J5.\nG1 X15. Y10.\nM30\n"
+    assert proof_of(text, "play", {"X": 0.0, "Y": 0.0, "Z": 200.0}).faults == []
+
+
+def test_where_a_cycle_goes_back_to_is_not_guessed() -> None:
+    text = b"G21 G90 G17\nG0 X0 Y0 Z20\n%sG81 X10 Y5 Z-4 R2 F100\nX20\nG80\nG1 X0\nM2\n"
+    assert proof_of(text % b"", "table", {}).reasons["where an axis stands is not known"] == 1
+    for code in (b"G98 ", b"G99 "):
+        proof = proof_of(text % code, "table", {})
+        assert (proof.faults, proof.unproved) == ([], 0)
+
+
+def test_full_circles_end_within_the_tolerance_and_inches_to_the_digit_of_the_control() -> None:
+    text = b"G20 G90 G17\nG0 X1.5 Y0.25 Z0.5\nG1 X1.00000000 Y0.50000000 F10.\nG2 Z0.5 I0.25 J0.\nG1 X2.\nM2\n"
+    proof = proof_of(text, "table", {})
+    assert (proof.faults, proof.unproved) == ([], 0)
