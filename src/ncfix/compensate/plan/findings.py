@@ -5,7 +5,7 @@ Findings of the parts of a program are put together in `Notes`: the first few ar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,10 +26,11 @@ class Finding:
     code    stable code, explained in `codes.py`
     moves   (k,) indices of the motions, ascending
     values  (k,) one figure per motion, in the unit that `text` names
-    text    sentence with the fields `{value}`, `{axis}` and `{unit}`
+    text    sentence with the fields `{value}`, `{axis}`, `{unit}` and `{range}`
     axes    (k,) axis letter per motion, or empty
     hint    what to do about it
     turns   (k,) whether that axis is rotary, and the value in degrees; or empty
+    ranges  the range of each axis in words, by letter; or empty
     """
 
     code: str
@@ -39,6 +40,7 @@ class Finding:
     axes: tuple[str, ...] = ()
     hint: str = ""
     turns: tuple[bool, ...] = ()
+    ranges: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.moves)
@@ -47,7 +49,8 @@ class Finding:
         """What is the matter with the k-th motion."""
         axis = self.axes[k] if self.axes else ""
         unit = "degrees" if self.turns and self.turns[k] else "mm"
-        return self.text.format(value=float(self.values[k]), axis=axis, unit=unit)
+        range_ = self.ranges.get(axis, "")
+        return self.text.format(value=float(self.values[k]), axis=axis, unit=unit, range=range_)
 
     def among(self, chosen: Sequence[bool]) -> Finding:
         """Some of the motions, (k,)."""

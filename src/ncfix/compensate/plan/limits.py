@@ -73,8 +73,8 @@ def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
         either = np.fmax(programmed, _begun_beyond(written, corrected))
         corrected[either > FUZZ] = -np.inf
         programmed = np.where(some(programmed > FUZZ)[:, None], programmed, either)
-    outside = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known"
-    over = "the correction takes axis {axis} {value:.4g} {unit} beyond its range"
+    outside = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known, {range}"
+    over = "the correction takes axis {axis} {value:.4g} {unit} beyond its range, {range}"
     return _of_axes(written, "NCF405", outside, programmed), _of_axes(written, "NCF404", over, corrected)
 
 
@@ -248,7 +248,10 @@ def _of_axes(written: WrittenPieces, code: str, text: str, beyond: Array) -> Fin
     units = np.where(machine.rotary, 180 / np.pi, 1.0)[axis[rows]]
     letters = machine.axis_names
     names = tuple(letters[j] for j in axis[rows].tolist())
-    return Finding(code, rows, most[rows] * units, text, names, turns=tuple(machine.rotary[axis[rows]].tolist()))
+    ends = np.where(machine.rotary[:, None], np.degrees(machine.ranges), machine.ranges).tolist()
+    ranges = {letter: f"{low:.10g} to {high:.10g}" for letter, (low, high) in zip(letters, ends, strict=True)}
+    turns = tuple(machine.rotary[axis[rows]].tolist())
+    return Finding(code, rows, most[rows] * units, text, names, turns=turns, ranges=ranges)
 
 
 def _worst(moves: Index, values: Array) -> tuple[Index, Array]:
