@@ -14,6 +14,7 @@ from ncfix.diagnosis.mistakes import find
 from ncfix.diagnosis.residual_data import is_free
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Polynomial
+from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Measurement
 
@@ -158,3 +159,38 @@ def test_a_file_that_is_right_has_no_mistake(data: Measurement, known: Machine) 
 def test_a_mistake_that_is_refused_is_not_named(data: Measurement, known: Machine) -> None:
     wrong = find([columns(data, -1.0, "dy")], known, ["sign-of-dy"])
     assert wrong is None or wrong.name != "sign of dy"
+
+
+TABLES = ("EXX", "EYX", "EZX", "EXY", "EYY", "EZY", "EXZ", "EYZ", "EZZ")
+
+
+def with_tables(known: Machine, names: tuple[str, ...], seed: int) -> Machine:
+    """The constants of a machine, and a table of its own for each of these errors: walks of 8 um rms."""
+    random, effects = np.random.default_rng(seed), [effect for effect in known.effects if is_free(effect)]
+    for name in names:
+        places = np.linspace(*next(axis.range for axis in known.axes if axis.name == name[2]), 13)
+        walk = np.cumsum(random.normal(size=13))
+        walk -= np.polyval(np.polyfit(places, walk, 1), places)
+        table = PiecewiseLinear(positions=tuple(places.tolist()))
+        effects.append(Effect(name, tuple((0.008 * walk / np.sqrt(np.mean(walk**2))).tolist()), table))
+    return known.replace(effects=tuple(effects))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_tables_of_another_machine(known: Machine, seed: int) -> None:
+    """None of them holds, and nine curves are missing: each name by itself would say no such thing."""
+    seen = simulate(plan(known, "tcp", 200, seed), with_tables(known, TABLES, seed), Faults(3.0), seed)
+    wrong = find([seen], with_tables(known, TABLES, 100 + seed))
+    assert wrong is not None
+    assert wrong.name == "another machine"
+    assert wrong.sure
+    assert all(is_free(effect) for effect in wrong.machine.effects)
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_some_tables_that_changed_are_not_another_machine(known: Machine, count: int) -> None:
+    true = with_tables(known, TABLES, 5)
+    changed = {effect.name: effect for effect in with_tables(known, TABLES, 6).effects if effect.name in TABLES[:count]}
+    seen = simulate(plan(known, "tcp", 200, 5), true, Faults(3.0), 5)
+    wrong = find([seen], true.replace(effects=tuple(changed.get(effect.name, effect) for effect in true.effects)))
+    assert wrong is None or wrong.name != "another machine"

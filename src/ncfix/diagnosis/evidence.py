@@ -40,8 +40,9 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
-from ncfix.diagnosis.forms import EffectForm, shape_variations
+from ncfix.diagnosis.forms import EffectForm, shape_variations, side_by_side
 from ncfix.diagnosis.residual_data import ResidualData
+from ncfix.measure.least_squares import inverse
 from ncfix.measure.measurement import Array, Index
 
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
@@ -100,12 +101,12 @@ class Background:
             if self.slow is not None:
                 inner = inner + self.drift**2 * self.slow
             scale = self.sigma * self.relative
-            self.precisions[share] = np.linalg.inv(inner) / scale[:, None] / scale
+            self.precisions[share] = inverse(inner) / scale[:, None] / scale
         return self.precisions[share]
 
     def seen(self, columns: Array) -> Array:
         """Columns (m, p) or values (m,) um in the coordinates, in units of `sigma`."""
-        scaled: Array = self.rotation.T @ columns / self.sigma
+        scaled: Array = (columns.T @ self.rotation / self.sigma).T
         return scaled
 
     def variance(self, share: float) -> Array:
@@ -190,7 +191,7 @@ class Evidence:
     def __post_init__(self) -> None:
         """Carry everything into the coordinates, once."""
         none = np.zeros((len(self.background.data.y), 0))
-        columns = np.concatenate([none, *(group.columns for group in self.groups)], axis=1)
+        columns = side_by_side([none, *(group.columns for group in self.groups)])
         self.columns = self.background.seen(columns)
         self.bounds = np.concatenate([[0], np.cumsum([group.columns.shape[1] for group in self.groups])])
         self.y = self.background.seen(self.background.data.y)
@@ -321,11 +322,10 @@ class Evidence:
     def _blocks(self, share: float) -> Blocks:
         """The inner products of all groups with themselves; computed once."""
         if share not in self.blocks:
-            variance, self.blocks[share] = self.background.variance(share), []
+            weighed, self.blocks[share] = self.columns.T / self.background.variance(share), []
             for alike in self._by_width().values():
                 places = np.array([range(self.part(k).start, self.part(k).stop) for k in alike], dtype=np.int64)
-                stack = np.stack([self.columns[:, self.part(k)] for k in alike])
-                products = np.swapaxes(stack, 1, 2) @ (stack / variance[:, None])
+                products = np.stack([weighed[self.part(k)] @ self.columns[:, self.part(k)] for k in alike])
                 self.blocks[share].append((np.asarray(alike), places.reshape(len(alike), -1), products))
         return self.blocks[share]
 
@@ -357,20 +357,17 @@ def log_odds(inner: Array, projected: Array, total: float, count: float, sizes: 
     `total` is the sum of squares of the data, `count` its freedom. One Cholesky factor of [[I/s^2 + B, a], [a', total]]
     has the determinant in its diagonal and what the columns gain in its last row.
     """
-    width = inner.shape[-1]
-    bordered = np.empty((*inner.shape[:-2], width + 1, width + 1))
-    bordered[..., :width, :width] = inner
-    bordered[..., width, :width] = bordered[..., :width, width] = projected
+    width, each = inner.shape[-1], np.asarray(sizes)
+    bordered = np.zeros((*inner.shape[:-2], len(each), width + 1, width + 1))  # the lower half is all that counts
+    bordered[..., :width, :width] = inner[..., None, :, :]
+    bordered[..., width, :width] = projected[..., None, :]
     bordered[..., width, width] = total
     places = np.arange(width)
-    odds = np.empty((*inner.shape[:-2], len(sizes)))
-    for k, size in enumerate(sizes):
-        own = bordered.copy()
-        own[..., places, places] += size**-2
-        factor = np.linalg.cholesky(own)
-        occam = width * np.log(size) + np.log(factor[..., places, places]).sum(axis=-1)
-        gain = (factor[..., width, :width] ** 2).sum(axis=-1)
-        odds[..., k] = -occam - 0.5 * count * np.log1p(-np.minimum(gain / total, 1 - 1e-12))
+    bordered[..., places, places] += each[:, None] ** -2
+    factor = np.linalg.cholesky(bordered)
+    occam = width * np.log(each) + np.log(factor[..., places, places]).sum(axis=-1)
+    gain = (factor[..., width, :width] ** 2).sum(axis=-1)
+    odds: Array = -occam - 0.5 * count * np.log1p(-np.minimum(gain / total, 1 - 1e-12))
     return odds
 
 

@@ -19,9 +19,9 @@ same, the effect is not in the catalogue.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,7 @@ from ncfix.diagnosis.residual_data import UNTELLABLE, ResidualData
 from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE, Axis, component_title
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
-from ncfix.measure.least_squares import orthonormal, without
+from ncfix.measure.least_squares import orthonormal
 from ncfix.measure.measurement import Array
 from ncfix.measure.observation import base_from_workpiece
 
@@ -93,6 +93,8 @@ WAVES = (1.0, 0.7, 0.5, 0.3, 0.2, 0.2)
 PLAY = (1.0, 1.0, 0.5, 0.3)
 JointPart = tuple[str, dict[str, Any], Array]
 """Component, options of the effect, and the loading of its coefficients."""
+TOLD = 1e-6
+"""Squares of the least of some independent columns, of the largest, that are far from rounding errors."""
 SAME_AS_NAME = 0.8
 """Share of an error's squares, beside what is free, that makes it the same as a name."""
 
@@ -135,7 +137,7 @@ def visible_forms(data: ResidualData, candidates: Sequence[Candidate]) -> Visibl
         if candidate.grows:
             design, loadings = data.expansion(candidate.effects), tuple(expansion_loadings(loadings))
         forms = [form for loading in loadings if (form := _form(data, candidate, loading, design)) is not None]
-        shares = [_visible_share(basis, form.columns / data.relative[:, None]) for form in forms]
+        shares = _visible_shares(data, basis, forms)
         seen = [form for form, share in zip(forms, shares, strict=True) if share >= VISIBLE]
         groups += seen
         if not seen:
@@ -160,8 +162,8 @@ def changes(data: ResidualData, groups: Sequence[EffectForm], first: int) -> tup
     basis, found = orthonormal(data.base / data.relative[:, None]), []
     for group in groups:
         columns = np.where(later[:, None], group.columns, 0.0)
-        size = data.rms(np.linalg.norm(columns, axis=1))
-        if size > UNSEEN_UM and _visible_share(basis, columns / data.relative[:, None]) >= VISIBLE:
+        size = data.rms(columns)
+        if size > UNSEEN_UM and _visible_shares(data, basis, [replace(group, columns=columns)])[0] >= VISIBLE:
             owner = replace(group.owner, name=CHANGE + group.owner.name, title=CAME + group.owner.title, constant=False)
             found.append(EffectForm(owner, group.loading / size, columns / size))
     return tuple(found)
@@ -196,11 +198,11 @@ def _form(data: ResidualData, candidate: Candidate, loading: Array, design: Arra
     """The form at a size of 1 um, with as few columns as it needs."""
     used = loading.any(axis=1)
     columns = design @ loading if used.all() else design[:, used] @ loading[used]
-    size = data.rms(np.linalg.norm(columns, axis=1))
+    size = data.rms(columns)
     if size < UNSEEN_UM or _lead_squares(candidate, loading, design) < LEAD_SHARE * size**2 * data.count:
         return None
-    turned = principal_rotation(columns / size)
-    return EffectForm(candidate, loading @ turned / size, columns @ turned / size)
+    turned = principal_rotation(columns) / size
+    return EffectForm(candidate, loading @ turned, columns @ turned)
 
 
 def _lead_squares(candidate: Candidate, loading: Array, design: Array) -> float:
@@ -220,8 +222,24 @@ def principal_rotation(columns: Array) -> Array:
     return kept
 
 
-def _visible_share(basis: Array, columns: Array) -> float:
-    return float((without(basis, columns) ** 2).sum() / (columns**2).sum())
+def side_by_side(parts: Iterable[Array]) -> Array:
+    """Columns (m, ...) of several beside one another, each column in one piece of memory."""
+    return np.concatenate([part.T for part in parts]).T
+
+
+def _ends(groups: Sequence[EffectForm]) -> list[int]:
+    """Where the columns of each begin and end, once they stand side by side."""
+    return np.cumsum([0, *(group.columns.shape[1] for group in groups)]).tolist()
+
+
+def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> list[float]:
+    """Share of the squares that each form shows, in units of each value's noise, beside an orthonormal basis."""
+    if not groups:
+        return []
+    columns = np.concatenate([group.columns.T for group in groups]) / data.relative
+    squares, hidden = np.einsum("ij,ij->i", columns, columns), ((columns @ basis) ** 2).sum(axis=1)
+    parts = [slice(start, stop) for start, stop in pairwise(_ends(groups))]
+    return [float(1.0 - hidden[part].sum() / squares[part].sum()) for part in parts]
 
 
 def _smooth_fields(data: ResidualData) -> Iterator[EffectForm | None]:
@@ -318,11 +336,12 @@ def shape_variations(data: ResidualData) -> Array:
 
 def combined_form(data: ResidualData, owner: Candidate, parts: Sequence[Array]) -> EffectForm | None:
     """The parts with the same share each, at a size of 1 um together, with as few columns as they need."""
-    sizes = [data.rms(np.linalg.norm(part, axis=1)) for part in parts]
-    columns = [part / size for part, size in zip(parts, sizes, strict=True) if size > 0]
-    if not columns:
+    sizes = [data.rms(part) for part in parts]
+    count = sum(size > 0 for size in sizes)
+    if not count:
         return None
-    whole = np.concatenate(columns, axis=1) / np.sqrt(len(columns))
+    scaled = (part / (size * np.sqrt(count)) for part, size in zip(parts, sizes, strict=True) if size > 0)
+    whole = side_by_side(scaled)
     squares, vectors = np.linalg.eigh(whole.T @ whole)
     kept = np.cumsum(squares) > DROPPED * squares.sum()
     return EffectForm(owner, np.zeros((0, int(kept.sum()))), whole @ vectors[:, kept])
@@ -335,7 +354,7 @@ def _joint_forms(data: ResidualData) -> Iterator[EffectForm | None]:
     designs = _designs(data, [Effect(name, (), **options) for name, options, _ in parts])
     shown = iter([design @ loading for design, (_, _, loading) in zip(designs, parts, strict=True)])
     for axis, what, components in sorts:
-        own = [np.concatenate([next(shown) for _ in component], axis=1) for component in components]
+        own = [side_by_side([next(shown) for _ in component]) for component in components]
         yield combined_form(data, _something(axis, f"something of {axis.name}", what), own)
         for component, part in zip(components, own, strict=True):
             effects = zero([Effect(name, (), **options) for name, options, _ in component])
@@ -413,7 +432,7 @@ def unnamed_alternatives(data: ResidualData, named: Sequence[EffectForm]) -> tup
     anywhere = list(_smooth_fields(data))
     found = [group for group in (*anywhere, *(_joint_forms(data) if anywhere else ())) if group is not None]
     if found and any(group.owner.constant for group in named):
-        columns = without_lacking_constants(data, np.concatenate([group.columns for group in found], axis=1), named)
+        columns = without_lacking_constants(data, side_by_side(group.columns for group in found), named)
         ends = np.cumsum([group.columns.shape[1] for group in found])[:-1]
         parts = np.split(columns, ends, axis=1)
         found = [replace(group, columns=own) for group, own in zip(found, parts, strict=True)]
@@ -424,29 +443,51 @@ def _not_in_catalogue(
     data: ResidualData, groups: Sequence[EffectForm], named: Sequence[EffectForm]
 ) -> list[EffectForm]:
     """Without the single errors that a name holds already: those are that name with another shape, or course."""
-    basis, wanted = orthonormal(data.base / data.relative[:, None]), {key for group in groups for key in _errors(group)}
-    own: dict[str, list[Array]] = {}
-    held = [group for group in named if _errors(group) & wanted]
-    for group, left in zip(held, _beside(data, basis, held), strict=True):
-        span = orthonormal(left)
-        for key in _errors(group):
-            own.setdefault(key, []).append(span)
-    pairs = zip(groups, _beside(data, basis, groups), strict=True)
-    return [group for group, left in pairs if not _is_held(left, group, own)]
+    basis = orthonormal(data.base / data.relative[:, None])
+    single = [(group, errors) for group in groups if (errors := _errors(group))]
+    wanted = set().union(*(errors for _, errors in single))
+    holding = [(group, errors) for group in named if (errors := _errors(group) & wanted)]
+    spans = [_span(left) for left in _beside(data, basis, [group for group, _ in holding])]
+    shown = _beside(data, basis, [group for group, _ in single])
+    held: set[int] = set()
+    for error in sorted(wanted):
+        by = [span for span, (_, errors) in zip(spans, holding, strict=True) if error in errors and span.shape[1]]
+        asked = [k for k, (_, errors) in enumerate(single) if error in errors]
+        most = _largest_shown([shown[k] for k in asked], by)
+        held |= {k for k, squares in zip(asked, most, strict=True) if squares > SAME_AS_NAME * (shown[k] ** 2).sum()}
+    same = {id(single[k][0]) for k in held}
+    return [group for group in groups if id(group) not in same]
 
 
 def _beside(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> list[Array]:
     """What each form shows beside an orthonormal basis of what is free, in units of each value's noise."""
-    columns = np.concatenate([np.zeros((len(data.y), 0)), *(group.columns for group in groups)], axis=1)
-    ends = np.cumsum([group.columns.shape[1] for group in groups])[:-1]
-    return np.split(without(basis, columns / data.relative[:, None]), ends, axis=1) if groups else []
+    if not groups:
+        return []
+    left = np.concatenate([group.columns.T for group in groups]) / data.relative
+    for _ in range(2):  # twice, for the last digits
+        left -= (left @ basis) @ basis.T
+    return np.split(left.T, _ends(groups)[1:-1], axis=1)
+
+
+def _span(columns: Array) -> Array:
+    """An orthonormal basis of what columns span; by their inner products where these are well told apart."""
+    squares, turned = np.linalg.eigh(columns.T @ columns)
+    if squares[0] > TOLD * squares[-1]:
+        return np.asarray(columns @ (turned / np.sqrt(squares)))
+    return orthonormal(columns)
+
+
+def _largest_shown(parts: Sequence[Array], by: Sequence[Array]) -> list[float]:
+    """Of the squares of each part those that one orthonormal basis can show, the largest."""
+    if not by:
+        return [0.0] * len(parts)
+    squares = (side_by_side(by).T @ side_by_side(parts)) ** 2
+    rows = np.cumsum([0, *(each.shape[1] for each in by[:-1])])
+    columns = np.cumsum([0, *(each.shape[1] for each in parts[:-1])])
+    found: list[float] = np.add.reduceat(np.add.reduceat(squares, rows), columns, axis=1).max(axis=0).tolist()
+    return found
 
 
 def _errors(group: EffectForm) -> set[str]:
     """The errors it consists of; and the course of time if it is nothing but one, wherever it acts."""
     return {effect.name for effect in group.owner.effects} | ({"slow"} if group.owner.slow else set())
-
-
-def _is_held(left: Array, group: EffectForm, spans: Mapping[str, Sequence[Array]]) -> bool:
-    held = [((span.T @ left) ** 2).sum() for key in _errors(group) for span in spans.get(key, ())]
-    return bool(max(held, default=0.0) > SAME_AS_NAME * (left**2).sum())

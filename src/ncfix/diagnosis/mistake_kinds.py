@@ -12,6 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ncfix.diagnosis.foreign_tables import CurvesOfFile
 from ncfix.diagnosis.residual_data import TIGHT_UM, UM, Misfit, is_free, misfit, rows_of
 from ncfix.diagnosis.stale_tables import shifted_tables
 from ncfix.machine import Effect, Machine
@@ -32,6 +33,8 @@ NOWHERE_MM = 0.1
 """A first step that is smaller leads to none that is off: what it leaves is of second order."""
 SIDE = 0.3
 """Share of its way from which on a direction in which the point of an axis moved is named."""
+CLEARLY = 25.0
+"""Log odds of another machine's file against one of whose curves some have changed, from which on it is sure."""
 PIVOT, PIVOT_STEPS = "pivot", 3
 """The name of an axis point that is off; and steps in which it is moved to where the data have it."""
 INCH = 25.4
@@ -55,6 +58,7 @@ class Mistake:
     given_um             rms of the lengths that the file as given leaves
     odds, paid           log odds against the file as given, after what the mistake pays
     sure                 it reaches the noise: no names do better
+    gained               log odds before it pays, where it is sure though the noise is not reached
     """
 
     name: str
@@ -73,6 +77,7 @@ class Mistake:
     odds: float = 0.0
     paid: float = 0.0
     sure: bool = False
+    gained: float | None = None
 
 
 def at_first_sight(
@@ -97,9 +102,11 @@ def at_first_sight(
 
 def _designs(problem: Problem) -> list[tuple[Effect, Array]]:
     """Each effect of the file with its columns (m, p), mm."""
+    effects = problem.machine.effects
+    every = np.concatenate([each.design(effects) for each in problem.observations])
+    starts = np.cumsum([0, *(effect.basis.size for effect in effects)])
     return [
-        (effect, np.concatenate([each.design([effect]) for each in problem.observations]))
-        for effect in problem.machine.effects
+        (effect, every[:, start : start + effect.basis.size]) for effect, start in zip(effects, starts, strict=False)
     ]
 
 
@@ -275,15 +282,15 @@ class FirstOrder:
         return float(np.sqrt(((kept**2).sum() + (rest[len(y) :] ** 2).sum()) / len(kept)))
 
 
-def points_of_axes(measurements: tuple[Measurement, ...], machine: Machine) -> list[Mistake]:
+def points_of_axes(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> list[Mistake]:
     """Axis points that the data have elsewhere than the machine file, by more than axes move."""
     moved = [_pivot(measurements, machine, axis) for axis in machine.axes if axis.rotary]
     return [each for each in moved if each is not None]
 
 
-def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
     """Mistakes of positions, tools and axes, whose effect is not of first order."""
-    yield from points_of_axes(measurements, machine)
+    yield from points_of_axes(measurements, machine, now)
     if any("radius" in each.columns for each in measurements):
         return  # circles: the bar's length says where the axes were
     yield from _units(measurements, machine)
@@ -303,7 +310,7 @@ def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine) 
                 _times(measurements, [axis.name], -1.0),
             )
     yield from _unstated_tools(measurements, machine)
-    yield from _other_machine(measurements, machine)
+    yield from _other_machine(measurements, machine, now)
     for shifted, title in shifted_tables(measurements, machine):
         axes = sum(not axis.rotary for axis in machine.axes)
         yield Mistake("stale table", title, "", shifted, measurements, fitted=axes)
@@ -481,15 +488,22 @@ def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) 
     return Mistake(f"{PIVOT} {axis.name}", title, axis.name, moved, measurements, fitted=2, aliases=carriers)
 
 
-def _other_machine(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """The file of another machine with the same axes: nothing of its errors holds; its constants are fitted anew."""
-    constants = [replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects if is_free(e)]
-    if machine.is_perfect or len(constants) == len(machine.effects):
+def _other_machine(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
+    """The file of another machine with the same axes: nothing of its errors holds; its constants are fitted anew.
+
+    The curves of this machine are missing then, so that the noise is not reached: it is weighed with others drawn.
+    """
+    if machine.is_perfect or all(map(is_free, machine.effects)):
         return
+    curves = CurvesOfFile.of(now)
+    if curves.foreign - curves.changed < CLEARLY:
+        return
+    constants = [replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects if is_free(e)]
     own = misfit(measurements, machine.replace(effects=tuple(constants))).constants
     fitted = Selection(tuple(constants), (True,) * len(constants)).machine(machine.replace(effects=()), own.tolist())
     title = "another machine: nothing of the file's tables holds; it is another machine's file, or out of date"
-    yield Mistake("another machine", title, "", fitted, measurements, fitted=len(own), replaces=True)
+    gained = curves.foreign - curves.as_given + now.count * float(np.log(now.left() / now.free))
+    yield Mistake("another machine", title, "", fitted, measurements, fitted=len(own), replaces=True, gained=gained)
 
 
 def _with(machine: Machine, axis: Axis) -> Machine:

@@ -67,7 +67,7 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     standing = now.left(AS_IT_STANDS_UM)
     moved = standing >= SUSPECT * max(left, now.noise)  # constants that moved explain the data: or points of axes
     kinds = not_of_first_order if far else points_of_axes
-    deep = [each for each in kinds(measurements, machine) if plain(each.name) not in names] if far or moved else []
+    deep = [each for each in kinds(measurements, machine, now) if plain(each.name) not in names] if far or moved else []
     tried = _judged(measurements, machine, now, TIGHT_UM, deep, names)
     found = max(tried, key=lambda each: each.odds, default=None)
     if (found is None or found.odds <= 0) and moved:
@@ -89,7 +89,7 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     components = len(now.problem.values) / max(sum(map(len, measurements)), 1)
     near = [each for each in alike if each.odds > simplest.odds - ALIKE and each is not simplest]
     aliases = (*dict.fromkeys(each.name for each in near if each.name != simplest.name), *simplest.aliases)
-    sure = simplest.odds > NAMES_COST and _reaches_noise(simplest, now)
+    sure = simplest.odds > NAMES_COST and (simplest.gained is not None or _reaches_noise(simplest, now))
     return replace(simplest, given_um=standing * float(np.sqrt(components)), aliases=aliases, sure=sure)
 
 
@@ -129,6 +129,7 @@ def _tried(mistake: Mistake, before: float, now: Misfit, count: int, held_um: fl
     except (NcfixError, np.linalg.LinAlgError, ValueError):
         return replace(mistake, odds=-np.inf)
     paid, odds = _paid(mistake, now, count), _odds(left, before, mistake, now, count)
+    odds = odds if mistake.gained is None else mistake.gained - paid
     return replace(mistake, before_um=before, after_um=left, odds=odds, paid=paid)
 
 

@@ -23,17 +23,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, eigh, lapack, qr, solve_triangular
+from scipy.linalg import cholesky, eigh, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
 from ncfix.diagnosis.evidence import MISSHAPEN, Background, entry_price, in_noise, log_odds, marginal
-from ncfix.diagnosis.forms import EffectForm, shape_variations, without_lacking_constants
+from ncfix.diagnosis.forms import EffectForm, shape_variations, side_by_side, without_lacking_constants
 from ncfix.diagnosis.residual_data import ResidualData
-from ncfix.measure.least_squares import orthonormal
+from ncfix.measure.least_squares import inverse, orthonormal
 from ncfix.measure.measurement import Array, groups
 
-REFLECTIONS = 64
-"""Reflections that are carried out together."""
 DRIFT_TIME = 900.0
 """s: how long an instrument's wandering lasts."""
 DRIFT_SIZES = (0.0, 0.15, 0.35, 0.7)
@@ -74,16 +72,24 @@ ENOUGH_REPEATS = 10
 
 @dataclass(frozen=True, repr=False)
 class Contrasts:
-    """An orthonormal basis of what is orthogonal to the base: `columns` (m, n), and as the reflections that make it."""
+    """An orthonormal basis of what is orthogonal to the base, (m, n), as the last columns of 1 - V T V': of the
+    reflections that make it V (m, k) are the vectors, and T (k, k) is what makes one product of them.
+    """
 
-    columns: Array
-    reflections: tuple[Array, Array]
+    vectors: Array
+    joined: Array
+
+    @property
+    def columns(self) -> Array:
+        """The basis itself, (m, n)."""
+        m, k = self.vectors.shape
+        last: Array = np.eye(m, m - k, -k) - self.vectors @ (self.joined @ self.vectors[k:].T)
+        return last
 
     def seen(self, values: Array) -> Array:
         """Columns of values (m, p) as contrasts, (n, p); far quicker by a few reflections."""
-        columns = np.asfortranarray(values)
-        turned = lapack.dormqr("L", "T", *self.reflections, columns, REFLECTIONS * columns.shape[1])[0]
-        last: Array = turned[len(values) - self.columns.shape[1] :]
+        k = self.vectors.shape[1]
+        last: Array = values[k:] - self.vectors[k:] @ (self.joined.T @ (self.vectors.T @ values))
         return last
 
     def of(self, covariance: Array) -> Array:
@@ -96,9 +102,13 @@ def error_contrasts(base: Array) -> Contrasts:
     size = np.linalg.norm(base, axis=0)
     scaled = base[:, size > 0] / size[size > 0]
     basis = orthonormal(scaled)
-    reflections, _ = qr(basis, mode="raw", check_finite=False)
-    whole = lapack.dormqr("L", "N", *reflections, np.eye(len(basis), order="F"), REFLECTIONS * len(basis))[0]
-    return Contrasts(whole[:, basis.shape[1] :], reflections)
+    (packed, scales), _ = qr(basis, mode="raw", check_finite=False)
+    count = basis.shape[1]
+    vectors = np.tril(packed[:, :count], -1) + np.eye(len(basis), count)
+    products, joined = vectors.T @ vectors, np.diag(scales)
+    for k in range(count):  # Schreiber and Van Loan 1989
+        joined[:k, k] = -scales[k] * (joined[:k, :k] @ products[:k, k])
+    return Contrasts(vectors, joined)
 
 
 def everything_covariance(data: ResidualData, named: Sequence[EffectForm]) -> Array:
@@ -109,7 +119,8 @@ def everything_covariance(data: ResidualData, named: Sequence[EffectForm]) -> Ar
     groups = [group for group in named if not group.owner.constant]
     forms = Counter(group.owner.name for group in groups)
     parts = [group.columns / np.sqrt(forms[group.owner.name] * len(forms)) for group in groups]
-    columns = without_lacking_constants(data, np.concatenate([np.zeros((len(data.y), 0)), *parts], axis=1), named)
+    columns = side_by_side([np.zeros((len(data.y), 0)), *parts])
+    columns = without_lacking_constants(data, columns, named)
     covariance: Array = columns @ columns.T
     return covariance
 
@@ -191,7 +202,8 @@ class DriftLikelihood:
 
     def _factor(self, size: float) -> Array:
         if size not in self.factors:
-            covariance = np.eye(len(self.slow)) + EVERYTHING_SHARE**2 * self.everything + size**2 * self.slow
+            covariance = EVERYTHING_SHARE**2 * self.everything + size**2 * self.slow
+            covariance[np.diag_indices_from(covariance)] += 1.0
             self.factors[size] = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
         return self.factors[size]
 
@@ -287,7 +299,7 @@ def leave_one_out(data: ResidualData, there: Array) -> Array:
 def _precision(data: ResidualData, covariance: Array) -> Array:
     """The inverse of a covariance in units of each value's noise, with the base free, (m, m)."""
     base = orthonormal(data.base / data.relative[:, None])
-    precision = np.linalg.inv(covariance)
+    precision = inverse(covariance)
     solved = precision @ base
     return np.asarray(precision - solved @ np.linalg.solve(base.T @ solved, solved.T), dtype=np.float64)
 

@@ -9,7 +9,7 @@ How well a machine file as it stands agrees with data: its constants nearly fixe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -191,7 +191,7 @@ class ResidualData:
         """Root mean square over rows of the length of what each shows; values (m, ...), um, those in `keep` (m,)."""
         inside = self._inside if keep is None else self._inside & keep
         rows = self._seen if keep is None else len(np.unique(self.row[inside]))
-        return float(np.sqrt((values[inside] ** 2).sum() / max(rows, 1)))
+        return float(np.linalg.norm(values if inside.all() else values[inside]) / np.sqrt(max(rows, 1)))
 
     @cached_property
     def _inside(self) -> NDArray[np.bool_]:
@@ -318,12 +318,14 @@ class Misfit:
     relative  (m,) standard deviation of each value against that of a plain one
     noise     of the instrument, um
     loose     how many coefficients are free besides
+    fits      what is left and the constants for each prior that was asked, computed once
     """
 
     problem: Problem
     relative: Array
     noise: float
     loose: int
+    fits: dict[float, tuple[float, Array]] = field(default_factory=dict)
 
     def left(self, prior_um: float = TIGHT_UM) -> float:
         """Root mean square of residual values, um, without the largest; what constants moved is counted as misfit."""
@@ -352,8 +354,12 @@ class Misfit:
 
     def _fitted(self, prior_um: float) -> tuple[float, Array]:
         """What is left and the constants, held as far as errors of this machine are larger than of others."""
-        large = times_a_machining_centre(self.problem.machine)
-        return _fitted(self.problem, self.relative, self.noise, large * prior_um, self.loose, large * LOOSE_UM)
+        if prior_um not in self.fits:
+            large = times_a_machining_centre(self.problem.machine)
+            self.fits[prior_um] = _fitted(
+                self.problem, self.relative, self.noise, large * prior_um, self.loose, large * LOOSE_UM
+            )
+        return self.fits[prior_um]
 
 
 def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequence[Effect] = ()) -> Misfit:

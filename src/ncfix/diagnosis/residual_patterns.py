@@ -15,14 +15,14 @@ from scipy.special import chdtrc
 from ncfix.diagnosis.evidence import Background
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array
+from ncfix.measure.measurement import Array, Index
 
 SHOWN = 6
 UNLIKELY = 1e-3
 NEARLY = 0.99
 """Share of the largest gain at which a simpler pattern is preferred."""
-NEAR = 6
-"""Neighbours of a pose."""
+NEAR, BLOCK = 6, 500
+"""Neighbours of a pose, and poses whose neighbours are sought together."""
 
 
 @dataclass(frozen=True)
@@ -127,12 +127,10 @@ def clustering(background: Background, residual: Array, places: Array) -> float:
 
     residual (m,) um; places (n, k) of the rows. Source: Moran, "Notes on continuous stochastic phenomena" (1950).
     """
-    from scipy.spatial import cKDTree
-
     data = background.data
     if data.count <= NEAR + 1:
         return 0.0
-    _, near = cKDTree(places).query(places, k=NEAR + 1)
+    near = np.concatenate([_nearest(places, part) for part in np.array_split(places, -(-len(places) // BLOCK))])
     total, count, square = 0.0, 0, 0.0
     for name in dict.fromkeys(data.names):
         own = np.array([each == name for each in data.names]) & (data.row >= 0)
@@ -143,3 +141,11 @@ def clustering(background: Background, residual: Array, places: Array) -> float:
         total, count = total + float(products.sum()), count + products.size
         square += float((value[known] ** 2).sum()) * NEAR
     return total / square if count and square else 0.0
+
+
+def _nearest(places: Array, part: Array) -> Index:
+    """The places (n, k) nearest to each of some of them (p, k), itself the first: (p, NEAR + 1)."""
+    apart = (places**2).sum(axis=1) - 2 * part @ places.T
+    nearest = np.argpartition(apart, NEAR, axis=1)[:, : NEAR + 1]
+    order = np.argsort(np.take_along_axis(apart, nearest, axis=1), axis=1, kind="stable")
+    return np.take_along_axis(nearest, order, axis=1)

@@ -345,10 +345,18 @@ class Machine:
         The columns are those of the effects in turn, whatever their present coefficients; `effects` are those of the
         machine if not given, and may be any others of its joints.
         """
-        effects = self.effects if effects is None else tuple(effects)
+        shape, found = self._design(q, state, self.effects if effects is None else tuple(effects))
+        return poses_first(found, shape)
+
+    def design_columns(self, q: Array, state: State, effects: Sequence[Effect]) -> Array:
+        """The same column by column, (6, k, n) for q (n, n_axes): quicker where there are many effects."""
+        return self._design(q, state, tuple(effects))[1]
+
+    def _design(self, q: ArrayLike, state: State, effects: tuple[Effect, ...]) -> tuple[tuple[int, ...], Array]:
+        """The common leading shape, and the design with poses last, (6, k, n)."""
         shared = linear.Dependences.of(self.axes, effects)
         shape, poses = self._with_signals(q, state, shared.signals)
-        return poses_first(linear.design(self.axes, self.tool, effects, shared, poses), shape)
+        return shape, linear.design(self.axes, self.tool, effects, shared, poses)
 
     def _poses(self, q: ArrayLike, state: State, model: ErrorModel | None) -> tuple[tuple[int, ...], Poses]:
         """The common leading shape, and the poses with all the signals that the model needs."""

@@ -97,7 +97,7 @@ class Problem:
         seen = tuple(observe(measurement, machine) for measurement in measurements)
         values = np.concatenate([each.values for each in seen])
         sigma = np.concatenate([each.sigma for each in seen])
-        design = np.concatenate([each.design(selection.estimated) for each in seen])
+        design = np.ascontiguousarray(np.concatenate([each.design(selection.estimated) for each in seen]))
         design[:, np.abs(design).max(axis=0, initial=0.0) < ROUNDING] = 0.0
         return Problem(machine, selection, seen, values, sigma, design)
 

@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
+from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import chdtr, ndtri, stdtrit
 
 from ncfix.measure.measurement import Array, Index
@@ -116,6 +117,19 @@ def orthonormal(columns: Array) -> Array:
     left, values, _ = np.linalg.svd(scaled, full_matrices=False)
     basis: Array = left[:, values > NUISANCE_RANK * values[0]]
     return basis
+
+
+def inverse(matrix: Array) -> Array:
+    """The inverse of a symmetric positive definite matrix (n, n), by its Cholesky factor.
+
+    Raises `numpy.linalg.LinAlgError` where it is none.
+    """
+    factor, failed = dpotrf(matrix, lower=1)
+    if failed:
+        raise np.linalg.LinAlgError("not positive definite")
+    half = dpotri(factor, lower=1, overwrite_c=1)[0]
+    whole: Array = np.tril(half) + np.tril(half, -1).T
+    return whole
 
 
 def without(basis: Array, columns: Array) -> Array:

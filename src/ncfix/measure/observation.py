@@ -145,7 +145,7 @@ class Observation(ABC):
         """The standard deviation of each value, (m,), mm or rad: from the header, else from repeats, else 1 um."""
         lengths, angles = self.measurement.noise
         if lengths is None:
-            lengths = repeatability(self.measurement, self.components, self.angular) or DEFAULT_NOISE
+            lengths = self._repeatability or DEFAULT_NOISE
         each = np.where(self.angular, lengths / LEVER if angles is None else angles, lengths)
         return np.concatenate([np.tile(each, len(self.measurement)), self.extra_sigma])
 
@@ -155,7 +155,12 @@ class Observation(ABC):
         lengths, angles = self.measurement.noise
         if lengths is not None or (angles is not None and all(self.angular)):
             return True
-        return repeatability(self.measurement, self.components, self.angular) is not None
+        return self._repeatability is not None
+
+    @cached_property
+    def _repeatability(self) -> float | None:
+        """That of its lengths, mm; computed once."""
+        return repeatability(self.measurement, self.components, self.angular)
 
     def with_values(self, values: Array) -> Measurement:
         """The measurement with these values (m,) read; those that belong to no row are left out."""

@@ -91,8 +91,13 @@ class TipErrors(Observation):
 
     def design(self, effects: Sequence[Effect]) -> Array:
         """See `Observation`."""
-        every = self.machine.design(self.q, self.state, effects)
-        return self._picked(every)
+        if self.observed_turn is not None:
+            return self._picked(self.machine.design(self.q, self.state, effects))
+        every = self.machine.design_columns(self.q, self.state, effects)
+        picked = np.empty((every.shape[1], every.shape[2], len(self.components)))
+        for place, name in enumerate(self.components):
+            picked[:, :, place] = every[(*SHIFTS, *TURNS).index(name)]
+        return picked.reshape(len(picked), len(self.measurement) * len(self.components)).T
 
     def unknown_design(self, unknowns: Array) -> Array:
         """See `Observation`."""
@@ -204,10 +209,13 @@ class Probing(Observation):
 
     def design(self, effects: Sequence[Effect]) -> Array:
         """See `Observation`."""
-        tip = self.machine.design(self.meant, self.state, effects)[:, :3]
-        rows = -np.einsum("nij,njk->nik", self.axes_by_tip, tip)
-        rows = rows.reshape(3 * len(self.measurement), rows.shape[-1])
-        return np.concatenate([rows, np.zeros((len(self.distances), rows.shape[1]))])
+        tip = self.machine.design_columns(self.meant, self.state, effects)[:3]
+        rows = np.empty((tip.shape[1], tip.shape[2], 3))
+        for k in range(3):
+            by_tip = [self.axes_by_tip[:, k, j] * tip[j] for j in range(3)]
+            rows[:, :, k] = -(by_tip[0] + by_tip[1] + by_tip[2])
+        design = rows.reshape(len(rows), 3 * len(self.measurement)).T
+        return np.concatenate([design, np.zeros((len(self.distances), len(rows)))]) if self.distances else design
 
     def unknown_design(self, unknowns: Array) -> Array:
         """See `Observation`."""

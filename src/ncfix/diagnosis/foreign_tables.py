@@ -1,0 +1,105 @@
+"""Whether the tables of a machine file are those of this machine at all.
+
+Each curve of the file is asked to be another one: a new draw, as large and as smooth as the file has it. That the whole
+file is another machine's leaves out what the file says of all curves, and draws all of them anew. The rival is that the
+file is right and some of its curves have changed: each of those is drawn beside what the file says, and pays as a
+further effect does. Where the file is right, to leave its curves out costs far more than to keep them; where nothing
+of it holds, keeping them costs the squares of two unrelated curves where one would do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import logsumexp
+
+from ncfix.diagnosis.evidence import FURTHER, marginal
+from ncfix.diagnosis.residual_data import UM, Misfit, is_free
+from ncfix.machine import Effect
+from ncfix.machine.piecewise import PiecewiseLinear
+from ncfix.measure.least_squares import orthonormal, without
+from ncfix.measure.measurement import Array
+
+SMOOTH = 0.3
+"""How far the values of a table know of each other, of its length."""
+CHANGES = (0.3, 0.7, 1.4)
+"""Size of a change against that of the curve: two unrelated curves of one size differ by the last."""
+FREEDOM = 1.0
+"""Degrees of freedom of what is known of the noise."""
+
+
+@dataclass(frozen=True, repr=False)
+class CurvesOfFile:
+    """The curves of a machine file against the data, beside set-up and constants, in units of the noise.
+
+    y      (n,) values minus what the file says
+    shown  what each curve shows as the file has it, (n,); drawn (n, k) what it may show instead, one draw of its size
+    freedom  values less what is free
+    """
+
+    y: Array
+    shown: tuple[Array, ...]
+    drawn: tuple[Array, ...]
+    freedom: int
+
+    @staticmethod
+    def of(now: Misfit) -> CurvesOfFile:
+        """Those of the file of a misfit."""
+        problem = now.problem
+        free = np.concatenate([problem.nuisance(problem.start), problem.design], axis=1) / now.relative[:, None]
+        basis, scale = orthonormal(free), UM / (now.noise * now.relative)
+        y = problem.residual(problem.selection.start, problem.start) * scale
+        curves = [effect for effect in problem.machine.effects if effect.active and not is_free(effect)]
+        shown, drawn = [], []
+        for effect in curves:
+            design = np.concatenate([each.design([effect]) for each in problem.observations]) * scale[:, None]
+            shown.append(without(basis, design @ np.asarray(effect.coefficients)))
+            drawn.append(without(basis, design @ _draws(effect)))
+        return CurvesOfFile(without(basis, y), tuple(shown), tuple(drawn), len(y) - basis.shape[1])
+
+    @property
+    def as_given(self) -> float:
+        """Log likelihood of the file as it is, constants free."""
+        return self._likelihood(self.y, (), 0.0)
+
+    @property
+    def foreign(self) -> float:
+        """The same where no curve of the file holds, and each is another one of its size."""
+        return self._likelihood(self.y + np.sum(self.shown, axis=0), range(len(self.drawn)), 1.0)
+
+    @property
+    def changed(self) -> float:
+        """The same where some of the curves have changed, less what these pay: the likeliest of them."""
+        price, chosen, best = FURTHER + float(np.log(len(self.drawn))), (), self.as_given
+        while len(chosen) < len(self.drawn):
+            rest = [(*chosen, k) for k in range(len(self.drawn)) if k not in chosen]
+            weights = [self._changed(each) - price * len(each) for each in rest]
+            if max(weights) <= best:
+                break
+            best, chosen = max(weights), rest[int(np.argmax(weights))]
+        return best
+
+    def _changed(self, which: Sequence[int]) -> float:
+        weights = [self._likelihood(self.y, which, size) for size in CHANGES]
+        return float(logsumexp(weights) - np.log(len(CHANGES)))
+
+    def _likelihood(self, y: Array, which: Sequence[int], size: float) -> float:
+        """With these curves drawn at this size."""
+        columns = np.concatenate([np.zeros((len(y), 0)), *(size * self.drawn[k] for k in which)], axis=1)
+        factor = cholesky(np.eye(columns.shape[1]) + columns.T @ columns, lower=True) if which else np.eye(0)
+        gained = solve_triangular(factor, columns.T @ y, lower=True) if which else np.zeros(0)
+        determinant = 2 * float(np.log(np.diag(factor)).sum())
+        return marginal(float(y @ y - gained @ gained), determinant, self.freedom, FREEDOM)
+
+
+def _draws(effect: Effect) -> Array:
+    """Coefficients of curves as large as this one, (p, k) from k independent numbers of variance one."""
+    size = float(np.sqrt(np.mean(np.square(effect.coefficients))))
+    if not isinstance(effect.basis, PiecewiseLinear):
+        return size * np.eye(effect.basis.size)
+    places = np.asarray(effect.basis.positions)
+    apart = np.abs(places[:, None] - places) / (SMOOTH * (places[-1] - places[0]))
+    return size * np.linalg.cholesky(np.exp(-apart))
