@@ -73,7 +73,8 @@ class CurvesOfFile:
     @property
     def changed(self) -> float:
         """The same where some of the curves have changed, less what these pay: the likeliest of them."""
-        price, chosen, best = FURTHER + float(np.log(len(self.drawn))), (), self.as_given
+        price, best = FURTHER + float(np.log(len(self.drawn))), self.as_given
+        chosen: tuple[int, ...] = ()
         while len(chosen) < len(self.drawn):
             rest = [(*chosen, k) for k in range(len(self.drawn)) if k not in chosen]
             weights = [self._changed(each) - price * len(each) for each in rest]

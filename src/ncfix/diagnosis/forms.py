@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise, product
+from itertools import accumulate, combinations, pairwise, product
 from typing import Any
 
 import numpy as np
@@ -229,7 +229,7 @@ def side_by_side(parts: Iterable[Array]) -> Array:
 
 def _ends(groups: Sequence[EffectForm]) -> list[int]:
     """Where the columns of each begin and end, once they stand side by side."""
-    return np.cumsum([0, *(group.columns.shape[1] for group in groups)]).tolist()
+    return [0, *accumulate(group.columns.shape[1] for group in groups)]
 
 
 def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> list[float]:
