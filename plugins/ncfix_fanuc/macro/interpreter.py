@@ -256,6 +256,11 @@ class MacroInterpreter(RS274Interpreter):
             text = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
             self.control.warn(NO_UNIT, text, "put G20 or G21 at its beginning")
 
+    def calls_behind(self, block: Block, codes: Codes) -> bool:
+        """See `RS274Interpreter`; G66 calls a macro behind every motion."""
+        modal = bool(self.modal_calls) and len(self.flow.calls) <= self.modal_calls[-1].depth
+        return modal or super().calls_behind(block, codes)
+
     def by_vector(self, block: Block, codes: Codes, motion: int) -> None:
         """The motion of a block while I J K say where the tool points; rotary axes never get words of their own."""
         control, axes = self.control, self.control.turning

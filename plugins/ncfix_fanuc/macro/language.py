@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.language import BulkLayout
-from ncfix.text.layout import CENTRE_LETTERS, Layout
+from ncfix.text.layout import CENTRE_LETTERS, BlockWords, Layout
 from ncfix.text.shapes import Scan, scan
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Literal, OWordLine, Program, Template
@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 
 SPELLING = Spelling(vector=CENTRE_LETTERS, vector_length=True)
 """I J K of G43.5, in the length that the program gives them."""
+
+STOPPING = frozenset({5.0, 9.0})
+STOPS = frozenset({50, 90})
+"""M5 and M9: with a motion in their block many controls execute them at its end; the tool must not cut without them."""
 
 ELSEWHERE = frozenset({970, 990})
 """M97 calls what stands in the text, M99 would end a subprogram in it."""
@@ -50,7 +54,9 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     if any(isinstance(word.value, Literal) and word.value.pointless for word in words if word.address not in "NFS"):
         return None
     assert RS274.bulk is not None
-    return None if has_corners(program) else RS274.bulk(program, block)
+    found = None if has_corners(program) else RS274.bulk(program, block)
+    stops = not STOPS.isdisjoint(program.template_of(block).m_codes)
+    return replace(found, further=False) if found is not None and stops else found
 
 
 def one_by_one(program: Program, moves: Moves, _pieces: Pieces, _first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -64,7 +70,10 @@ def one_by_one(program: Program, moves: Moves, _pieces: Pieces, _first_piece: ND
 def layout(program: Program, block: int) -> Layout | None:
     """The layout of a block; at a corner that the control rounds, axes outside its plane get no words."""
     found = writable(program, block)
-    return None if found is None else replace(found, allowed=axes_of_corner(program, block))
+    if found is None:
+        return None
+    after = (*found.after, *BlockWords(program, block).coded("M", STOPPING))
+    return replace(found, allowed=axes_of_corner(program, block), after=after)
 
 
 FANUC: WrittenLanguage = replace(

@@ -195,15 +195,15 @@ class KlartextControl(base.ProgramControl):
         """As of every control.
 
         What must not be split: elements at a corner that the control makes (RND, CHF), turns of the tool in a plane
-        (PATHCTRL VECTOR), which in pieces would be turns of axes, and increments of an axis whose datum is not known,
-        which further pieces would have to name.
+        (PATHCTRL VECTOR), which in pieces would be turns of axes, motions whose time is given (FT), and increments of
+        an axis whose datum is not known, which further pieces would have to name.
         """
         if motion.kind == MotionKind.RAPID and not motion.refusal and AT_START in motion.end.unknown.values():
             motion = motion._replace(passing=motion.passing or Passing(Pass.UNSAID, first_reason(motion.end.unknown)))
         whole = self.whole
         self.tilted = self.plane_tilted and not self.m128
         turns = any(motion.axes >> index & 1 for index in self.turning)
-        if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
+        if self.path.corner or self.path.ahead or (self.path.by_vector and turns) or "FT" in self.block_words:
             self.whole = True
         if motion.axes & mask_of(self.composed.unknown):
             self.whole = True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS, mask_of
@@ -304,8 +304,17 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         if polar:
             self.control.resume(POLAR_WORDS)
 
+    def calls_behind(self, block: Block, codes: Codes) -> bool:
+        """Whether something is called behind the motion of the block, or P of M99 says where to go on."""
+        return codes.call is not None and (codes.call != RETURN or "P" in block.values)
+
     def move(self, block: Block, codes: Codes, motion: int) -> None:
-        """The motion of a block."""
+        """The motion of a block; behind the pieces of one a subprogram would be called in between."""
+        with self.control.in_one_piece() if self.calls_behind(block, codes) else nullcontext():
+            self.move_axes(block, codes, motion)
+
+    def move_axes(self, block: Block, codes: Codes, motion: int) -> None:
+        """The motion of a block alone."""
         if MACHINE in codes.g.values():
             in_machine_coordinates(self.control, block, motion)
         else:

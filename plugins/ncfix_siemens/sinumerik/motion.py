@@ -112,9 +112,9 @@ def straight(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 
 
 def is_one_piece(control: Sinumerik, words: BlockWordValues) -> bool:
-    """Whether a motion must not be split: its time is another block's, or REPEAT would miss lines."""
+    """Whether a motion must not be split: its time or feed would be another's, or REPEAT would miss lines."""
     timed = control.modal.feed_mode == 93 and control.modal.motion != 0 and "F" not in words.values
-    return timed or words.block in control.solitary
+    return timed or "FB" in words.values or words.block in control.solitary
 
 
 def as_coded(control: Sinumerik, words: BlockWordValues, code: int) -> None:

@@ -21,6 +21,7 @@ from ncfix.control.moves import CycleCall
 from ncfix.text.layout import (
     CENTRE_LETTERS,
     CODES_AFTER_MOTION,
+    EXACT_STOP,
     FEED_MODES,
     MOTION_CODES,
     BlockWords,
@@ -397,7 +398,7 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
         feed=words.by_address.get("F"),
         motion=words.first_coded("G", MOTION_CODES) or named_motion(program, block),
         feed_mode=words.first_coded("G", FEED_MODES),
-        after=words.coded("M", CODES_AFTER_MOTION | END_OF_SUBPROGRAM),
+        after=(*words.coded("M", CODES_AFTER_MOTION | END_OF_SUBPROGRAM), *words.coded("G", EXACT_STOP)),
         words_at=words_at,
         code_at=code_at,
         blank=blank,

@@ -20,6 +20,8 @@ FEED_MODES = frozenset((93.0, 94.0))
 CENTRE_LETTERS = ("I", "J", "K")
 #: M codes that act after the motion of their block: they belong on its last piece.
 CODES_AFTER_MOTION = frozenset((0.0, 1.0, 2.0, 30.0, 60.0, 99.0))
+EXACT_STOP = frozenset((9.0,))
+"""G9: the control comes to a stop at the end of the block, that of its last piece."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +39,7 @@ class Layout:
     feed_mode the G93 or G94 word
     vector    words of the direction of the tool, by address
     angles    those that give it as angles: they give way to a vector
-    after     words that act after the motion (M0, M1, M2, M30, M60, M99)
+    after     words that act at the end of the motion (M0, M1, M2, M30, M60, M99, G9)
     words_at  where a missing axis word goes: after the last axis word
     code_at   where a missing motion code goes: before the first axis word
     blank     what separates words in this block
@@ -127,7 +129,7 @@ def layout_of(program: Program, block: int) -> Layout:
         feed=words.by_address.get("F"),
         motion=words.first_coded("G", MOTION_CODES),
         feed_mode=words.first_coded("G", FEED_MODES),
-        after=words.coded("M", CODES_AFTER_MOTION),
+        after=(*words.coded("M", CODES_AFTER_MOTION), *words.coded("G", EXACT_STOP)),
         words_at=words_at,
         code_at=code_at,
         blank=blank,
