@@ -114,6 +114,7 @@ def split(moves: Moves, row: int, fraction: float) -> Pieces:
     [
         ("G0 X0 Y0 Z0\nG1 X10. F9 S1000 M3\nM2\n", 1, "G0 X0 Y0 Z0\nG1 X4. F9 S1000 M3\nX10.000\nM2\n"),
         ("G0 X0 Y0 Z0\n/G1 X10. F9 M1\nM2\n", 1, "G0 X0 Y0 Z0\n/G1 X4. F9\n/X10.000 M1\nM2\n"),
+        ("G0 X0 Y0 Z0\nG1 X10. F9 M5\nM2\n", 1, "G0 X0 Y0 Z0\nG1 X4. F9 M5\nX10.000\nM2\n"),
         ("G0 X0 Y0 Z0\nG93\nG1 X10. F2.\nM2\n", 1, "G0 X0 Y0 Z0\nG93\nG1 X4. F5.\nX10.000 F3.333\nM2\n"),
         ("G0 X0 Y0 Z0\nG91 G1 X10. F9\r\nX1.\nM2\n", 1, "G0 X0 Y0 Z0\nG91 G1 X4. F9\nX6.000\r\nX1.\nM2\n"),
     ],
@@ -124,6 +125,26 @@ def test_words_of_a_split_block_go_to_the_right_piece(text: str, row: int, expec
     assert apply(program.source, emission.edits).decode() == expected.replace(
         "\r\n", "\n" if "\r" not in text else "\r\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("dialect", "block", "pieces"),
+    [
+        ("iso", "G1 G9 X10. F9", ["G1 X4. F9", "X10.000 G9"]),
+        ("iso", "G1 X10. F9 M5", ["G1 X4. F9 M5", "X10.000"]),
+        ("fanuc", "G1 G9 X10. F9", ["G1 X4. F9", "X10.000 G9"]),
+        ("fanuc", "G1 X10. F9 M5", ["G1 X4. F9", "X10.000 M5"]),
+        ("haas", "G1 X10. F9 M09", ["G1 X4. F9", "X10.000 M09"]),
+        ("haas", "G1 X10. F9 M8", ["G1 X4. F9 M8", "X10.000"]),
+        ("siemens", "G1 G9 X10 F9", ["G1 X4 F9", "X10.000 G9"]),
+    ],
+)
+def test_what_acts_at_the_end_of_a_motion_goes_to_the_last_piece(dialect: str, block: str, pieces: list[str]):
+    program = read(f"G0 X0 Y0 Z0\n{block}\nM2\n".encode(), "test", dialect)
+    given = Setup(no_point="calculator", assume_zero=True)
+    moves = trace(program, given, AXES, frozenset()).moves
+    emission = emit(program, moves, split(moves, 1, 0.4), STEP)
+    assert apply(program.source, emission.edits).decode().splitlines()[1:3] == pieces
 
 
 def test_an_arc_made_of_lines_states_the_codes_around_it():

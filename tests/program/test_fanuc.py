@@ -341,6 +341,22 @@ def test_rows_of_holes_that_the_control_makes_up_are_refused(dialect: str, block
     assert why[1].startswith(("holes", "a grid of holes"))
 
 
+@pytest.mark.parametrize(
+    ("text", "dialect", "held"),
+    [
+        ("G1X5.F9.M98P2\nX9.\nM30\nO2\nM8\nM99", "fanuc", [True, False]),
+        ("G1X5.F9.M98P2\nX9.\nM30\nO2\nM8\nM99", "iso", [True, False]),
+        ("G1X5.F9.M97P2\nX9.\nM30\nN2M8\nM99", "haas", [True, False]),
+        ("G66P2\nG1X5.F9.\nG67\nX9.\nM30\nO2\nG91Y1.\nG90M99", "fanuc", [True, False, False]),
+        ("G1X5.F9.M99P3\nN3X9.\nM30", "fanuc", [True, False]),
+        ("G1X5.F9.\nX9.M99", "fanuc", [False, False]),
+    ],
+)
+def test_a_motion_behind_which_something_is_called_is_not_split(text: str, dialect: str, held: list[bool]) -> None:
+    found = follow(f"G21G90\n{text}", dialect=dialect, no_point="calculator", assume_zero=True)
+    assert found.moves.compensated.tolist() == held
+
+
 def test_additional_work_offsets_of_haas() -> None:
     setup = Setup(work_offsets={"G54.1P3": {"X": 5.0, "Y": 0.0, "Z": 0.0}}, initial=dict.fromkeys("XYZ", 0.0))
     assert last(follow("G154P3\nG0X1.", setup=setup, dialect="haas")) == [6, 0, 0]

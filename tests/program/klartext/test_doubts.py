@@ -76,6 +76,10 @@ def test_a_turn_in_a_plane_is_not_split() -> None:
     assert follow(body.format("AXIS"), "XYZC").moves.compensated.tolist() == [False, False]
 
 
+def test_a_motion_whose_time_is_given_is_not_split() -> None:
+    assert follow("L X+1 F100\nL X+5 FT2\nL X+9 FU0.1").moves.compensated.tolist() == [False, True, False]
+
+
 def test_increments_of_parameters_say_the_same_from_a_corrected_place() -> None:
     found = lines("L X+100 Y+100 Z+0 FMAX\nQ3 = 2.5\nL IX-Q3 IY+Q3 F100\nL X+0")
     words = found[2].split()
