@@ -35,7 +35,7 @@ CORNERS = frozenset({"rnd", "chf"})
 TURN_DEGREES = 360.0
 
 AXIS_WORDS = frozenset({*AXIS_LETTERS, *(f"I{letter}" for letter in AXIS_LETTERS)})
-LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 129})
+LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 111, 115, 117, 127, 129, 135, 137, 145, 149})
 """M codes that act at the end of their block: they belong on its last piece."""
 
 FALLBACK = Word("L", Constant(10.0), Span(Anchor(-1, 0), Anchor(-1, 0)), Span(Anchor(-1, 0), Anchor(-1, 0)))

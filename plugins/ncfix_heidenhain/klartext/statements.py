@@ -105,15 +105,13 @@ def before_motion(control: KlartextControl, step: Step) -> None:
     for code in step.codes:
         if code in SUSPENDING:
             control.suspend(f"M{code}", SUSPENDING[code])
-        elif code in ENDING:
-            control.resume(f"M{ENDING[code]}")
     control.resume("M130")
     if 130 in step.codes and control.plane_tilted:
         control.suspend("M130", UNTILTED)
-    if step.codes & {126, 127}:
-        end_of_short_ways(control, 127 in step.codes)
-    if 136 in step.codes or 137 in step.codes:
-        control.modal.feed_mode = 95 if 136 in step.codes else 94
+    if 126 in step.codes:
+        control.shortest = True
+    if 136 in step.codes:
+        control.modal.feed_mode = 95
     if 128 in step.codes:
         tip_control(control, on=True)
     if 94 in step.codes:
@@ -122,18 +120,18 @@ def before_motion(control: KlartextControl, step: Step) -> None:
         choose_axes(control, step.flags)
 
 
-def end_of_short_ways(control: KlartextControl, on: bool) -> None:
+def end_of_short_ways(control: KlartextControl) -> None:
     """M127 after M126: an axis that went past a turn may count from there, or from the angle below a turn.
 
     M126 means nothing to an axis that cannot go round, as the one that tilts the tool: it may stand below zero.
     """
-    pointing = control.posture.pointing if on and control.shortest else None
+    pointing = control.posture.pointing if control.shortest else None
     tilts = None if pointing is None else control.machine[pointing.columns[1]]
-    for index in control.turning if on and control.shortest else ():
+    for index in control.turning if control.shortest else ():
         below = control.position[index] < 0 and index != tilts
         if index not in control.unknown and (below or control.position[index] >= TURN):
             control.lose([index], COUNTED)
-    control.shortest = not on
+    control.shortest = False
 
 
 def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
@@ -163,6 +161,12 @@ def after_motion(control: KlartextControl, code: int, own: MotionWords, flags: f
     if code == 129:
         tip_control(control, on=False)
         control.path.by_vector = control.path.spatial = False
+    elif code == 127:
+        end_of_short_ways(control)
+    elif code == 137:
+        control.modal.feed_mode = 94
+    elif code in ENDING:
+        control.resume(f"M{ENDING[code]}")
     elif code == 140:
         control.pass_here(RETRACT, RETRACTED, "XYZ" if control.tcp else "Z")
 

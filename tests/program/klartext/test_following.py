@@ -292,6 +292,14 @@ def test_after_a_retract_rapids_pass_and_feeds_are_refused() -> None:
     assert moves.rule.tolist() == [Rule.PASS, Rule.PASS, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
 
 
+def test_codes_that_end_something_act_at_the_end_of_their_block() -> None:
+    moves = follow("L C+350 F100\nM126\nL C+10 M127\nL C+350", "XYZC").moves
+    turns = np.degrees(moves.end[:, 3] - moves.start[:, 3])
+    assert turns[1] == pytest.approx(20.0)
+    rules = follow("M144\nL X+1 F100 M145\nL X+2").moves.rule.tolist()
+    assert rules == [Rule.REFUSE, Rule.CORRECT]
+
+
 def test_corners_are_left_to_the_control_and_not_split() -> None:
     moves = follow("L X+10 F100\nRND R2\nL Y+10\nL X+0").moves
     assert moves.compensated.tolist() == [True, True, False]
