@@ -62,6 +62,7 @@ class PathFunctionState:
     tangent  the direction in which the last path element ended, commands; None where there is none
     corner   the block before was a corner (RND, CHF)
     ahead    the block that follows is one
+    doubtful  M127 stands in the block: it ends the shorter ways of M126, at the end of the block if manuals are right
     spatial  A B C are spatial angles, not positions of axes (FUNCTION TCPM AXIS SPAT)
     by_vector  the tool turns in a plane (PATHCTRL VECTOR), not its axes at even speed
     free     elements of the free contour (FK) that is being made: program and block -> what it is, None: not certain
@@ -73,6 +74,7 @@ class PathFunctionState:
     tangent: tuple[float, float, float] | None = None
     corner: bool = False
     ahead: bool = False
+    doubtful: bool = False
     by_vector: bool = False
     spatial: bool = False
     free: dict[tuple[str, int], ContourElement | None] = field(default_factory=dict)
@@ -203,7 +205,9 @@ class KlartextControl(base.ProgramControl):
         whole = self.whole
         self.tilted = self.plane_tilted and not self.m128
         turns = any(motion.axes >> index & 1 for index in self.turning)
-        if self.path.corner or self.path.ahead or (self.path.by_vector and turns) or "FT" in self.block_words:
+        if self.path.corner or self.path.ahead or "FT" in self.block_words:
+            self.whole = True
+        if turns and (self.path.by_vector or self.path.doubtful):
             self.whole = True
         if motion.axes & mask_of(self.composed.unknown):
             self.whole = True

@@ -298,6 +298,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         self.note_foreign(plan, step)
         before_motion(control, step)
         control.path.ahead = self.corner_ahead(flow)
+        control.path.doubtful = 127 in codes and control.shortest
         self.move(plan, step)
         for code, own in plan.codes:
             after_motion(control, code, self.evaluated(own), plan.flags)
