@@ -18,7 +18,7 @@ from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError
 from ncfix.text.language import language_of
 from ncfix.text.reader import read
-from ncfix.text.spelling import NumberStyle, in_style, is_plain, laid_out, rounded, styles_of
+from ncfix.text.spelling import Spelling, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Edit, Splices, apply, spliced
 from ncfix.writer.bulk import Bulk
@@ -342,23 +342,38 @@ def test_arcs_written_by_themselves_in_another_order_than_they_stand_in() -> Non
 
 
 @EXAMPLES
-@given(st.lists(st.tuples(NUMBERS, st.floats(-999, 999), st.integers(0, 6))))
-def test_numbers_in_their_style(rows: list[tuple[str, float, int]]) -> None:
+@given(st.lists(st.tuples(NUMBERS, st.floats(-999, 999), st.integers(0, 6))), st.booleans())
+def test_numbers_in_their_style(rows: list[tuple[str, float, int]], signed: bool) -> None:
     if not rows:
         return
     texts = [text.encode() for text, _, _ in rows]
     stops = np.cumsum([len(text) + 1 for text in texts]) - 1
     spans = np.stack((stops - [len(text) for text in texts], stops), axis=1)
-    styles = styles_of(np.frombuffer(b" ".join(texts) + b" ", np.uint8), spans)
+    styles = styles_of(np.frombuffer(b" ".join(texts) + b" ", np.uint8), spans, signed=signed)
     assert styles.clear.tolist() == [" " not in text for text, _, _ in rows]
     values, decimals = np.array([row[1] for row in rows]), np.array([row[2] for row in rows])
     clear = np.flatnonzero(styles.clear & is_plain(values, np.maximum(decimals, styles.decimals)))
     digits = np.maximum(decimals, styles.decimals)[clear]
     found = laid_out(in_style(values[clear], styles.rows(clear), decimals[clear]))
-    expected = [NumberStyle.of(rows[i][0]).write(rows[i][1], rows[i][2]) for i in clear]
+    expected = [Spelling(signed=signed).like(*rows[i]) for i in clear]
     assert found.data.decode() == "".join(expected)
     assert found.length.tolist() == [len(text) for text in expected]
     assert rounded(values[clear], digits).tolist() == [float(text) for text in expected]
+
+
+@EXAMPLES
+@given(st.lists(st.tuples(st.floats(-999, 999), st.integers(0, 6)), min_size=1), st.booleans())
+def test_new_numbers_many_at_a_time(rows: list[tuple[float, int]], signed: bool) -> None:
+    values, decimals = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    clear = np.flatnonzero(is_plain(values, decimals))
+    heads = np.zeros((len(clear), 4), dtype=np.uint8)
+    heads[:, 2:] = [ord(" "), ord("X")]
+    heads[::2, 2] = 0
+    found = laid_out(plain(values[clear], decimals[clear], heads, signed=signed))
+    blanks = ("", " ") * len(clear)
+    expected = [f"{blank}X{Spelling(signed=signed).number(*rows[i])}" for i, blank in zip(clear, blanks, strict=False)]
+    assert found.data.decode() == "".join(expected)
+    assert found.length.tolist() == [len(text) for text in expected]
 
 
 def test_the_middle_between_two_outputs_goes_one_by_one() -> None:

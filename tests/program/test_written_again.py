@@ -102,8 +102,18 @@ def _arcs(rng: np.random.Generator, before: str, dialect: str) -> list[str]:
 def _holes(rng: np.random.Generator, dialect: str) -> list[str]:
     if dialect == "siemens":
         return ["G1 X1 F100", "X2 Y1"]
-    ways = [f"{code} G81 X1. Y2. Z-3. R{rng.uniform(0.5, 2):.2f} F100." for code in ("G98", "G99")]
-    return ["G17 G0 Z3.", ways[rng.integers(2)], "X4.", "Y1. R1.5", "X2. Z-4.", "G80", "G1 Z5."]
+    level = rng.uniform(0.5, 2)
+    ways = [f"{code} G81 X1. Y2. Z-3. R{level:.2f} F100." for code in ("G98", "G99")]
+    return [
+        "G17",
+        f"G0 Z{rng.choice([3.0, level]):.2f}",
+        ways[rng.integers(2)],
+        "X4.",
+        "Y1. R1.5",
+        "X2. Z-4.",
+        "G80",
+        "G1 Z5.",
+    ]
 
 
 def corrected(rng: np.random.Generator, moves: Moves, size: float) -> Pieces:
@@ -175,6 +185,11 @@ def assert_understood(moves: Moves, pieces: Pieces, emission: Emission, again: M
     free = ~(pieces.kept | arc)[:, None] & ~moves.wordless[row]
     assert (np.abs(emission.end - pieces.end) < HALF)[free].all()
     assert np.abs(emission.centre - pieces.centre)[arc].max(initial=0.0) < 2.1 * STEP[0]
+    if moves.approach is not None and pieces.approach is not None and again.approach is not None:
+        holes = np.flatnonzero(moves.kind[row] == MotionKind.CYCLE)
+        level, wanted, begun = again.approach[holes, 2], pieces.approach[holes, 2], emission.start[row[holes], 2]
+        assert (level > wanted - HALF[2]).all()
+        assert (level < np.maximum(wanted, begun) + STEP[2]).all()
     timed = moves.feed_mode[row] == FeedMode.INVERSE_TIME
     assert np.allclose(again.feed[~timed], moves.feed[row][~timed], equal_nan=True)
     minutes = np.bincount(row[timed], 1 / again.feed[timed], len(moves))
