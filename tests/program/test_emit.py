@@ -65,6 +65,7 @@ def test_without_correction_nothing_changes(text: str):
         ("G91 G1 X1. F9\nX1.\nM2\n", "G91 G1 X1.01 Y-0.020 Z0.005 F9\nX1.\nM2\n"),
         # an expression gives way to a number
         ("#1=3\nG1 X[#1+1] Y0 Z0 F9\nM2\n", "#1=3\nG1 X4.01 Y-0.02 Z0.005 F9\nM2\n"),
+        ("#1=3\nG1 X[#1*1.25] Y0 Z0 F9\nM2\n", "#1=3\nG1 X3.76 Y-0.02 Z0.005 F9\nM2\n"),
         # inches: digits as the least increment needs them
         ("G20 G1 X1. F9\nM2\n", "G20 G1 X1.00039 Y-0.00079 Z0.00020 F9\nM2\n"),
         # arcs: incremental centres stay, the start has moved with everything else

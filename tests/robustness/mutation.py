@@ -109,6 +109,8 @@ OPERATORS = (
 )
 MEASURED = re.compile(r"half|fuzz|tolerance|rounded|largest|jump|together|[A-Z][A-Z_]{3,}|\d\.\d|\de-?\d")
 """What compares measured numbers: `<` for `<=` is another answer for one double only."""
+KEYWORD_ONLY = re.compile(r"[(,] ?/,")
+"""A star between parameters is no product."""
 KEYWORDS = ("strict", "slots", "frozen", "kw_only", "maxsize", "eq", "repr", "stacklevel")
 """Arguments that decide nothing about a program."""
 
@@ -183,7 +185,7 @@ class Source:
         text = mutate_code(self.text, *way)
         changed = zip(self.text.splitlines(), (text or self.text).splitlines(), strict=False)
         was, line = next(((a.strip(), b.strip()) for a, b in changed if a != b), ("", ""))
-        if text is None or was == line or (was, line) in self.same:
+        if text is None or was == line or (was, line) in self.same or KEYWORD_ONLY.search(line):
             return None
         with suppress(SyntaxError):
             compile(text, "mutant", "exec")
