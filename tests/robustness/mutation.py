@@ -35,6 +35,7 @@ from types import CodeType, FrameType, FunctionType
 from typing import Any
 
 import pytest
+from hypothesis.internal.conjecture.engine import ConjectureRunner
 
 ROOT = Path(__file__).parents[2]
 EQUIVALENT = Path(__file__).parent / "equivalent_mutants.txt"
@@ -290,7 +291,8 @@ class Trials:
         self.found: list[tuple[Mutant, str]] = []
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """In place of the tests."""
+        """In place of the tests. Hypothesis does not look for the smallest example that fails, which takes long."""
+        ConjectureRunner.shrink_interesting_examples = lambda self: None  # type: ignore[method-assign]
         seconds, run = self.look_round(session.items)
         slow = sorted(seconds, key=lambda name: -seconds[name])[:5]
         print(
