@@ -15,7 +15,13 @@ from ncfix import core
 
 hypothesis.settings.register_profile("same every time", deadline=None, derandomize=True)
 hypothesis.settings.register_profile("searching", deadline=None)
-hypothesis.settings.load_profile("searching" if os.environ.get("NCFIX_SEARCH") else "same every time")
+hypothesis.settings.register_profile(  # that a test fails is enough: no smaller example is looked for
+    "mutant", deadline=None, derandomize=True, phases=(hypothesis.Phase.explicit, hypothesis.Phase.generate)
+)
+PROFILES = {"NCFIX_SEARCH": "searching", "NCFIX_MUTANT": "mutant"}
+hypothesis.settings.load_profile(
+    next((profile for name, profile in PROFILES.items() if os.environ.get(name)), "same every time")
+)
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES = "figures"

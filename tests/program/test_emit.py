@@ -9,7 +9,7 @@ from ncfix.control.trace import trace
 from ncfix.text.reader import read
 from ncfix.text.writer import apply
 from ncfix.writer.block import NO_TIME
-from ncfix.writer.emit import SEVERAL_STATES, emit
+from ncfix.writer.emit import MODE_LOST, SEVERAL_STATES, emit
 from ncfix.writer.pieces import Pieces
 
 AXES = ("X", "Y", "Z")
@@ -197,3 +197,28 @@ def test_a_loop_whose_corrections_agree_is_written():
     emission = emit(program, moves, whole(moves, (0.01, 0, 0)), STEP)
     assert not emission.conflicts
     assert apply(program.source, emission.edits).decode().splitlines()[2:4] == ["G1 X1.01", "X0.01"]
+
+
+def test_behind_a_motion_that_is_written_already_the_next_goes_on_from_where_it_led():
+    program, moves = traced("G1 X1 Y0 Z0 F9\nX2\nG91 X1\nM2\n")
+    emission = emit(program, moves, whole(moves), STEP, done=np.array([1.25, 0.5, 0.0]))
+    assert apply(program.source, emission.edits).decode() == "G1 X1 Y0 Z0 F9\nX2 Y0.000\nG91 X1\nM2\n"
+    assert emission.start[1].tolist() == [1.25, 0.5, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "lost"),
+    [
+        ("G2 X2 Y0 I1 J0 F9\nX4 I1 J0", {1}),
+        ("G2 X2 Y0 I1 J0 F9\nG2 X4 I1 J0", set()),
+        ("G2 X2 Y0 I1 J0 F9\nG4 P1\nX4 I1 J0", {1}),
+        ("G2 X2 Y0 I1 J0 F9\nG1 X3\nX4", set()),
+    ],
+)
+def test_a_motion_that_is_kept_must_not_rely_on_a_code_that_another_one_takes_away(text: str, lost: set[int]):
+    """The first arc becomes lines; the block behind it is not written, and so cannot state its code."""
+    program, moves = traced(f"G0 X0 Y0 Z0\n{text}\nM2\n")
+    pieces = split(moves, 1, 0.5)
+    pieces.kept[pieces.move > 1] = True
+    emission = emit(program, moves, pieces, STEP)
+    assert emission.conflicts == dict.fromkeys(lost, MODE_LOST)

@@ -35,7 +35,6 @@ from types import CodeType, FrameType, FunctionType
 from typing import Any
 
 import pytest
-from hypothesis.internal.conjecture.engine import ConjectureRunner
 
 ROOT = Path(__file__).parents[2]
 EQUIVALENT = Path(__file__).parent / "equivalent_mutants.txt"
@@ -291,8 +290,7 @@ class Trials:
         self.found: list[tuple[Mutant, str]] = []
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """In place of the tests. Hypothesis does not look for the smallest example that fails, which takes long."""
-        ConjectureRunner.shrink_interesting_examples = lambda self: None  # type: ignore[method-assign]
+        """In place of the tests."""
         seconds, run = self.look_round(session.items)
         slow = sorted(seconds, key=lambda name: -seconds[name])[:5]
         print(
@@ -444,7 +442,8 @@ def tried_in_copy(modules: Sequence[str], count: int, seed: int) -> None:
         folder = Path(place) / "ncfix"
         copied(folder)
         paths = os.pathsep.join(str(folder / each) for each in ("src", "plugins", "tests"))
-        environment = {**os.environ, "PYTHONPATH": paths, "NCFIX_SHARED": "", "PYTEST_DEBUG_TEMPROOT": place}
+        environment = {**os.environ, "PYTHONPATH": paths, "PYTEST_DEBUG_TEMPROOT": place}
+        environment |= {"NCFIX_SHARED": "", "NCFIX_MUTANT": "1"}
         environment |= {"NCFIX_CORE": "plain"} if modules[0].startswith(PLAIN) else {}
         command = [sys.executable, "-m", "robustness.mutation", "--here", *modules, "--count", str(count)]
         subprocess.run([*command, "--seed", str(seed)], cwd=folder, env=environment, check=True)
