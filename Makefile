@@ -90,9 +90,9 @@ fuzz:            ## damaged files for all readers; what goes wrong is kept in te
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) -m robustness.readers \
 		--seconds $(or $(SECONDS),600) $(if $(ONLY),--only $(ONLY))
 
-mutation:        ## faults put into the code of limits, account, state and writer, and which of them tests find (needs: pip install -e '.[mutation]'); COUNT=30 of each ONLY=limits SEED=1
+mutation:        ## faults put into the code of writer, limits, account, control, numbers and core, and which of them tests find (needs: pip install -e '.[mutation]'); COUNT=60 of each ONLY=limits SEED=1
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) -m robustness.mutation \
-		--count $(or $(COUNT),30) $(if $(ONLY),--only $(ONLY)) $(if $(SEED),--seed $(SEED))
+		--count $(or $(COUNT),60) $(if $(ONLY),--only '$(ONLY)') $(if $(SEED),--seed $(SEED))
 
 fuzz-core:       ## the compiled core under sanitizers, fed with damaged programs (needs gcc's libasan); SECONDS=600 SEED=7
 	$(PYTHON) tests/core/fuzz.py --seconds $(or $(SECONDS),600) $(if $(SEED),--seed $(SEED))

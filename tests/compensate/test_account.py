@@ -162,14 +162,14 @@ def test_what_is_left_in_parts_adds_up_and_of_ways_the_most_counts() -> None:
 
 
 def test_what_is_left_is_said_with_lines_and_size() -> None:
-    said = left(cuts=1).message("part.nc")
+    said = left(cuts=1, most=0.0023456).message("part.nc")
     assert (
         said.code,
         said.advice,
         str(said.place.path if said.place else ""),
         said.place.line if said.place else 0,
     ) == ("NCF439", HINT, "part.nc", 4)
-    assert "X is left where it stands in this motion, which cuts, up to 2.00 um beside" in said.text
+    assert "X is left where it stands in this motion, which cuts, up to 2.35 um beside" in said.text
     nothing = left().message("part.nc")
     assert "this motion, which cuts nothing, up to" in nothing.text
     assert nothing.hint == ""

@@ -140,12 +140,12 @@ def corrected(rng: np.random.Generator, moves: Moves, size: float, *, arc_pieces
     way = (moves.end - moves.start)[:, XYZ]
     way = way - moves.normal * np.sum(way * moves.normal, axis=1)[:, None]
     round_ = is_arc & (np.abs(np.nan_to_num(way)).max(axis=1) < 0.05)
-    is_arc &= ~round_ | (np.abs(way).max(axis=1) < 1e-6)  # a micrometre of an arc becomes a line
+    is_arc &= ~round_ | (np.abs(way).max(axis=1) < 1e-6) | (size == 0)  # a micrometre of an arc becomes a line
     for row in np.flatnonzero(round_ | kept).tolist():
         shift[row] = shift[row - 1]
     straight = np.isin(moves.kind, (MotionKind.RAPID, MotionKind.FEED)) | (is_arc & ~round_ & arc_pieces)
     straight &= np.abs(moves.end - moves.start)[:, XYZ].max(axis=1) > 0.1
-    counts = np.where((rng.random(n) < 0.2) & straight & ~kept, 2, 1)
+    counts = np.where((rng.random(n) < 0.2) & straight & ~kept & (size > 0), 2, 1)
     move = np.repeat(np.arange(n), counts)
     last = np.append(np.diff(move) != 0, True)
     end = (moves.end + shift)[move]
@@ -164,7 +164,7 @@ def corrected(rng: np.random.Generator, moves: Moves, size: float, *, arc_pieces
         start, way = end[piece - 1, XYZ], end[piece, XYZ] - end[piece - 1, XYZ]
         way = way - moves.normal[row] * (way @ moves.normal[row])
         centre[piece] += shift[row, XYZ]
-        if not round_[row]:
+        if size and not round_[row]:
             off = (centre[piece] - start - way / 2) @ way
             centre[piece] -= way * off / (way @ way)
     approach = None if moves.approach is None else moves.approach[move] + shift[move]
@@ -195,8 +195,9 @@ def test_what_is_written_is_what_is_read_again(control: str, size: float) -> Non
                 understood += 1
                 break
             reading = SecondReading.of(again, pieces)
-        if size == 0 and len(pieces) == len(moves):
-            assert written == program.source
+        halves = set(program.lines(moves.block[np.abs(np.abs(moves.sweep) - np.pi) < 0.01]).tolist())
+        lines = zip(program.source.splitlines(), written.splitlines(), strict=not size)
+        assert size or all(was == now or k in halves for k, (was, now) in enumerate(lines, 1))  # R may be a hair short
     assert understood >= PROGRAMS - 2
 
 
@@ -217,7 +218,7 @@ def assert_understood(moves: Moves, pieces: Pieces, emission: Emission, again: M
         holes = np.flatnonzero(moves.kind[row] == MotionKind.CYCLE)
         level, wanted, begun = again.approach[holes, 2], pieces.approach[holes, 2], emission.start[row[holes], 2]
         assert (level > wanted - HALF[2]).all()
-        assert (level < np.maximum(wanted, begun) + STEP[2]).all()
+        assert (level < np.maximum(wanted + HALF[2], begun + SAME)).all()
     timed = moves.feed_mode[row] == FeedMode.INVERSE_TIME
     assert np.allclose(again.feed[~timed], moves.feed[row][~timed], equal_nan=True)
     minutes = np.bincount(row[timed], 1 / again.feed[timed], len(moves))

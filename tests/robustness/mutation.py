@@ -320,13 +320,13 @@ class Trials:
         return True
 
     def in_turn(self, names: Sequence[str], seconds: Mapping[str, float]) -> list[str]:
-        """Tests in the order in which they are tried: those that have found most, then the quickest of each file."""
+        """Tests in the order in which they are tried: those that have found most, quick ones, all files in turn."""
         turns = Counter[str]()
-        order: list[tuple[float, int, float, str]] = []
+        order: list[tuple[float, float, str]] = []
         for name in sorted(names, key=lambda name: seconds[name]):
             file = name.split("::")[0]
             turns[file] += 1
-            order.append((-self.kills[name] / (seconds[name] + 0.1), turns[file], seconds[name], name))
+            order.append((-self.kills[name] / (seconds[name] + 0.1), turns[file] * max(seconds[name], 0.01), name))
         return [each[-1] for each in sorted(order)]
 
     def look_round(self, items: Sequence[pytest.Item]) -> tuple[dict[str, float], dict[str, dict[str, set[int]]]]:
