@@ -155,6 +155,25 @@ def test_an_arc_made_of_lines_states_the_codes_around_it():
     assert text.splitlines()[1:4] == ["G1 X1 Y0 F9", "X2.000", "G2 X4 I1 J0"]
 
 
+def test_a_word_that_is_taken_out_takes_one_blank_along():
+    program, moves = traced("G0 X0 Y0 Z0\nG2 X2 Y0  I1   J0 F9\nG2 X4  I1 J0\nM2\n")
+    text = apply(program.source, emit(program, moves, split(moves, 1, 0.5), STEP).edits).decode()
+    assert text.splitlines()[1:] == ["G1 X1 Y0    F9", "X2.000", "G2 X4  I1 J0", "M2"]
+
+
+def test_of_an_arc_in_several_the_further_ones_name_the_axes_of_their_plane():
+    source = b"G0 X0 Y0 Z0\nG2 X2 Y0 I1 J0 F9\nG2 X4 I1 J0\nM30\n"
+    program = read(source, "test.mpf", "siemens")
+    moves = trace(program, Setup(assume_zero=True), AXES, frozenset()).moves
+    pieces = split(moves, 1, 0.5)
+    top, centre = (1.0, 1.0, 0.0), (1.0, 0.0, 0.0)
+    pieces.end[1], pieces.arc[1:3], pieces.centre[1:3] = top, True, centre
+    emission = emit(program, moves, pieces, STEP)
+    text = apply(program.source, emission.edits).decode()
+    assert text.splitlines()[1:3] == ["G2 X1 Y1 I1 J0 F9", "X2.000 Y0.000 I0.000 J-1.000"]
+    assert emission.centre[1:3].tolist() == [list(centre)] * 2
+
+
 @pytest.mark.parametrize("before", [" ", "N20 ", " N20 ", "/N20 "])
 def test_a_full_circle_without_a_word_of_an_axis_becomes_lines(before: str):
     program, moves = traced(f"G0 X0 Y0 Z0\nG2 X2 Y0 I1 J0 F9\n{before}I-1 J0\nX4 Y0 I1 J0\nM2\n")

@@ -202,3 +202,21 @@ def test_an_axis_whose_datum_a_reset_does_not_move_stays_where_the_program_has_b
     assert followed.moves.placed is not None
     assert followed.moves.placed[-2].tolist() == [False, True, True]
     assert followed.moves.placed[-1].tolist() == [True, True, True]
+
+
+@pytest.mark.parametrize(
+    ("text", "of_the_tip", "length"),
+    [
+        ("T1 M6", True, 80.0),
+        ("T1 M6\nG43.4", True, 80.0),
+        ("T1 M6\nG43 H2", True, 50.0),
+        ("T1 M6\nG43.4 H2", True, 50.0),
+        ("T1 M6\nG43.4 H2", False, 50.0),
+    ],
+)
+def test_under_tcp_a_control_leads_the_tip_of_the_tool_that_it_knows_of(text: str, of_the_tip: bool, length: float):
+    """Without an offset it leads the spindle reference, unless the setup says that X, Y and Z are those of the tip."""
+    tools = {1: Tool(80.0), 2: Tool(50.0)}
+    moves = follow(f"{text}\nG1 X1. F9.", axes="XYZBC", dialect="fanuc", tcp=of_the_tip, tools=tools).moves
+    assert moves.tcp[-1]
+    assert moves.length_under_tcp[-1] == length

@@ -52,8 +52,10 @@ BULK = (
 )
 STATE = (
     *("program/test_trace_motion.py", "program/test_trace_knowledge.py", "program/test_trace_offsets.py"),
+    *("program/test_trace_cycles.py", "program/test_trace_errors.py", "program/test_trace_arcs.py"),
     *("program/test_frames.py", "program/test_pointing.py", "program/siemens/test_following.py"),
-    *("program/test_contour.py", "compensate/test_block_delete.py", "classes/test_planes_by_steps.py"),
+    *("program/test_contour.py", "program/test_fanuc.py", "compensate/test_following.py"),
+    *("compensate/test_block_delete.py", "classes/test_planes_by_steps.py", "program/klartext/test_following.py"),
 )
 MODULES: dict[str, tuple[str, ...]] = {
     "src/ncfix/writer/block.py": WRITER,

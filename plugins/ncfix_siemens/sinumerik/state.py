@@ -318,9 +318,9 @@ class Sinumerik(ProgramControl):
         if not follows or any(index in self.unknown or index in end.unknown for index in (X, Y, Z)):
             self.heading = None
         elif arc is not None:
-            self.heading = self.in_frame(departing(arc, end.target, step))[:3]
+            self.heading = self.in_frame(departing(arc, end.target, step))
         elif any(step[:3]):
-            self.heading = self.in_frame(step)[:3]
+            self.heading = self.in_frame(step)
         elif any(step):
             self.heading = None
 

@@ -275,13 +275,11 @@ class ControlState(ABC):
         return rotated(self.inverse, inner) if self.is_rotated else inner
 
     def in_frame(self, step: Vector) -> Vector:
-        """A difference of commands in the axes of the program's frame, mm and rad."""
-        if not self.is_rotated:
-            return step
-        return [dot(row, step) for row in self.inverse] + step[3:]
+        """X, Y and Z of a difference of commands, along the axes of the program's frame, mm."""
+        return [dot(row, step) for row in self.inverse] if self.is_rotated else step[:3]
 
     def way_to(self, target: Vector) -> Vector:
-        """The way from where the control stands to a command, in the axes of the program's frame, mm and rad."""
+        """The way of X, Y and Z from where the control stands to a command, along those of its frame, mm."""
         return self.in_frame([b - a for a, b in zip(self.position, target, strict=True)])
 
     def command(self, program: Vector, axes: int) -> Vector:
