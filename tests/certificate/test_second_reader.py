@@ -12,7 +12,8 @@ from certificate.planting import GIVEN, cases
 from ncfix.certificate.expected import Expected
 from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
-from ncfix.certificate.reading import READERS, Family, Shapes, Text
+from ncfix.certificate.reading import READERS, Family
+from ncfix.certificate.text import Lines, Text
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup
@@ -33,18 +34,19 @@ BLANKS = ("", " ", " ", " ", "  ", "\t")
 
 @pytest.mark.parametrize("family", Family)
 def test_lines_of_a_shape_are_read_as_one_by_one(family: Family) -> None:
-    rng, shapes, plain = random.Random(7), Shapes(family), 0
-    for number in range(30_000):
+    rng, texts = random.Random(7), []
+    for _ in range(30_000):
         pieces = rng.choices(PIECES[family].split("|"), k=rng.randint(0, 5))
         if family is Family.KLARTEXT and rng.random() < 0.7:
             pieces = [*rng.choice((["12", "L"], ["L"])), *pieces]
-        text = "".join(rng.choice(BLANKS) + piece for piece in pieces) + rng.choice(BLANKS)
-        found = shapes.line(number, text)
-        plain += found.plain
-        assert replace(found, plain=False) == READERS[family](number, text), text
-        if found.plain:
-            assert READERS[family](number, text).doubled() == ""
-    assert plain > 1000
+        texts.append("".join(rng.choice(BLANKS) + piece for piece in pieces) + rng.choice(BLANKS))
+    found = Lines(family, texts, range(1, len(texts) + 1))
+    assert len(found) == len(texts)
+    for line, text in zip(found, texts, strict=True):
+        alone = READERS[family](line.number, text)
+        assert replace(line, plain=False) == alone, text
+        assert not line.plain or alone.doubled() == ""
+    assert sum(line.plain for line in found) > 1000
 
 
 def test_lines_of_a_shape_are_followed_as_one_by_one() -> None:
@@ -52,9 +54,12 @@ def test_lines_of_a_shape_are_followed_as_one_by_one() -> None:
         family = Family.of(case.original, case.language)
         for source in (case.original, case.corrected):
             text = Text.of(source, family)
-            slow = replace(text, lines=[replace(line, plain=False) for line in text.lines])
+            one_by_one = replace(text, lines=list(text.lines), read=None)
+            slow = replace(one_by_one, lines=[replace(line, plain=False) for line in text.lines])
             assert any(line.plain for line in text.lines)
-            steps = [Expected(each, each, case.machine, GIVEN).ours for each in (text, slow)]
+            ways = (text, one_by_one, slow)
+            steps = [[*Expected(each, each, case.machine, GIVEN).ours.values()] for each in ways]
+            assert repr(steps[0]) == repr(steps[2])
             assert repr(steps[0]) == repr(steps[1])  # NaN is NaN
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.expected import SLACK, Expected, PoseColumns
-from ncfix.certificate.following import AxisStep, Given, Kind
-from ncfix.certificate.model import LEVER, Array, Ways
+from ncfix.certificate.model import LEVER, Array, Mask, Ways
 from ncfix.certificate.pairing import LinePair
-from ncfix.certificate.reading import Text
-from ncfix.machine import Machine
+from ncfix.certificate.steps import Indices, Kind
 
 MANY, FEW = 11, 3
 """At so many places on a motion, or a piece of one, its way is looked at: on long and on short ones."""
@@ -21,25 +19,45 @@ WIDER = 1.05
 """Of the tolerance: a way farther out is beyond it for sure."""
 
 
-class MovedPair(NamedTuple):
-    """A motion of the original, and the pieces in its place."""
+class Moved(NamedTuple):
+    """Motions of the original, and the pieces in their places: steps by their indices, pairs (m,) one behind the other.
 
-    pair: LinePair
-    step: AxisStep
-    pieces: list[AxisStep]
+    row, first, last  lines, as in `LinePair`
+    ours              (m,) step of the original
+    begin, stop       (m,) the first of its pieces, and behind the last, among the steps of the corrected program
+    """
+
+    row: Indices
+    first: Indices
+    last: Indices
+    ours: Indices
+    begin: Indices
+    stop: Indices
+
+    def where(self, which: Mask | Indices) -> Moved:
+        """Some of them."""
+        return Moved(*(each[which] for each in self))
 
     @property
-    def begins(self) -> bool:
-        """Whether it is known where it begins, in both programs."""
-        return not any(map(math.isnan, (*self.step.start, *self.pieces[0].start)))
+    def owner(self) -> Indices:
+        """Which motion each piece belongs to."""
+        found: Indices = np.repeat(np.arange(len(self.row)), self.stop - self.begin)
+        return found
+
+    @property
+    def pieces(self) -> Indices:
+        """All pieces, one behind the other."""
+        counts = self.stop - self.begin
+        found: Indices = np.arange(int(counts.sum())) + np.repeat(self.begin - (np.cumsum(counts) - counts), counts)
+        return found
+
+    def pairs(self) -> Iterator[LinePair]:
+        """Their lines."""
+        return map(LinePair, self.row.tolist(), self.first.tolist(), self.last.tolist())
 
 
 class Deviations(Expected):
     """What ways are judged by."""
-
-    def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float) -> None:
-        super().__init__(first, second, machine, given, tolerance_um)
-        self._digits: dict[float, float] = {}
 
     def gaps(self, meant: Array, done: Array, rows: NDArray[np.intp], given: PoseColumns) -> Array:
         """How far the tip is from where it is meant to be, mm; with play, on the better side of each axis."""
@@ -52,15 +70,15 @@ class Deviations(Expected):
         gap: Array = np.min([self.model.gaps(meant, done, tcp, length, side) for side in sides], axis=0)
         return gap
 
-    def allowed(self, step: AxisStep) -> float:
-        """How far the tip may be from the intended way, mm: the tolerance, and what digits add."""
-        digits = self._digits.get(step.unit)
-        if digits is None:
-            halves = self.half_steps(step, True)[~self.machine.rotary]
-            digits = self._digits[step.unit] = float(np.linalg.norm(halves))
-        if step.kind == Kind.ARC:
-            digits *= 3
-        return WIDER * self.tolerance + digits + SLACK
+    def allowed(self, at: Indices) -> Array:
+        """How far the tip may be from the intended ways of steps (m,), mm: the tolerance, and what digits add."""
+        units = self.ours.unit[at]
+        digits = np.empty(len(at))
+        for unit in set(units.tolist()):
+            digits[units == unit] = np.linalg.norm(self.control_halves(unit)[~self.machine.rotary])
+        digits[self.ours.kind[at] == Kind.ARC] *= 3
+        found: Array = WIDER * self.tolerance + digits + SLACK
+        return found
 
     def shares(
         self,

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.families import follower_of
-from ncfix.certificate.following import AxisStep, Given, Kind
+from ncfix.certificate.following import Given
 from ncfix.certificate.model import Array, Mask, TipModel, Ways
-from ncfix.certificate.reading import AXES, Text, TextLine
+from ncfix.certificate.reading import AXES, TextLine
+from ncfix.certificate.steps import AxisStep, Indices, Kind
+from ncfix.certificate.text import Text
 from ncfix.machine import Machine
 
 SLACK = 3e-6
@@ -28,12 +29,15 @@ PoseColumns = tuple[Mask, Array, Array]
 
 
 class Expected:
-    """The steps of an original and of its correction, by line, and where the correction of each should end.
+    """The steps of an original and of its correction, and where the correction of each should end.
 
-    expected    line of the original -> command (n_axes,), mm and rad
-    directions  line of the original -> the last direction of each axis; 0 where it has not moved yet, or is not sure
-    one_sided   lines of the original at whose ends it is known of every axis with play how it came there, or that it
-                has not moved yet: then `fix` and this reader take the middle
+    our_ends, their_ends  ends of steps (n, n_axes), mm and rad
+    expected    commands at which the corrected steps should end (n, n_axes), mm and rad; NaN where that is not known
+    sure        (n,) it is known
+    directions  the last direction of each axis (n, n_axes); 0 where it has not moved yet, or is not sure
+    one_sided   (n,) of every axis with play it is known how it came there, or that it has not moved yet: then `fix` and
+                this reader take the middle
+    told        (n,) it is known where the line should lead
     """
 
     def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float = 1.0) -> None:
@@ -44,82 +48,70 @@ class Expected:
         self.strategy = second.stamp.strategy if second.stamp else "rotary-then-linear"
         turned = self.model.turned if self.model else lambda numbers, length, on: [math.nan] * len(numbers)
         ours, theirs = (follower_of(text.family, machine.axis_names, given, turned) for text in (first, second))
-        self.ours = {step.row: step for step in ours.run(first)}
+        self.ours, self.theirs = ours.run(first), theirs.run(second)
         self.foreign = ours.foreign
-        self.theirs = {step.row: step for step in theirs.run(second)}
-        self.our_ends, self.their_ends = self._ends(self.ours), self._ends(self.theirs)
         self.tolerance = (second.stamp.tolerance_um if second.stamp else tolerance_um) / 1e3
         self._halves: dict[tuple[Any, ...], Array] = {}
-        self._near: dict[float, list[float]] = {}
+        self._near: dict[float, Array] = {}
         self._leads: dict[tuple[int, int], bool] = {}
-        self._expect()
-        self.sure = {row for row, place in self.expected.items() if np.isfinite(place).all()}
-        """Lines of which it is known where their correction should end."""
+        n, axes = len(self.ours), len(machine.axes)
+        self.expected, self.directions = np.full((n, axes), math.nan), np.zeros((n, axes), dtype=np.int8)
+        self.one_sided = np.zeros(n, dtype=bool)
+        if self.model is not None:
+            self.our_ends, self.their_ends = (self.model.internal(each.end) for each in (self.ours, self.theirs))
+            self._expect(self.model)
+        self.sure = np.isfinite(self.expected).all(axis=1)
+        self.told = self.sure & ~self.ours.unsaid
+        if self.machine.depends_on_direction:
+            self.told &= self.one_sided & (np.abs(self.ours.sweep) <= WHOLE_TURN)
 
-    def _expect(self) -> None:
+    def _expect(self, model: TipModel) -> None:
         """Work out where corrected motions should end."""
-        self.expected: dict[int, Array] = {}
-        self.directions: dict[int, NDArray[np.int8]] = {}
-        self.one_sided: set[int] = set()
-        model = self.model
-        if model is None:
-            return
-        known = [step for step in self.ours.values() if not step.why and step.kind != Kind.FIXED]
-        known = [step for step in known if not any(map(math.isnan, step.end))]
-        known = [step for step in known if not step.tcp or (model.leads and not math.isnan(step.length))]
-        if not known:
-            return
-        self._signs(known)
-        end, tcp, length, direction = self.columns(known)
-        found = model.aimed(end, tcp, length, direction)
-        self.expected = dict(zip([step.row for step in known], found, strict=True))
+        ours = self.ours
+        known = ours.followed & (ours.kind != Kind.FIXED) & np.isfinite(ours.end).all(axis=1)
+        known &= ~ours.tcp | (np.isfinite(ours.length) & bool(ours.tcp.any() and model.leads))
+        at = np.flatnonzero(known)
+        if at.size:
+            self._signs(model, at)
+            self.expected[at] = model.aimed(*self.columns(at))
 
-    def _signs(self, steps: Sequence[AxisStep]) -> None:
+    def _signs(self, model: TipModel, known: Indices) -> None:
         """The last direction of each axis at the end of each step, as its program means it; 0 where it is not sure."""
-        assert self.model is not None
-        last = np.zeros(len(self.machine.axes), dtype=np.int8)
+        ours, n = self.ours, len(self.ours)
         if not self.machine.depends_on_direction:
-            self.directions = dict.fromkeys((step.row for step in steps), last)
-            self.one_sided = set(self.directions)
+            self.one_sided[known] = True
             return
-        ways, rows = Ways.of(self.model, steps), np.arange(len(steps))
-        tcp = np.array([step.tcp for step in steps])
-        length = np.nan_to_num(np.array([step.length for step in steps]))
-        end = self.model.joints(ways.end, tcp, length)
+        ways, rows = Ways.of(model, ours, known), np.arange(len(known))
+        tcp, length = ours.tcp[known], np.nan_to_num(ours.length[known])
+        end = model.joints(ways.end, tcp, length)
         way, lately, at_last = (
-            end - self.model.joints(ways.at(rows, np.full(len(steps), 1 - share)), tcp, length)
+            end - model.joints(ways.at(rows, np.full(len(known), 1 - share)), tcp, length)
             for share in (1e-4, 1e-2, 1e-6)
         )
-        signs = np.where(np.isfinite(way) & (np.abs(way) > 1e-11), np.sign(way), 0).astype(np.int8)
-        clear = np.isfinite(way) & ((np.abs(lately) < 1e-9) | ((lately > 0) == (at_last > 1e-11)))
-        clear &= (np.abs(lately) < 1e-9) | ((lately < 0) == (at_last < -1e-11))  # it does not turn round at the end
-        found = {step.row: (sign, at) for step, sign, at in zip(steps, signs, clear, strict=True)}
-        tcp_before, sure = False, np.ones(len(last), dtype=bool)
+        signs, clear = np.zeros_like(self.directions), np.zeros(self.directions.shape, dtype=bool)
+        signs[known] = np.where(np.isfinite(way) & (np.abs(way) > 1e-11), np.sign(way), 0)
+        same = (np.abs(lately) < 1e-9) | (np.sign(lately) == np.where(np.abs(at_last) > 1e-11, np.sign(at_last), 0))
+        clear[known] = np.isfinite(way) & same  # and it does not turn round at the end
+        lost = np.ones(n, dtype=bool)
+        lost[known] = False
+        lost |= ours.tcp != np.concatenate([[False], ours.tcp[:-1]])
+        moves, index = (signs != 0) & ~lost[:, None], np.arange(n)[:, None]
+        last = np.maximum.accumulate(np.where(moves | lost[:, None], index, -1), axis=0)
+        self.directions = np.where(last >= 0, np.take_along_axis(np.where(moves, signs, 0), last, axis=0), 0)
         placed = np.array([name in self.given.initial for name in self.machine.axis_names])
-        """Axes of which it is not only assumed where they stood before they moved for the first time."""
-        directed = list(self.machine.directed)
-        for row in sorted(self.ours):
-            sign, known = found.get(row, (None, sure))
-            tcp_now = self.ours[row].tcp
-            if sign is None or tcp_now != tcp_before:
-                last, sure = np.zeros_like(last), np.zeros_like(sure)
-            else:
-                last, sure = np.where(sign != 0, sign, last), known & (placed | (sign == 0)) & (sure | (sign != 0))
-                placed = placed | (sign != 0)
-            tcp_before = tcp_now
-            self.directions[row] = last
-            if sure[directed].all():
-                self.one_sided.add(row)
+        moved = np.logical_or.accumulate(moves, axis=0)
+        placed_before = np.vstack([placed[None], placed | moved[:-1]])  # else it is only assumed where they stood
+        breaks = lost[:, None] | ~clear | (moves & ~placed_before)
+        last = np.maximum.accumulate(np.where(moves | breaks, index, -1), axis=0)
+        sure = (last < 0) | ~np.take_along_axis(breaks, last, axis=0)
+        self.one_sided = sure[:, list(self.machine.directed)].all(axis=1)
 
-    def columns(self, steps: Sequence[AxisStep]) -> tuple[Array, Mask, Array, Array]:
-        """Ends (n, n_axes), under tool-centre-point control (n,), tool lengths (n,), directions (n, n_axes)."""
-        assert self.model is not None
-        return (
-            self.model.internal([step.end for step in steps]),
-            np.array([step.tcp for step in steps], dtype=bool),
-            np.nan_to_num(np.array([step.length for step in steps], dtype=np.float64)),
-            np.array([self.directions[step.row] for step in steps], dtype=np.float64),
-        )
+    def columns(self, at: Indices) -> tuple[Array, Mask, Array, Array]:
+        """Of steps: ends (n, n_axes), under TCP (n,), tool lengths (n,), directions (n, n_axes)."""
+        ours = self.ours
+        return self.our_ends[at], ours.tcp[at], np.nan_to_num(ours.length[at]), self.directions[at].astype(np.float64)
+
+    # -- where lines lead -------------------------------------------------------------------------------------------
 
     def leads_there(self, row: int, at: int) -> bool:
         """Whether a corrected line leads where the correction of an original one should."""
@@ -131,23 +123,53 @@ class Expected:
         return found
 
     def _is_there(self, row: int, at: int) -> bool:
-        step, other = self.ours.get(row), self.theirs.get(at)
-        if step is None or other is None:
-            return step is None and other is None
-        if row not in self.sure or any(map(math.isnan, other.end)):
-            return self._alike(self.first.lines[row], self.second.lines[at], step.unit)
-        if (step.kind == Kind.RAPID) != (other.kind == Kind.RAPID):
-            return False
-        near = self._near.get(step.unit)
-        if near is None:
-            reach = 3 * self.half_steps(step, True) + SLACK
+        i, j = self.ours.step_of(row), self.theirs.step_of(at)
+        if i < 0 or j < 0:
+            return i < 0 and j < 0
+        unit = float(self.ours.unit[i])
+        if not self.sure[i] or not np.isfinite(self.theirs.end[j]).all():
+            return self._alike(self.first.lines[row], self.second.lines[at], unit)
+        return bool(self._are_there(np.array([i]), np.array([j]))[0])
+
+    def _are_there(self, ours: Indices, theirs: Indices) -> Mask:
+        """Whether corrected steps (k,) lead where the correction of original ones (k,), which is known, should."""
+        units = self.ours.unit[ours]
+        near = np.empty((len(ours), len(self.machine.axes)))
+        for unit in set(units.tolist()):
+            near[units == unit] = self._reach(unit)
+        turns = np.abs(self.ours.sweep[ours]) > WHOLE_TURN
+        near[turns] = np.maximum(near[turns], self.tolerance)
+        rapid = (self.ours.kind[ours] == Kind.RAPID) == (self.theirs.kind[theirs] == Kind.RAPID)
+        off = np.abs(self.their_ends[theirs] - self.expected[ours])
+        there: Mask = rapid & ((off <= near) | ~self.ours.said[ours]).all(axis=1)
+        return there
+
+    def _reach(self, unit: float) -> Array:
+        """How near corrected ends are to where they should be, (n_axes,) mm and rad."""
+        found = self._near.get(unit)
+        if found is None:
+            found = 3 * self.control_halves(unit) + SLACK
             if self.strategy == "full":
-                reach = np.where(self.machine.rotary, self.machine.max_correction[1], FULL)
-            near = self._near[step.unit] = reach.tolist()
-        if abs(step.sweep) > WHOLE_TURN:
-            near = [max(reach, self.tolerance) for reach in near]
-        places = zip(step.said, self.their_ends[at].tolist(), self.expected[row].tolist(), near, strict=True)
-        return all(abs(there - wanted) <= reach for said, there, wanted, reach in places if said)
+                found = np.where(self.machine.rotary, self.machine.max_correction[1], FULL)
+            self._near[unit] = found
+        return found
+
+    def lead_there(self, row: int, at: int, count: int) -> int:
+        """How many of so many lines from `row` on lead, one by one, where lines from `at` on do, and surely so.
+
+        Behind each of the latter there is another line with a path.
+        """
+        done, size = 0, 16
+        while done < count:
+            size = min(4 * size, count - done)
+            ours, theirs = self.ours.at[row + done :][:size], self.theirs.at[at + done :][: size + 1]
+            good = (ours >= 0) & (theirs[:-1] >= 0) & (theirs[1:] >= 0)
+            good &= self.told[ours] & np.isfinite(self.their_ends[theirs[:-1]]).all(axis=1)
+            good &= self._are_there(ours, theirs[:-1])
+            if not good.all():
+                return done + int(np.argmin(good))
+            done += size
+        return done
 
     def _alike(self, line: TextLine, other: TextLine, unit: float) -> bool:
         """Whether the numbers of two lines differ by corrections only, word by word."""
@@ -161,42 +183,49 @@ class Expected:
                 return False
         return True
 
+    def is_followed(self, row: int) -> bool:
+        """Whether it is known where a line should lead, or that it leads nowhere."""
+        at = self.ours.step_of(row)
+        return at < 0 or bool(self.told[at])
+
+    # -- digits -----------------------------------------------------------------------------------------------------
+
     def half_steps(self, step: AxisStep, added: bool = False) -> Array:
         """Half of the last digit of each axis, as it is written in a block, (n_axes,) mm and rad.
 
         added  the number stands in an added line, which has the digits of the control only
         """
-        words = () if added else tuple(step.named.items())
-        digits_of = tuple((name, word.decimals) for name, word in words if word.value is not None)
-        key = (step.unit, digits_of)
-        found = self._halves.get(key)
+        if added:
+            return self.control_halves(step.unit)
+        named = step.named
+        written = tuple(
+            named[name].decimals if name in named and named[name].value is not None else 0
+            for name in self.machine.axis_names
+        )
+        found = self._halves.get((step.unit, written))
         if found is None:
-            found = np.empty(len(self.machine.axes))
-            written = dict(digits_of)
-            for column, name in enumerate(self.machine.axis_names):
-                rotary = bool(self.machine.rotary[column])
-                unit = math.pi / 180 if rotary else step.unit
-                least = self.machine.least_increment[rotary] / unit
-                digits = max(0, math.ceil(-math.log10(least) - 1e-9), written.get(name, 0))
-                found[column] = 0.5 * 10.0**-digits * unit
-            self._halves[key] = found
+            found = self._halves[step.unit, written] = self.halves(np.array([step.unit]), np.array([written]))[0]
+        return found
+
+    def control_halves(self, unit: float) -> Array:
+        """The same for the digits of the control."""
+        found = self._halves.get((unit,))
+        if found is None:
+            written = np.zeros((1, len(self.machine.axes)), dtype=np.intp)
+            found = self._halves[unit,] = self.halves(np.array([unit]), written)[0]
+        return found
+
+    def halves(self, units: Array, written: NDArray[np.intp]) -> Array:
+        """The same for blocks with so many digits behind the point (n, n_axes), in units of so many mm (n,)."""
+        rotary = self.machine.rotary
+        linear, angle = self.machine.least_increment
+        units = np.where(rotary, math.pi / 180, units[:, None])
+        least = np.where(rotary, angle, linear) / units
+        digits = np.maximum(np.maximum(0, np.ceil(-np.log10(least) - 1e-9)), written)
+        found: Array = 0.5 * 10.0**-digits * units
         return found
 
     def sure_of_side(self, step: AxisStep) -> bool:
         """Whether the direction of every axis is known on which an error depends."""
-        return step.row in self.one_sided
-
-    def is_followed(self, row: int) -> bool:
-        """Whether it is known where a line should lead, or that it leads nowhere."""
-        step = self.ours.get(row)
-        if step is None:
-            return True
-        if row not in self.sure or not all(step.said[self.machine.axis_names.index(name)] for name in step.named):
-            return False
-        return not self.machine.depends_on_direction or (self.sure_of_side(step) and abs(step.sweep) <= WHOLE_TURN)
-
-    def _ends(self, steps: Mapping[int, AxisStep]) -> dict[int, Array]:
-        """The ends of steps, mm and rad, by line."""
-        if self.model is None:
-            return {}
-        return dict(zip(steps, self.model.internal([step.end for step in steps.values()]), strict=True))
+        at = self.ours.step_of(step.row)
+        return at >= 0 and bool(self.one_sided[at])

@@ -9,18 +9,16 @@ from collections.abc import Mapping, Sequence
 from ncfix.certificate.following import (
     CENTRES,
     INCH,
-    NAN,
     NO_CENTRE,
     NO_POLE,
     PLANES,
     UNKNOWN_WORDS,
     AxisFollower,
-    AxisStep,
     Given,
-    Kind,
     Turned,
 )
 from ncfix.certificate.reading import AXES, Family, TextLine, TextWord
+from ncfix.certificate.steps import NAN, AxisStep, Kind
 
 QUIET = frozenset((51, 80, 90, 150, 501, 600, 610, 611, 620, 640, 690, 800, 911, 960, 970, 980, 990)) | frozenset(
     (4500, 4510, 6010, 6020, 6030, 6410, 6420, 6430, 6440, 6450)

@@ -10,26 +10,17 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum
 
-from ncfix.certificate.reading import AXES, JUMPS, Family, Text, TextLine, TextWord
+import numpy as np
+from numpy.typing import NDArray
 
-NAN = math.nan
+from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
+from ncfix.certificate.steps import NAN, AxisStep, Kind, Modes, Steps, StraightRun
+from ncfix.certificate.text import Lines, StraightLines, Text
+
 INCH = 25.4
 PLANES = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}
 CENTRES = {"X": "I", "Y": "J", "Z": "K"}
-
-
-class Kind(IntEnum):
-    """What a step is."""
-
-    RAPID = 0
-    FEED = 1
-    ARC = 2
-    HOLE = 3
-    """A drilling cycle: the end is the bottom of the hole."""
-    FIXED = 4
-    """In machine coordinates, or to a reference point: never corrected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,43 +45,11 @@ class Given:
     """Numbers without a decimal point count increments: such programs are not followed."""
 
 
-@dataclass(slots=True)
-class AxisStep:
-    """What one line does; positions are commands, mm and degree, NaN where they are not known.
-
-    row     the index of the line
-    said    axes that the program itself has brought to their places
-    named   the words of the axes
-    why     why this reader cannot follow it; empty if it does
-    tcp     X Y Z are those of the tool tip in the workpiece
-    unit    mm in a unit of linear words
-    centre  of arcs, mm, in the order X Y Z; `across`: the axis normal to its plane; `sweep`: rad, about that axis
-    """
-
-    row: int
-    kind: Kind
-    start: list[float]
-    end: list[float]
-    said: list[bool]
-    named: dict[str, TextWord]
-    why: str
-    tcp: bool
-    length: float
-    feed: float | None
-    feed_mode: int
-    unit: float
-    centre: tuple[float, float, float] = (NAN, NAN, NAN)
-    across: str = "Z"
-    sweep: float = 0.0
-    foreign: bool = False
-    """It is because of what the program uses before, or in this line, that a correction may rewrite otherwise."""
-    unsteady: bool = False
-    """Cutter radius compensation is on: the control offsets the contour."""
-
-
 Turned = Callable[[Sequence[float], float, bool], Sequence[float]]
 """A command (mm, degree), the tool length, and whether tool-centre-point control goes on: the same as it is then."""
 
+LEAST = 6
+"""So many straight lines one behind the other are followed in columns."""
 REWRITTEN = re.compile(r"jumps|skip|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
 """What a program uses, and is not followed behind; a correction may write further lines another way."""
 UNKNOWN_WORDS = "words that this reader does not know here"
@@ -134,28 +93,81 @@ class AxisFollower:
         if given.pointless:
             self.lost["points"] = "numbers without a decimal point count increments"
 
-    def run(self, text: Text) -> list[AxisStep]:
+    def run(self, text: Text) -> Steps:
         """Follow the lines of a program."""
-        if any(line.odd is JUMPS for line in text.lines):
+        lines = text.lines
+        if self._has_jumps(text):
             self.lost["jumps"] = JUMPS
-        steps: list[AxisStep] = []
-        for row, line in enumerate(text.lines):
-            if line.odd or (self.lost and any(map(REWRITTEN.match, self.lost))):
-                self.foreign.add(row)
-            if line.skipped and self.given.skip is None and (line.path or line.codes):
-                self._perhaps(line)
-                if line.path:
-                    steps.append(self.step(row, Kind.FEED, dict(self.at), line, "blocks with / may be skipped"))
-                    steps[-1].foreign = True
-                continue
-            if line.skipped and self.given.skip:
-                continue
-            found = self.block(row, line)
-            if found is not None:
-                steps.append(found)
-                if found.why:
-                    self.forget()
-        return steps
+        log: list[AxisStep | StraightRun] = []
+        straight = None if text.read is None or self.lost else text.read.straight(self.axes)
+        stops = [] if straight is None else _stops(straight.is_straight)
+        row, tried = 0, 0
+        while row < len(lines):
+            if straight is not None and not self.lost and row >= tried and stops[row] - row >= LEAST:
+                run = self._straight_run(straight, row, stops[row])
+                if run is not None:
+                    log.append(run)
+                    row = stops[row]
+                    continue
+                tried = row + 1 if self.kind is None or self.kind > Kind.FEED else stops[row]
+            self._line(row, lines[row], log)
+            row += 1
+        return Steps(log, lines, self.axes, straight)
+
+    def _line(self, row: int, line: TextLine, log: list[AxisStep | StraightRun]) -> None:
+        """Follow one line."""
+        if line.odd or (self.lost and any(map(REWRITTEN.match, self.lost))):
+            self.foreign.add(row)
+        if line.skipped and self.given.skip is None and (line.path or line.codes):
+            self._perhaps(line)
+            if line.path:
+                step = self.step(row, Kind.FEED, dict(self.at), line, "blocks with / may be skipped")
+                step.foreign = True
+                log.append(step)
+            return
+        if line.skipped and self.given.skip:
+            return
+        found = self.block(row, line)
+        if found is not None:
+            log.append(found)
+            if found.why:
+                self.forget()
+
+    @staticmethod
+    def _has_jumps(text: Text) -> bool:
+        """Whether there is a line with a loop, a jump or a call; plain lines are none."""
+        lines = text.lines
+        if isinstance(lines, Lines):
+            plain = np.array([shape is not None for shape in lines.shapes], dtype=bool)
+            lines = [lines[row] for row in np.flatnonzero(~plain[lines.kinds]).tolist()] if len(lines) else ()
+        return any(line.odd is JUMPS for line in lines)
+
+    def _straight_run(self, lines: StraightLines, row: int, stop: int) -> StraightRun | None:
+        """The steps of lines that only bring axes straight to places; None if that takes more than columns."""
+        klartext = self.family is Family.KLARTEXT
+        if not klartext and (self.kind is None or self.kind > Kind.FEED) and lines.code[row] < 0:
+            return None
+        length = self.length_of(self.tool)
+        modes = Modes(
+            np.array([self.offset(axis) for axis in self.axes]),
+            np.array([self.scale(axis) for axis in self.axes]),
+            self.counting,
+            self.tcp,
+            NAN if length is None else length,
+            self.feed_mode,
+            self.unit,
+            self.beside,
+        )
+        at, said = list(self.at.values()), list(self.said.values())
+        before = (at, said, self.kind == Kind.RAPID, NAN if self.feed is None else self.feed)
+        run = StraightRun.of(lines, (row, stop), before, modes, klartext)
+        if run is not None:
+            self.at = dict(zip(self.axes, run.end[-1].tolist(), strict=True))
+            self.said = dict(zip(self.axes, run.said[-1].tolist(), strict=True))
+            self.kind = Kind.RAPID if run.rapid[-1] else Kind.FEED
+            feed = float(run.feed[-1])
+            self.feed = None if math.isnan(feed) else feed
+        return run
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
@@ -349,3 +361,11 @@ class AxisFollower:
         """Another tool length is in force in coordinates."""
         self.length = length
         self.unsay("XYZ")
+
+
+def _stops(flags: NDArray[np.bool_]) -> list[int]:
+    """Where the run of true ones ends in which each of them stands; of others their own index."""
+    n = len(flags)
+    others = np.where(flags, n, np.arange(n))
+    found: list[int] = np.minimum.accumulate(others[::-1])[::-1].tolist()
+    return found

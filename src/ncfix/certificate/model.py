@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.certificate.following import AxisStep, Kind
+from ncfix.certificate.steps import Kind, Steps
 from ncfix.machine import Machine, State
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class TipModel:
         ways = self.machine.linear_ways
         return ways is not None and abs(np.linalg.det(ways)) > FLAT
 
-    def internal(self, rows: Sequence[Sequence[float]]) -> Array:
+    def internal(self, rows: Sequence[Sequence[float]] | Array) -> Array:
         """Positions in mm and degree as mm and rad, (n, n_axes)."""
         found = np.array(rows, dtype=np.float64).reshape(-1, len(self.machine.axes))
         found[:, self.machine.rotary] *= math.pi / 180
@@ -120,15 +120,15 @@ class Ways:
     columns: tuple[int, int, int]
 
     @classmethod
-    def of(cls, model: TipModel, steps: Sequence[AxisStep]) -> Ways:
-        """Those of steps."""
+    def of(cls, model: TipModel, steps: Steps, at: NDArray[np.intp]) -> Ways:
+        """Those of steps (n,)."""
         return cls(
-            model.internal([step.start for step in steps]),
-            model.internal([step.end for step in steps]),
-            np.array([step.kind == Kind.ARC for step in steps], dtype=bool),
-            np.array([step.centre for step in steps], dtype=np.float64).reshape(-1, 3),
-            np.array(["XYZ".index(step.across) for step in steps], dtype=np.intp),
-            np.array([step.sweep for step in steps], dtype=np.float64),
+            model.internal(steps.start[at]),
+            model.internal(steps.end[at]),
+            steps.kind[at] == Kind.ARC,
+            steps.centre[at],
+            steps.across[at],
+            steps.sweep[at],
             model.columns,
         )
 

@@ -12,12 +12,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from ncfix.certificate.reading import Family, Text, TextLine
+from ncfix.certificate.reading import Family, TextLine
+from ncfix.certificate.text import Text
 
 AHEAD = 8
 """Lines that are looked at for where a line that should be here has gone."""
 FAR = 30
 """Lines that are looked at for where two programs agree again."""
+SEVERAL = 3
+"""So many lines are looked at one by one before those behind them are compared at once."""
 MOTION = {
     Family.WORDS: re.compile(r"[ \t]*\bG[ \t]*0?[0-3](?![\d.])", re.IGNORECASE),
     Family.KLARTEXT: re.compile(r"[ \t]*(?<![\w.])(?:L|CC|CP|CR|C|DR[+-])(?![\w.+-])", re.IGNORECASE),
@@ -51,6 +54,7 @@ class Pairing:
     original: Text
     corrected: Text
     nearness: Callable[[int, int], bool]
+    run_of: Callable[[int, int, int], int]
     moves: Callable[[int], bool]
     followed: Callable[[int], bool]
     foreign: Callable[[int], bool]
@@ -62,7 +66,7 @@ class Pairing:
     def run(self) -> None:
         """Find `pairs` and `faults`."""
         ours, theirs = self.original.lines, self.corrected.lines
-        own, other = [self._key(line) for line in ours], [self._key(line) for line in theirs]
+        own, other = self._keys(self.original), self._keys(self.corrected)
         i = j = 0
         while i < len(ours) or j < len(theirs):
             if i < len(ours) and j < len(theirs) and own[i] is not None and own[i] == other[j]:
@@ -72,6 +76,31 @@ class Pairing:
                 i, j = self._stretch(own, other, i, j)
             else:
                 i, j = self._apart(own, other, i, j)
+
+    def _keys(self, text: Text) -> list[str | None]:
+        """What the lines of a program hold besides a path and its pace, as `_key`; alike lines have the same."""
+        lines = text.read
+        if lines is None:
+            return [self._key(line) for line in text.lines]
+        found: list[str | None] = []
+        known: dict[tuple[int, tuple[str, ...]], str | None] = {}
+        digits, begins = lines.digits, lines.begins.tolist()
+        for row, kind in enumerate(lines.kinds.tolist()):
+            shape = lines.shapes[kind]
+            if shape is None or (shape.numbered and not digits[begins[row]].isdecimal()):
+                found.append(self._key(lines[row]))
+                continue
+            begin = begins[row]
+            block, held = "", shape.held
+            if shape.rest.startswith("N{}"):
+                block, held = f"N{digits[begin + held[0]]}", held[1:]
+            each = (kind, tuple([digits[begin + k] for k in held]))
+            if each not in known:
+                key = self._key(lines[row])
+                known[each] = key if key is None else key.removeprefix(block)
+            tail = known[each]
+            found.append(tail if tail is None else block + tail)
+        return found
 
     def _key(self, line: TextLine) -> str | None:
         """What a line holds besides a path and its pace; None for a line that holds nothing else."""
@@ -95,7 +124,12 @@ class Pairing:
         if self.pairs and self.pairs[-1].row == i - 1 and self.original.lines[i - 1].path:
             i, j = i - 1, self.pairs.pop().first
         more = (stop - j) - (end - i)
-        for row in range(i, end):
+        row = i - 1
+        while (row := row + 1) < end:
+            count = min(end - row, stop - j) - 1
+            if count > SEVERAL and (count := self._one_by_one(row, j, count)):
+                self.pairs.extend(LinePair(row + k, j + k, j + k) for k in range(count))
+                row, j = row + count, j + count
             if more > 0 and not self.followed(row):
                 self.unsure.update(range(row, end))
             whole = row == end - 1 and not (more > 0 and end < len(own) and self.foreign(end))
@@ -112,6 +146,10 @@ class Pairing:
         if i == end or more > 0:
             self._extra(j, stop)
         return end, stop
+
+    def _one_by_one(self, row: int, at: int, count: int) -> int:
+        """How many of so many lines have one line each in their place, from these on; a few may be left out."""
+        return self.run_of(row, at, count) if all(self.nearness(row + k, at + k) for k in range(SEVERAL)) else 0
 
     def _is_gone(self, row: int, at: int, end: int) -> bool:
         """Whether a line is not there any more: the next one leads where its correction should, and it does not."""

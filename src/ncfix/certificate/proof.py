@@ -11,17 +11,19 @@ from __future__ import annotations
 import gc
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ncfix.certificate.deviations import FEW, MANY, Deviations, MovedPair
+from ncfix.certificate.deviations import FEW, MANY, Deviations, Moved
 from ncfix.certificate.expected import SLACK, WHOLE_TURN
-from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, AxisStep, Given, Kind
-from ncfix.certificate.model import Array, Ways
+from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, Given
+from ncfix.certificate.model import Array, Mask, Ways
 from ncfix.certificate.pairing import BlockFault, LinePair, Pairing, text_faults
-from ncfix.certificate.reading import Family, StampFound, Text, TextLine
+from ncfix.certificate.reading import Family, TextLine
+from ncfix.certificate.steps import AxisStep, Indices, Kind
+from ncfix.certificate.text import StampFound, Text, same_but_axes
 from ncfix.machine import Machine
 
 TURNED = 1e-9
@@ -110,23 +112,28 @@ class Prover(Deviations):
         super().__init__(first, second, machine, given, tolerance_um)
         self.machine_hash = machine.hash
         self.proof = BlockProof(stamp=second.stamp)
-        self.polar = {row for row, line in enumerate(second.lines) if line.word("PA")}
+        self.polar: set[int] = set()
+        if second.family is Family.KLARTEXT:
+            self.polar = {row for row, line in enumerate(second.lines) if line.word("PA")}
         """Lines of the corrected program whose digits are those of an angle about a pole."""
 
     def run(self) -> BlockProof:
         """Compare all blocks."""
         self._stamps()
-        pairing = Pairing(
-            self.first, self.second, self.leads_there, self.ours.__contains__, self.is_followed, self._is_foreign
-        )
+        moves, nearness = self.ours.__contains__, (self.leads_there, self.lead_there)
+        pairing = Pairing(self.first, self.second, *nearness, moves, self.is_followed, self._is_foreign)
         pairing.run()
         for fault in pairing.faults:
             if self._foreign_near(fault, pairing):
                 self.proof.leave(UNSURE, fault.original or fault.line)
             else:
                 self.proof.fault(*fault)
-        motions: list[LinePair] = []
-        for pair in pairing.pairs:
+        pairs = np.array(pairing.pairs, dtype=np.intp).reshape(-1, 3)
+        plain = self._are_plain(pairs, pairing.unsure)
+        self.proof.blocks += int(plain.sum())
+        self.proof.motions += int(plain.sum())
+        for k in np.flatnonzero(~plain).tolist():
+            pair = pairing.pairs[k]
             line = self.first.lines[pair.row]
             if pair.row in pairing.unsure:
                 self.proof.blocks += 1
@@ -154,13 +161,32 @@ class Prover(Deviations):
             if why:
                 self.proof.leave(why, line.number)
                 self._roughly(step, pair)
-            else:
-                motions.append(pair)
+            elif step.kind != Kind.FIXED:
+                plain[k] = True
         self.proof.blocks += sum(1 for fault in pairing.faults if fault.original)
-        if motions:
-            self._motions(motions)
+        if plain.any():
+            self._motions(*pairs[plain].T)
         self.proof.faults.sort(key=lambda fault: fault.line)
         return self.proof
+
+    def _are_plain(self, pairs: Indices, unsure: Set[int]) -> Mask:
+        """Which pairs (n, 3) are plain motions of one line that differ in numbers of axes only."""
+        ours, first, second = self.ours, self.first.read, self.second.read
+        row, at, last = pairs.T
+        found: Mask = (at == last) & (ours.at[row] >= 0)
+        if first is None or second is None or self.model is None or self.strategy not in (*PLAIN_STRATEGIES, "full"):
+            return np.zeros(len(pairs), dtype=bool)
+        known = ours.followed & (ours.kind <= Kind.FEED) & ~ours.unsteady & ~ours.foreign & np.isfinite(ours.length)
+        known &= np.isfinite(ours.end).all(axis=1)
+        if ours.tcp.any() and not self.model.leads:
+            known &= ~ours.tcp
+        found[found] = known[ours.at[row[found]]]
+        for rows in (self.foreign, unsure):
+            found &= ~np.isin(row, list(rows))
+        found &= ~np.isin(np.asarray(first.numbers)[row], list(self.proof.faulty))
+        where = np.flatnonzero(found)
+        found[where] = same_but_axes(first, row[where], second, at[where])
+        return found
 
     # -- stamp and text -----------------------------------------------------------------------------------------------
 
@@ -248,32 +274,20 @@ class Prover(Deviations):
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
-    def _motions(self, pairs: Sequence[LinePair]) -> None:
-        """Judge motions that this reader can follow."""
-        moved: list[MovedPair] = []
-        for pair in pairs:
-            step, number = self.ours[pair.row], self.first.lines[pair.row].number
-            if step.kind == Kind.FIXED:
-                continue
-            line = self.second.lines[pair.last].number
-            pieces = [self.theirs[row] for row in range(pair.first, pair.last + 1) if row in self.theirs]
-            broken = next((piece.why for piece in pieces if piece.why in (NO_POLE, NO_CENTRE, NO_CIRCLE)), "")
-            if broken:
-                self.proof.fault(broken, line, number)
-                continue
-            why = self._pieces(step, pieces)
-            if why:
-                self.proof.leave(why, number)
-                continue
-            if not pieces or not self._same_kind(step, pieces):
-                self.proof.fault("the block does not move as it did", line, number)
-                continue
-            moved.append(MovedPair(pair, step, pieces))
-        ways: list[MovedPair] = []
-        for each, right in zip(moved, self._right_ends(moved), strict=True):
-            pair, step, pieces = each
+    def _motions(self, row: Indices, first: Indices, last: Indices) -> None:
+        """Judge motions that this reader can follow, given as in `LinePair`."""
+        before = self.theirs.before
+        moved = Moved(row, first, last, self.ours.at[row], before[first], before[last + 1])
+        whole = self._are_whole(moved)
+        for pair in moved.where(~whole).pairs():
+            self._incomplete(pair)
+        moved = moved.where(whole)
+        good = self._right_ends(moved) & self._same_pace(moved)
+        rest = np.flatnonzero(~good)
+        for k, pair in zip(rest.tolist(), moved.where(rest).pairs(), strict=True):
+            step, pieces = self.ours[pair.row], self._pieces_of(pair)
             line, number = self.second.lines[pair.last].number, self.first.lines[pair.row].number
-            verdict, proved = ("", False) if right else self._end(step, pieces, pair)
+            verdict, proved = self._end(step, pieces, pair)
             if verdict and proved:
                 self.proof.leave(verdict, number)
             elif verdict:
@@ -281,31 +295,71 @@ class Prover(Deviations):
             elif pace := self._pace(step, pieces):
                 self.proof.fault(pace, line, number)
             else:
-                ways.append(each)
-        self._ways(ways)
+                good[k] = True
+        self._ways(moved.where(good))
 
-    def _right_ends(self, moved: Sequence[MovedPair]) -> list[bool]:
-        """Whether nothing is wrong with the ends of motions, all at once; where that is not sure `_end` says more."""
-        if not moved or self.strategy == "full" or self.model is None:
-            return [False] * len(moved)
-        rows, lasts = [each.step.row for each in moved], [each.pieces[-1].row for each in moved]
-        meant = np.array([self.our_ends[row] for row in rows])
-        done = np.array([self.their_ends[row] for row in lasts])
-        expected = np.array([self.expected[row] for row in rows])
+    def _pieces_of(self, pair: LinePair) -> list[AxisStep]:
+        return [self.theirs[row] for row in range(pair.first, pair.last + 1) if row in self.theirs]
+
+    def _are_whole(self, moved: Moved) -> Mask:
+        """Of which motions, and their pieces, everything is known that they are judged by, (m,)."""
+        theirs = self.theirs
+        unknown = ~theirs.followed | ~np.isfinite(theirs.end).all(axis=1)
+        counts = np.concatenate([[0], np.cumsum(unknown)])
+        whole = (counts[moved.stop] == counts[moved.begin]) & self.sure[moved.ours] & (moved.stop > moved.begin)
+        if self.machine.depends_on_direction:
+            whole &= self.one_sided[moved.ours]
+        kind, pieces = self.ours.kind[moved.ours][moved.owner], theirs.kind[moved.pieces]
+        other = (pieces != kind) & ~((kind == Kind.ARC) & (pieces == Kind.FEED))
+        whole[moved.owner[other]] = False
+        found: Mask = whole
+        return found
+
+    def _incomplete(self, pair: LinePair) -> None:
+        """Say why a motion cannot be judged, or what is wrong with what its pieces are."""
+        step, number = self.ours[pair.row], self.first.lines[pair.row].number
+        line, pieces = self.second.lines[pair.last].number, self._pieces_of(pair)
+        broken = next((piece.why for piece in pieces if piece.why in (NO_POLE, NO_CENTRE, NO_CIRCLE)), "")
+        if broken:
+            self.proof.fault(broken, line, number)
+        elif why := self._pieces(step, pieces):
+            self.proof.leave(why, number)
+        else:
+            self.proof.fault("the block does not move as it did", line, number)
+
+    def _right_ends(self, moved: Moved) -> Mask:
+        """Whether nothing is wrong with the ends of motions, (m,); where that is not sure `_end` says more."""
+        if not len(moved.row) or self.strategy == "full" or self.model is None:
+            return np.zeros(len(moved.row), dtype=bool)
+        ours = self.ours
+        meant, done, expected = self.our_ends[moved.ours], self.their_ends[moved.stop - 1], self.expected[moved.ours]
         rotary, (low, high) = self.machine.rotary, self.machine.ranges.T
-        halves = np.array([self.half_steps(each.step, len(each.pieces) > 1) for each in moved])
+        single = moved.stop - moved.begin == 1
+        written = np.where(single[:, None], ours.decimals(moved.ours), 0)
+        halves = self.halves(ours.unit[moved.ours], written)
         right = (np.abs(done - expected) <= halves * 1.002 + np.where(rotary, TURNED, SLACK)).all(axis=1)
-        right &= (np.array([each.step.said for each in moved]) | rotary).all(axis=1)
+        right &= (ours.said[moved.ours] | rotary).all(axis=1)
         added = np.where(rotary, 0.0, np.abs(done - meant))
         least = np.where(rotary, np.inf, self.machine.least_increment[0] / 2)
         right &= (added <= self.machine.max_correction[0] + least).all(axis=1)
-        there = done
-        tcp = np.array([each.step.tcp for each in moved])
+        there, tcp = done, ours.tcp[moved.ours]
         if tcp.any():
-            there = self.model.joints(done, tcp, np.array([each.step.length for each in moved]))
+            there = self.model.joints(done, tcp, np.nan_to_num(ours.length[moved.ours]))
         right &= ((there >= low) & (there <= high)).all(axis=1)
         self.proof.largest_um = max(self.proof.largest_um, 1e3 * float(added[right].max(initial=0.0)))
-        return right.tolist()  # type: ignore[no-any-return]
+        found: Mask = right
+        return found
+
+    def _same_pace(self, moved: Moved) -> Mask:
+        """Whether all pieces of motions have the feed of the original, (m,)."""
+        ours, theirs, owner, pieces = self.ours, self.theirs, moved.owner, moved.pieces
+        feed, mode = ours.feed[moved.ours][owner], ours.feed_mode[moved.ours][owner]
+        alike = (feed == theirs.feed[pieces]) | (np.isnan(feed) & np.isnan(theirs.feed[pieces]))
+        alike &= mode == theirs.feed_mode[pieces]
+        alike &= (mode != 93) | (moved.stop - moved.begin == 1)[owner]
+        same = np.ones(len(moved.row), dtype=bool)
+        same[owner[~alike]] = False
+        return same
 
     def _pieces(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
         """Why what stands for a motion cannot be followed."""
@@ -314,31 +368,24 @@ class Prover(Deviations):
                 return piece.why
             if any(map(math.isnan, piece.end)):
                 return "where an axis stands is not known"
-        if step.row not in self.sure:
+        if not self.sure[self.ours.at[step.row]]:
             return "the machine model has no answer"
         if self.machine.depends_on_direction and not self.sure_of_side(step):
             return "play: the side of an axis is not known to this reader"
         return ""
 
-    @staticmethod
-    def _same_kind(step: AxisStep, pieces: Sequence[AxisStep]) -> bool:
-        kinds = {piece.kind for piece in pieces}
-        if step.kind == Kind.ARC:
-            return kinds <= {Kind.ARC, Kind.FEED}
-        return kinds == {step.kind}
-
     def _end(self, step: AxisStep, pieces: Sequence[AxisStep], pair: LinePair) -> tuple[str, bool]:
         """What is wrong with the end of a motion, and whether that is only not proved."""
         assert self.model is not None
-        meant, done = self.our_ends[step.row], self.their_ends[pieces[-1].row]
-        expected = self.expected[step.row]
+        at = self.ours.at[step.row]
+        meant, done, expected = self.our_ends[at], self.their_ends[self.theirs.at[pieces[-1].row]], self.expected[at]
         rotary = self.machine.rotary
         full = self.strategy == "full" and bool(rotary.any())
         if full:
             if (np.abs(done - meant)[rotary] > self.machine.max_correction[1] + 1e-6).any():
                 return UNSURE, True
             tcp, length = np.array([step.tcp]), np.array([step.length])
-            side = self.directions[step.row][None].astype(np.float64)
+            side = self.directions[at][None].astype(np.float64)
             expected = self.model.aimed(meant[None], tcp, length, side, done[None])[0]
             expected = np.where(rotary, done, expected)
         said = np.array(step.said) | (rotary if not full else False)  # no other strategy turns rotary axes
@@ -397,18 +444,20 @@ class Prover(Deviations):
             return "" if abs(theirs - ours) <= 2e-3 * ours else "the pieces take another time than the block"
         return "" if all(feed == step.feed for feed in feeds) else "the feed has changed"
 
-    def _ways(self, moved: Sequence[MovedPair]) -> None:
+    def _ways(self, moved: Moved) -> None:
         """Judge the ways of motions whose ends are right."""
-        self.proof.proved += len(moved)
-        self.proof.proved_motions += len(moved)
-        cutting = [each for each in moved if each.step.kind in (Kind.FEED, Kind.ARC) and each.begins]
-        if not cutting or self.model is None:
+        self.proof.proved += len(moved.row)
+        self.proof.proved_motions += len(moved.row)
+        kinds = self.ours.kind[moved.ours]
+        known = np.isfinite(self.ours.start[moved.ours]).all(axis=1) & np.isfinite(self.theirs.start[moved.begin]).all(
+            axis=1
+        )
+        cutting = moved.where(known & ((kinds == Kind.FEED) | (kinds == Kind.ARC)))
+        if not len(cutting.row) or self.model is None:
             return
-        steps, pieces = [each.step for each in cutting], [each.pieces for each in cutting]
-        counts = np.array([len(each) for each in pieces])
-        owner = np.repeat(np.arange(len(steps)), counts)
-        meant, done = Ways.of(self.model, steps), Ways.of(self.model, [step for each in pieces for step in each])
-        _, tcp, length, direction = self.columns(steps)
+        owner, counts = cutting.owner, cutting.stop - cutting.begin
+        meant, done = Ways.of(self.model, self.ours, cutting.ours), Ways.of(self.model, self.theirs, cutting.pieces)
+        _, tcp, length, direction = self.columns(cutting.ours)
         last = np.cumsum(counts) - 1
         share = np.ones(len(owner))
         inner = np.setdiff1d(np.arange(len(owner)), last)
@@ -420,9 +469,9 @@ class Prover(Deviations):
         for k in inner[share[inner] < before[inner] - 1e-2].tolist():
             bad.setdefault(int(owner[k]), "the pieces of the block are not one behind the other")
         given = (tcp, length, direction)
-        allowed = np.array([self.allowed(step) for step in steps])[owner]
+        allowed = self.allowed(cutting.ours)[owner]
         opens = np.concatenate([[0], last[:-1] + 1])
-        allowed[opens] += self.gaps(meant.start, done.start[opens], np.arange(len(steps)), given)
+        allowed[opens] += self.gaps(meant.start, done.start[opens], np.arange(len(cutting.row)), given)
         counts = np.where(done.is_short(self.machine.rotary), FEW, MANY)
         first = np.cumsum(counts) - counts
         each = np.repeat(np.arange(len(owner)), counts)
@@ -435,11 +484,11 @@ class Prover(Deviations):
         for k in np.flatnonzero(~(gap <= allowed)).tolist():
             text = f"the tip leaves the intended way by {1e3 * gap[k]:.2f} um between the ends of the block"
             bad.setdefault(int(owner[k]), text)
-        good = np.array([int(k) not in bad for k in owner])
+        good = ~np.isin(owner, list(bad))
         if good.any():
             self.proof.farthest_um = max(self.proof.farthest_um, 1e3 * float(gap[good].max()))
         for k, text in sorted(bad.items()):
-            pair = cutting[k].pair
+            (pair,) = cutting.where(np.array([k])).pairs()
             self.proof.proved -= 1
             self.proof.proved_motions -= 1
             number = self.first.lines[pair.row].number

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
@@ -91,72 +91,6 @@ class TextLine:
         return next((name for name in names if names.count(name) > 1), "") if len(names) > 1 else ""
 
 
-@dataclass(frozen=True, slots=True)
-class Text:
-    """A program as lines.
-
-    ends   what stands behind each line: its line end, empty behind the last one without
-    """
-
-    family: Family
-    lines: list[TextLine]
-    ends: list[str]
-    stamp: StampFound | None
-
-    @classmethod
-    def of(cls, source: bytes, family: Family) -> Text:
-        """Read a program; the line of its stamp, if it has one, is kept apart."""
-        read = READERS[family] if b"\0" in source else Shapes(family).line
-        lines: list[TextLine] = []
-        ends: list[str] = []
-        stamp = None
-        looked = b"ncfix" in source.lower()
-        for number, raw in enumerate(re.findall(r"[^\r\n]*(?:\r\n|\n|\r)|[^\r\n]+$", source.decode("latin-1")), 1):
-            text = raw.rstrip("\r\n")
-            if looked and stamp is None and (found := STAMP.search(text)):
-                stamp = StampFound(number, found[1].lower(), found[2].lower(), float(found[3]))
-                continue
-            lines.append(read(number, text))
-            ends.append(raw[len(text) :])
-        return cls(family, lines, ends, stamp)
-
-    @property
-    def block_numbers(self) -> list[int]:
-        """The numbers of the blocks that have one."""
-        found = (line.block or (BLOCK_NUMBER.match(line.rest) or [""] * 2)[1] for line in self.lines)
-        return [int(number) for number in found if number]
-
-    @property
-    def is_renumbered(self) -> bool:
-        """Whether its blocks have the numbers that `fix --block-numbers renumber` gives, in each program of a text."""
-        if self.family not in RENUMBERED:
-            return False
-        numbers, (start, step) = self.block_numbers, RENUMBERED[self.family]
-        pairs = list(zip([start - step, *numbers], numbers, strict=False))
-        gaps = sum(number == before + 2 * step for before, number in pairs)  # there is the number of the stamp
-        counted = all(number in (start, before + step, before + 2 * step) for before, number in pairs)
-        return counted and gaps <= (self.stamp is not None)
-
-    def without_block_numbers(self) -> Text:
-        """The same program where nobody looks at block numbers, nor at those to which jumps go."""
-        lines = [replace(line, block="", rest=ANY_BLOCK_NUMBER.sub("", line.rest)) for line in self.lines]
-        return replace(self, lines=lines)
-
-
-class StampFound(NamedTuple):
-    """What a corrected program says of itself: the line, the hash of the machine, strategy and tolerance (um)."""
-
-    line: int
-    machine: str
-    strategy: str
-    tolerance_um: float
-
-
-STAMP = re.compile(r"\bncfix \d\S* machine ([0-9a-f]+) strategy ([\w-]+) tolerance ([\d.e-]+) um", re.IGNORECASE)
-RENUMBERED = {Family.KLARTEXT: (0, 1), Family.SINUMERIK: (10, 10)}
-"""The first number that blocks get anew, and the step to the next."""
-BLOCK_NUMBER = re.compile(r"[ \t]*/?[ \t]*N[ \t]*(\d+)", re.IGNORECASE)
-ANY_BLOCK_NUMBER = re.compile(r"[ \t]*\bN[ \t]*\d+[ \t]*", re.IGNORECASE)
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 FORMULA = r"[+-]?(?:\#+(?:\d+|<[^<>]*>)|\#?\[(?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])*\])"
 WORD_ADDRESS = re.compile(
@@ -322,107 +256,3 @@ READERS: dict[Family, Callable[[int, str], TextLine]] = {
     Family.SINUMERIK: _sinumerik,
     Family.KLARTEXT: _klartext,
 }
-
-
-class PlainShape(NamedTuple):
-    """What lines have in common that differ in their numbers only.
-
-    path      names of the words that a correction may change, and which of the numbers of a line they have
-    codes     the same of the other words
-    rest      the other text, with {} for each number in it
-    held      which numbers these are
-    numbered  the first number is that of a block of Klartext
-    """
-
-    path: tuple[tuple[str, int], ...]
-    codes: tuple[tuple[str, int], ...]
-    rest: str
-    held: tuple[int, ...]
-    numbered: bool
-
-
-PLAIN_NUMBER = re.compile(rf"({NUMBER})")
-PLAIN_DECIMAL = re.compile(rf"(?<![Rr])({DECIMAL})")
-"""Numbers of Klartext, but for that of R0."""
-MARK = "\0"
-PLAIN_SHAPES = {
-    Family.WORDS: re.compile(rf"((?:[ \t]*[A-Za-z][ \t]*{MARK})+)[ \t]*(?:\([^(){MARK}]*\)|;[^{MARK}]*)?"),
-    Family.SINUMERIK: re.compile(rf"((?:[ \t]*[A-Za-z]{MARK})+)[ \t]*(?:;[^{MARK}]*)?"),
-    Family.KLARTEXT: re.compile(
-        rf"([ \t]*{MARK}(?=[ \t]))?[ \t]*L((?:[ \t]+(?:I?[XYZABCUVW]|F|M){MARK}|[ \t]+(?:R0|RL|RR|FMAX))+)[ \t]*",
-        re.IGNORECASE,
-    ),
-}
-"""Shapes that are read at once: words of a letter and a number, a comment without numbers behind them."""
-PLAIN_WORD = re.compile(rf"[ \t]*(?:([A-Za-z]+)[ \t]*{MARK}|(R0|RL|RR|FMAX))", re.IGNORECASE)
-
-
-class Shapes:
-    """Reads lines of a family; of those that differ in their numbers only, the shape is found once."""
-
-    def __init__(self, family: Family) -> None:
-        self.reader, self.klartext = READERS[family], family is Family.KLARTEXT
-        self.numbers = PLAIN_DECIMAL if self.klartext else PLAIN_NUMBER
-        self.pattern = PLAIN_SHAPES[family]
-        self.known: dict[str, PlainShape | None] = {}
-
-    def line(self, number: int, text: str) -> TextLine:
-        """One line."""
-        parts = self.numbers.split(text)
-        key = MARK.join(parts[::2])
-        shape = self.known.get(key, MARK)
-        if isinstance(shape, str):
-            shape = self.known[key] = self._shape(key)
-        if shape is None:
-            return self.reader(number, text)
-        digits = parts[1::2]
-        path, block = shape.path, ""
-        rest = shape.rest.format(*(digits[k] for k in shape.held)) if shape.held else shape.rest
-        if self.klartext:
-            block = digits[0] if shape.numbered else ""
-            if shape.numbered and not block.isdecimal():
-                return self.reader(number, text)
-            words = [
-                TextWord(name[-1], (it := digits[k]), float(it.replace(",", ".")), "+" if len(name) > 1 else "=")
-                for name, k in path
-            ]
-            codes = [
-                TextWord(name, (it := digits[k]), float(it.replace(",", "."))) if k >= 0 else TextWord(name, "", None)
-                for name, k in shape.codes
-            ]
-        else:
-            words = [TextWord(name, (it := digits[k]), float(it)) for name, k in path]
-            codes = [TextWord(name, (it := digits[k]), float(it)) for name, k in shape.codes]
-        return TextLine(number, words, codes, rest, block, plain=True)
-
-    def _shape(self, key: str) -> PlainShape | None:
-        """The shape that a text has whose numbers are marks; None if it takes more than a look to read it."""
-        found = self.pattern.fullmatch(key)
-        if found is None or "{" in key or "}" in key:
-            return None
-        path: list[tuple[str, int]] = []
-        codes: list[tuple[str, int]] = [("L", -1)] if self.klartext else []
-        held: list[int] = []
-        head = found.end(1) if self.klartext and found[1] else 0
-        begin, end = found.span(found.re.groups)
-        count, pieces, kept = int(head > 0), list[str](), key[head:begin]
-        for word in PLAIN_WORD.finditer(key, begin, end):
-            name = (word[1] or word[2]).upper()
-            if word[1] and name[-1] in AXES and (self.klartext or len(name) == 1):
-                path.append((name, count))
-                kept = kept.rstrip(" \t")
-                pieces.append(kept)
-                kept = ""
-            else:
-                kept += word[0].replace(MARK, "{}")
-                codes.append((name, count if word[1] else -1))
-                held += [count] if word[1] else []
-            count += bool(word[1])
-        pieces.append(kept + key[end:])
-        names = [name[-1] for name, _ in path]
-        if len(set(names)) < len(names):
-            return None
-        other = PATH_WORDS if not self.klartext else frozenset("R")
-        if any(name in other for name, _ in codes):
-            return None
-        return PlainShape(tuple(path), tuple(codes), "".join(pieces), tuple(held), head > 0)
