@@ -135,6 +135,9 @@ def test_a_parser_leaves_no_files(tmp_path: Path, root: Path) -> None:
         ("(SUB 12)", False),
         ("(RET)", False),
         ("(P1=5)", False),
+        ("(return)", False),
+        ("(retract, then goto N10)", False),
+        ("(SUB 12)\n(return)", False),
         ("(GOTO10)", False),
         ("(IF[#1EQ#0]GOTO10)", False),
         ("(IF LOOSE GOTO N10)", False),
@@ -148,3 +151,23 @@ def test_statements_of_fagor_are_no_comments(dialect: str, line: str, foreign: b
             read(source, "part.nc", dialect)
     else:
         read(source, "part.nc", dialect)
+
+
+@pytest.mark.parametrize(
+    ("text", "foreign"),
+    [
+        ("%9001\nN10 G0 G52 Z0\nN20 X1 Y1\n", True),
+        ("\n% 12 (PART)\nN10 G1 X5 F100\nN20 G79 N10\n", True),
+        ("%9001\nL1=5\nG0 X1\n", True),
+        ("%9001\nG0 X1 Y1\n", False),
+        ("%\nO9001\nG52 X0 Y0\nG0 X1\n", False),
+        ("%9001\n(G52 Z0)\nG0 X1 Y1\n", False),
+    ],
+)
+@pytest.mark.parametrize("dialect", ["iso", "fanuc"])
+def test_num_is_known_by_its_number_and_its_codes(dialect: str, text: str, foreign: bool) -> None:
+    if foreign:
+        with pytest.raises(NcfixError, match="NCF103: this is NUM code"):
+            read(text.encode(), "part.nc", dialect)
+    else:
+        read(text.encode(), "part.nc", dialect)

@@ -16,7 +16,7 @@ from ncfix.plugins import nearest, registry, working
 FAGOR = (
     rb"[ \t]*(?:RPT[ \t]+N\d+[ \t]*,[ \t]*N\d+|GOTO[ \t]+N\d+|P\d+[ \t]*=[^()\r\n]*P\d[^()\r\n]*"
     rb"|IF[ \t]+P\d[^()\r\n]*[ \t](?:GOTO[ \t]+N|P?CALL[ \t]+|RPT[ \t]+N)\d[^()\r\n]*"
-    rb"|SUB[ \t]*\d+[ \t]*\)(?=(?s:.*?)\([ \t]*RET[ \t]*\))|RET)[ \t]*\)?"
+    rb"|SUB[ \t]*\d+(?=[ \t]*\)(?s:.*?)\([ \t]*RET[ \t]*\))|RET)[ \t]*\)"
 )
 """Statements of Fagor controls: to all others they are comments, and the program is another one."""
 
@@ -30,11 +30,16 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
         rb"|A?(?:TRANS|ROT|MIRROR|SCALE)\b|MSG[ \t]*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+[ \t]*\(|R\d+[ \t]*=)",
     ),
     ("Okuma OSP code", rb"(?im)^[^(;\n]*(?<![A-Z])(?:G1[56][ \t]*H[ \t]*\d|VC\d+[ \t]*=|CALL[ \t]+O[A-Z\d])"),
+    (
+        "NUM code",
+        rb"(?i)\A[ \t\r\n]*(%[ \t]*\d+)(?=(?s:.*?)(?<![A-Z])"
+        rb"(?:G[ \t]*5[12][ \t]*[XYZ]|G[ \t]*7[79][ \t]*N[ \t]*\d|E[ \t]*[5-8]\d{4}\b|L\d+[ \t]*=))",
+    ),
     ("Fagor code (statements in brackets)", rb"(?i)\((?![ \t]*RET[ \t]*\))" + FAGOR),
 )
 """Other families of controls: what people call their language, and what shows it; for `Dialect.foreign`.
 
-With Okuma G54 to G59 are tool lengths, and G15 H selects work offsets.
+With Okuma G54 to G59 are tool lengths, and G15 H selects work offsets. With NUM G52 is a motion in machine coordinates.
 """
 
 LATHE = "lathe code (X a diameter, U and W increments)"
