@@ -386,24 +386,13 @@ def _left(blocks: Array, white: Array, projected: Array, present: Array) -> Arra
 
 
 def _whitening(small: Array) -> Array:
-    """L^-1, where L L' = 1 + `small`; where poses leave much open, rounding spoils that `small` is not negative."""
-    r = small.shape[1]
-    left = np.moveaxis(small, 0, 2) + np.eye(r)[:, :, None]
-    found = np.zeros_like(left)
-    found[range(r), range(r)] = 1.0
-    for k in range(r):
-        if not left[k, k].min() > 0:
-            values, ways = np.linalg.eigh(small)
-            whole: Array = np.swapaxes(ways, 1, 2) / np.sqrt(1 + np.maximum(values, 0.0))[:, :, None]
-            return whole
-        size = np.sqrt(left[k, k])
-        left[k, k:] /= size
-        found[k, : k + 1] /= size
-        for j in range(k + 1, r):
-            share = left[k, j]
-            left[j, j:] -= share * left[k, j:]
-            found[j, : k + 1] -= share * found[k, : k + 1]
-    return np.ascontiguousarray(np.moveaxis(found, 2, 0))
+    """W (n, r, r) with W (1 + `small`) W' = 1; where poses leave much open, rounding makes `small` negative."""
+    try:
+        result: Array = np.linalg.inv(np.linalg.cholesky(np.eye(small.shape[1]) + small))
+    except np.linalg.LinAlgError:
+        values, ways = np.linalg.eigh(small)
+        result = np.swapaxes(ways, 1, 2) / np.sqrt(1 + np.maximum(values, 0.0))[:, :, None]
+    return result
 
 
 def information(pool: Pool, rows: Sequence[int]) -> Array:
