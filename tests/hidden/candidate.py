@@ -61,17 +61,21 @@ class Candidate(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A command line as in docs/formats.md section 4. `without` is the option that takes names out of the catalogue."""
+    """A command line as in docs/formats.md section 4. `without` is the option that takes names out of the catalogue,
+    `options` are further ones of `diagnose`.
+    """
 
     command: tuple[str, ...] = ("ncfix",)
     without: str = "--without"
     timeout: float = 120.0
+    options: tuple[str, ...] = ()
 
     def diagnose(
         self, machine: Path, measured: Sequence[Path], output: Path, without: Sequence[str]
     ) -> Mapping[str, Any]:
         """Run `diagnose`; exit codes 0 and 1 are answers."""
         hidden = [part for name in without for part in (self.without, name)]
+        hidden += self.options
         text = self._run("diagnose", *map(str, measured), "-m", str(machine), "-o", str(output), "--json", *hidden)
         result: Mapping[str, Any] = json.loads(text)
         return result
