@@ -22,7 +22,8 @@ from ncfix.machine.basis import Backlash
 from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.reader import reads
-from ncfix.reports.diagnosis import document
+from ncfix.reports.diagnosis import document, measured_curves
+from ncfix.reports.diagnosis_picture import picture
 from ncfix.reports.rendering import html, markdown
 
 NOISE_UM = 2.0
@@ -171,6 +172,23 @@ def test_the_report_and_the_text_name_it(backlash: Diagnosis) -> None:
     assert page.count("<svg") >= 5
     assert page.count("<circle") > 100
     assert "## backlash X" in plain_page
+
+
+def test_what_was_measured_against_the_model(backlash: Diagnosis) -> None:
+    """A play of its own sign for each direction, and the model within three bands of what was measured."""
+    drawn = list(measured_curves(backlash, backlash.findings[0]))
+    plus, minus = [each for each in drawn if each.component == "dx"]
+    assert plus.title == "backlash X, X moving in plus"
+    assert minus.title == "backlash X, X moving in minus"
+    assert np.sign(plus.model).sum() == -np.sign(minus.model).sum() != 0
+    assert all((np.abs(each.measured - each.model) < 3 * each.spread).all() for each in (plus, minus))
+
+
+def test_a_picture_for_papers(backlash: Diagnosis) -> None:
+    pytest.importorskip("matplotlib")
+    drawn = picture(backlash, "svg")
+    assert b"backlash X, X moving in minus" in drawn
+    assert drawn == picture(backlash, "svg")
 
 
 def test_a_name_that_must_not_be_used_is_not_used(known: Machine) -> None:

@@ -359,6 +359,7 @@ def _named(text: str, count: int, option: str) -> tuple[str, list[float]]:
     "--next", "next_path", type=PATH, metavar="FILE", help="Write the poses to be measured next: CSV, else a program."
 )
 @click.option("--report", type=PATH, metavar="FILE", help="Write a report with figures (HTML or Markdown).")
+@click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Draw what was found for a paper.")
 @click.option("--check", is_flag=True, help="Exit code 1 if anything is missing.")
 @force_option
 @json_option
@@ -370,12 +371,14 @@ def diagnose(
     since: bool,
     next_path: str | None,
     report: str | None,
+    plot: str | None,
     check: bool,
     force: bool,
     as_json: bool,
 ) -> int:
     """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
+    from ncfix.cli.shop.pages import check_plot
     from ncfix.diagnosis.diagnosis import NOTHING
     from ncfix.diagnosis.presentation import as_dict, text, with_provenance
     from ncfix.machine import dumps
@@ -385,9 +388,11 @@ def diagnose(
 
     each_once(measured, shown)
     inputs = (*measured, machine_path)
-    machine_target, next_target, page_target = (
+    if plot is not None:
+        check_plot(plot)
+    machine_target, next_target, page_target, plot_target = (
         targets([STREAM], Outputs(path, force=force), inputs)[0] if path is not None else None
-        for path in (output, next_path, report)
+        for path in (output, next_path, report, plot)
     )
     check_streams("what was found", machine=machine_target, poses=next_target, report=page_target)
     form = form_of(report) if report is not None else None
@@ -407,6 +412,10 @@ def diagnose(
         _write_next(diagnosis, next_target)
     if page_target is not None and form is not None:
         page_target.write(form(document(diagnosis)))
+    if plot_target is not None:
+        from ncfix.reports.diagnosis_picture import picture
+
+        plot_target.write(picture(diagnosis, plot_target.path.lower().rpartition(".")[2]))
     if as_json:
         console.put_json(**as_dict(diagnosis, written))
     else:

@@ -49,6 +49,8 @@ SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
 """Size of everything else together, against the noise of one value."""
 PRIOR = (0.3, 0.3, 0.25, 0.12, 0.03)
 """How likely these are beforehand."""
+TOGETHER = 64
+"""Groups that are carried into the coordinates at once: of many the copies would take much memory."""
 FALLEN = 12.0
 """A share of the background that is less likely than another by this log likelihood adds nothing."""
 Members = Mapping[str, "Member"]
@@ -106,8 +108,9 @@ class Background:
 
     def seen(self, columns: Array) -> Array:
         """Columns (m, p) or values (m,) um in the coordinates, in units of `sigma`."""
-        scaled: Array = (columns.T @ self.rotation / self.sigma).T
-        return scaled
+        scaled: Array = columns.T @ self.rotation
+        scaled /= self.sigma
+        return scaled.T
 
     def variance(self, share: float) -> Array:
         """Variance along the coordinates in units of sigma^2, (n,)."""
@@ -190,10 +193,13 @@ class Evidence:
 
     def __post_init__(self) -> None:
         """Carry everything into the coordinates, once."""
-        none = np.zeros((len(self.background.data.y), 0))
-        columns = side_by_side([none, *(group.columns for group in self.groups)])
-        self.columns = self.background.seen(columns)
         self.bounds = np.concatenate([[0], np.cumsum([group.columns.shape[1] for group in self.groups])])
+        seen = np.empty((int(self.bounds[-1]), self.background.rotation.shape[1]))
+        for start in range(0, len(self.groups), TOGETHER):
+            some = self.groups[start : start + TOGETHER]
+            part = slice(int(self.bounds[start]), int(self.bounds[start + len(some)]))
+            seen[part] = self.background.seen(side_by_side(group.columns for group in some)).T
+        self.columns = seen.T
         self.y = self.background.seen(self.background.data.y)
         self.forms = {}
         for index, group in enumerate(self.groups):
@@ -322,10 +328,11 @@ class Evidence:
     def _blocks(self, share: float) -> Blocks:
         """The inner products of all groups with themselves; computed once."""
         if share not in self.blocks:
-            weighed, self.blocks[share] = self.columns.T / self.background.variance(share), []
+            variance, self.blocks[share] = self.background.variance(share), []
             for alike in self._by_width().values():
                 places = np.array([range(self.part(k).start, self.part(k).stop) for k in alike], dtype=np.int64)
-                products = np.stack([weighed[self.part(k)] @ self.columns[:, self.part(k)] for k in alike])
+                own = [self.columns[:, self.part(k)] for k in alike]
+                products = np.stack([columns.T / variance @ columns for columns in own])
                 self.blocks[share].append((np.asarray(alike), places.reshape(len(alike), -1), products))
         return self.blocks[share]
 

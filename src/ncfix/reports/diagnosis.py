@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.diagnosis.compound import EffectFinding
 from ncfix.diagnosis.diagnosis import NOTHING, Diagnosis
@@ -39,6 +41,10 @@ LEAST = 1e-99
 """Chances below this are none."""
 RUNNERS = 6
 """Names that did not win which are shown."""
+PLACES, ROWS_LEAST = 15, 6
+"""Places of a measured curve at most, and rows that the mean at each is made of at least."""
+MAIN = 0.5
+"""Share of the largest component from which on another is drawn, too."""
 EXTREME = 0.995
 """Share of the residuals that a plot must hold; the others are drawn at its edge."""
 
@@ -128,8 +134,93 @@ def _finding(diagnosis: Diagnosis, finding: EffectFinding) -> ReportSection:
     ]
     return ReportSection(
         candidate.name,
-        [*parts, *_curve(diagnosis, finding), *_folded(diagnosis, finding), *_runners(diagnosis, finding)],
+        [
+            *parts,
+            *(curve.plot for curve in measured_curves(diagnosis, finding)),
+            *_curve(diagnosis, finding),
+            *_folded(diagnosis, finding),
+            *_runners(diagnosis, finding),
+        ],
     )
+
+
+@dataclass(frozen=True)
+class MeasuredCurve:
+    """What was measured against what a finding shows: means of neighbouring rows.
+
+    title      the finding, and the direction of motion where it depends on that
+    component  which measured value; `over` what x (k,) is, with its unit
+    measured   (k,) um with everything else taken off; `spread` two standard errors of it
+    model      (k,) um, means over the same rows
+    """
+
+    title: str
+    component: str
+    over: str
+    x: Array
+    measured: Array
+    spread: Array
+    model: Array
+
+    @property
+    def plot(self) -> Plot:
+        """As a part of the report."""
+        caption = (
+            f"{self.title}: {self.component}, um over {self.over}, with everything else taken off; "
+            "means of neighbouring rows, band: two standard errors of what was measured"
+        )
+        drawn = [Line(self.x, self.measured, self.spread, "measured"), Line(self.x, self.model, None, "model")]
+        return Plot(caption, drawn)
+
+
+def measured_curves(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[MeasuredCurve]:
+    """Of the components in which a finding shows most, over what it depends on; each direction of motion by itself."""
+    found = _depends_on(diagnosis, finding)
+    if found is None or not finding.shown.any():
+        return
+    (over, place), data = found, diagnosis.data
+    names, rows = np.array(data.names), np.maximum(data.row, 0)
+    sizes = {name: float(np.linalg.norm(finding.shown[names == name])) for name in dict.fromkeys(names.tolist())}
+    for component in [name for name, size in sizes.items() if size >= MAIN * max(sizes.values())]:
+        for said, there in _ways(diagnosis, finding):
+            own = np.flatnonzero((names == component) & diagnosis.case.kept & there[rows])
+            own = own[np.argsort(place[rows[own]], kind="stable")]
+            count = min(PLACES, len(own) // ROWS_LEAST)
+            if count < 3:
+                continue
+            parts = np.array_split(own, count)
+            values = diagnosis.after + finding.shown
+            yield MeasuredCurve(
+                finding.candidate.name + said, component, over,
+                np.array([place[rows[part]].mean() for part in parts]),
+                np.array([values[part].mean() for part in parts]),
+                np.array([2 * diagnosis.after[part].std(ddof=1) / np.sqrt(len(part)) for part in parts]),
+                np.array([finding.shown[part].mean() for part in parts]),
+            )  # fmt: skip
+
+
+def _depends_on(diagnosis: Diagnosis, finding: EffectFinding) -> tuple[str, Array] | None:
+    """What a finding depends on, with its unit, and that for each row; None where that is no axis and no clock."""
+    data = diagnosis.data
+    signals = [effect.signal or "" for effect in finding.effects] + [finding.candidate.axis]
+    if any(signal.startswith(("temp_", "time_s")) for signal in signals):
+        time = data.column("time_s")
+        return ("time, h", (time - time.min()) / HOUR) if np.ptp(time) > 0 else None
+    axis = next((axis for signal in signals if (axis := data.machine.axis(signal)) is not None), None)
+    if axis is None or not data.measured.moved(axis):
+        return None
+    return with_unit(data.machine, axis.name), data.q[:, data.machine.axis_names.index(axis.name)] / axis.unit
+
+
+def _ways(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    """Words and rows of each direction in which the axis came, where the finding depends on that; else all rows."""
+    data, axis = diagnosis.data, finding.candidate.axis
+    side = data.column(f"dir_{axis}") if axis else np.zeros(data.count)
+    if any(effect.basis.needs_direction for effect in finding.effects) and np.ptp(side) > 0:
+        yield f", {axis} moving in plus", side > 0
+        yield f", {axis} moving in minus", side < 0
+    else:
+        yield "", np.ones(data.count, dtype=bool)
 
 
 def _runners(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:

@@ -58,7 +58,7 @@ class Pages:
         found = cls(page, plot, many, force)
         inputs = identities([*(target.source for target in targets), *(path for path in read if path)])
         outputs = {folded_name(target.path) for target in targets}
-        for path, check in ((page, _check_page), (plot, _check_plot)):
+        for path, check in ((page, _check_page), (plot, check_plot)):
             if path is not None:
                 if folded_name(path) in outputs:
                     raise UsageError.of(
@@ -135,7 +135,8 @@ def _check_page(path: str) -> None:
     library()
 
 
-def _check_plot(path: str) -> None:
+def check_plot(path: str) -> None:
+    """Raises `UsageError` NCF018 and NCF031 where no picture can be drawn into such a file."""
     from ncfix.reports.picture import FORMS, require_matplotlib
 
     if _suffix(path) not in FORMS:
