@@ -73,7 +73,10 @@ MODULES: dict[str, tuple[str, ...]] = {
     ),
     "src/ncfix/compensate/plan/limits.py": ("compensate/test_limits.py", "compensate/test_long_motions.py"),
     "src/ncfix/control/state.py": STATE,
-    "src/ncfix/control/moves.py": (*STATE, "compensate/test_wordless.py", "compensate/test_account.py"),
+    "src/ncfix/control/moves.py": (
+        *("compensate/test_moves.py", "compensate/test_account.py", "program/test_pinning.py"),
+        *("program/test_emit.py", "program/test_trace_motion.py", "program/siemens/test_following.py"),
+    ),
     "src/ncfix/control/interpreter.py": (
         *STATE,
         *("program/test_trace_flow.py", "program/test_recurrence.py", "program/test_trace_lane.py"),
