@@ -30,11 +30,14 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType
 from typing import Any
 
 import pytest
+
+from ncfix.core import interpreted
 
 ROOT = Path(__file__).parents[2]
 EQUIVALENT = Path(__file__).parent / "equivalent_mutants.txt"
@@ -367,9 +370,11 @@ class Trials:
         """Try a mutant of functions; the test that finds it, "stopped", or "survived"."""
 
         def run() -> str:
-            for each in gc.get_objects():
-                if type(each) is FunctionType and each.__code__ in changed:
-                    each.__code__ = changed[each.__code__]
+            functions = [f for f in gc.get_objects() if type(f) is FunctionType and f.__code__ in changed]
+            if not functions:
+                return UNSEEN
+            for each in functions:
+                each.__code__ = changed[each.__code__]
             for item, behind in zip(items, [*items[1:], None], strict=True):
                 if not passes(item, behind):
                     return item.nodeid
@@ -454,12 +459,20 @@ def tried_in_copy(modules: Sequence[str], count: int, seed: int) -> None:
         subprocess.run([*command, "--seed", str(seed)], cwd=folder, env=environment, check=True)
 
 
+def dotted(path: Path) -> str:
+    """The name of a module."""
+    return ".".join(path.relative_to(ROOT / "src").with_suffix("").parts)
+
+
 def tried_here(modules: Sequence[str], count: int, seed: int) -> None:
     """Try mutants of modules in this process, whose folder is a copy."""
     sources = {module: Source(ROOT / module, module) for module in modules}
     tried = [mutant for source in sources.values() for mutant in source.chosen(count, random.Random(seed))]
     trials = Trials([source.path for source in sources.values()], tried)
     tests = [f"tests/{each}" for each in MODULES[modules[0]]]
+    for source in sources.values():
+        is_core = source.path.parent.name == "core"  # it is there before this process is forked
+        _ = interpreted(source.path.stem) if is_core else import_module(dotted(source.path))
     pytest.main(["-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests], plugins=[trials])
     for module, source in sources.items():
         outcomes = [outcome for mutant, outcome in trials.found if mutant.path == source.path]
