@@ -367,8 +367,6 @@ class BlockWriter(BlockText):
         """The direction of the tool at an end, in the program's coordinates, as it is written."""
         target = self.target
         assert target.pointing is not None
-        assert target.rotation is not None
-        assert target.offset is not None
         direction = np.linalg.solve(target.rotation, target.pointing.direction(np.radians(end) + target.offset))
         return [round(float(part) * self.vector_length, self.vector_digits) for part in direction]
 
@@ -383,8 +381,6 @@ class BlockWriter(BlockText):
         """
         target, turning = self.target, list(self.turning)
         assert target.pointing is not None
-        assert target.rotation is not None
-        assert target.offset is not None
         vector = target.rotation @ np.array(self._vector(end))
         here, there = (np.radians(each[turning]) + target.offset[turning] for each in (position, end))
         ways = target.pointing.angles(vector / np.linalg.norm(vector), (float(here[0]), float(here[1])))

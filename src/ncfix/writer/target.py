@@ -94,7 +94,7 @@ class Target:
     offset       (n_axes,) of the frame, mm and rad
     level        of a canned cycle whose R is to be written: what it shall be
     measured     (n_axes,) axes whose words are computed at run time, and must be; empty: no axis
-    wordless     (n_axes,) axes that have no word and must get none; empty: no axis
+    wordless     (n_axes,) axes that have no word and must get none
     call         of a canned cycle whose depth stands in a call of its own
     spelled      (n_axes,) axes that get a word even if they stand where it leads; empty: no axis
     """
@@ -118,27 +118,27 @@ class Target:
     inverse_time: bool
     code: int
     active_code: int
-    feed: float = float("nan")
-    turn_minutes: float = float("nan")
-    turn_by_feed: bool = False
+    feed: float
+    turn_minutes: float
+    turn_by_feed: bool
+    arcs: NDArray[np.bool_] | None
+    centres: FloatArray | None
+    arc_code: int
+    increments: tuple[float, float]
+    rotary: tuple[bool, ...]
+    pointing: Pointing | None
+    rotation: FloatArray
+    offset: FloatArray
+    level: Level | None
+    wordless: tuple[bool, ...]
+    call: CycleCall | None
+    measured: tuple[bool, ...]
+    spelled: tuple[bool, ...]
     back_to_inverse_time: bool = False
-    arcs: NDArray[np.bool_] | None = None
-    centres: FloatArray | None = None
-    arc_code: int = 0
-    increments: tuple[float, float] = (1.0, 1.0)
-    rotary: tuple[bool, ...] = ()
-    pointing: Pointing | None = None
-    rotation: FloatArray | None = None
-    offset: FloatArray | None = None
-    level: Level | None = None
-    wordless: tuple[bool, ...] = ()
-    call: CycleCall | None = None
-    measured: tuple[bool, ...] = ()
-    spelled: tuple[bool, ...] = ()
 
     def may_name(self, column: int) -> bool:
         """Whether an axis has a word, or may get one."""
-        return not self.wordless or not self.wordless[column]
+        return not self.wordless[column]
 
     def must_name(self, column: int) -> bool:
         """Whether an axis gets a word even if it stands where that leads it."""
