@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ncfix.control.moves import MotionKind, Moves
+from ncfix.control.moves import Frame, MotionKind, Moves
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.text.reader import read
@@ -11,6 +11,7 @@ from ncfix.text.writer import apply
 from ncfix.writer.block import NO_TIME
 from ncfix.writer.emit import MODE_LOST, SEVERAL_STATES, emit
 from ncfix.writer.pieces import Pieces
+from ncfix.writer.target import FrameMap
 
 AXES = ("X", "Y", "Z")
 STEP = np.full(3, 0.001)
@@ -161,17 +162,37 @@ def test_a_word_that_is_taken_out_takes_one_blank_along():
     assert text.splitlines()[1:] == ["G1 X1 Y0    F9", "X2.000", "G2 X4  I1 J0", "M2"]
 
 
-def test_of_an_arc_in_several_the_further_ones_name_the_axes_of_their_plane():
-    source = b"G0 X0 Y0 Z0\nG2 X2 Y0 I1 J0 F9\nG2 X4 I1 J0\nM30\n"
+@pytest.mark.parametrize(
+    ("arcs", "lines"),
+    [
+        ((True, True), ["X2.000 Y0.000 I0.000 J-1.000", "X4 I1 J0"]),
+        ((True, False), ["G1 X2.000 Y0.000", "G2 X4 I1 J0"]),
+    ],
+)
+def test_of_an_arc_in_several_the_further_ones_name_the_axes_of_their_plane(arcs: tuple[bool, bool], lines: list[str]):
+    source = b"G0 X0 Y0 Z0\nG2 X2 Y0 I1 J0 F9\nX4 I1 J0\nM30\n"
     program = read(source, "test.mpf", "siemens")
     moves = trace(program, Setup(assume_zero=True), AXES, frozenset()).moves
     pieces = split(moves, 1, 0.5)
     top, centre = (1.0, 1.0, 0.0), (1.0, 0.0, 0.0)
-    pieces.end[1], pieces.arc[1:3], pieces.centre[1:3] = top, True, centre
+    pieces.end[1], pieces.arc[1:3], pieces.centre[1:3] = top, arcs, centre
     emission = emit(program, moves, pieces, STEP)
     text = apply(program.source, emission.edits).decode()
-    assert text.splitlines()[1:3] == ["G2 X1 Y1 I1 J0 F9", "X2.000 Y0.000 I0.000 J-1.000"]
+    assert text.splitlines()[1:4] == ["G2 X1 Y1 I1 J0 F9", *lines]
     assert emission.centre[1:3].tolist() == [list(centre)] * 2
+
+
+def test_what_is_not_known_hides_the_coordinates_that_are_made_of_it():
+    """In a frame that is turned about Z an unknown X hides X and Y of the program, not Z."""
+    turned = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    frame = FrameMap(Frame(np.array([1.0, 2.0, 3.0]), turned, 1.0), AXES, np.zeros(3, dtype=bool))
+    known, lacking = np.array([4.0, 5.0, 6.0]), np.array([np.nan, 5.0, 6.0])
+    assert frame.program(known) == pytest.approx([0.8 * 3 + 0.6 * 3, -0.6 * 3 + 0.8 * 3, 3.0])
+    assert frame.command(frame.program(known)) == pytest.approx(known)
+    assert np.isnan(frame.program(lacking)).tolist() == [True, True, False]
+    assert frame.program(lacking)[2] == 3.0
+    both = frame.program(np.stack([known, lacking]))
+    assert np.isnan(both).tolist() == [[False] * 3, [True, True, False]]
 
 
 @pytest.mark.parametrize("before", [" ", "N20 ", " N20 ", "/N20 "])
@@ -241,3 +262,11 @@ def test_a_motion_that_is_kept_must_not_rely_on_a_code_that_another_one_takes_aw
     pieces.kept[pieces.move > 1] = True
     emission = emit(program, moves, pieces, STEP)
     assert emission.conflicts == dict.fromkeys(lost, MODE_LOST)
+
+
+def test_what_is_known_of_pieces():
+    _, moves = traced("G1 X1 Y2 Z3 F9\nX2\nM2\n")
+    pieces = whole(moves)
+    assert pieces.known.tolist() == [True, True]
+    pieces.end[1, 2] = np.nan
+    assert pieces.known.tolist() == [True, False]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -95,6 +97,23 @@ def test_a_bound_increment_begins_where_it_began() -> None:
     kept = np.array([False, False, False, True])
     added = closure_of_refusals(moves, kept, kept).added
     assert added == {2: 3, 1: 3}
+
+
+def test_several_refusals_need_what_each_of_them_needs() -> None:
+    moves = moves_of("G1 X5 Y5\nX1 Y1\nG2 X2 Y0 I1 J0\nG1 X9\nX5 Y3\nG2 X6 Y2 I1\nG1 X9\nX5\nY1\nG2 X6 Y2 I1\nG1 X0")
+    arcs = np.flatnonzero(moves.kind == MotionKind.ARC).tolist()
+    alone = [closure_of_refusals(moves, np.isin(np.arange(len(moves)), arc)).kept for arc in arcs]
+    assert (
+        closure_of_refusals(moves, np.isin(np.arange(len(moves)), arcs)).kept.tolist() == np.any(alone, axis=0).tolist()
+    )
+    assert [kept.sum() for kept in alone] == [2, 2, 3]
+
+
+def test_where_tool_centre_point_control_goes_on_all_axes_stand_elsewhere() -> None:
+    moves = moves_of("G1 X3 Y3 Z3\nX2 Y2\nG2 X4 Y2 I1 J0")
+    refused, switched = np.array([0, 0, 0, 1], dtype=bool), replace(moves, tcp=np.array([0, 0, 0, 1], dtype=bool))
+    assert sorted(closure_of_refusals(moves, refused).added) == [2]
+    assert sorted(closure_of_refusals(switched, refused).added) == [1, 2]
 
 
 LINES = (
