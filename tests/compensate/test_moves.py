@@ -6,7 +6,7 @@ import numpy as np
 
 from compensate.machines_at_random import perfect
 from compensate.motions import changed, motions
-from ncfix.control.moves import PASS_RULES, RAPIDS, CycleCall, MotionKind, Pass, Rule
+from ncfix.control.moves import PASS_RULES, RAPIDS, CycleCall, MotionKind, Pass, Rule, TcpState
 
 CALLS = tuple(CycleCall(name, (), (), "Z", modal=True) for name in ("CYCLE81", "CYCLE83"))
 
@@ -61,3 +61,7 @@ def test_what_may_pass() -> None:
     assert {rule for rule, each in PASS_RULES.items() if each.kinds == {MotionKind.DWELL}} == {Pass.DWELL}
     assert all(each.kinds >= RAPIDS for rule, each in PASS_RULES.items() if rule not in (Pass.DWELL, Pass.DEPARTURE))
     assert set(PASS_RULES) == set(Pass) - {Pass.NONE}
+
+
+def test_a_length_shifts_commands_while_tool_centre_point_control_is_on() -> None:
+    assert [TcpState(on, 80.0).shift for on in (True, False)] == [80.0, 0.0]
