@@ -245,6 +245,8 @@ def test_directions_of_the_tool_are_read_again(dialect: str, root: Path) -> None
         place = "X{} Y{} Z{}".format(*numbers)
         if dialect != "fanuc" and rng.random() < 0.2:
             lines.append(f"{begin.replace('N', '')}{place} B{numbers[3]} C{numbers[4]}")
+        elif rng.random() < 0.2:
+            lines.append(f"{begin.replace('N', '')}{place}")  # the tool points as before
         else:
             lines.append(f"{begin}{place} " + words.format(*map(form.replace("3", "6").format, vector)))
     machine = load(root / "examples/machines/wCBXFZYSt.toml")
@@ -262,6 +264,8 @@ def test_directions_of_the_tool_are_read_again(dialect: str, root: Path) -> None
     last = np.append(np.diff(row) != 0, True)
     end = np.where(last[:, None], moves.end[row], (moves.start + moves.end)[row] / 2)
     end += rng.normal(size=end.shape) * np.where(machine.rotary, 1e-4, 0.02)
+    for piece in np.flatnonzero(~moves.moved[row][:, moves.rotary].any(axis=1)).tolist():
+        end[piece, moves.rotary] = end[piece - 1, moves.rotary]
     fraction, none = np.where(last, 1.0, 0.5), np.zeros(len(row), dtype=bool)
     step = np.where(machine.rotary, np.radians(1e-3), 1e-3)
     emission = emit(program, moves, Pieces(row, fraction, end, none, moves.centre[row], none), step)
