@@ -350,6 +350,7 @@ def test_rows_of_holes_that_the_control_makes_up_are_refused(dialect: str, block
         ("G66P2\nG1X5.F9.\nG67\nX9.\nM30\nO2\nG91Y1.\nG90M99", "fanuc", [True, False, False]),
         ("G1X5.F9.M99P3\nN3X9.\nM30", "fanuc", [True, False]),
         ("G1X5.F9.\nX9.M99", "fanuc", [False, False]),
+        ("G1X5.F9.\nG60X9.\nX1.", "fanuc", [False, True, False]),
     ],
 )
 def test_a_motion_behind_which_something_is_called_is_not_split(text: str, dialect: str, held: list[bool]) -> None:

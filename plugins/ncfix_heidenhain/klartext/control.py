@@ -205,7 +205,7 @@ class KlartextControl(base.ProgramControl):
         whole = self.whole
         self.tilted = self.plane_tilted and not self.m128
         turns = any(motion.axes >> index & 1 for index in self.turning)
-        if self.path.corner or self.path.ahead or "FT" in self.block_words:
+        if self.path.corner or self.path.ahead or {"FT", "T"}.intersection(self.block_words):
             self.whole = True
         if turns and (self.path.by_vector or self.path.doubtful):
             self.whole = True

@@ -244,8 +244,9 @@ def in_machine_coordinates(control: RS274Control, block: Block, code: int) -> No
 
 
 def one_way(control: RS274Control, block: Block, code: int) -> None:
-    """G60: a rapid to the words from one side (ISO controls)."""
-    control.make(Motion(MotionKind.RAPID, block.axes, destination(control, block), 0))
+    """G60: a rapid to the words from one side (ISO controls), in one piece: the next block is none any more."""
+    with control.in_one_piece():
+        control.make(Motion(MotionKind.RAPID, block.axes, destination(control, block), 0))
 
 
 # -- reference points -------------------------------------------------------------------------------------------------

@@ -77,7 +77,8 @@ def test_a_turn_in_a_plane_is_not_split() -> None:
 
 
 def test_a_motion_whose_time_is_given_is_not_split() -> None:
-    assert follow("L X+1 F100\nL X+5 FT2\nL X+9 FU0.1").moves.compensated.tolist() == [False, True, False]
+    held = follow("L X+1 F100\nL X+5 FT2\nL X+9 FU0.1\nL X+1 FMAXT5").moves.compensated.tolist()
+    assert held == [False, True, False, True]
 
 
 def test_increments_of_parameters_say_the_same_from_a_corrected_place() -> None:
