@@ -9,26 +9,46 @@ of it holds, keeping them costs the squares of two unrelated curves where one wo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from ncfix.diagnosis.evidence import FURTHER, marginal
-from ncfix.diagnosis.residual_data import UM, Misfit, is_free
-from ncfix.machine import Effect
+from ncfix.diagnosis.residual_data import UM, Misfit, is_free, misfit
+from ncfix.machine import Effect, Machine
 from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array
+from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.selection import Selection
 
 SMOOTH = 0.3
 """How far the values of a table know of each other, of its length."""
 CHANGES = (0.3, 0.7, 1.4)
 """Size of a change against that of the curve: two unrelated curves of one size differ by the last."""
+CLEARLY = 25.0
+"""Log odds of another machine's file against one of whose curves some have changed, from which on it is sure."""
 FREEDOM = 1.0
 """Degrees of freedom of what is known of the noise."""
+
+
+def without_foreign_tables(
+    measurements: Sequence[Measurement], machine: Machine, now: Misfit
+) -> Iterator[tuple[Machine, int, float]]:
+    """The machine without the curves of its file, where none of them holds: its constants as the data have them, how
+    many these are, and the log odds that are gained. The curves of this machine are missing then.
+    """
+    if machine.is_perfect or all(map(is_free, machine.effects)):
+        return
+    curves = CurvesOfFile.of(now)
+    if curves.foreign - curves.changed < CLEARLY:
+        return
+    constants = [replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects if is_free(e)]
+    own = misfit(measurements, machine.replace(effects=tuple(constants))).constants
+    fitted = Selection(tuple(constants), (True,) * len(constants)).machine(machine.replace(effects=()), own.tolist())
+    yield fitted, len(own), curves.foreign - curves.as_given + now.count * float(np.log(now.left() / now.free))
 
 
 @dataclass(frozen=True, repr=False)

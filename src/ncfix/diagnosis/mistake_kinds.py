@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ncfix.diagnosis.foreign_tables import CurvesOfFile
+from ncfix.diagnosis.foreign_tables import without_foreign_tables
 from ncfix.diagnosis.residual_data import TIGHT_UM, UM, Misfit, is_free, misfit, rows_of
 from ncfix.diagnosis.stale_tables import shifted_tables
 from ncfix.machine import Effect, Machine
@@ -21,7 +21,6 @@ from ncfix.machine.plausible import much, times_a_machining_centre
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index, Measurement
-from ncfix.measure.selection import Selection
 
 LARGE_RAD = 2e-4
 """An angle above this may have been typed in degrees."""
@@ -33,8 +32,6 @@ NOWHERE_MM = 0.1
 """A first step that is smaller leads to none that is off: what it leaves is of second order."""
 SIDE = 0.3
 """Share of its way from which on a direction in which the point of an axis moved is named."""
-CLEARLY = 25.0
-"""Log odds of another machine's file against one of whose curves some have changed, from which on it is sure."""
 PIVOT, PIVOT_STEPS = "pivot", 3
 """The name of an axis point that is off; and steps in which it is moved to where the data have it."""
 INCH = 25.4
@@ -489,21 +486,10 @@ def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) 
 
 
 def _other_machine(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
-    """The file of another machine with the same axes: nothing of its errors holds; its constants are fitted anew.
-
-    The curves of this machine are missing then, so that the noise is not reached: it is weighed with others drawn.
-    """
-    if machine.is_perfect or all(map(is_free, machine.effects)):
-        return
-    curves = CurvesOfFile.of(now)
-    if curves.foreign - curves.changed < CLEARLY:
-        return
-    constants = [replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects if is_free(e)]
-    own = misfit(measurements, machine.replace(effects=tuple(constants))).constants
-    fitted = Selection(tuple(constants), (True,) * len(constants)).machine(machine.replace(effects=()), own.tolist())
-    title = "another machine: nothing of the file's tables holds; it is another machine's file, or out of date"
-    gained = curves.foreign - curves.as_given + now.count * float(np.log(now.left() / now.free))
-    yield Mistake("another machine", title, "", fitted, measurements, fitted=len(own), replaces=True, gained=gained)
+    """The file of another machine with the same axes: nothing of its errors holds; its constants are fitted anew."""
+    for fitted, count, gained in without_foreign_tables(measurements, machine, now):
+        title = "another machine: nothing of the file's tables holds; it is another machine's file, or out of date"
+        yield Mistake("another machine", title, "", fitted, measurements, fitted=count, replaces=True, gained=gained)
 
 
 def _with(machine: Machine, axis: Axis) -> Machine:
