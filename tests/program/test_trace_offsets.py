@@ -220,3 +220,14 @@ def test_under_tcp_a_control_leads_the_tip_of_the_tool_that_it_knows_of(text: st
     moves = follow(f"{text}\nG1 X1. F9.", axes="XYZBC", dialect="fanuc", tcp=of_the_tip, tools=tools).moves
     assert moves.tcp[-1]
     assert moves.length_under_tcp[-1] == length
+
+
+@pytest.mark.parametrize(
+    ("change", "placed"),
+    [("", [True] * 3), ("G43 H2", [True, True, False]), ("G92 Y5", [True] * 3), ("G55", [True, False, False])],
+)
+def test_behind_a_change_of_what_numbers_count_from_axes_have_to_be_named_again(change: str, placed: list[bool]):
+    """A tool length counts along Z: until a block names Z, it gets no word. A shift in numbers changes nothing."""
+    moves = follow(f"G1 X1 Y1 Z1 F9\n{change}\nX2", tools={2: Tool(50.0)}).moves
+    found = np.ones(3, dtype=bool) if moves.placed is None else moves.placed[-1]
+    assert found.tolist() == placed
