@@ -65,6 +65,8 @@ class Deviations(Expected):
         tcp, length, direction = given[0][rows], given[1][rows], given[2][rows]
         sides = [direction]
         for column in self.machine.directed:
+            if not direction[:, column].any():
+                continue
             turned = np.where(np.arange(direction.shape[1]) == column, -1.0, 1.0)
             sides += [side * turned for side in sides]
         gap: Array = np.min([self.model.gaps(meant, done, tcp, length, side) for side in sides], axis=0)

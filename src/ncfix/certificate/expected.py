@@ -215,14 +215,19 @@ class Expected:
             found = self._halves[unit,] = self.halves(np.array([unit]), written)[0]
         return found
 
+    def control_digits(self, units: Array) -> NDArray[np.intp]:
+        """Digits behind the point that the control resolves, in blocks with units of so many mm (n,); (n, n_axes)."""
+        linear, angle = self.machine.least_increment
+        least = np.where(self.machine.rotary, angle * 180 / math.pi, linear / units[:, None])
+        found: NDArray[np.intp] = np.maximum(0, np.ceil(-np.log10(least) - 1e-9)).astype(np.intp)
+        return found
+
     def halves(self, units: Array, written: NDArray[np.intp]) -> Array:
         """The same for blocks with so many digits behind the point (n, n_axes), in units of so many mm (n,)."""
-        rotary = self.machine.rotary
-        linear, angle = self.machine.least_increment
-        units = np.where(rotary, math.pi / 180, units[:, None])
-        least = np.where(rotary, angle, linear) / units
-        digits = np.maximum(np.maximum(0, np.ceil(-np.log10(least) - 1e-9)), written)
-        found: Array = 0.5 * 10.0**-digits * units
+        digits = np.maximum(self.control_digits(units), written)
+        found: Array = (
+            0.5 * 10.0 ** -digits.astype(float) * np.where(self.machine.rotary, math.pi / 180, units[:, None])
+        )
         return found
 
     def sure_of_side(self, step: AxisStep) -> bool:

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+
 from ncfix.certificate.reading import Family, TextLine
 from ncfix.certificate.text import Text
 
@@ -82,13 +84,15 @@ class Pairing:
         lines = text.read
         if lines is None:
             return [self._key(line) for line in text.lines]
-        found: list[str | None] = []
         known: dict[tuple[int, tuple[str, ...]], str | None] = {}
-        digits, begins = lines.digits, lines.begins.tolist()
-        for row, kind in enumerate(lines.kinds.tolist()):
-            shape = lines.shapes[kind]
+        digits, begins, shapes = lines.digits, lines.begins.tolist(), lines.shapes
+        bare = [shape is not None and bool(shape.path) and not shape.rest and not shape.numbered for shape in shapes]
+        found: list[str | None] = [None] * len(lines)
+        others = np.flatnonzero(~np.array(bare, dtype=bool)[lines.kinds]).tolist() if found else []
+        for row, kind in zip(others, lines.kinds[others].tolist(), strict=True):
+            shape = shapes[kind]
             if shape is None or (shape.numbered and not digits[begins[row]].isdecimal()):
-                found.append(self._key(lines[row]))
+                found[row] = self._key(lines[row])
                 continue
             begin = begins[row]
             block, held = "", shape.held
@@ -99,7 +103,7 @@ class Pairing:
                 key = self._key(lines[row])
                 known[each] = key if key is None else key.removeprefix(block)
             tail = known[each]
-            found.append(tail if tail is None else block + tail)
+            found[row] = tail if tail is None else block + tail
         return found
 
     def _key(self, line: TextLine) -> str | None:

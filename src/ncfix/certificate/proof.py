@@ -335,8 +335,9 @@ class Prover(Deviations):
         meant, done, expected = self.our_ends[moved.ours], self.their_ends[moved.stop - 1], self.expected[moved.ours]
         rotary, (low, high) = self.machine.rotary, self.machine.ranges.T
         single = moved.stop - moved.begin == 1
-        written = np.where(single[:, None], ours.decimals(moved.ours), 0)
-        halves = self.halves(ours.unit[moved.ours], written)
+        units = ours.unit[moved.ours]
+        written = np.where(single[:, None], ours.decimals(moved.ours, self.control_digits(units)), 0)
+        halves = self.halves(units, written)
         right = (np.abs(done - expected) <= halves * 1.002 + np.where(rotary, TURNED, SLACK)).all(axis=1)
         right &= (ours.said[moved.ours] | rotary).all(axis=1)
         added = np.where(rotary, 0.0, np.abs(done - meant))

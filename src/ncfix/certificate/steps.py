@@ -259,8 +259,8 @@ class Steps(Mapping[int, AxisStep]):
             unsteady=bool(self.unsteady[at]),
         )
 
-    def decimals(self, at: Indices) -> NDArray[np.intp]:
-        """Digits behind the point of the words of axes of steps (k,), (k, a); 0 where there is no number."""
+    def decimals(self, at: Indices, least: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Digits behind the point of the words of axes of steps (k,), where they may be more than `least`; (k, a)."""
         found = np.zeros((len(at), len(self._names)), dtype=np.intp)
         lines, straight = self._lines, self._straight
         single = np.array([self._made[step] is not None for step in at.tolist()], dtype=bool)
@@ -271,11 +271,14 @@ class Steps(Mapping[int, AxisStep]):
                     found[k, self._names.index(name)] = word.decimals
         runs = np.flatnonzero(~single)
         if runs.size and straight is not None and isinstance(lines, Lines):
-            words = straight.word[self.rows[at[runs]]]
-            where = np.nonzero(words >= 0)
             digits = lines.digits
-            texts = [digits[number] for number in words[where].tolist()]
-            points = [max(text.find("."), text.find(",")) for text in texts]
-            sizes = [0 if p < 0 else len(text) - 1 - p for text, p in zip(texts, points, strict=True)]
-            found[runs[where[0]], where[1]] = sizes
+            words = straight.word[self.rows[at[runs]]]
+            values = straight.values
+            before = np.ceil(np.log10(np.maximum(np.floor(np.abs(values)) + 1, 1))) + (values < 0)
+            most = np.fromiter(map(len, digits), np.intp, len(digits)) - before - 1
+            where = np.nonzero((words >= 0) & (most[words] > least[runs]))
+            for k, column, number in zip(*map(np.ndarray.tolist, where), words[where].tolist(), strict=True):
+                text = digits[number]
+                point = max(text.find("."), text.find(","))
+                found[runs[k], column] = 0 if point < 0 else len(text) - 1 - point
         return found

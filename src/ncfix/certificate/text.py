@@ -143,8 +143,9 @@ class Lines(Sequence[TextLine]):
         self.family, self.rows, self.numbers = family, rows, numbers
         self.klartext = family is Family.KLARTEXT
         pattern, text = PLAIN_DECIMAL if self.klartext else PLAIN_NUMBER, "\n".join(rows)
-        self.digits: list[str] = pattern.findall(text)
-        keys = pattern.sub(MARK, text).split("\n") if rows else []
+        parts = pattern.split(text)
+        self.digits: list[str] = parts[1::2]
+        keys = MARK.join(parts[::2]).split("\n") if rows else []
         known: dict[str, int] = {}
         self.kinds = np.fromiter((known.setdefault(key, len(known)) for key in keys), np.intp, len(rows))
         self.shapes = [self._shape(key) for key in known]
@@ -193,6 +194,11 @@ class Lines(Sequence[TextLine]):
             codes = [TextWord(name, (it := digits[k]), float(it)) for name, k in shape.codes]
         return TextLine(number, words, codes, rest, block, plain=True)
 
+    def _values(self) -> NDArray[np.float64]:
+        """All numbers."""
+        digits = [each.replace(",", ".") for each in self.digits] if self.klartext else self.digits
+        return np.fromiter(map(float, digits), np.float64, len(digits))
+
     def straight(self, axes: Sequence[str]) -> StraightLines:
         """The lines that only bring these axes straight to places, in columns."""
         n = len(self.rows)
@@ -200,7 +206,7 @@ class Lines(Sequence[TextLine]):
             np.zeros(n, dtype=bool),
             np.full((n, len(axes)), -1, dtype=np.intp),
             np.zeros((n, len(axes)), dtype=bool),
-            np.array([float(each) for each in map(_pointed, self.digits)]),
+            self._values(),
             np.full(n, -1, dtype=np.intp),
             np.full(n, -1, dtype=np.intp),
             np.zeros(n, dtype=bool),
@@ -283,11 +289,6 @@ def same_but_axes(first: Lines, rows: NDArray[np.intp], second: Lines, others: N
             same &= digits[here + k] == texts[there + j]
         found[each] = same
     return found
-
-
-def _pointed(number: str) -> str:
-    """A number with a point for its comma."""
-    return number.replace(",", ".") if "," in number else number
 
 
 class StraightLines(NamedTuple):
