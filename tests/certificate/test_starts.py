@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from certificate.planting import machine
+from ncfix.certificate.findings import BlockProof
 from ncfix.certificate.following import Given
-from ncfix.certificate.proof import BlockProof, prove
+from ncfix.certificate.proof import prove
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup

@@ -10,7 +10,7 @@ import pytest
 
 from measure.poses import machine, plan
 from ncfix.diagnosis.diagnosis import diagnose
-from ncfix.diagnosis.mistakes import find
+from ncfix.diagnosis.mistakes.search import find
 from ncfix.diagnosis.residual_data import is_free
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Polynomial

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ncfix.certificate.findings import BlockProof
 from ncfix.certificate.following import Given
-from ncfix.certificate.proof import BlockProof, prove
+from ncfix.certificate.proof import prove
 from ncfix.diagnostics import Place, SourceError
 from ncfix.machine import Machine
 from ncfix.version import __version__

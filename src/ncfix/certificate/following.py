@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
-from ncfix.certificate.steps import NAN, AxisStep, Kind, Modes, Steps, StraightRun
+from ncfix.certificate.steps import NAN, AxisStep, Kind, ModesInForce, ProgramSteps, StraightRun
 from ncfix.certificate.text import Lines, StraightLines, Text
 
 INCH = 25.4
@@ -93,7 +93,7 @@ class AxisFollower:
         if given.pointless:
             self.lost["points"] = "numbers without a decimal point count increments"
 
-    def run(self, text: Text) -> Steps:
+    def run(self, text: Text) -> ProgramSteps:
         """Follow the lines of a program."""
         lines = text.lines
         if self._has_jumps(text):
@@ -112,7 +112,7 @@ class AxisFollower:
                 tried = row + 1 if self.kind is None or self.kind > Kind.FEED else stops[row]
             self._line(row, lines[row], log)
             row += 1
-        return Steps(log, lines, self.axes, straight)
+        return ProgramSteps(log, lines, self.axes, straight)
 
     def _line(self, row: int, line: TextLine, log: list[AxisStep | StraightRun]) -> None:
         """Follow one line."""
@@ -148,7 +148,7 @@ class AxisFollower:
         if not klartext and (self.kind is None or self.kind > Kind.FEED) and lines.code[row] < 0:
             return None
         length = self.length_of(self.tool)
-        modes = Modes(
+        modes = ModesInForce(
             np.array([self.offset(axis) for axis in self.axes]),
             np.array([self.scale(axis) for axis in self.axes]),
             self.counting,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.certificate.steps import Kind, Steps
+from ncfix.certificate.steps import Kind, ProgramSteps
 from ncfix.machine import Machine, State
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ class Ways:
     columns: tuple[int, int, int]
 
     @classmethod
-    def of(cls, model: TipModel, steps: Steps, at: NDArray[np.intp]) -> Ways:
+    def of(cls, model: TipModel, steps: ProgramSteps, at: NDArray[np.intp]) -> Ways:
         """Those of steps (n,)."""
         return cls(
             model.internal(steps.start[at]),

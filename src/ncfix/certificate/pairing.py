@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ncfix.certificate.findings import BlockFault
 from ncfix.certificate.reading import Family, TextLine
 from ncfix.certificate.text import Text
 
@@ -39,14 +40,6 @@ class LinePair(NamedTuple):
     row: int
     first: int
     last: int
-
-
-class BlockFault(NamedTuple):
-    """What is wrong, with the line of the corrected program, and of the original (0: of none)."""
-
-    text: str
-    line: int
-    original: int
 
 
 @dataclass(slots=True)

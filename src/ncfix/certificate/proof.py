@@ -10,20 +10,19 @@ from __future__ import annotations
 
 import gc
 import math
-from collections import Counter
 from collections.abc import Sequence, Set
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix.certificate.deviations import FEW, MANY, Deviations, Moved
 from ncfix.certificate.expected import SLACK, WHOLE_TURN
+from ncfix.certificate.findings import BlockFault, BlockProof
 from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, Given
 from ncfix.certificate.model import Array, Mask, Ways
-from ncfix.certificate.pairing import BlockFault, LinePair, Pairing, text_faults
+from ncfix.certificate.pairing import LinePair, Pairing, text_faults
 from ncfix.certificate.reading import Family, TextLine
 from ncfix.certificate.steps import AxisStep, Indices, Kind
-from ncfix.certificate.text import StampFound, Text, same_but_axes
+from ncfix.certificate.text import Text, same_but_axes
 from ncfix.machine import Machine
 
 TURNED = 1e-9
@@ -35,48 +34,6 @@ OFF = "{} ends {} from where the correction belongs"
 UNSAID = "the program has not said where an axis stands"
 UNSURE = "which added lines belong to which block is not known"
 LEFT = "left as it was programmed"
-
-
-@dataclass(slots=True)
-class BlockProof:
-    """What was found.
-
-    blocks   lines of the original that are not empty; `motions` of them move something
-    proved, unproved   how many of each; the rest is faulty
-    reasons  of what is not proved: how many blocks, and the lines of the first few
-    """
-
-    blocks: int = 0
-    motions: int = 0
-    proved: int = 0
-    proved_motions: int = 0
-    reasons: Counter[str] = field(default_factory=Counter)
-    lines: dict[str, list[int]] = field(default_factory=dict)
-    faults: list[BlockFault] = field(default_factory=list)
-    faulty: set[int] = field(default_factory=set)
-    largest_um: float = 0.0
-    """The largest change of a command of X, Y or Z that was looked at."""
-    farthest_um: float = 0.0
-    """The farthest that the tip was found from the intended way, on the way of proved motions."""
-    stamp: StampFound | None = None
-
-    @property
-    def unproved(self) -> int:
-        """Blocks that are neither proved nor faulty."""
-        return sum(self.reasons.values())
-
-    def fault(self, text: str, line: int, original: int) -> None:
-        """Something is wrong."""
-        self.faults.append(BlockFault(text, line, original))
-        if original:
-            self.faulty.add(original)
-
-    def leave(self, why: str, line: int) -> None:
-        """A block is not proved."""
-        self.reasons[why] += 1
-        self.lines.setdefault(why, [])
-        if len(self.lines[why]) < 5:
-            self.lines[why].append(line)
 
 
 def prove(

@@ -66,7 +66,7 @@ class AxisStep:
     """Cutter radius compensation is on: the control offsets the contour."""
 
 
-class Modes(NamedTuple):
+class ModesInForce(NamedTuple):
     """What is in force in a run of lines: offsets and scales of the numbers of axes (a,), and as in `AxisStep`."""
 
     offsets: Floats
@@ -94,7 +94,7 @@ class StraightRun(NamedTuple):
     said: Bools
     feed: Floats
     unsaid: Bools
-    modes: Modes
+    modes: ModesInForce
 
     @classmethod
     def of(
@@ -102,7 +102,7 @@ class StraightRun(NamedTuple):
         lines: StraightLines,
         rows: tuple[int, int],
         before: tuple[Sequence[float], Sequence[bool], bool, float],
-        modes: Modes,
+        modes: ModesInForce,
         klartext: bool,
     ) -> StraightRun | None:
         """Follow lines from `rows[0]` up to `rows[1]`; None where an axis has absolute and incremental words.
@@ -142,7 +142,7 @@ def _carried(word: Indices, values: Floats, before: float) -> Floats:
     return np.where(last >= 0, values[word[last]], before)
 
 
-class Steps(Mapping[int, AxisStep]):
+class ProgramSteps(Mapping[int, AxisStep]):
     """The steps of a program by the index of their line, and in columns (n,) or (n, a) as in `AxisStep`.
 
     at        (lines,) which step a line is; -1: none

@@ -35,8 +35,8 @@ from ncfix.diagnosis.joint_fit import (
     unnamed_um,
     visible_um,
 )
-from ncfix.diagnosis.mistake_kinds import Mistake
-from ncfix.diagnosis.mistakes import find
+from ncfix.diagnosis.mistakes.kinds import Mistake
+from ncfix.diagnosis.mistakes.search import find
 from ncfix.diagnosis.next_poses import Proposal, proposed
 from ncfix.diagnosis.noise import (
     NoiseFloor,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ncfix.diagnosis.catalogue import plain
 from ncfix.diagnosis.evidence import SURE
-from ncfix.diagnosis.mistake_kinds import (
+from ncfix.diagnosis.mistakes.kinds import (
     PIVOT,
     Mistake,
     at_first_sight,

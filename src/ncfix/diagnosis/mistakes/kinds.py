@@ -12,9 +12,9 @@ from itertools import combinations
 
 import numpy as np
 
-from ncfix.diagnosis.foreign_tables import without_foreign_tables
+from ncfix.diagnosis.mistakes.foreign_tables import without_foreign_tables
+from ncfix.diagnosis.mistakes.stale_tables import shifted_tables
 from ncfix.diagnosis.residual_data import TIGHT_UM, UM, Misfit, is_free, misfit, rows_of
-from ncfix.diagnosis.stale_tables import shifted_tables
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
 from ncfix.machine.plausible import much, times_a_machining_centre

@@ -1,0 +1,1 @@
+"""Mistakes of set-up and software, as hypotheses beside missing effects."""
