@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import product
 from unittest import mock
 
 import numpy as np
@@ -153,6 +154,17 @@ def test_long_stretches(modal: bool) -> None:
         emit(program, moves, pieces, STEPS)
     assert sum(len(ends) for ends in taken if ends is not None) > 1500
     assert_same(program, moves, pieces)
+
+
+@pytest.mark.parametrize("size", [0.0003, 0.01, 0.7, 40.0])
+def test_every_style_in_a_stretch(size: float) -> None:
+    styles = product(
+        ("", "+", "-"), ("", "0", "7", "00", "007", "099", "123"), ("", ".", ".0", ".5", ".1250", ".000001")
+    )
+    numbers = ["".join(style) for style in styles if any(map(str.isdigit, "".join(style)))]
+    lines = [f"G1 X{number} Y{numbers[-k]} C{numbers[k // 2]}" for k, number in enumerate(numbers, 1)]
+    program, moves = followed("\n".join(["G90 G21 G94 G0 X0 Y0 Z0 B0 C0 F100", *lines, "M2\n"]).encode())
+    assert_same(program, moves, moved(moves, 11, size))
 
 
 @EXAMPLES
