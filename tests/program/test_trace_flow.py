@@ -159,6 +159,7 @@ def test_the_end_is_m2_m30_m99_or_tape() -> None:
         ("siemens", "%_N_A_MPF\nG90 G0 X1\nSUB1\nM30\n%_N_SUB1_SPF\nG0 X9\nM17\n", 0),
         ("heidenhain", "BEGIN PGM A MM\nL X+1 FMAX\nEND PGM A MM\nBEGIN PGM B MM\nL IX+9\nL X+Q1\nEND PGM B MM\n", 2),
         ("heidenhain", "BEGIN PGM A MM\nCALL LBL 1\nM30\nLBL 1\nL X+1 FMAX\nLBL 0\nEND PGM A MM\n", 0),
+        ("heidenhain", 'BEGIN PGM A14 MM\nL X+1 FMAX M30\n* - X14\n7 TOOL CALL "Z1" Z\n8 END PGM A14 MM\n', 0),
     ],
 )
 def test_motions_that_the_program_never_goes_through_are_a_remark(dialect: str, text: str, lines: int) -> None:

@@ -138,10 +138,11 @@ class TextUnit(ABC, Generic[P]):
 NO_END = "NCF234"
 BEHIND = "NCF249"
 NAMES_AN_AXIS = re.compile(
-    rb"(?i)(?:\([^)\r\n]*\)|[^(;%\r\n])*?(?<![A-Z_$#<])I?[XYZABCUVW][ \t]*=?[ \t]*[-+]?[ \t]*"
-    rb"(?:[.,]?\d|[#\[]|Q[LR]?\d|R\d)"
+    rb"(?i)(?!\d*[ \t]*(?:\*|(?:BEGIN|END|CALL)[ \t]+PGM\b))"
+    rb"(?:\([^)\r\n]*\)|\"[^\"\r\n]*\"|[^(;%\"\r\n])*?"
+    rb"(?<![A-Z_$#<])I?[XYZABCUVW][ \t]*=?[ \t]*[-+]?[ \t]*(?:[.,]?\d|[#\[]|Q[LR]?\d|R\d)"
 )
-"""A block with an axis word that is not in a comment, in any of the languages."""
+"""A block with an axis word, in any of the languages; none stands in comments, in strings and in names of programs."""
 RUNTIME = "NCF237"
 """What is executed is known only at run time, so that no flat program can say it."""
 
