@@ -227,7 +227,7 @@ class Interpreter(ABC, Generic[U]):
         return moves
 
     def note_behind(self, program: Program, moves: Moves) -> None:
-        """Say which blocks behind the end of the program name axes though it never goes through them.
+        """Say where blocks behind the end of the program begin that name axes though it never goes through them.
 
         They are those of other programs in the file, and of subprograms that nothing calls. `program` and `moves`: what
         was followed last, with the end of the program.
@@ -236,17 +236,14 @@ class Interpreter(ABC, Generic[U]):
             return
         executed = self.in_calls.union(moves.block[moves.block >= self.behind].tolist())
         source, spans = program.source, program.blocks[self.behind :].tolist()
-        names = (NAMES_AN_AXIS.match(source, start, stop) is not None for start, stop in spans)
-        found = [block for block, named in enumerate(names, self.behind) if named and block not in executed]
-        if found:
-            text = (
-                f"{len(found)} blocks behind the end of the program name axes, and the program never goes through them"
-            )
-            if len(found) == 1:
-                text = "a block behind the end of the program names axes, and the program never goes through it"
-            hint = "they stay as they are: correct another program in a file of its own"
-            place = program.place(found[0])
-            self.control.messages[text] = Message(BEHIND, text, place, hint)
+        for block, (start, stop) in enumerate(spans, self.behind):
+            if block not in executed and NAMES_AN_AXIS.match(source, start, stop):
+                text = (
+                    "behind the end of the program there are blocks that name axes; the program never goes through them"
+                )
+                hint = "they stay as they are: correct another program in a file of its own"
+                self.control.messages[text] = Message(BEHIND, text, program.place(block), hint)
+                return
 
     # -- what a language says of parts --------------------------------------------------------------------------------
 

@@ -43,12 +43,13 @@ def without_foreign_tables(
     if machine.is_perfect or all(map(is_free, machine.effects)):
         return
     curves = CurvesOfFile.of(now)
-    if curves.foreign - curves.changed < CLEARLY:
+    foreign = curves.foreign
+    if foreign - curves.changed < CLEARLY:
         return
     constants = [replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects if is_free(e)]
     own = misfit(measurements, machine.replace(effects=tuple(constants))).constants
     fitted = Selection(tuple(constants), (True,) * len(constants)).machine(machine.replace(effects=()), own.tolist())
-    yield fitted, len(own), curves.foreign - curves.as_given + now.count * float(np.log(now.left() / now.free))
+    yield fitted, len(own), foreign - curves.as_given + now.count * float(np.log(now.left() / now.free))
 
 
 @dataclass(frozen=True, repr=False)
