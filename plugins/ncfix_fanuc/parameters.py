@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ncfix.diagnostics import UsageError
+from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.tables.axis_tables import reversals
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Assumption, Files, Option, Request, SettingForm, number, one_of
@@ -278,7 +278,7 @@ class BacklashAmounts:
 
     @classmethod
     def of(cls, request: Request, settings: Mapping[str, str], unit: float) -> BacklashAmounts:
-        """The play of a machine, as it is written; unit: detection unit, mm."""
+        """The play of a machine, as it is written; unit: detection unit, mm. Raises `RefusedError` NCF484."""
         home = "".join(sorted(settings["home_minus"].upper()))
         if settings["play"] == "no":
             return cls(home_minus=home)
@@ -286,9 +286,11 @@ class BacklashAmounts:
             each.axis: round(each.whole / unit)
             for each in reversals(request.machine, request.space, request.tool_length, request.target, 2)
         }
-        return cls(
-            tuple(int(np.clip(found.get(axis, 0), -LARGEST_BACKLASH, LARGEST_BACKLASH)) for axis in LINEAR), home
-        )
+        for axis in [axis for axis in LINEAR if abs(found.get(axis, 0)) > LARGEST_BACKLASH]:
+            text = f"the play of {axis} is {found[axis]} detection units, and parameter {BACKLASH_PARAMETER} holds "
+            hint = "--set detection_unit_um=... as it is on the control; --set play=no leaves the play"
+            raise RefusedError.of("NCF484", f"{text}{LARGEST_BACKLASH}", hint=hint)
+        return cls(tuple(found.get(axis, 0) for axis in LINEAR), home)
 
     def files(self) -> dict[str, bytes]:
         """The parameter as it is punched; no file if there is no play."""

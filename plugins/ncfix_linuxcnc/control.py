@@ -125,11 +125,15 @@ def is_ini(content: bytes) -> bool:
     return LOADS.search(content) is not None
 
 
-def is_table(content: bytes) -> bool:
-    """Whether a file begins as a table does: three numbers, and nothing else, in its first line."""
-    first = content.decode("latin-1").lstrip().split("\n", 1)[0].strip()
-    match = TRIPLE.fullmatch(first)
-    return match is not None and not match[4].strip()
+def is_table(name: str, content: bytes) -> bool:
+    """Whether a file begins as a table does: three numbers, and nothing else, in its first line.
+
+    One that is called `.comp` is a table if most of its lines begin with a number: LinuxCNC does not read it all.
+    """
+    rows = [row for row in content.decode("latin-1").splitlines() if row.strip()]
+    match = TRIPLE.fullmatch(rows[0]) if rows else None
+    begun = sum(re.match(rf"\s*{NUMBER}[\s,;]", row) is not None for row in rows)
+    return (match is not None and not match[4].strip()) or (name.lower().endswith(".comp") and 2 * begun > len(rows))
 
 
 def look_at(files: Files) -> list[Remarks]:
@@ -323,6 +327,11 @@ class LinuxCnc(Control):
     def read(self, files: Files) -> Compensation:
         """As LinuxCNC loads them. Raises `ConfigError` NCF491."""
         joints, remarks = read_joints(files)
+        axes = [joint.axis for joint in joints]
+        for axis in {axis for axis in axes if axes.count(axis) > 1}:
+            numbers = " and ".join(str(joint.number) for joint in joints if joint.axis == axis)
+            hint = "leave one of the two COMP_FILE lines to look at one side alone"
+            remarks[0].refuse(0, f"joints {numbers} move {axis} together: two tables for one axis are not run", hint)
         check_all(remarks)
         return Compensation(tuple(term for joint in joints for term in joint.terms()))
 
@@ -332,8 +341,8 @@ class LinuxCnc(Control):
         return messages_of(remarks)
 
     def knows(self, name: str, content: bytes) -> bool:
-        """An ini file that names tables, or a table: numbers by threes in the first line that has anything."""
-        return is_ini(content) or is_table(content)
+        """An ini file that names tables, or a table."""
+        return is_ini(content) or is_table(name, content)
 
     def look(self, files: Files) -> tuple[Message, ...]:
         """The same, and of tables that no ini file loads what is wrong in them under either type."""

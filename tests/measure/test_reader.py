@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -300,11 +301,44 @@ def test_a_run_that_was_cut_off_is_remarked():
     assert remarks(RTL.replace("2 1 0.4\n", "")) == {"NCF618"}
 
 
+def test_a_run_that_turns_back_approaches_its_targets_from_both_sides():
+    found = reads(RTL.replace("\n2 ", "\n1 ").replace("Run-count: 2", "Run-count: 1").encode(), THREE)
+    assert found.columns["direction"].tolist() == [1, 1, 1, -1, -1, -1]
+
+
+def test_deviations_in_millimetres_are_remarked():
+    small = re.sub(r"(?m)^([12] [123]) (.*)$", lambda row: f"{row[1]} {float(row[2]) / 1000:.4f}", RTL)
+    assert remarks(small) == {"NCF618"}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("X EYY\n0 0\n100 0.01\n", "EYY beside positions of X"),
+        ("EXX EYX\n0 0\n0.01 100\n", "the first column is 'EXX'"),
+        ("position,EXX\n0,0\n100,0.01\n", "the first column is 'position'"),
+        ("X EXX EXX\n0 0 0\n100 0.01 0.02\n", "a column stands twice"),
+        ("X EXX [um]\n0 0\n100 10\n", "'\\[um\\]' is no error of X"),
+        ("X Y EXX\n0 0 0\n", "a grid over several axes"),
+        ("X;EXX\n0;0\n100;0,01\n", "3 cells, there are 2 columns(.|\n)*decimal point"),
+        ("[EXX]\nGridpoints = {\n 0 0\n 50 5 1\n 100 10\n}\n", "4:1: NCF618: not understood"),
+        ("[EXX]\nUNIT = um\nGridpoints = {\n 0 0\n 100 10\n}\n", "2:1: NCF618: not understood"),
+        ("[C0B\nVALUE = 1e-5\n[EXX]\nGridpoints = {\n 0 0\n}\n", "1:1: NCF618: not understood"),
+    ],
+)
+def test_tables_of_controls_that_would_be_misread(text: str, said: str):
+    with pytest.raises(ConfigError, match=said):
+        reads(text.encode(), moving((1.0, 0.0, 0.0)))
+
+
 def test_tables_of_controls_are_direct_readings():
     isg = "// lengths mm\nX EXX EYX EAX\n0.0 0.02 0.01 1e-5\n100 0.03 0.02 2e-5\n"
     found = reads(isg.encode(), THREE)
     assert found.labels["component"] == ("EXX", "EYX", "EAX") * 2
     assert found.columns["position"].tolist() == [0, 0, 0, 100, 100, 100]
+    squared = reads(b"X EXX EC0Y\n0 0 1e-5\n100 0.03 1e-5\n", moving((1.0, 0.0, 0.0)))
+    assert set(squared.labels["component"]) == {"EXX"}
+    assert [message.code for message in squared.remarks] == ["NCF618"]
     etalon = "[C0Y]\nVALUE = 0.00002\n[EXY]\nGridpoints = {\n -10 -0.001\n 20 0.002\n}\n"
     found = reads(etalon.encode(), moving((1.0, 0.0, 0.0)))
     assert found.columns["value"].tolist() == [-0.001, 0.002]

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.diagnostics import ConfigError, UsageError
+from ncfix.diagnostics import ConfigError, RefusedError, UsageError
 from ncfix.machine import Effect, load
+from ncfix.machine.basis import Backlash
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import Exported, export
@@ -261,3 +262,12 @@ def test_points_are_fitted_to_what_is_around_them_if_exact_ones_miss_too_much(ro
         left[fit] = float(made.left.after.max())
     assert left["nodes"] > 0.0008
     assert left["auto"] < left["nodes"]
+
+
+def test_play_that_the_parameter_cannot_hold_is_refused() -> None:
+    """20 um of play are 20000 detection units of 0.001 um."""
+    play = Effect("EXX", (-0.02,), Backlash())
+    machine = single_error("EXX").replace(effects=(play,))
+    request = Request(machine, ranges_of(machine), 0.0, 0.001, {"sign": "error", "detection_unit_um": "0.001"})
+    with pytest.raises(RefusedError, match="20000 detection units, and parameter 1851 holds 9999"):
+        CONTROL.write(request)

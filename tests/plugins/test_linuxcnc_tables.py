@@ -64,6 +64,22 @@ def test_inches() -> None:
     assert at({"comp.ini": ini, "x.comp": GOOD}, 254.0, 1) == pytest.approx(-0.0254, abs=1e-8)
 
 
+def test_two_joints_of_one_axis_are_not_added_up() -> None:
+    """A gantry: each joint has its table, and the axis is not corrected twice."""
+    ini = INI.replace(b"X Y Z", b"X X Y Z") + b"[JOINT_1]\nCOMP_FILE = x.comp\nCOMP_FILE_TYPE = 1\n"
+    with pytest.raises(ConfigError, match="joints 0 and 1 move X together"):
+        CONTROL.read({"comp.ini": ini, "x.comp": GOOD})
+    assert not CONTROL.lint({"comp.ini": ini, "x.comp": GOOD})
+
+
+@pytest.mark.parametrize("head", ["# screw of X\n", "0,0 0,0 0,0\n", "; X\n\n", "nominal forward reverse\n"])
+def test_a_table_that_linuxcnc_does_not_read_is_known_by_its_name(head: str) -> None:
+    content = head.encode() + GOOD
+    assert CONTROL.knows("x.comp", content)
+    assert "LinuxCNC stops reading here" in str(CONTROL.look({"x.comp": content})[0])
+    assert not CONTROL.knows("notes.comp", b"of 3 screws\n3 are worn\nand\none is new\n")
+
+
 BROKEN = {
     "a comment": (b"# screw of X\n" + GOOD, "not three numbers"),
     "a blank line": (GOOD.replace(b"\n0.0", b"\n\n0.0"), "a blank line"),

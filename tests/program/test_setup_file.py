@@ -129,12 +129,13 @@ def table(tmp_path: Path, name: str, text: str) -> dict[int, Tool]:
 
 
 def test_linuxcnc_tables(tmp_path: Path) -> None:
-    text = "; my tools\nT1 P1 X0 Z+120.5 D10 ;end mill\n\nT2 P2 Z.5\nt3p3z-1.25d+0.5Q0\nT4 P9\n"
+    text = "; my tools\nT1 P1 X0 Z+120.5 D10 ;end mill\n\nT2 P2 Z.5\nt3p3z-1.25d+0.5Q0\nT4 P9\nT5 Z1.2e2 D1E+1\n"
     assert table(tmp_path, "tool.tbl", text) == {
         1: Tool(120.5, 5.0),
         2: Tool(0.5, None),
         3: Tool(-1.25, 0.25),
         4: Tool(0.0, None),
+        5: Tool(120.0, 5.0),
     }
 
 
@@ -152,11 +153,14 @@ def test_csv_tables(tmp_path: Path) -> None:
     [
         ("t.tbl", "T1 Z1\nnonsense\nP2 Z1\nT1 Z2\n", [2, 3, 4]),
         ("t.tbl", "; nothing\n", [0]),
+        ("t.tbl", "T1 Z100 X0.5\nT2 Z100 B45\nT3 Z1 Z2\nT4 Z1.2.3\nT5 Z1,2\nT6 R5 Z1\n", [1, 2, 3, 4, 5, 6]),
         ("t.csv", "tool,length\n1,2,3\n2,1.5x\n-1,1\n1.5,2\n", [2, 3, 4, 5]),
         ("t.csv", "tool;length\n1;2\n", [1]),
         ("t.csv", "tool,length,colour\n1,2,red\n", [1]),
         ("t.csv", 'tool,length\n1,"2,5"\n', [2]),
         ("t.csv", "tool,length\n1,\n", [2]),
+        ("t.csv", "tool,length,length\n1,100,50\n", [1]),
+        ("t.csv", "tool,length,radius,diameter\n1,100,5,10\n2,100,5,12\n", [3]),
         ("t.csv", "tool,length\n1,nan\n", [2]),
     ],
 )

@@ -46,6 +46,10 @@ def test_inches(tmp_path: Path) -> None:
         ("+90,25", "+9O,25", "L: '\\+9O,25' is not a number"),
         ("7      MILL", "X      MILL", "'X' is not a tool number"),
         ("T      NAME", "N      NAME", "no columns T and L"),
+        ("BALL_D8          +120.5  ", "BALL_D8      +120.5  ", "not below the names"),
+        ("5      BALL_D8          +120.5", "5 BALL +120.5", "'5 BALL' is not a tool number"),
+        ("BALL_D8          +120.5", "BALL_D8\t+120.5", "not below the names"),
+        (".T MM", ".T", "does not say MM or INCH"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, what: str) -> None:

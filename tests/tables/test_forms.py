@@ -144,6 +144,7 @@ def test_any_numbers_come_back_as_they_were(numbers: list[Decimal], eol: str) ->
 
 VARIED = {
     "tnc306": b"Y = F(Z)  \n\nDATUM POINT  -990\nSETUP        14\n  0  Z-990      Y+0\n1  Z-973.616  Y-0.06 \n",
+    "g10 ": b"%\nO0001 (SCREW)\nG90 G10 L50\nN3620 P1 R50\nG11\nM30\n%\n",
     "g10": b"; page 3\n(axis 1)\ng10 l52;\nn8312 p2 r0;\nG11;\n",
     "isg-csv": b"X  EXX EYX // mm\n 0.0\t0.02 0.01 // first\n# next\nY EYY\n0 1e-3\n",
     "isg-list": b"  # head\nkw.ssfk.unit\t1   # 0.1 um\n\n",

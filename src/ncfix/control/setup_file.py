@@ -3,9 +3,11 @@
 Tool tables: LinuxCNC's `.tbl`, Heidenhain's TOOL.T, and CSV with a header.
 
 - LinuxCNC: one tool a line, `T1 P1 Z120.5 D10 ; comment`. Z is the length offset and D the diameter, both in mm here,
-  since the machine's unit is mm. Source: LinuxCNC documentation, "Tool table format".
+  since the machine's unit is mm. G43 adds the offsets of all other axes, too: one that is not zero is refused. I, J and
+  Q are of a lathe's tool nose. Source: LinuxCNC documentation, "Tool table format".
 - TOOL.T: columns at fixed places under a line of names. L and R count with their oversizes DL and DR. A tool with an
-  index (5.1) and a row without a length are left out. Source: TNC 640 user's manual, "Entering tool data in the table".
+  index (5.1) and a row without a length are left out. A word that begins in one column and ends in the next is refused:
+  columns are at other places then. Source: TNC 640 user's manual, "Entering tool data in the table".
 """
 
 from __future__ import annotations
@@ -48,7 +50,10 @@ TOOL = re.compile(r"\d{1,9}$|(?!T\d+$|\d+$).{2,}")
 """A tool is called by its number or by a name."""
 
 BAD_TABLE = "NCF385"
-ENTRY = re.compile(r"([A-Za-z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
+ENTRY = re.compile(r"([TPXYZABCUVWDIJQ])\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?)(?![\d.E])", re.IGNORECASE)
+"""A word of LinuxCNC's tool table."""
+ASIDE = "XYABCUVW"
+"""Axes along which a tool has no length here."""
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)\Z")
 LONGEST = 1e6
 """mm; a number beyond it is a slip."""
@@ -288,7 +293,10 @@ def load_tool_table(path: str) -> dict[int, Tool]:
 
     Raises SourceError NCF002, ConfigError NCF385 with every line that is wrong.
     """
-    text = read_bytes(path, MOST_SAID).decode("utf-8-sig", "replace")
+    source = read_bytes(path, MOST_SAID)
+    if b"\0" in source:
+        raise ConfigError.of(BAD_TABLE, "not plain text, or text in UTF-16", Place(path), "save it as UTF-8")
+    text = source.decode("utf-8-sig", "replace")
     reader = csv_rows if PurePath(path).suffix.lower() == ".csv" else linuxcnc_rows
     if TOOL_T_BEGIN.match(text):
         reader = tool_t_rows
@@ -322,12 +330,18 @@ def linuxcnc_rows(text: str) -> Iterator[Row]:
         entry = content.partition(";")[0].strip()
         if not entry:
             continue
-        rest = ENTRY.sub("", entry).strip()
-        values = {letter.upper(): float(number) for letter, number in ENTRY.findall(entry)}
+        rest, words = ENTRY.sub("", entry).strip(), ENTRY.findall(entry.upper())
+        values = {letter: float(number) for letter, number in words}
+        offset = next((f"{letter}{number}" for letter, number in words if letter in ASIDE and float(number)), "")
         if rest:
             yield line, f"{rest!r} is not understood in a tool table"
+        elif len(values) < len(words):
+            twice = next(letter for letter in values if [each for each, _ in words].count(letter) > 1)
+            yield line, f"{twice} stands twice"
         elif "T" not in values or not values["T"].is_integer():
             yield line, "the line names no tool (T)"
+        elif offset:
+            yield line, f"{offset} is an offset that G43 adds, too; only lengths along Z are known here"
         else:
             radius = values["D"] / 2 if "D" in values else None
             yield line, (int(values["T"]), Tool(values.get("Z", 0.0), radius))
@@ -343,7 +357,11 @@ def csv_rows(text: str) -> Iterator[Row]:
     first, names = rows[0][0], [name.strip().lower() for name in rows[0][1]]
     strangers = [name for name in names if name not in COLUMNS]
     if strangers or not {"tool", "length"} <= set(names):
-        yield first, f"the columns are {', '.join(COLUMNS)}; found {', '.join(names)}"
+        apart = ", separated by commas" if re.search(r"[;\t]", names[0]) else ""
+        yield first, f"the columns are {', '.join(COLUMNS)}{apart}; found {', '.join(names)}"
+        return
+    if len(set(names)) < len(names):
+        yield first, f"a column stands twice: {', '.join(names)}"
         return
     for line, row in rows[1:]:
         yield line, csv_tool(names, [part.strip() for part in row])
@@ -360,6 +378,8 @@ def csv_tool(names: list[str], row: list[str]) -> tuple[int, Tool] | str:
     if not values["tool"].is_integer() or values["tool"] < 0:
         return f"{values['tool']:g} is not a tool number"
     radius = values.get("radius", values.get("diameter", math.nan) / 2)
+    if "diameter" in values and not math.isclose(radius, values["diameter"] / 2, abs_tol=1e-6):
+        return f"radius {radius:g} and diameter {values['diameter']:g} are of two tools"
     return int(values["tool"]), Tool(values["length"], None if math.isnan(radius) else radius)
 
 
@@ -377,11 +397,21 @@ def tool_t_rows(text: str) -> Iterator[Row]:
     if head is None or not {"T", "L"} <= {name for name, _ in names}:
         yield 2, "the second line names no columns T and L"
         return
-    scale = INCH if (head["unit"] or "").upper() == "INCH" else 1.0
+    if head["unit"] is None:
+        yield 1, "the first line does not say MM or INCH"
+        return
+    scale = INCH if head["unit"].upper() == "INCH" else 1.0
     stops = [start for _, start in names[1:]] + [None]
-    for number, line in enumerate(lines[2:], 3):
+    sides = ((start, stop) for (name, start), stop in zip(names, stops, strict=True) if name in ("T", *WANTED))
+    edges = {edge for side in sides for edge in side if edge}
+    for number, line in enumerate(lines[1:], 2):
         if TOOL_T_END.match(line):
             return
+        if "\t" in line or any(re.match(r"\S\S", line[edge - 1 : edge + 1]) for edge in edges):
+            yield number, "words are not below the names of their columns"
+            continue
+        if number == 2:
+            continue
         cells = {name: line[start:stop].strip() for (name, start), stop in zip(names, stops, strict=True)}
         if cells["T"].isdigit() and cells["L"]:
             yield number, tool_of(cells, scale)

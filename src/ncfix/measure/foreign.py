@@ -13,8 +13,9 @@ measured is not in the file, but for its free texts: it is read as positioning, 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -28,6 +29,7 @@ LINEAR = "XYZ"
 SLANTED = 1e-6
 GRID = re.compile(r"\[(\w+)\]")
 ERROR = re.compile(r"E[XYZABC][A-Z]")
+LOCATION = re.compile(r"E[XYZABC]0[A-Z]")
 
 SECTION = re.compile(r"([A-Z][A-Z -]*)::")
 KEY = re.compile(r"([A-Za-z][\w -]*?)\s*:(.*)")
@@ -35,6 +37,8 @@ LETTER = re.compile(r"(?:axis\b\s*)?([a-z])(?:[\s_-]*(?:axis|achse)?)", re.IGNOR
 OTHER = re.compile(r"straight|square|angular|flatness|diagonal|(?<![a-z])(?:pitch|yaw|roll)(?![a-z])", re.IGNORECASE)
 """Words of a title that speak of another error than positioning."""
 MICROMETRE = 1e-3
+SMALL = 1e-4
+"""mm; no run of an axis has such small deviations."""
 
 Reader = Callable[[str, str], Measurement | None]
 """Makes a measurement of a text and its path, or None if the text is not of its kind."""
@@ -138,36 +142,67 @@ def _reader(text: str) -> Callable[[str, str], Measurement] | None:
 
 
 def renishaw(text: str, path: str) -> Measurement:
-    """A Renishaw `.rtl`: targets in mm, deviations in um by run and target; a run goes the way of its targets."""
+    """A Renishaw `.rtl`: targets in mm, deviations in um by run and target.
+
+    A target is approached from the one before it in its run; at the end of a run that turns back, from beyond.
+    """
     file = _rtl(text, path)
     axis, rows = file.axis(), Rows(path)
-    for way, readings in file.runs():
+    for readings in file.runs():
         if len(readings) < len(file.targets):
             said = f"run {readings[0].run} has {len(readings)} of {len(file.targets)} targets"
             rows.remarks.append(Message("NCF618", said, Place(path, readings[0].line), "was it cut off?"))
-        for each in readings:
-            rows.add(f"E{axis}{axis}", file.targets[each.target - 1], each.value, each.line, each.run, way)
+        places = [file.targets[each.target - 1] for each in readings]
+        ways = np.sign(np.diff(places))
+        came = [*ways[:1], *(back or on for back, on in pairwise([*ways, 0.0]))] if len(ways) else [0.0]
+        for each, place, way in zip(readings, places, came, strict=True):
+            rows.add(f"E{axis}{axis}", place, each.value, each.line, each.run, int(way))
+    largest = max(map(abs, rows.value), default=0.0)
+    if 0 < largest < SMALL:
+        said = f"no deviation is above {largest / MICROMETRE:g} um: they are read as micrometres"
+        rows.remarks.append(Message("NCF618", said, Place(path, rows.line[0]), "are they in mm?"))
     return rows.measurement("line", "Renishaw")
 
 
 def isg(text: str, path: str) -> Measurement:
     """An ISG VOLCOMP CSV of one axis: its position, then the components that the first line names, mm and rad."""
     rows, names = Rows(path), _first_words(text)
-    if ERROR.fullmatch(names[1]) is None:
-        where = Place(path, 1)
-        raise ConfigError.of("NCF618", "a grid over several axes is a table, not a measurement of one axis", where)
-    seen = False
+    where = Place(path, next(n for n, line in enumerate(text.splitlines(), 1) if line.split("//")[0].strip()))
+    axis, *components = names
+    _check_isg_names(axis, components, where)
     for number, line in enumerate(text.splitlines(), 1):
         words = re.split(r"[\s;,]+", line.split("//")[0].strip())
-        if not words[0] or not seen:
-            seen = seen or bool(words[0])
+        if not words[0] or number <= where.line:
             continue
         if len(words) != len(names):
-            raise ConfigError.of("NCF606", f"{len(words)} cells, there are {len(names)} columns", Place(path, number))
+            hint = "numbers have a decimal point" if re.search(r"\d,\d", line) else ""
+            text = f"{len(words)} cells, there are {len(names)} columns"
+            raise ConfigError.of("NCF606", text, Place(path, number, 0, line), hint)
         values = [number_of(word, path, number) for word in words]
-        for name, value in zip(names[1:], values[1:], strict=True):
-            rows.add(name, values[0], value, number)
+        for name, value in zip(components, values[1:], strict=True):
+            if ERROR.fullmatch(name):
+                rows.add(name, values[0], value, number)
+    for name in components:
+        if not ERROR.fullmatch(name):
+            rows.remarks.append(Message("NCF618", _located(name), where))
     return rows.measurement("none", "ISG VOLCOMP CSV")
+
+
+def _check_isg_names(axis: str, components: Sequence[str], where: Place) -> None:
+    """Raise `ConfigError` NCF618 if these are no columns of one axis."""
+    text = ""
+    if len(axis) > 1:
+        text = f"the first column is {axis!r}, not the position of an axis: X"
+    elif components[0] in LINEAR + "ABC":
+        text = "a grid over several axes is a table, not a measurement of one axis"
+    elif len(set(components)) < len(components):
+        text = f"a column stands twice: {' '.join(components)}"
+    elif others := [name for name in components if ERROR.fullmatch(name) and name[2] != axis]:
+        text = f"{others[0]} beside positions of {axis}"
+    elif strangers := [name for name in components if not ERROR.fullmatch(name) and not LOCATION.fullmatch(name)]:
+        text = f"{strangers[0]!r} is no error of {axis}, such as EX{axis}"
+    if text:
+        raise ConfigError.of("NCF618", text, where, "mm, degree and rad; other readings go into a file of kind axis")
 
 
 def etalon(text: str, path: str) -> Measurement:
@@ -175,16 +210,25 @@ def etalon(text: str, path: str) -> Measurement:
     rows, section = Rows(path), ""
     for number, line in enumerate(text.splitlines(), 1):
         plain = line.split("//")[0].strip()
-        match = GRID.match(plain)
-        if match:
+        words = re.sub(r"^Gridpoints\s*=\s*\{|\}$", "", plain).split()
+        if match := GRID.fullmatch(plain):
             section = match[1]
-        elif plain.startswith("VALUE"):
-            what = f"[{section}] is a location error, not an error motion: put E{section} into the machine file"
-            rows.remarks.append(Message("NCF618", what, Place(path, number, 1, line)))
-        elif section and len(plain.split()) == 2 and ERROR.fullmatch(section):
-            position, value = (number_of(word, path, number) for word in plain.split())
+        elif section and re.match(r"VALUE\s*=", plain):
+            rows.remarks.append(Message("NCF618", _located(f"E{section}", section), Place(path, number, 1, line)))
+        elif len(words) == 2 and ERROR.fullmatch(section):
+            position, value = (number_of(word, path, number) for word in words)
             rows.add(section, position, value, number)
+        elif words:
+            said = (
+                f"not understood: a line is [EXY], position and value of such an error, or VALUE of {section or 'C0B'}"
+            )
+            raise ConfigError.of("NCF618", said, Place(path, number, 1, line))
     return rows.measurement("none", "Etalon exchange")
+
+
+def _located(name: str, called: str = "") -> str:
+    """What is said of a location error in a file of error motions."""
+    return f"[{called or name}] is a location error, not an error motion: put {name} into the machine file"
 
 
 def _first_words(text: str) -> list[str]:
@@ -248,11 +292,10 @@ class Rtl:
                 raise self.odd(f"{key} is {text}, and {count} are there: is a part of the file missing?", line)
         return self
 
-    def runs(self) -> Iterator[tuple[int, list[Deviation]]]:
-        """The readings of each run, with the way in which it went: 1, -1, or 0 with a single reading."""
+    def runs(self) -> Iterator[list[Deviation]]:
+        """The readings of each run, as they were taken."""
         for run in dict.fromkeys(each.run for each in self.readings):
-            mine = [each for each in self.readings if each.run == run]
-            yield int(np.sign(self.targets[mine[-1].target - 1] - self.targets[mine[0].target - 1])), mine
+            yield [each for each in self.readings if each.run == run]
 
     def odd(self, text: str, line: int, hint: str = "") -> ConfigError:
         """The error NCF618."""

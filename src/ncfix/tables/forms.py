@@ -170,7 +170,7 @@ def _elmo(document: TableFile, remarks: Remarks) -> None:
 
 def _framed(first: str, last: str) -> Check:
     def check(document: TableFile, remarks: Remarks) -> None:
-        kinds = [line.kind for line in document.lines if line.kind not in ("blank", "comment")]
+        kinds = [line.kind for line in document.lines if line.kind not in ("blank", "comment", "around")]
         if not kinds or kinds[0] != first or kinds[-1] != last:
             remarks.refuse(0, f"should begin with the line of {first} and end with that of {last}")
 
@@ -244,7 +244,8 @@ FORMS = (
         "g10",
         "programmable parameter input",
         {
-            "begin": rf"(?i:G10 *L5[02]);?{BLANK}",
+            "begin": rf"(?i:(?:G90 *)?G10 *L5[02]);?{BLANK}",
+            "around": rf"(?i:[O:]\d+.*|G90|M0?2|M30|M99);?{BLANK}",
             "record": rf"(?i:N){N}(?: *(?i:P){N})? *(?i:R){N};?{BLANK}",
             "end": rf"(?i:G11);?{BLANK}",
             "comment": rf"{BLANK}(?:;.*|\(.*\)|%)",
