@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+import ncfix as module
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import ExitCode
 
 FILES = ["comp.ini", "hand-over.html", "hand-over.md", "joint_0_X.comp", "ncfix-tables.json"]
@@ -208,6 +210,29 @@ def test_a_machine_without_errors_leaves_programs_as_they_are(shop: Any, ncfix: 
     found = ncfix("export", "gcode", *arguments, "--json").json()["program"]
     assert found["error_before_um"]["max"] == found["error_after_um"]["max"] == 0
     assert (shop.folder / "g" / shop.program.name).read_bytes() == shop.program.read_bytes()
+
+
+@pytest.mark.parametrize("control", ["isg", "gcode"])
+def test_import_says_of_a_program_what_the_verb_says(shop: Any, ncfix: Any, control: str) -> None:
+    folders = shop.folder / "verb", shop.folder / "import"
+    arguments = ("-m", shop.machine, "--program", shop.program, "--assume-zero", "--json")
+    said = ncfix("export", control, *arguments, "-o", folders[0]).json()["program"]
+    given: dict[str, Any] = {"program": shop.program, "setup": Setup(assume_zero=True)}
+    made = module.export(control, shop.machine, output=folders[1], **given)
+    assert made.program is not None
+    assert json.loads(json.dumps(made.program.as_dict())) == said
+    written, same = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in folders)
+    assert written == same == made.files
+    assert (shop.program.name in written) == (control == "gcode")
+    assert ncfix("emulate", control, folders[1], *arguments).json()["program"] == said
+    assert module.emulate(control, folders[1], shop.machine, **given).program == made.program
+
+
+def test_a_program_that_cuts_nothing_has_no_figures(shop: Any, ncfix: Any, tables: Path) -> None:
+    shop.program.write_text("G21 G90\nM2\n")
+    result = ncfix("emulate", "linuxcnc", tables, "-m", shop.machine, "--program", shop.program)
+    assert result.code == ExitCode.DONE
+    assert "made worse" not in result.err
 
 
 TILTED = '[[effect]]\nname = "EBX"\nbasis = "polynomial"\ndegree = [1]\nscale = 100\ncoefficients = [20e-6]\n'

@@ -4,19 +4,41 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ncfix.api.sources import PathName, as_machine, check_writable, load_machine, paths_of, sound_machine, write_output
-from ncfix.diagnostics import UsageError
+from ncfix.api.programs import fixed
+from ncfix.api.sources import (
+    PathName,
+    as_machine,
+    as_program,
+    as_setup,
+    check_writable,
+    load_machine,
+    paths_of,
+    sound_machine,
+    subprograms_of,
+    write_output,
+)
+from ncfix.diagnostics import Place, RefusedError, UsageError
 from ncfix.files import read_folder, write_folder
 from ncfix.inputs import identities
 from ncfix.outputs import check_folder
 
 if TYPE_CHECKING:
+    from ncfix.compensate.following import Resolve
+    from ncfix.control.setup import Setup
     from ncfix.diagnosis.diagnosis import Diagnosis
     from ncfix.machine import Machine
     from ncfix.tables.control import Control, Request
     from ncfix.tables.export import Exported
+    from ncfix.text.tree import Program
+
+SAME = 0.5
+"""mm: tools whose lengths differ by less are the same to tables."""
+MANY = 4
+"""Lengths that are listed."""
+INSTEAD = "give the original program, or run this one without tables"
 
 
 def table_request(
@@ -45,6 +67,8 @@ def export(
     target_um: float = 1.0,
     ranges: Mapping[str, tuple[float, float]] | None = None,
     settings: Mapping[str, str] | None = None,
+    program: Program | PathName | None = None,
+    setup: Setup | PathName | None = None,
     output: PathName | None = None,
     force: bool = False,
 ) -> Exported:
@@ -55,6 +79,7 @@ def export(
     target_um    how much correction may be lost between the points of a table
     ranges       axis -> what the tables cover, mm and rad; others: the travel
     settings     options of the control
+    program      a program to run with them, with its `setup`; for gcode, to rewrite
     output       a folder for the files
     """
     from ncfix.tables.control import get_control
@@ -63,10 +88,12 @@ def export(
     chosen = get_control(control) if isinstance(control, str) else control
     if output is not None:
         check_folder(os.fspath(output))
-    request = table_request(chosen, sound_machine(machine, force), tool_length, target_um, ranges, settings or {})
-    made = exported(chosen, request)
+    known = sound_machine(machine, force)
+    made = exported(chosen, table_request(chosen, known, tool_length, target_um, ranges, settings or {}))
+    if program is not None:
+        made = with_program(made, chosen, *_to_run(program, known, setup), rewrite=True)
     if output is not None:
-        write_folder(os.fspath(output), made.files, force, identities(paths_of([machine])))
+        write_folder(os.fspath(output), made.files, force, identities(paths_of([machine, program, setup])))
     return made
 
 
@@ -77,12 +104,15 @@ def emulate(
     *,
     other_machine: bool = False,
     name: str = "tables",
+    program: Program | PathName | None = None,
+    setup: Setup | PathName | None = None,
 ) -> Exported:
     """Say what tables leave on a machine: run them as the control would.
 
     tables         the files that `export` made, all of them, or their folder
     other_machine  run tables that were made for another machine or other errors
     name           what the folder is called in messages, if files are given
+    program        a program to run with them, with its `setup`
     """
     from ncfix.tables.control import get_control
     from ncfix.tables.export import emulate as emulated
@@ -91,7 +121,77 @@ def emulate(
     if isinstance(tables, (str, os.PathLike)):
         name = os.fspath(tables)
         tables = read_folder(name)
-    return emulated(chosen, tables, as_machine(machine), name, other_machine)
+    known = as_machine(machine)
+    found = emulated(chosen, tables, known, name, other_machine)
+    return found if program is None else with_program(found, chosen, *_to_run(program, known, setup))
+
+
+def _to_run(
+    program: Program | PathName, machine: Machine, setup: Setup | PathName | None
+) -> tuple[Program, Machine, Setup, Resolve | None]:
+    """A program, the machine and the set-up that it is run with, and what finds its subprograms."""
+    read, own = as_program(program, machine), as_setup(setup, machine)
+    return read, machine, replace(own, assume_zero=True) if machine.is_perfect else own, subprograms_of(own, read)
+
+
+def with_program(
+    made: Exported,
+    control: Control,
+    program: Program,
+    machine: Machine,
+    setup: Setup,
+    resolve: Resolve | None,
+    rewrite: bool = False,
+) -> Exported:
+    """Tables, and what a control with them leaves along a program.
+
+    Errors before and after are looked at where the tool cuts; those of a rewritten program are the figures of `fix`,
+    which looks at the ends of rapids too. It is remarked on if the program's tools are not of the length that the
+    tables hold for.
+
+    rewrite  add the program as `fix` rewrites it to the files of a control that has no tables; raises `RefusedError`
+             with what could not be corrected
+
+    Raises `RefusedError` for a program that would be corrected twice: NCF493 if it carries a stamp of ncfix, NCF438 if
+    its numbers show it.
+    """
+    import numpy as np
+
+    from ncfix.compensate import FixOptions
+    from ncfix.compensate.figures.simulation import Along, seems_corrected, tip_errors_of, tip_with
+    from ncfix.compensate.following import follow
+    from ncfix.tables.export import SIDE_FILE, ProgramWithTables, read_manifest
+    from ncfix.text import stamp
+
+    manifest = read_manifest(made.files[SIDE_FILE], SIDE_FILE)
+    if (block := stamp.find(program)) is not None:
+        text = "the program has been corrected already: with tables of the same errors it would be corrected twice"
+        raise RefusedError.of("NCF493", text, program.place(block), INSTEAD)
+    followed = follow(program, machine, setup, resolve)
+    before = Along.of(tip_errors_of(program, followed)).figures()
+    if control.rewrites:
+        options = FixOptions(manifest.settings["strategy"], float(manifest.settings["tolerance_um"]))
+        found = fixed(program, machine, setup, options, resolve)
+        if rewrite and found.report.refused:
+            raise RefusedError.collected(found.report.refusals)
+        files = {**made.files, os.path.basename(program.path): found.text} if rewrite else made.files
+        after = found.report.error_after_um or before
+        return replace(made, files=files, program=ProgramWithTables(program.path, before, after))
+    moves, names = followed.trace.moves, machine.axis_names
+    if seems_corrected(followed.machine, moves):
+        text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
+        raise RefusedError.of("NCF438", text, Place(program.path), INSTEAD)
+    tip = tip_with(lambda q, way, length: made.tables.for_tool(length).at(names, q, way))
+    after = Along.of(tip_errors_of(program, followed, made=tip)).figures()
+    remarks: tuple[str, ...] = ()
+    if not control.any_tool and machine.depends_on_tool_length:
+        used = moves.tool_length[np.isfinite(moves.tool_length)].tolist()
+        others = sorted({round(each, 3) for each in used if abs(each - manifest.tool_length) > SAME})
+        listed = ", ".join(f"{each:g}" for each in others[:MANY]) + (" ..." if len(others) > MANY else "")
+        if others:
+            for_tool = f"The tables hold for a tool of {manifest.tool_length:g} mm"
+            remarks = (f"{for_tool}; this program also runs with {listed} mm.",)
+    return replace(made, program=ProgramWithTables(program.path, before, after, remarks))
 
 
 def report(

@@ -32,93 +32,16 @@ from ncfix.cli.options import (
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import shown
-from ncfix.diagnostics import ConfigError, ExitCode, Message, Place, RefusedError, UsageError
+from ncfix.diagnostics import ConfigError, ExitCode, Message, UsageError
 from ncfix.inputs import identities
 from ncfix.outputs import check_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
-    from ncfix.compensate.driver import Fixed
-    from ncfix.compensate.following import Followed
     from ncfix.machine import Machine
-    from ncfix.tables.compensation import Tables
     from ncfix.tables.control import Control, Written
     from ncfix.tables.export import Exported
-    from ncfix.text.tree import Program
-
-SAME = 0.5
-"""mm: tools whose lengths differ by less are the same to tables."""
-INSTEAD = "give the original program, or run this one without tables"
-MANY = 4
-"""Lengths that are listed."""
-
-
-def along(
-    following: Following, control: Control, tables: Tables, settings: Mapping[str, str], path: str, tool_length: float
-) -> dict[str, Any]:
-    """What a control with these tables leaves along a program: `{path, error_before_um, error_after_um, remarks}`.
-
-    Both are looked at where the tool cuts; rewritten programs have the figures of `fix` after, which looks at the ends
-    of rapids too. It is remarked on if the program's tools are not of the length that the tables hold for, mm.
-
-    Raises `RefusedError` for a program that would be corrected twice: NCF493 if it carries a stamp of ncfix, NCF438 if
-    its numbers show it.
-    """
-    import numpy as np
-
-    from ncfix.compensate.figures.simulation import Along, seems_corrected, tip_errors_of, tip_with
-
-    program, followed = _followed(following, path)
-    names, machine, moves = followed.machine.axis_names, followed.machine, followed.trace.moves
-    before = Along.of(tip_errors_of(program, followed)).figures()
-    if control.rewrites:
-        after = rewritten(following, settings, path).report.as_dict()["error_after_um"] or before
-    else:
-        if seems_corrected(machine, moves):
-            text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
-            raise RefusedError.of("NCF438", text, Place(shown(path)), INSTEAD)
-        made = tip_with(lambda q, way, length: tables.for_tool(length).at(names, q, way))
-        after = Along.of(tip_errors_of(program, followed, made=made)).figures()
-    fixed_length = not (control.any_tool or control.rewrites) and machine.depends_on_tool_length
-    used = moves.tool_length[np.isfinite(moves.tool_length)].tolist() if fixed_length else []
-    others = sorted({round(each, 3) for each in used if abs(each - tool_length) > SAME})
-    remarks = []
-    if others:
-        listed = ", ".join(f"{each:g}" for each in others[:MANY]) + (" ..." if len(others) > MANY else "")
-        remarks = [f"The tables hold for a tool of {tool_length:g} mm; this program also runs with {listed} mm."]
-    return {"path": shown(path), "error_before_um": before, "error_after_um": after, "remarks": remarks}
-
-
-def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
-    """The program as `ncfix fix` rewrites it under these settings of the control."""
-    from ncfix.api.programs import fixed
-    from ncfix.compensate import FixOptions
-
-    assert following.machine is not None
-    options = FixOptions(settings["strategy"], float(settings["tolerance_um"]))
-    find = subprograms(following.setup, path)
-    return fixed(following.read(path), following.machine, following.setup, options, find)
-
-
-def rewritten_file(following: Following, settings: Mapping[str, str], path: str) -> dict[str, bytes]:
-    """Its file; raises `RefusedError` with what could not be corrected, if anything could not."""
-    found = rewritten(following, settings, path)
-    if found.report.refused:
-        raise RefusedError.collected(found.report.refusals)
-    return {os.path.basename(path): found.text}
-
-
-def _followed(following: Following, path: str) -> tuple[Program, Followed]:
-    from ncfix.text import stamp
-
-    program = following.read(path)
-    block = stamp.find(program)
-    if block is not None:
-        text = "the program has been corrected already: with tables of the same errors it would be corrected twice"
-        place = program.place(block)
-        raise RefusedError.of("NCF493", text, place, INSTEAD)
-    return program, following.on_machine(program, path)
 
 
 @click.command()
@@ -190,17 +113,22 @@ def export(
         files.write_folder(output, found.files, force, inputs)
         _tell_of_probe(found, chosen.name, as_json)
         return ExitCode.DONE
-    more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
     with console.busy("making tables"):
         made = exported(chosen, request)
         if program is not None:
-            more["program"] = along(following, chosen, made.tables, request.settings, program, tool_length)
-        if program is not None and chosen.rewrites:
-            made = replace(made, files={**made.files, **rewritten_file(following, request.settings, program)})
+            made = _with_program(made, chosen, following, program, rewrite=True)
     files.write_folder(output, made.files, force, inputs)
     console.tell_some(made.messages)
-    tell(made, as_json, control=chosen.name, reaches=made.reaches, **more)
+    tell(made, chosen, as_json)
     return ExitCode.DONE
+
+
+def _with_program(made: Exported, control: Control, following: Following, path: str, rewrite: bool = False) -> Exported:
+    from ncfix.api.tables import with_program
+
+    assert following.machine is not None
+    find = subprograms(following.setup, path)
+    return with_program(made, control, following.read(path), following.machine, following.setup, find, rewrite)
 
 
 def given_ranges(machine: Machine, texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
@@ -232,12 +160,14 @@ def _tell_of_probe(written: Written, control: str, as_json: bool) -> None:
     console.put("".join(f"{name}\n" for name in sorted(written.files)))
 
 
-def tell(made: Exported, as_json: bool, **more: object) -> None:
+def tell(made: Exported, control: Control, as_json: bool) -> None:
     """Say what the tables leave."""
-    figures = made.left.figures()
-    reaches, program = more.pop("reaches"), more.get("program")
+    figures, program = made.left.figures(), made.program
     if as_json:
-        entries = {**more, "class": reaches, "files": sorted(made.files), "residual_um": figures}
+        entries: dict[str, Any] = {"control": control.name, "assumptions": control.described()["assumptions"]}
+        if program is not None:
+            entries["program"] = program.as_dict()
+        entries |= {"class": made.reaches, "files": sorted(made.files), "residual_um": figures}
         warnings = [message.as_dict() for message in made.messages]
         if made.least:
             entries["least_um"] = {"max": 1e3 * made.least.value, "why": made.least.why}
@@ -247,13 +177,13 @@ def tell(made: Exported, as_json: bool, **more: object) -> None:
     console.table(("tip error, um", "max", "rms", "mean"), rows)
     pose = " ".join(f"{name}{value:g}" for name, value in figures["after"]["at"].items())
     limits = made.limits()
-    console.put(f"class {reaches}; {limits['tables']} tables, {limits['points']} points; most is left at {pose}\n")
-    if isinstance(program, dict):
-        for when in ("before", "after"):
-            console.put(f"{program['path']} {when}: {console.error_figures(program[f'error_{when}_um'])}\n")
-        for remark in program["remarks"]:
+    console.put(f"class {made.reaches}; {limits['tables']} tables, {limits['points']} points; most is left at {pose}\n")
+    if program is not None:
+        for when, error in (("before", program.before), ("after", program.after)):
+            console.put(f"{program.path} {when}: {console.error_figures(error)}\n")
+        for remark in program.remarks:
             console.say(remark)
-        if program["error_after_um"]["rms"] > program["error_before_um"]["rms"]:
+        if (program.after["rms"] or 0.0) > (program.before["rms"] or 0.0):
             console.say("This program is made worse: it runs where these tables do not fit the machine.")
     for note in made.notes:
         console.say(note)
@@ -283,13 +213,11 @@ def emulate(
     Exit code 1 if there is something to remark on the files.
     """
     from ncfix.tables.control import get_control
-    from ncfix.tables.export import SIDE_FILE, read_manifest
 
     chosen = get_control(control)
     following = Following.of(machine_path, dialect, given)
     assert following.machine is not None
     content = files.read_folder(folder)
-    more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
     with console.busy("running the tables"):
         try:
             name = folder.rstrip(os.sep)
@@ -297,11 +225,10 @@ def emulate(
         except ConfigError as error:
             raise ConfigError.collected(_below(folder, error.messages, content)) from error
         if program is not None:
-            made = read_manifest(content[SIDE_FILE], SIDE_FILE)
-            more["program"] = along(following, chosen, found.tables, made.settings, program, made.tool_length)
+            found = _with_program(found, chosen, following, program)
     found = replace(found, messages=_below(folder, found.messages, content))
     console.tell_some(found.messages)
-    tell(found, as_json, control=chosen.name, reaches=found.reaches, **more)
+    tell(found, chosen, as_json)
     return ExitCode.FINDINGS if found.messages else ExitCode.DONE
 
 

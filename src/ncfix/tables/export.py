@@ -117,13 +117,33 @@ def check_origin(manifest: Manifest, control: str, machine: Machine | None, path
 
 
 @dataclass(frozen=True, slots=True)
+class ProgramWithTables:
+    """A program as a control with tables runs it, or as one without tables has it rewritten.
+
+    before, after  the tip errors where it cuts, um: `max`, `rms`, and `where`, the line of the largest
+    remarks        why the tables do not fit it
+    """
+
+    path: str
+    before: Mapping[str, Any]
+    after: Mapping[str, Any]
+    remarks: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """As the verbs print it with --json."""
+        figures = {"error_before_um": self.before, "error_after_um": self.after}
+        return {"path": self.path, **figures, "remarks": self.remarks}
+
+
+@dataclass(frozen=True, slots=True)
 class Exported:
     """Files with what they leave.
 
-    native  the control's own files
-    files   all: also the side file and the hand-over sheet
-    least   what no tables of this kind could do better, if that is known
+    native   the control's own files
+    files    all: also the side file and the hand-over sheet
+    least    what no tables of this kind could do better, if that is known
     reaches  the class of what was written
+    program  what they leave along a program, if one was given
     """
 
     native: Files
@@ -134,6 +154,7 @@ class Exported:
     messages: tuple[Message, ...]
     least: Least | None = None
     reaches: str = ""
+    program: ProgramWithTables | None = None
 
     def limits(self) -> dict[str, Any]:
         """How much of what the control can hold is used."""
