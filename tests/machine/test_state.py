@@ -12,7 +12,7 @@ from machine import chains
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Axis, Effect, Machine, State
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
-from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear
+from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 from ncfix.machine.state import lagged
 
 MACHINE = chains.four_kinds()["w C B F X Y Z t"]
@@ -59,8 +59,23 @@ def test_an_endless_axis_comes_round_again() -> None:
 def test_an_endless_axis_s_table_need_not_start_at_zero_nor_close() -> None:
     table = Effect("EZC", (1.0, 2.0), PiecewiseLinear((-90.0, 180.0)))
     np.testing.assert_allclose(
-        value(table, at(C=np.array([-90.0, 180.0, 200.0, 269.0, 270.0]))), [1, 2, 2, 2, 1], atol=1e-9
+        value(table, at(C=np.array([-90.0, 180.0, 200.0, 224.0, 226.0, 270.0]))), [1, 2, 2, 2, 1, 1], atol=1e-9
     )
+
+
+@pytest.mark.parametrize("turns", [0, -360, 3600])
+def test_next_to_where_an_endless_axis_was_calibrated_the_nearer_end_holds(turns: int) -> None:
+    """A thousandth below -30 degrees, which rounding and corrections bring, is not 30 degrees."""
+    places = at(C=turns + np.array([-149.0, -30.001, -30.0 - 1e-12, -30.0, 30.0, 30.001, 149.0]))
+    expected = [-1, -1, -1, -1, 1, 1, 1]
+    for effect in (
+        Effect("EZC", (-1.0, 1.0), PiecewiseLinear((-30.0, 30.0))),
+        Effect("EZC", (1.0,), Polynomial((1,)), scale=30.0, range=(-30.0, 30.0)),
+        Effect("EZC", (-1.0, 1.0), Spline((-1.0, -1.0, 1.0, 1.0), 1), scale=30.0),
+    ):
+        np.testing.assert_allclose(value(effect, places), expected, atol=1e-9)
+        changed = MACHINE.replace(effects=(effect,))
+        assert np.rad2deg(changed.breakpoints("C")).max() == pytest.approx(180.0)
 
 
 def test_an_effect_may_follow_another_axis() -> None:
@@ -198,7 +213,7 @@ def test_breakpoints_are_in_internal_units_and_sorted() -> None:
     )
     machine = MACHINE.replace(effects=effects)
     np.testing.assert_allclose(machine.breakpoints("X"), [-100, -7, 5, 45, 65])
-    np.testing.assert_allclose(machine.breakpoints("B"), [0, np.pi / 2])
+    np.testing.assert_allclose(machine.breakpoints("B"), [0, np.pi / 2, 1.25 * np.pi])  # and between the turns
     assert machine.breakpoints("C").shape == (0,)
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ncfix.machine.axes import BASE_AXES, SPINDLE, Axis, Effect, GaugeLine, Vector
 from ncfix.machine.basis import Basis
 from ncfix.machine.se3 import Array
-from ncfix.machine.state import Poses, Signal, inputs_of, signal_called
+from ncfix.machine.state import Poses, Signal, inputs_of, middle_of_gap, signal_called
 
 
 class Sort(Enum):
@@ -228,6 +228,11 @@ def breakpoints(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> tuple[Ar
         kinks = () if is_factor else effect.basis.kinks
         places[index].update(x * signal.unit for x in held if np.isfinite(x))
         places[index].update((signal.center + signal.scale * u) * signal.unit for u in kinks)
+        if signal.endless:
+            low, high = sorted(signal.center + signal.scale * end for end in effect.basis.domain)
+            ranges = [(signal.low, signal.high)] if is_factor else [(signal.low, signal.high), (low, high)]
+            jumps = (middle_of_gap(*each) for each in ranges if np.isfinite(each).all())
+            places[index].update(jump * signal.unit for jump in jumps)
     return tuple(np.array(sorted(own), dtype=np.float64) for own in places)
 
 

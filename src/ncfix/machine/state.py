@@ -228,11 +228,22 @@ def signal_called(axes: tuple[Axis, ...], name: str) -> Signal:
 
 
 def turned_back(angle: Array, low: float, high: float, turn: float = 360.0) -> Array:
-    """Angles outside low ... high moved by whole turns to the first turn from `low`; infinite limits leave them."""
+    """Angles outside low ... high moved by whole turns into it, or next to its nearer end; infinite limits leave them.
+
+    So an angle that rounding puts a little below `low` stays there: what holds at `low` holds for it.
+    """
     if not np.isfinite(low):
         return angle
     outside = (angle < low) | (angle > high)
-    return np.where(outside, low + np.mod(angle - low, turn), angle) if outside.any() else angle
+    if not outside.any():
+        return angle
+    moved = low + np.mod(angle - low, turn)
+    return np.where(outside, np.where(moved > middle_of_gap(low, high, turn), moved - turn, moved), angle)
+
+
+def middle_of_gap(low: float, high: float, turn: float = 360.0) -> float:
+    """Where the nearer end of low ... high changes, between `high` and the next turn of `low`; `high` without a gap."""
+    return max(high, (high + low + turn) / 2)
 
 
 def with_lags(poses: Poses, signals: Iterable[Signal]) -> Poses:
