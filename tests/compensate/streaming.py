@@ -12,7 +12,7 @@ from ncfix.cli.streams import Outlet
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import Stream, Streamed, fix_program
 from ncfix.compensate.following import Task
-from ncfix.compensate.workers import Ground
+from ncfix.compensate.workers import OpenFiles
 from ncfix.control.setup import Setup
 from ncfix.control.trace import NotInPartsError
 from ncfix.machine import Machine
@@ -49,7 +49,7 @@ def run(task: Task, source: bytes, jobs: int) -> tuple[bytes, Streamed]:
         given.write(source)
         given.seek(0)
         outlet = Outlet(out, direct=False, stamped=lambda: False)
-        done = Stream(task, given.read, outlet.put, jobs, Ground(given.fileno(), True, out.fileno())).run()
+        done = Stream(task, given.read, outlet.put, jobs, OpenFiles(given.fileno(), True, out.fileno())).run()
         return out.read(), done
 
 

@@ -13,8 +13,8 @@ from compensate.test_plain import AMONG, winding
 from compensate.test_stream import OPTIONS, SETUP, program, streamed
 from ncfix.compensate.driver import PartCorrector
 from ncfix.compensate.following import Task
-from ncfix.compensate.parts import Part, Units
-from ncfix.compensate.workers import PartCheckpoint, ReadAhead, Share
+from ncfix.compensate.parts import MachineParts, Part
+from ncfix.compensate.workers import PartCheckpoint, ReadAhead, WorkShare
 from ncfix.control.moves import Moves
 from ncfix.control.trace import TABLES
 from ncfix.diagnostics import NcfixError
@@ -30,7 +30,7 @@ def machine(root: Path) -> Machine:
 
 
 @dataclass
-class Telling(Share):
+class Telling(WorkShare):
     """Has all parts, and keeps what it would tell of them."""
 
     received: dict[int, PartCheckpoint | None] = field(default_factory=dict)
@@ -46,7 +46,7 @@ class Telling(Share):
 
 
 @dataclass
-class Hearing(Share):
+class Hearing(WorkShare):
     """Has no part, and has received of all."""
 
     received: dict[int, PartCheckpoint | None] = field(default_factory=dict)
@@ -58,11 +58,11 @@ class Hearing(Share):
         return self.received[number]
 
 
-def gone_through(source: bytes, machine: Machine, dialect: str, share: Share) -> tuple[Units, list[Part]]:
+def gone_through(source: bytes, machine: Machine, dialect: str, share: WorkShare) -> tuple[MachineParts, list[Part]]:
     task = Task(machine, SETUP, OPTIONS, None, "p.nc", get(dialect), SIZE)
-    units = PartCorrector(task, ReadAhead(io.BytesIO(source).read)).units
-    units.share = share
-    return units, [unit.part for unit in units]
+    parts = PartCorrector(task, ReadAhead(io.BytesIO(source).read)).parts
+    parts.share = share
+    return parts, [continued.part for continued in parts]
 
 
 def assert_same_motions(found: Moves, expected: Moves) -> None:
@@ -114,13 +114,13 @@ def test_all_that_a_control_keeps_can_be_compared(dialect: str, machine: Machine
 @pytest.mark.parametrize("jobs", [2, 3])
 def test_processes_pass_over_parts_of_each_other(jobs: int, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     """Counted in the first process."""
-    passed, resume = [], Units._passed
+    passed, resume = [], MachineParts._passed
 
-    def counted(self: Units, checkpoint: PartCheckpoint, text: bytes) -> object:
+    def counted(self: MachineParts, checkpoint: PartCheckpoint, text: bytes) -> object:
         passed.append(checkpoint.blocks)
         return resume(self, checkpoint, text)
 
-    monkeypatch.setattr(Units, "_passed", counted)
+    monkeypatch.setattr(MachineParts, "_passed", counted)
     for seed in range(3):
         source = winding(seed, 400, 0.01, (*AMONG, "#100=1.5"))
         expected = streamed(source, machine, 2000)

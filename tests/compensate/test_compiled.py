@@ -14,7 +14,7 @@ from conftest import require_core
 from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, arc_lengths
 from ncfix.compensate.figures.nearest import Search
-from ncfix.compensate.plan.deviation import bounds, deviations_seen, path_error, samples, uneasy_starts
+from ncfix.compensate.plan.deviation import bounds, deviations_seen, path_error, samples, starts_to_check
 from ncfix.compensate.plan.ends import corrected
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.path import plan
@@ -101,10 +101,10 @@ def test_no_look_finds_more_than_the_bound(root: Path, step: float, passing: flo
     done = get_strategy("position").solve(machine, moves.end, State(100.0)).q
     start = np.concatenate([moves.start[:1], done[:-1]])
     real = replace(Segments.of_moves(moves, intent.columns), start=start, end=done)
-    rows, uneasy = np.arange(1, len(moves)), uneasy_starts(intent, np.zeros(len(moves), dtype=bool))
+    rows, check_start = np.arange(1, len(moves)), starts_to_check(intent, np.zeros(len(moves), dtype=bool))
     bound, found = (
-        bounds(intent, real, rows, uneasy),
-        deviations_seen(intent, real, rows, uneasy, 8, 15, bends(intent, rows)),
+        bounds(intent, real, rows, check_start),
+        deviations_seen(intent, real, rows, check_start, 8, 15, bends(intent, rows)),
     )
     assert (found <= bound).all()
     assert (bound < 2.5e-3).mean() >= passing
@@ -123,10 +123,10 @@ def test_no_look_at_a_led_tip_finds_more_than_the_bound(root: Path, name: str, s
     moves, rows = intent.moves, np.arange(1, len(wound.moves))
     done = corrected(intent, get_strategy("position"), np.arange(len(moves))).wanted
     real = replace(Segments.of_moves(moves, intent.columns), start=np.vstack((moves.start[:1], done[:-1])), end=done)
-    uneasy = uneasy_starts(intent, np.zeros(len(moves), dtype=bool))
+    check_start = starts_to_check(intent, np.zeros(len(moves), dtype=bool))
     bound, found = (
-        bounds(intent, real, rows, uneasy),
-        deviations_seen(intent, real, rows, uneasy, 8, 15, bends(intent, rows)),
+        bounds(intent, real, rows, check_start),
+        deviations_seen(intent, real, rows, check_start, 8, 15, bends(intent, rows)),
     )
     assert np.isfinite(bound).mean() > 0.5
     assert (found <= bound).all()

@@ -10,7 +10,7 @@ import pytest
 from compensate.machines_at_random import STROKE, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, interpolated, motions
 from ncfix.compensate.plan.findings import Finding
-from ncfix.compensate.plan.limits import FUZZ, findings, led_astray
+from ncfix.compensate.plan.limits import FUZZ, findings, increments_beyond_travel
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Moves
@@ -257,7 +257,7 @@ def test_increments_are_led_astray_where_they_stay_and_begin_elsewhere() -> None
         moves = changed(moves, incremental=rng.random(12) < 0.6)
         beyond = [(np.maximum(low - places, places - high) > FUZZ) for places in (pieces.end, moves.end)]
         expected = np.flatnonzero(moves.incremental & pieces.kept & (beyond[0] & ~beyond[1]).any(axis=1))
-        assert led_astray(machine, moves, pieces, start, State()).tolist() == expected.tolist()
+        assert increments_beyond_travel(machine, moves, pieces, start, State()).tolist() == expected.tolist()
         count += len(expected)
     assert count > 10
 

@@ -18,7 +18,7 @@ from compensate.test_stream import OPTIONS, streamed
 from conftest import require_core, use_form
 from ncfix import core
 from ncfix.compensate import FixOptions, driver, plain
-from ncfix.compensate.parts import ProgramPart
+from ncfix.compensate.parts import ContinuedPart
 from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.plan.deviation import straight_bounds
 from ncfix.compensate.solve import SelfCheckError
@@ -72,8 +72,8 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Whether each part, in turn, was planned as one of plain motions."""
     plan, found = Planner.plan, []
 
-    def watched(self: Planner, unit: ProgramPart) -> PlainPlan | None:
-        course = plan(self, unit)
+    def watched(self: Planner, continued: ContinuedPart) -> PlainPlan | None:
+        course = plan(self, continued)
         found.append(course is not None)
         return course
 
@@ -118,9 +118,9 @@ def test_arcs_are_planned_with_plain_motions(machine: Machine, monkeypatch: pyte
     source = winding(2, 600, 0.03, AMONG[2:4])
     plan, begun = Planner.plan, []
 
-    def watched(self: Planner, unit: ProgramPart) -> PlainPlan | None:
-        course = plan(self, unit)
-        begun.append((course is not None, int(unit.part.moves.kind[0])))
+    def watched(self: Planner, continued: ContinuedPart) -> PlainPlan | None:
+        course = plan(self, continued)
+        begun.append((course is not None, int(continued.part.moves.kind[0])))
         return course
 
     with monkeypatch.context() as patched:
@@ -246,8 +246,8 @@ def course_of(source: bytes, machine: Machine, monkeypatch: pytest.MonkeyPatch) 
     """The plan of the longest part of a program."""
     plan, courses = Planner.plan, []
 
-    def watched(self: Planner, unit: ProgramPart) -> PlainPlan | None:
-        courses.append(plan(self, unit))
+    def watched(self: Planner, continued: ContinuedPart) -> PlainPlan | None:
+        courses.append(plan(self, continued))
         return courses[-1]
 
     monkeypatch.setattr(Planner, "plan", watched)

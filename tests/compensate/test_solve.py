@@ -14,7 +14,7 @@ from ncfix.control.moves import MotionKind
 from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
 from ncfix.text.reader import read
-from ncfix.writer.pieces import LED, PINNED
+from ncfix.writer.pieces import BEYOND_TRAVEL, PINNED
 
 ZERO = dict.fromkeys("XYZ", 0.0)
 SETUP = Setup(work_offsets={"G54": ZERO}, initial=ZERO, assume_zero=True)
@@ -46,7 +46,7 @@ def test_a_refused_increment_begins_where_the_corrected_program_has_led(machine:
 def test_but_never_beyond_the_travel(machine: Machine, side: int) -> None:
     """The correction where the loop begins leads outwards where it ends: so it begins where it began."""
     refused, ends = loop_to(side * 400.0, side * 230.0, machine)
-    assert refused[3] == f"{LED} (line 5)"
+    assert refused[3] == f"{BEYOND_TRAVEL} (line 5)"
     assert 5 in refused
     assert ends[:, 0].tolist()[1:] == [side * x for x in (-290.0, -60.0, 170.0, 400.0)]
 

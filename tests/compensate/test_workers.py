@@ -24,7 +24,7 @@ from ncfix.compensate import driver, workers
 from ncfix.compensate.driver import PartCorrector, ProvedPart, Stream
 from ncfix.compensate.following import Task
 from ncfix.compensate.parts import PartProof
-from ncfix.compensate.workers import GoneError, Post, lines_between
+from ncfix.compensate.workers import Mailbox, WorkerGoneError, connections_between
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError, UsageError
 from ncfix.machine import Machine, load
@@ -65,9 +65,9 @@ def killed(*_: object) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def killed_in_a_message(line: Connection, _: object) -> None:
+def killed_in_a_message(connection: Connection, _: object) -> None:
     """After the size of a message, and a little of it."""
-    os.write(line.fileno(), (1 << 20).to_bytes(4, "big") + b"some")
+    os.write(connection.fileno(), (1 << 20).to_bytes(4, "big") + b"some")
     killed()
 
 
@@ -91,7 +91,7 @@ def test_a_process_that_is_gone(
     owner: Any, name: str, instead: Callable[..., Any], jobs: int, machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     in_another_process(monkeypatch, owner, name, instead)
-    with pytest.raises(GoneError):
+    with pytest.raises(WorkerGoneError):
         streamed(program(5, 400, 0.0), machine, 1000, jobs=jobs)
     assert not multiprocessing.active_children()
 
@@ -107,26 +107,26 @@ def test_what_does_not_arrive(here: bool, machine: Machine, monkeypatch: pytest.
     """What sends messages, in this process or in the others, has no memory."""
     own, send = os.getpid(), Connection.send_bytes
 
-    def full(line: Connection, data: bytes) -> None:
+    def full(connection: Connection, data: bytes) -> None:
         if (os.getpid() == own) == here:
             raise MemoryError
-        send(line, data)
+        send(connection, data)
 
     monkeypatch.setattr(Connection, "send_bytes", full)
-    with pytest.raises(GoneError):
+    with pytest.raises(WorkerGoneError):
         streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
 
 
 def test_messages_of_any_size_that_nobody_hears_yet() -> None:
-    """Two processes that tell each other more than a line holds do not wait for each other."""
-    lines = lines_between(2, multiprocessing.get_context())
-    posts = [Post(mine, {1 - mine: lines[mine, 1 - mine]}) for mine in range(2)]
-    with posts[0].opened(killed), posts[1].opened(killed):
-        for post in posts:
+    """Two processes that tell each other more than a connection holds do not wait for each other."""
+    connections = connections_between(2, multiprocessing.get_context())
+    posts = [Mailbox(process, {1 - process: connections[process, 1 - process]}) for process in range(2)]
+    with posts[0].sending(killed), posts[1].sending(killed):
+        for mailbox in posts:
             for number in range(3):
-                post.tell("much", number, bytes(1 << 22))
-        for post in posts:
-            assert [len(post.waited_for("much", number)) for number in range(3)] == [1 << 22] * 3
+                mailbox.send("much", number, bytes(1 << 22))
+        for mailbox in posts:
+            assert [len(mailbox.wait_for("much", number)) for number in range(3)] == [1 << 22] * 3
 
 
 def test_what_is_read_of_a_pipe_is_told(machine: Machine) -> None:
@@ -134,7 +134,7 @@ def test_what_is_read_of_a_pipe_is_told(machine: Machine) -> None:
     task = Task(machine, SETUP, OPTIONS, None, "p.ngc", get("linuxcnc"), 1000)
     with TemporaryFile(buffering=0) as kept, TemporaryFile(buffering=0) as out:
         source_of_pipe = Source("-", io.BytesIO(source), kept)
-        stream = Stream(task, source_of_pipe.read, Outlet(out, False, bool).put, 3, source_of_pipe.ground(out.fileno()))
+        stream = Stream(task, source_of_pipe.read, Outlet(out, False, bool).put, 3, source_of_pipe.files(out.fileno()))
         stream.run()
         assert out.read() == run(task, source, 1)[0]
 
@@ -171,8 +171,10 @@ CHANGES = (
 @pytest.mark.parametrize("at", [60, 100, 140, 150])
 def test_a_tool_that_is_used_within_one_part(change: tuple[bytes, bytes], at: int, machine: Machine) -> None:
     """What is not known of it is told, whichever process has that part."""
-    lines = program(5, 200, 0.0).splitlines()
-    source = b"\n".join([*lines[:at], change[0], *lines[at : at + 4], change[1], *lines[at + 4 :], b""])
+    connections = program(5, 200, 0.0).splitlines()
+    source = b"\n".join(
+        [*connections[:at], change[0], *connections[at : at + 4], change[1], *connections[at + 4 :], b""]
+    )
     assert streamed(source, machine, 2000, jobs=2) == streamed(source, machine, 2000)
     zero = dict.fromkeys("XYZBC", 0.0)
     setup = Setup(work_offsets={"G54": zero}, initial=zero, tools={0: Tool(length=50.0)})

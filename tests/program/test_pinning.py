@@ -148,8 +148,10 @@ def test_refused_arcs_close_whatever_is_before_them(lines: list[str], refused: i
             off[:] = True
 
 
-@pytest.mark.parametrize(("text", "unmoored"), [("G1 X1\nG2 X3 Y0 I1 J0", True), ("G1 X1 Y0\nG2 X3 Y0 I1 J0", False)])
-def test_a_refusal_that_needs_what_was_before_the_first_motion_says_so(text: str, unmoored: bool) -> None:
+@pytest.mark.parametrize(
+    ("text", "reaches_back"), [("G1 X1\nG2 X3 Y0 I1 J0", True), ("G1 X1 Y0\nG2 X3 Y0 I1 J0", False)]
+)
+def test_a_refusal_that_needs_what_was_before_the_first_motion_says_so(text: str, reaches_back: bool) -> None:
     program = read(f"G21 G90 G94 G17 F100\n{text}\nM2\n".encode(), "part.ngc", "linuxcnc")
     moves = trace(program, Setup(assume_zero=True), ("X", "Y", "Z"), frozenset()).moves
-    assert closure_of_refusals(moves, np.array([True, True])).unmoored is unmoored
+    assert closure_of_refusals(moves, np.array([True, True])).reaches_back is reaches_back

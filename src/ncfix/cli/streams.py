@@ -18,7 +18,7 @@ from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
 if TYPE_CHECKING:
     from ncfix.compensate.driver import Stamp
     from ncfix.compensate.report import FixReport
-    from ncfix.compensate.workers import Ground
+    from ncfix.compensate.workers import OpenFiles
     from ncfix.reports.program_page import ProgramPage
 
 
@@ -92,12 +92,12 @@ class Source:
     taken: int = 0
     stamp: Place | None = None
 
-    def ground(self, out: int) -> Ground:
+    def files(self, out: int) -> OpenFiles:
         """What other processes need to read the text, too, and to write into the file `out`."""
-        from ncfix.compensate.workers import Ground
+        from ncfix.compensate.workers import OpenFiles
 
         kept = self.kept is not None
-        return Ground((self.kept or self.handle).fileno(), not kept, out)
+        return OpenFiles((self.kept or self.handle).fileno(), not kept, out)
 
     def check_unchanged(self) -> None:
         """Raise SourceError NCF002 if the file is not what it was at first: parts of it may not fit together."""

@@ -212,7 +212,7 @@ def not_in_all(why: Exception, program: Program) -> RefusedError:
 
 
 @dataclass(frozen=True, slots=True)
-class Together:
+class JointPlan:
     """The plan for each position, and the text of all.
 
     added_blocks  lines added
@@ -231,14 +231,14 @@ def plan_and_write_all(
     readings: Readings,
     before: PrecedingMotion | None = None,
     first: AcceptedPlan | None = None,
-) -> Together:
+) -> JointPlan:
     """Plan and write a program so that all positions agree on the text; `moves` and `readings` of each of them.
 
     before, first  of a program in one position, see `plan_and_write`
     """
     if len(moves) == 1:
         solution = plan_and_write(program, moves[0], machine, options, readings[0], before, first)
-        return Together((solution,), solution.emission.splices, solution.emission.added_blocks)
+        return JointPlan((solution,), solution.emission.splices, solution.emission.added_blocks)
     refused, whole, spelled = dict[int, Reason](), _starting_elsewhere(moves), dict[int, Mask]()
     while True:
         found: list[WrittenPlan] = []
@@ -312,12 +312,12 @@ def _differing(moves: Sequence[Moves], edits: Sequence[Mapping[int, Edits]]) -> 
     return differing
 
 
-def _merged(found: Sequence[WrittenPlan], edits: Sequence[Mapping[int, Edits]]) -> Together:
+def _merged(found: Sequence[WrittenPlan], edits: Sequence[Mapping[int, Edits]]) -> JointPlan:
     """The text of all positions: they agree on blocks that several of them execute."""
     wanted = {block: own for done in edits for block, own in done.items()}
     every = [edit for block in sorted(wanted) for edit in wanted[block]]
     ends = b"\n" if any(b"\n" in edit.text for edit in every) else b"\r"
-    return Together(tuple(found), Splices.of(every), sum(edit.text.count(ends) for edit in every))
+    return JointPlan(tuple(found), Splices.of(every), sum(edit.text.count(ends) for edit in every))
 
 
 def equal(one: object, other: object) -> bool:
@@ -366,19 +366,19 @@ class WholeProof:
     follows: Sequence[Callable[[Program], Trace]]
     attempts: int = ATTEMPTS
 
-    def taught(self, unit: object, together: Together, text: bytes) -> Readings | None:
-        """See `driver.Proof.taught`. RefusedError NCF453 where no text is right in all of several positions."""
+    def misreadings(self, continued: object, joint: JointPlan, text: bytes) -> Readings | None:
+        """See `driver.Proof.misreadings`. RefusedError NCF453 where no text is right in all of several positions."""
         if text == self.program.source:
             return None
         try:
-            return self._taught(together, text)
+            return self._misreadings(joint, text)
         except SelfCheckError as why:
             if len(self.follows) == 1:
                 raise
             raise not_in_all(why, self.program) from why
 
-    def _taught(self, together: Together, text: bytes) -> Readings | None:
-        pairs = list(zip(together.plans, (self._again(text, each) for each in self.follows), strict=True))
+    def _misreadings(self, joint: JointPlan, text: bytes) -> Readings | None:
+        pairs = list(zip(joint.plans, (self._again(text, each) for each in self.follows), strict=True))
         wrong = [differences(solution, again) for solution, again in pairs]
         at = next((k for k, each in enumerate(wrong) if each.any()), None)
         if at is None:

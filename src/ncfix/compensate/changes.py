@@ -94,11 +94,11 @@ class Changes:
             return cls(program, fixed, Splices.of([]), None, machine)
         flat = any(message.code == FLAT for message in fixed.report.warnings)
         source, corrector = seen[-1 if flat else 0]
-        assert corrector.together is not None
+        assert corrector.joint is not None
         stamp = [Edit(corrector.at, corrector.at, corrector.stamped)] if corrector.stamped else []
-        edits = Splices.joined([corrector.together.splices, Splices.of(stamp)])
+        edits = Splices.joined([corrector.joint.splices, Splices.of(stamp)])
         anew = spliced(source.source, edits) != fixed.text
-        return cls(source, fixed, None if anew else edits, corrector.together.plans[0], placed(machine, setup))
+        return cls(source, fixed, None if anew else edits, corrector.joint.plans[0], placed(machine, setup))
 
     def unified(self, original: bytes, before: str, after: str) -> Iterator[bytes]:
         """The lines of a unified diff of the text that was given; nothing if nothing changes."""

@@ -15,12 +15,12 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.block_delete import SwitchSetting, messages_of, positions_of
 from ncfix.compensate.driver import PartCorrector, fix_program
 from ncfix.compensate.following import Resolve, Task, follow, placed, suspected
-from ncfix.compensate.parts import Part, Parts, Units
+from ncfix.compensate.parts import MachineParts, Part, Parts
 from ncfix.compensate.plan.findings import Notes
 from ncfix.compensate.plan.limits import findings
 from ncfix.compensate.plan.path import untouched
 from ncfix.compensate.report import FixReport, Tally
-from ncfix.compensate.workers import Read, Share
+from ncfix.compensate.workers import Read, WorkShare
 from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
@@ -75,20 +75,20 @@ def survey_alone(parts: Parts, found: Iterable[Part]) -> Checked:
 def survey_on(task: Task, read: Read) -> Checked:
     """As `check_on`, of the text that is read; raises what correcting does, and `NotInPartsError`."""
     if task.machine.is_perfect:
-        units = Units.of(task, read)
-        survey = Survey(units.placed)
-        units.look = survey.look
-        for _ in units:
+        parts = MachineParts.of(task, read)
+        survey = Survey(parts.placed)
+        parts.look = survey.look
+        for _ in parts:
             pass
-        return _surveyed(units, survey)
+        return _surveyed(parts, survey)
     task.check()
     corrector, tally = PartCorrector(task, read), Tally(task.machine.least_increment[0])
     survey = Survey(corrector.machine)
-    corrector.units.look = survey.look
-    for _, done in corrector.work(Share()):
+    corrector.parts.look = survey.look
+    for _, done in corrector.work(WorkShare()):
         tally.take(done.tally)
     suspicion = suspected(tally.numbers, tally.step, task.path, task.options.force)
-    return _surveyed(corrector.units, survey, corrector.report(tally, suspicion))
+    return _surveyed(corrector.parts, survey, corrector.report(tally, suspicion))
 
 
 @dataclass(slots=True)

@@ -24,8 +24,8 @@ import numpy as np
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.block_delete import (
+    JointPlan,
     Readings,
-    Together,
     WholeProof,
     assumed_of,
     messages_of,
@@ -46,7 +46,7 @@ from ncfix.compensate.following import (
     traced,
     with_tool_lengths,
 )
-from ncfix.compensate.parts import PartProof, ProgramPart, Units
+from ncfix.compensate.parts import ContinuedPart, MachineParts, PartProof
 from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.plain_figures import figures, largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
@@ -56,7 +56,7 @@ from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.offset import is_offset
 from ncfix.compensate.report import FixReport, Tally, in_lines
 from ncfix.compensate.solve import AcceptedPlan, PrecedingMotion, WrittenPlan, accepted_plan, increments
-from ncfix.compensate.workers import Ground, Read, Share, worker_pool
+from ncfix.compensate.workers import OpenFiles, Read, WorkShare, worker_pool
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.trace import NotInPartsError
@@ -77,7 +77,7 @@ ASTRAY = 1.0
 class Proof(Protocol):
     """Reads a text that was written again, and follows it."""
 
-    def taught(self, unit: ProgramPart, together: Together, text: bytes) -> Readings | None:
+    def misreadings(self, continued: ContinuedPart, joint: JointPlan, text: bytes) -> Readings | None:
         """What a control makes of the text, if that is not what was meant, for another attempt; None if it is.
 
         Raises `SelfCheckError` for a text that cannot be read, or that never is right, `NotInPartsError` for one that
@@ -129,7 +129,7 @@ class Corrector:
     head     the first part
     at       where the stamp stands in what is written
     stamped  the stamp, as far as it was known then; empty if there is none
-    together what was planned and written last
+    joint what was planned and written last
     watch    is shown what was corrected
     """
 
@@ -140,7 +140,7 @@ class Corrector:
     head: Program | None = None
     at: int = 0
     stamped: bytes = b""
-    together: Together | None = None
+    joint: JointPlan | None = None
     watch: Watch | None = None
 
     def stamp(self) -> bytes:
@@ -150,7 +150,7 @@ class Corrector:
 
     def correct(
         self,
-        unit: ProgramPart,
+        continued: ContinuedPart,
         moves: Sequence[Moves],
         accepted: AcceptedPlan | None = None,
         before: PrecedingMotion | None = None,
@@ -163,28 +163,30 @@ class Corrector:
         before  what the part before has left
         leave   is told what this one leaves, and how long its text is, before it is proved
         """
-        task, part = self.task, unit.together
+        task, part = self.task, continued.joined
         readings: Readings | None = [None] * len(moves)
         while readings is not None:
-            together = plan_and_write_all(part.program, moves, self.machine, task.options, readings, before, accepted)
-            solution = together.plans[0]
-            if before is not None and (solution.unmoored or solution.kept[0] != before.kept):
+            joint = plan_and_write_all(part.program, moves, self.machine, task.options, readings, before, accepted)
+            solution = joint.plans[0]
+            if before is not None and (solution.reaches_back or solution.kept[0] != before.kept):
                 raise NotInPartsError("a refusal reaches back into an earlier part")
-            text = self._text(part.program, together.splices, before is None)
+            text = self._text(part.program, joint.splices, before is None)
             if not part.last:
                 leave(PrecedingMotion.of(solution.rounds, np.zeros(len(solution.moves.axes), dtype=np.int8)), len(text))
-            readings = self.proof.taught(unit, together, text)
-        self.together = together
+            readings = self.proof.misreadings(continued, joint, text)
+        self.joint = joint
         own, tally = None, Tally(self.machine.least_increment[0])
-        if unit.head is not None:
+        if continued.head is not None:
             own = np.ones(len(solution.moves), dtype=bool)
             own[:1] = False
-        tally.add(part.program, together, own, self.machine)
+        tally.add(part.program, joint, own, self.machine)
         if task.options.verify:
-            errors = [(each.moves, self._tip_errors(each, own, unit)) for each in together.plans]
+            errors = [(each.moves, self._tip_errors(each, own, continued)) for each in joint.plans]
             self.note(tally, part.program, *errors)
         if self.watch is not None:
-            self.watch(part.program, self.machine, solution, own, None if unit.head is None else unit.direction)
+            self.watch(
+                part.program, self.machine, solution, own, None if continued.head is None else continued.direction
+            )
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _text(self, program: Program, splices: Splices, first: bool) -> bytes:
@@ -200,7 +202,7 @@ class Corrector:
         self.stamped = edit.text
         return spliced(program.source, Splices.joined([splices, Splices.of([edit])]))
 
-    def _tip_errors(self, solution: WrittenPlan, own: Mask | None, unit: ProgramPart) -> PathError:
+    def _tip_errors(self, solution: WrittenPlan, own: Mask | None, continued: ContinuedPart) -> PathError:
         """Tip errors before and after, with the numbers as the control will understand them; of motions `own` (n,)."""
         emission, shown = solution.emission, solution.shown(self.task.options.split_rapids)
         return path_error(
@@ -208,7 +210,7 @@ class Corrector:
             solution.moves,
             replace(solution.plan.pieces, end=emission.end, centre=emission.centre),
             emission.start,
-            state=State() if unit.head is None else State(direction=unit.direction),
+            state=State() if continued.head is None else State(direction=continued.direction),
             rows=shown if own is None else own & shown,
             tilts=False,
             known=solution.plan.known,
@@ -281,7 +283,7 @@ def fix_program(
     moves, words = [each.trace.moves for each in positions], (stamped(positions), assumed_of(positions))
     proof = WholeProof(program, [partial(follow, own=each.setup) for each in positions])
     corrector = Corrector(task, placed(machine, setup), proof, lambda: words)
-    done = corrector.correct(ProgramPart.whole(program, moves[0], corrector.machine), moves)
+    done = corrector.correct(ContinuedPart.whole(program, moves[0], corrector.machine), moves)
     seen(program, corrector)
     tally, text = done.tally, done.text
     assert isinstance(text, bytes)
@@ -336,46 +338,46 @@ class PartCorrector(Corrector):
     """Goes through a program and corrects its parts, or some of them. `work` is called once."""
 
     def __init__(self, task: Task, read: Read) -> None:
-        self.units = units = Units.of(task, read)
-        self.parts_proof = PartProof(task, units.reader)
-        super().__init__(task, units.placed, self.parts_proof, lambda: ("", units.assumed))
+        self.parts = parts = MachineParts.of(task, read)
+        self.parts_proof = PartProof(task, parts.reader)
+        super().__init__(task, parts.placed, self.parts_proof, lambda: ("", parts.assumed))
         self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect, WrittenLanguage)
 
-    def work(self, share: Share) -> Iterator[tuple[int, ProvedPart]]:
+    def work(self, share: WorkShare) -> Iterator[tuple[int, ProvedPart]]:
         """The number of each part of the share, and what it has become; the others are followed, or passed over.
 
         Raises what reading, following and correcting do, and at last UsageError for what the setup does not give.
         """
-        foreign, self.units.share = False, share
-        for number, unit in enumerate(self.units):
+        skipped, self.parts.share = False, share
+        for number, continued in enumerate(self.parts):
             if not share.has(number):
-                self.parts_proof.pass_over(unit, foreign)
-                foreign = True
+                self.parts_proof.pass_over(continued, skipped)
+                skipped = True
                 continue
-            yield number, self._corrected(unit, number, share, foreign)
-            foreign = False
+            yield number, self._corrected(continued, number, share, skipped)
+            skipped = False
 
-    def _corrected(self, unit: ProgramPart, number: int, share: Share, foreign: bool) -> ProvedPart:
-        """Correct a part, hand on what the next one has to know, and prove it; `foreign`: the one before was not."""
-        if unit.head is not None and is_offset(unit.head.moves).any():
+    def _corrected(self, continued: ContinuedPart, number: int, share: WorkShare, skipped: bool) -> ProvedPart:
+        """Correct a part, hand on what the next one has to know, and prove it; `skipped`: the one before was not."""
+        if continued.head is not None and is_offset(continued.head.moves).any():
             raise NotInPartsError("the control offsets a contour from one part into the next")
-        plan = None if self.planner is None else self.planner.plan(unit)
-        accepted = None if plan is not None else self._accepted_plan(unit)
+        plan = None if self.planner is None else self.planner.plan(continued)
+        accepted = None if plan is not None else self._accepted_plan(continued)
         before = share.before(number)
-        if before is not None and foreign:
+        if before is not None and skipped:
             self.parts_proof.follower.stand(before.position)
         if plan is not None and before is not None and not before.kept:
             plain = written(self.language, plan, before.position, increments(self.machine))
             if plain is not None:
                 return self._plainly(plan, plain, number, share)
-        accepted, moves = accepted or self._accepted_plan(unit), unit.together.moves
+        accepted, moves = accepted or self._accepted_plan(continued), continued.joined.moves
         if before is not None:
-            before, (first, *_) = replace(before, direction=unit.direction), before.rounds
+            before, (first, *_) = replace(before, direction=continued.direction), before.rounds
             if first.kept.any() or (moves.wordless[0] & (first.shift != 0)).any():
                 accepted = None  # the motion before was left as it was, or an axis goes on standing off its place
-        return self.correct(unit, [moves], accepted, before, partial(share.leave, number))
+        return self.correct(continued, [moves], accepted, before, partial(share.leave, number))
 
-    def _plainly(self, plan: PlainPlan, plain: Emission, number: int, share: Share) -> ProvedPart:
+    def _plainly(self, plan: PlainPlan, plain: Emission, number: int, share: WorkShare) -> ProvedPart:
         """Finish a part of plain motions."""
         part, moves = plan.part, plan.part.moves
         text = spliced(part.program.source, plain.splices)
@@ -393,17 +395,17 @@ class PartCorrector(Corrector):
             self.watch(part.program, self.machine, solution, None, None)
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
-    def _accepted_plan(self, unit: ProgramPart) -> AcceptedPlan:
+    def _accepted_plan(self, continued: ContinuedPart) -> AcceptedPlan:
         """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
-        part = unit.together
+        part = continued.joined
         nowhere = np.zeros(len(part.moves.axes))
-        guess = None if unit.head is None else PrecedingMotion.steady(nowhere, unit.direction, nowhere)
+        guess = None if continued.head is None else PrecedingMotion.steady(nowhere, continued.direction, nowhere)
         return accepted_plan(part.moves, self.machine, self.task.dialect, self.task.options, guess)
 
     def report(self, tally: Tally, suspicion: tuple[Message, ...]) -> FixReport:
         """The report of all parts."""
-        tally.notes = self.units.notes
-        return tally.report(self.task.path, (*suspicion, *self.units.follower.messages), self.task.options)
+        tally.notes = self.parts.notes
+        return tally.report(self.task.path, (*suspicion, *self.parts.follower.messages), self.task.options)
 
 
 @dataclass(frozen=True, slots=True)
@@ -428,9 +430,9 @@ class Stream:
     """One program on its way. `run` is called once.
 
     read   gives the next so many bytes of the text; none at its end
-    write  takes the corrected text, part by part; or how much of it stands where it belongs already (`Ground.out`)
+    write  takes the corrected text, part by part; or how much of it stands where it belongs already (`OpenFiles.out`)
     jobs   processes that work on it
-    ground  the files, which all of them have; without it there is one process
+    files  the files, which all of them have; without it there is one process
     suspicion  what makes one think that the program was corrected before; None: not judged yet
     watch      is shown each part; one process only then
     """
@@ -439,7 +441,7 @@ class Stream:
     read: Read
     write: Callable[[bytes | int], object]
     jobs: int = 1
-    ground: Ground | None = None
+    files: OpenFiles | None = None
     tally: Tally = field(init=False)
     suspicion: tuple[Message, ...] | None = None
     corrector: PartCorrector | None = None
@@ -458,15 +460,15 @@ class Stream:
         task = self.task
         task.check()
         task.follower()
-        with worker_pool(1 if self.watch else self.jobs, partial(PartCorrector, task), self.ground) as others:
+        with worker_pool(1 if self.watch else self.jobs, partial(PartCorrector, task), self.files) as others:
             own = self.corrector = PartCorrector(task, others.spread(self.read))
             own.watch = self.watch
             for number, done in own.work(others.share):
                 others.put(number, done)
                 self._take(others.ready())
-            self._take(others.rest(own.units.count))
-        self._pass_on(own.units.rest, own.units.read)
-        self.tally.blocks += own.units.blocks
+            self._take(others.rest(own.parts.count))
+        self._pass_on(own.parts.rest, own.parts.read)
+        self.tally.blocks += own.parts.blocks
         report = own.report(self.tally, self._judged())
         return Streamed(report, Stamp(own.at, own.stamped, own.stamp() if self.tally.changed else b""))
 

@@ -13,14 +13,14 @@ import numpy as np
 
 from ncfix import core
 from ncfix.compensate import FixOptions
-from ncfix.compensate.block_delete import Readings, Together
+from ncfix.compensate.block_delete import JointPlan, Readings
 from ncfix.compensate.following import Task, placed, refuse_stamped, with_tool_lengths
 from ncfix.compensate.plan.arrays import Index, Mask
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.solve import SelfCheckError, WrittenPlan, differences
-from ncfix.compensate.workers import PartCheckpoint, Read, Share
+from ncfix.compensate.workers import PartCheckpoint, Read, WorkShare
 from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.trace import Follower, NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
@@ -76,7 +76,7 @@ class Parts:
     rest: bytes = b""
     blocks: int = 0
     tcp: bool = True
-    share: Share = field(default_factory=Share)
+    share: WorkShare = field(default_factory=WorkShare)
     found: int = 0
     told: int = -1
 
@@ -204,7 +204,7 @@ def _ends_clean(program: Program, moves: Moves) -> bool:
 
 
 @dataclass(frozen=True)
-class ProgramPart:
+class ContinuedPart:
     """A part, and the last motion of the one before, which is written already.
 
     head       that motion and its block; None for the first part
@@ -218,12 +218,12 @@ class ProgramPart:
     machine: Machine
 
     @classmethod
-    def whole(cls, program: Program, moves: Moves, machine: Machine) -> ProgramPart:
+    def whole(cls, program: Program, moves: Moves, machine: Machine) -> ContinuedPart:
         """A program that is one part."""
         return cls(Part(program, moves, True), None, np.zeros(len(machine.axes), dtype=np.int8), machine)
 
     @cached_property
-    def together(self) -> Part:
+    def joined(self) -> Part:
         """The part behind that motion."""
         if self.head is None:
             return self.part
@@ -234,11 +234,11 @@ class ProgramPart:
     @cached_property
     def intent(self) -> Intent:
         """The part behind that motion on the machine."""
-        return Intent(self.machine, self.together.moves, State(direction=self.direction))
+        return Intent(self.machine, self.joined.moves, State(direction=self.direction))
 
 
 @dataclass(slots=True, kw_only=True)
-class Units(Parts):
+class MachineParts(Parts):
     """The parts of a program on a machine, with every tool length known. Gone through once.
 
     machine  as it is; `placed` with the workpiece where the setup has it
@@ -261,7 +261,7 @@ class Units(Parts):
     look: Callable[[Part], object] | None = None
 
     @classmethod
-    def of(cls, task: Task, read: Read) -> Units:
+    def of(cls, task: Task, read: Read) -> MachineParts:
         """The parts of a program that is read."""
         return cls(
             task.options,
@@ -285,7 +285,7 @@ class Units(Parts):
         """What there is to say of following the program, so far."""
         return (*self.follower.messages, *self.notes.values())
 
-    def __iter__(self) -> Iterator[ProgramPart]:
+    def __iter__(self) -> Iterator[ContinuedPart]:
         """The parts; none any more once something is lacking.
 
         Raises what reading and following do, and at last UsageError for what the setup does not give.
@@ -297,12 +297,12 @@ class Units(Parts):
                 continue
             if self.look is not None:
                 self.look(part)
-            unit = ProgramPart(part, head, direction, self.placed)
+            continued = ContinuedPart(part, head, direction, self.placed)
             self._check_units(part.moves, head is None)
             if not part.last:
-                head, direction = self._head(unit)
+                head, direction = self._head(continued)
             self.count += 1
-            yield unit
+            yield continued
         if missing := (*self.follower.lacking,) or (*self.lacking.values(),):
             raise UsageError.collected(missing)
 
@@ -324,12 +324,12 @@ class Units(Parts):
             raise NotInPartsError("the program changes between inch and mm")
         self.units |= units
 
-    def _head(self, unit: ProgramPart) -> tuple[Part, Signs]:
+    def _head(self, continued: ContinuedPart) -> tuple[Part, Signs]:
         """The last motion with its block, and the way in which the axes came there."""
-        part, direction = unit.part, unit.direction
+        part, direction = continued.part, continued.direction
         head = Part(*last_of(part.program, part.moves), False)
         if self.sided:
-            arrival = unit.intent.arrival
+            arrival = continued.intent.arrival
             assert arrival is not None
             direction = arrival[-2] if len(arrival) > 1 else direction
         return head, direction
@@ -342,31 +342,31 @@ class PartProof:
         self.again, self.follower = PartReader(task.path, task.dialect, task.head), task.follower()
         self.again.templates, self.again.index = reader.templates, reader.index
 
-    def pass_over(self, unit: ProgramPart, foreign: bool) -> None:
-        """Go past a part of another process, as programmed; `foreign`: so was the one before."""
-        part = unit.part
-        if unit.head is not None and not foreign:
-            self.follower.stand(unit.head.moves.end[-1])
+    def pass_over(self, continued: ContinuedPart, skipped: bool) -> None:
+        """Go past a part of another process, as programmed; `skipped`: so was the one before."""
+        part = continued.part
+        if continued.head is not None and not skipped:
+            self.follower.stand(continued.head.moves.end[-1])
         if part.checkpoint is not None:
             self.again.first_line += part.checkpoint.lines
             self.follower.resume(part.checkpoint.control)
         self.again.first_line += part.program.lines_ended
         self.follower.follow(part.program, part.last)
 
-    def taught(self, unit: ProgramPart, together: Together, text: bytes) -> Readings | None:
-        """See `driver.Proof.taught`."""
-        (solution,), head = together.plans, unit.head
+    def misreadings(self, continued: ContinuedPart, joint: JointPlan, text: bytes) -> Readings | None:
+        """See `driver.Proof.misreadings`."""
+        (solution,), head = joint.plans, continued.head
         if head is None:
-            self.check(unit.part, solution, text, None)
+            self.check(continued.part, solution, text, None)
         else:
             own = solution.plan.pieces.move > 0
-            self.check(unit.part, solution, text, together.splices.moved(-len(head.program.source)), own)
+            self.check(continued.part, solution, text, joint.splices.moved(-len(head.program.source)), own)
         return None
 
     def check(
         self, part: Part, solution: WrittenPlan, text: bytes, edits: Splices | None, own: Mask | None = None
     ) -> None:
-        """Raise what `taught` does; `edits` make the text of that of the part, if known; `own` (m,): pieces in it."""
+        """Raise what `misreadings` does; `edits` make the text from the part's, if known; `own` (m,): its pieces."""
         if edits is not None and core.engaged() and not left_alone(part.program.source, edits, text):
             raise SelfCheckError("more of the text has changed than was written anew")
         try:

@@ -20,7 +20,7 @@ import numpy as np
 
 from ncfix import core
 from ncfix.compensate import FixOptions
-from ncfix.compensate.parts import Part, ProgramPart
+from ncfix.compensate.parts import ContinuedPart, Part
 from ncfix.compensate.plan.arcs import Closure, fitted, full_circles
 from ncfix.compensate.plan.arrays import (
     Array,
@@ -34,8 +34,8 @@ from ncfix.compensate.plan.arrays import (
     places,
     some,
 )
-from ncfix.compensate.plan.deviation import CORNER, SURE, led_bounds, looked_at
-from ncfix.compensate.plan.ends import led_as_commands
+from ncfix.compensate.plan.deviation import CORNER, SURE, looked_at, tcp_bounds
+from ncfix.compensate.plan.ends import commands_of_positions
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import REST, matters, moves_as_one, reached_joints
@@ -64,35 +64,35 @@ class MotionEnds:
 
     machine      with the workpiece in its place
     tool_length  mm
-    led          under TCP
+    tcp          under TCP
     commands     of the program
     meant        axis positions of the program
     """
 
     machine: Machine
     tool_length: float
-    led: bool
+    tcp: bool
     commands: Array
     meant: Array
 
     @classmethod
-    def of(cls, machine: Machine, tool_length: float, commands: Array, led: bool) -> MotionEnds | None:
+    def of(cls, machine: Machine, tool_length: float, commands: Array, tcp: bool) -> MotionEnds | None:
         """From the commands of a program; None where axes under TCP may not reach every point, or stray by no bound."""
-        if led and not (moves_as_one(machine) and skew(machine) is not None):
+        if tcp and not (moves_as_one(machine) and skew(machine) is not None):
             return None
-        ends = cls(machine, tool_length, led, commands, commands)
-        return replace(ends, meant=ends.joints(commands)) if led else ends
+        ends = cls(machine, tool_length, tcp, commands, commands)
+        return replace(ends, meant=ends.joints(commands)) if tcp else ends
 
     def joints(self, commands: Array) -> Array:
         """The axis positions that follow from commands (k, n_axes)."""
-        return reached_joints(self.machine, commands, np.full(len(commands), self.led), self.tool_length)[0]
+        return reached_joints(self.machine, commands, np.full(len(commands), self.tcp), self.tool_length)[0]
 
     def corrected(self, done: Array) -> Array:
         """The commands that lead to corrected axis positions, (n + 1, n_axes)."""
-        if not self.led:
+        if not self.tcp:
             return done
         tcp = np.ones(len(done), dtype=bool)
-        return led_as_commands(self.machine, self.commands, (self.meant, done), tcp, self.tool_length)
+        return commands_of_positions(self.machine, self.commands, (self.meant, done), tcp, self.tool_length)
 
     def accelerations(self, segments: Segments, begin: Array, end: Array) -> Array:
         """What no linear axis exceeds along motions under TCP, (k,) mm per motion squared, see `segments`.
@@ -119,7 +119,7 @@ FEW = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Others:
+class MorePieces:
     """What is to be written of some motions.
 
     rows    (k,) which motions, in order
@@ -134,7 +134,7 @@ class Others:
 
 def arcs_and_dwells(
     intent: Intent, real: Segments, plain: Mask, dialect: Dialect, rounding: float
-) -> tuple[Segments, Others] | None:
+) -> tuple[Segments, MorePieces] | None:
     """Motions as they are really done, with the circles of the arcs among them, and these arcs and dwells.
 
     real      where they really start and end
@@ -161,12 +161,12 @@ def arcs_and_dwells(
     rows = np.flatnonzero(arc | dwell)
     ones = np.ones(len(rows), dtype=np.intp)
     centre = np.where(arc[rows, None], real.centre[rows], np.nan)
-    return real, Others(rows, ones, Pieces(rows, ones.astype(float), real.end[rows], arc[rows], centre, ~arc[rows]))
+    return real, MorePieces(rows, ones, Pieces(rows, ones.astype(float), real.end[rows], arc[rows], centre, ~arc[rows]))
 
 
 def by_the_long_way(
     machine: Machine, dialect: Dialect, options: FixOptions, moves: Moves, plain: Mask
-) -> Others | None:
+) -> MorePieces | None:
     """The motions that are not `plain` (n,), and those behind them; None if more has to be said of them than that."""
     odd = np.flatnonzero(~plain)
     if FEW * len(odd) > len(moves) or odd[0] == 0 or odd[-1] + 2 >= len(moves):
@@ -181,10 +181,10 @@ def by_the_long_way(
     chosen = own[pieces.move]
     columns = {name: getattr(pieces, name)[chosen] for name in ("fraction", "end", "arc", "centre", "kept")}
     move = near[pieces.move[chosen]]
-    return Others(near[own], np.bincount(pieces.move, minlength=len(near))[own], Pieces(move=move, **columns))
+    return MorePieces(near[own], np.bincount(pieces.move, minlength=len(near))[own], Pieces(move=move, **columns))
 
 
-Looked = tuple[Index, Split | None, tuple[Finding, ...]]
+SplitChoice = tuple[Index, Split | None, tuple[Finding, ...]]
 """Motions that must be split, their pieces, and what there is to say; see `Planner._split`."""
 NEARLY = 1 - 1e-6
 """Of a limit; what comes so close to one is for the long way to judge."""
@@ -221,8 +221,8 @@ class PlainPlan:
         return len(self.pieces) == len(self.first) - 1
 
     @property
-    def uneasy(self) -> Mask:
-        """(n,) motions whose starts no figure of the one before shows: as `deviation.uneasy`."""
+    def check_start(self) -> Mask:
+        """(n,) motions whose starts no figure of the one before shows: as `deviation.starts_to_check`."""
         kind = self.part.moves.kind[:-1]
         return np.append(self.behind_rapid, (kind == MotionKind.DWELL) | (kind == MotionKind.RAPID))
 
@@ -231,7 +231,7 @@ class PlainPlan:
         moves = self.part.moves
         untold = np.zeros(len(moves)), np.ones(len(moves), dtype=bool)
         plan = Plan(self.pieces, self.real.start, *untold, self.findings)
-        return WrittenPlan(moves, plan, emission, moves.kind == MotionKind.DWELL, {}, unmoored=False)
+        return WrittenPlan(moves, plan, emission, moves.kind == MotionKind.DWELL, {}, reaches_back=False)
 
     def last(self, of_pieces: Array) -> Array:
         """Of what all pieces (m, k) have that of the last piece of each motion, (n, k)."""
@@ -268,14 +268,14 @@ class Planner:
         demands = Demands(budget, Closure(), options.split_rapids, arc_pieces=False)
         return cls(machine, options, strategy, demands)
 
-    def plan(self, unit: ProgramPart) -> PlainPlan | None:
+    def plan(self, continued: ContinuedPart) -> PlainPlan | None:
         """The plan of a part behind the last motion of the one before; None if it needs the long way."""
-        part, moves = unit.part, unit.part.moves
-        plain = None if unit.head is None else plain_ones(unit.head.moves, moves)
-        if unit.head is None or plain is None or moves.beside is not None:
+        part, moves = continued.part, continued.part.moves
+        plain = None if continued.head is None else plain_ones(continued.head.moves, moves)
+        if continued.head is None or plain is None or moves.beside is not None:
             return None
-        commands, led = np.concatenate([unit.head.moves.end, moves.end]), bool(moves.tcp[0])
-        poses = MotionEnds.of(self.machine, float(moves.tool_length[0]), commands, led)
+        commands, tcp = np.concatenate([continued.head.moves.end, moves.end]), bool(moves.tcp[0])
+        poses = MotionEnds.of(self.machine, float(moves.tool_length[0]), commands, tcp)
         if poses is None:
             return None
         found = self.strategy.solve(self.machine, poses.meant, State(poses.tool_length))
@@ -288,7 +288,7 @@ class Planner:
             return None
         others, alone, looked = None, plain, None
         if not plain.all():
-            others, looked = self._in_one_look(unit, intent, real, bound, plain)
+            others, looked = self._in_one_look(continued, intent, real, bound, plain)
             others = others or by_the_long_way(self.machine, part.program.dialect, self.options, moves, plain)
             if others is None:
                 return None
@@ -303,7 +303,7 @@ class Planner:
             pieces = on_digits(intent, pieces, inner)
             if not self._fine_inside(poses, real, pieces, inner, found.q):
                 return None
-        behind_rapid = bool(unit.head.moves.kind[-1] == MotionKind.RAPID)
+        behind_rapid = bool(continued.head.moves.kind[-1] == MotionKind.RAPID)
         return PlainPlan(part, plain, intent, real, pieces, first, found.before[1:], findings, behind_rapid)
 
     def _bounds_of(self, poses: MotionEnds, intent: Intent, real: Segments, done: Array) -> Array | None:
@@ -312,7 +312,7 @@ class Planner:
         done  (n + 1, n_axes) corrected axis positions
         """
         begin, end = done[:-1], done[1:]
-        if not poses.led:
+        if not poses.tcp:
             bound = self._bounds(poses.meant, done, np.asarray(poses.tool_length))
             bound[passed(intent, begin, end)[0]] = np.inf
             return bound
@@ -323,31 +323,33 @@ class Planner:
             return None
         if poses.leave_travel(real, begin, end, acceleration):
             return None
-        return led_bounds(intent, self.machine.bow, begin, end, acceleration, poses.tool_length)
+        return tcp_bounds(intent, self.machine.bow, begin, end, acceleration, poses.tool_length)
 
     def _in_one_look(
-        self, unit: ProgramPart, intent: Intent, real: Segments, bound: Array, plain: Mask
-    ) -> tuple[Others, Looked] | tuple[None, None]:
+        self, continued: ContinuedPart, intent: Intent, real: Segments, bound: Array, plain: Mask
+    ) -> tuple[MorePieces, SplitChoice] | tuple[None, None]:
         """The arcs and dwells among `plain` motions (n,), and which motions must be split, all looked at together.
 
         Nothing if these arcs need more than that; the others as `_split`.
         """
         moves, found = intent.moves, None
         if not moves.tcp[0]:
-            found = arcs_and_dwells(intent, real, plain, unit.part.program.dialect, self.demands.budget.rounding)
+            found = arcs_and_dwells(intent, real, plain, continued.part.program.dialect, self.demands.budget.rounding)
         if found is None or moves.kind[-1] == MotionKind.DWELL:
             return None, None
         turned, others = found
-        uneasy = np.append(False, moves.kind[:-1] == MotionKind.DWELL)
-        unknown = np.where(uneasy | turned.arc, np.inf, bound)
-        over, parts, _ = looked = self._split(intent, turned, unknown, moves.kind != MotionKind.DWELL, uneasy)
+        check_start = np.append(False, moves.kind[:-1] == MotionKind.DWELL)
+        unknown = np.where(check_start | turned.arc, np.inf, bound)
+        over, parts, _ = looked = self._split(intent, turned, unknown, moves.kind != MotionKind.DWELL, check_start)
         return (None, None) if over.size and parts is None else (others, looked)
 
-    def _split(self, intent: Intent, real: Segments, bound: Array, among: Mask, uneasy: Mask | None = None) -> Looked:
+    def _split(
+        self, intent: Intent, real: Segments, bound: Array, among: Mask, check_start: Mask | None = None
+    ) -> SplitChoice:
         """The motions `among` (n,) that must be split, and their pieces; None of them where some need the long way.
 
-        bound   (n,) mm: what their deviation does not exceed
-        uneasy  (n,) those that are looked at where they begin, too
+        bound        (n,) mm: what their deviation does not exceed
+        check_start  (n,) those that are looked at where they begin, too
 
         Also what there is to say of those that must not be split. An arc that would have to be needs the long way.
         """
@@ -357,7 +359,8 @@ class Planner:
         rows = rows[moving if self.demands.split_rapids else moving & (moves.kind[rows] != MotionKind.RAPID)]
         if not rows.size:
             return rows, None, ()
-        worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool) if uneasy is None else uneasy, limit)
+        checked = np.zeros(len(moves), dtype=bool) if check_start is None else check_start
+        worst = looked_at(intent, real, rows, checked, limit)
         if np.isinf(worst).any() or (real.arc[rows] & (worst > limit)).any():
             return rows, None, ()
         whole = (worst > limit) & moves.compensated[rows]
@@ -411,7 +414,7 @@ class Planner:
         before[at_start] = done[own[at_start]] - poses.meant[own[at_start]]
         low, high = self.machine.ranges.T
         within = bool((low - positions <= FUZZ).all() and (positions - high <= FUZZ).all())
-        if within and poses.led:
+        if within and poses.tcp:
             start = np.concatenate([ends[:1], ends[:-1]])
             start[at_start] = real.start[own[at_start]]
             along, begin = replace(real.rows(own), start=start, end=ends), poses.joints(start)
@@ -467,7 +470,7 @@ def _are_straight(moves: Moves) -> Mask:
     return straight
 
 
-def pieces_of(real: Segments, over: Index, parts: Split | None, others: Others | None) -> tuple[Pieces, Index]:
+def pieces_of(real: Segments, over: Index, parts: Split | None, others: MorePieces | None) -> tuple[Pieces, Index]:
     """The pieces of motions done as `real` has them, but for motions `over`, done in `parts`, and for `others`.
 
     Also the first piece of each motion, and how many there are, (n + 1,).

@@ -62,8 +62,8 @@ def figures(plan: PlainPlan, text: Emission, rapids: bool) -> PathError:
     """Tip errors over the motions that cut, and over rapids if the tolerance holds along them."""
     moves, written = plan.part.moves, replace(plan.real, start=text.start, end=plan.last(text.end))
     shown = (moves.kind != MotionKind.DWELL) & (rapids | (moves.kind != MotionKind.RAPID))
-    uneasy = plan.uneasy
-    apart = ~plan.plain | uneasy | (np.diff(plan.first) > 1)
+    check_start = plan.check_start
+    apart = ~plan.plain | check_start | (np.diff(plan.first) > 1)
     if moves.tcp[0]:
         apart |= bool(plan.intent.kinks)
     else:
@@ -75,7 +75,7 @@ def figures(plan: PlainPlan, text: Emission, rapids: bool) -> PathError:
         tally.add(_inside(plan, written, inside[part], counts[inside[part]]))
     rows = np.flatnonzero(apart & shown)
     if rows.size:
-        for found in _along(plan, text, rows, uneasy):
+        for found in _along(plan, text, rows, check_start):
             tally.add(found)
     return tally.result()
 
@@ -143,12 +143,12 @@ def _inside(plan: PlainPlan, written: Segments, rows: Index, counts: Index) -> P
     return PathSamples(move, fraction, *errors_at(intent, move, fraction, written.at(move, fraction)), weight, 0.0, 0.0)
 
 
-def _along(plan: PlainPlan, text: Emission, rows: Index, uneasy: Mask) -> Iterator[PathSamples]:
-    """The errors along motions `rows` (k,); `uneasy` (n,) as in `PlainPlan`."""
+def _along(plan: PlainPlan, text: Emission, rows: Index, check_start: Mask) -> Iterator[PathSamples]:
+    """The errors along motions `rows` (k,); `check_start` (n,) as in `PlainPlan`."""
     counts = np.diff(plan.first)[rows]
     own = np.repeat(plan.first[:-1][rows], counts) + places(counts)
     whole, no = plan.pieces, np.broadcast_to(False, len(own))
     pieces = Pieces(rows[owners(counts)], whole.fraction[own], text.end[own], whole.arc[own], text.centre[own], no)
     written = WrittenPieces(plan.intent, pieces, text.start)
     known = Known(plan.before, plan.real.end)
-    return samples(written, np.arange(len(own)), tilts=False, known=known, uneasy=uneasy)
+    return samples(written, np.arange(len(own)), tilts=False, known=known, check_start=check_start)

@@ -19,7 +19,7 @@ from ncfix.compensate.account import (
     left_where_they_stand,
     without_figure,
 )
-from ncfix.compensate.block_delete import Together, worst_findings
+from ncfix.compensate.block_delete import JointPlan, worst_findings
 from ncfix.compensate.following import LOOKED, Numbers, numbers_of, numbers_together
 from ncfix.compensate.plan.arrays import Mask, lengths
 from ncfix.compensate.plan.figure_tally import PathError
@@ -192,9 +192,9 @@ class Tally:
     left: dict[str, Left] = field(default_factory=dict)
     numbers: Numbers = field(default_factory=dict)
 
-    def add(self, program: Program, together: Together, own: Mask | None, machine: Machine) -> None:
+    def add(self, program: Program, joint: JointPlan, own: Mask | None, machine: Machine) -> None:
         """Take in a part, in all positions of block delete; of its motions those that are `own` (n,), if given."""
-        every, steps = together.plans, increments(machine)
+        every, steps = joint.plans, increments(machine)
         lacking = [each.lacking(steps, own) for each in every]
         left = [left_where_they_stand(program, each.moves, lack) for each, lack in zip(every, lacking, strict=True)]
         self.left = joined(self.left, either(left))
@@ -212,8 +212,8 @@ class Tally:
         self.moves += max(len(each.moves) for each in every) if own is None else int(own.sum())
         self.compensated += len(account.compensated - theirs)
         self.passed += Counter(rule for block, rule in account.rules.items() if block not in theirs)
-        self.inserted += together.added_blocks
-        self.changed |= len(together.splices) > 0
+        self.inserted += joint.added_blocks
+        self.changed |= len(joint.splices) > 0
         refused = {block: reason for block, reason in account.refused.items() if block not in theirs}
         self.refused += refusals(program, replace(account, refused=refused))
         self._look_at_numbers(program, every[0], True if own is None else own)

@@ -27,7 +27,7 @@ from ncfix.compensate.plan.arcs import Closure, across
 from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs
-from ncfix.compensate.plan.limits import findings, led_astray
+from ncfix.compensate.plan.limits import findings, increments_beyond_travel
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding, without_idle
@@ -38,7 +38,7 @@ from ncfix.text.language import language_of
 from ncfix.text.tree import Program
 from ncfix.writer.emit import Emission, emit
 from ncfix.writer.language import WrittenLanguage
-from ncfix.writer.pieces import LED, PINNED, SecondReading, closure_of_refusals
+from ncfix.writer.pieces import BEYOND_TRAVEL, PINNED, SecondReading, closure_of_refusals
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +123,7 @@ class WrittenPlan:
     moves     the motions as programmed
     kept      (n,) those left as they were
     reasons   block -> why it was refused
-    unmoored  a refusal needs something before the first motion as it was
+    reaches_back  a refusal needs something before the first motion as it was
     rounds    what the last motion was in each round that plan and emitter took
     """
 
@@ -132,7 +132,7 @@ class WrittenPlan:
     emission: Emission
     kept: Mask
     reasons: dict[int, Reason]
-    unmoored: bool
+    reaches_back: bool
     rounds: tuple[Round, ...] = ()
 
     def shown(self, rapids: bool) -> Mask:
@@ -175,19 +175,19 @@ class AcceptedPlan:
 
     kept      (n,) motions left as they were
     reasons   block -> why it was refused
-    unmoored  a refusal needs something before the first motion as it was
-    trail     in each plan on the way here, whether the last motion was left as it was, and how far off its start was
+    reaches_back  a refusal needs something before the first motion as it was
+    history     in each plan on the way here, whether the last motion was left as it was, and how far off its start was
     """
 
     plan: Plan
     kept: Mask
     reasons: dict[int, Reason]
-    unmoored: bool
-    trail: tuple[tuple[bool, Array], ...]
+    reaches_back: bool
+    history: tuple[tuple[bool, Array], ...]
 
     def round(self, position: Array) -> Round:
         """What the last motion was, the end of which was written as a command `position` (n_axes,)."""
-        kept, shift = zip(*self.trail, strict=True)
+        kept, shift = zip(*self.history, strict=True)
         return Round(np.array(kept), np.array(shift), position.copy())
 
 
@@ -221,7 +221,7 @@ def plan_and_write(
             rounds.append(accepted.round(emission.end[-1]))
         if not emission.conflicts and (before is None or len(rounds) >= len(before.rounds)):
             return WrittenPlan(
-                moves, accepted.plan, emission, accepted.kept, accepted.reasons, accepted.unmoored, tuple(rounds)
+                moves, accepted.plan, emission, accepted.kept, accepted.reasons, accepted.reaches_back, tuple(rounds)
             )
         if emission.conflicts and emission.conflicts.keys() <= accepted.reasons.keys():
             raise AssertionError(f"blocks {sorted(emission.conflicts)} are kept and yet in conflict")
@@ -249,15 +249,15 @@ def accepted_plan(
     )
     reasons = {**refused, **_by_rule(moves)} if earlier is None else earlier.reasons
     head = None if before is None else before.in_round(number)
-    state, trail = State() if before is None else State(direction=before.direction), list[tuple[bool, Array]]()
+    state, history = State() if before is None else State(direction=before.direction), list[tuple[bool, Array]]()
     bound = np.zeros(len(moves), dtype=bool)
     while True:
         shift = None
         if head is not None:
-            at = min(len(trail), len(head.kept) - 1)
+            at = min(len(history), len(head.kept) - 1)
             kept[0] |= head.kept[at]
             shift = head.shift[at]
-        kept, unmoored = _with_what_they_need(moves, kept, bound, reasons)
+        kept, reaches_back = _with_what_they_need(moves, kept, bound, reasons)
         planned = plan(
             machine,
             moves,
@@ -273,23 +273,23 @@ def accepted_plan(
         )
         if len(moves):  # of the last one
             off = planned.start[-1] - moves.start[-1]
-            trail.append((bool(planned.pieces.kept[-1]), np.where(np.isfinite(off), off, 0.0)))
+            history.append((bool(planned.pieces.kept[-1]), np.where(np.isfinite(off), off, 0.0)))
         planned = replace(planned, pieces=on_digits(Intent(machine, moves, state), planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start, state)
         stays = planned.pieces.kept[np.searchsorted(planned.pieces.move, np.arange(len(moves)))] & ~kept
         for finding in against:
             stays[finding.moves] = True
-        astray = led_astray(machine, moves, planned.pieces, planned.start, state)
-        waiting = head is not None and len(trail) < len(head.kept)
-        if not (stays.any() or (~bound[astray]).any() or waiting):
-            return AcceptedPlan(planned, kept, reasons, unmoored, tuple(trail))
+        beyond = increments_beyond_travel(machine, moves, planned.pieces, planned.start, state)
+        waiting = head is not None and len(history) < len(head.kept)
+        if not (stays.any() or (~bound[beyond]).any() or waiting):
+            return AcceptedPlan(planned, kept, reasons, reaches_back, tuple(history))
         for finding in (*against, *planned.findings):
             for k, row in enumerate(finding.moves.tolist()):
                 if stays[row]:
                     _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
         _explain(reasons, moves.block[stays].tolist(), CODE_OF_RULE, "no correction was found for it")
         kept |= stays
-        bound[astray] = True
+        bound[beyond] = True
 
 
 def _with_what_they_need(moves: Moves, kept: Mask, bound: Mask, reasons: dict[int, Reason]) -> tuple[Mask, bool]:
@@ -303,11 +303,11 @@ def _with_what_they_need(moves: Moves, kept: Mask, bound: Mask, reasons: dict[in
         kept = kept | (np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS))
         closure, count = closure_of_refusals(moves, kept, bound), len(reasons)
         for row, cause in closure.added.items():
-            why = LED if bound[cause] else PINNED
+            why = BEYOND_TRAVEL if bound[cause] else PINNED
             reasons.setdefault(int(moves.block[row]), Reason(CODE_OF_TEXT, why, int(moves.block[cause])))
         kept = closure.kept
         if len(reasons) == count:
-            return kept, closure.unmoored
+            return kept, closure.reaches_back
 
 
 def increments(machine: Machine) -> Array:

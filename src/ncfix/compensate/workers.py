@@ -1,15 +1,19 @@
-"""Several processes that correct one program: each corrects parts of its own, and knows what the others leave behind.
+"""Several processes correct one program: each its own parts, and each knows what the others leave behind.
 
-Parts are taken in turn. What a part leaves in the control (`PartCheckpoint`) is told to all as soon as it has been
-followed; only where that is more than can be told, the others read and follow it, too. What it leaves to the motions
-behind it (`PrecedingMotion`) is handed on as soon as its text is there, so that the next one can be written, too,
-while it is still being proved. Texts do not go from one process to another: each reads the program from its file, and
-puts what it has corrected where it belongs (`Ground`); the first process counts, and hands out what comes through a
-pipe.
+Process k of n corrects the parts k, n + k, 2n + k and so on. It reads the whole text, but of the parts between it only
+needs two things, which their processes send it:
 
-Each process has a line to each of the others. Nobody waits for a process that is gone: its lines end (`Post`), also in
-the middle of a message, and who listens there gets `GoneError`; and when the first process leaves the work, whatever
-the reason, all others are ended; and they end by themselves if it is killed.
+- `PartCheckpoint`: the state of the control behind a part, as soon as that has been followed. Where the state cannot be
+  sent, the others read and follow that part themselves;
+- `PrecedingMotion`: the last motion of a part as it was written, as soon as that is known. The process of the next part
+  can write then, while this one is still being proved.
+
+Corrected text is not sent: each process writes it into the output file, where it belongs (`OpenFiles`). The first
+process counts the parts, and reads the program for all of them if it comes through a pipe.
+
+Every two processes have a connection. When a process dies, its connections end, and whoever waits at one gets
+`WorkerGoneError`. When the first process leaves the work, for whatever reason, it ends all others; if it is killed,
+they end by themselves.
 """
 
 from __future__ import annotations
@@ -33,63 +37,63 @@ from ncfix.plugins import blamed
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    Lines = Mapping[tuple[int, int], Connection]
-    """The end of each line that one process has to another: (one, other)."""
+    Connections = Mapping[tuple[int, int], Connection]
+    """The end of each connection that one process has to another: (one, other)."""
 
 
-class GoneError(Exception):
+class WorkerGoneError(Exception):
     """A process that worked on the program has ended before its time."""
 
 
 @dataclass(slots=True)
-class Post:
-    """What a process sends to the others, and what it has received from them.
+class Mailbox:
+    """The messages of one process to the others, and theirs to it.
 
-    mine    its own number
-    lines   to the others, by their numbers
-    received  by the kind of a message and the number it has, mostly that of a part
-    unsent  messages on their way: nobody who tells something waits until another one listens
+    process      its own number
+    connections  to the others, by their numbers
+    received     by the kind of a message and its number, mostly that of a part
+    unsent       on their way: a thread sends them, so that `send` never waits for the one who receives
     """
 
-    mine: int = 0
-    lines: Mapping[int, Connection] = field(default_factory=dict)
+    process: int = 0
+    connections: Mapping[int, Connection] = field(default_factory=dict)
     received: dict[tuple[str, int], Any] = field(default_factory=dict)
     unsent: SimpleQueue[tuple[int, bytes] | None] = field(default_factory=SimpleQueue)
 
-    def tell(self, kind: str, number: int, what: Any, to: int | None = None) -> None:
-        """Tell something to one process, or to all others; what cannot be packed raises here, and is not lost later."""
-        if to == self.mine:
+    def send(self, kind: str, number: int, what: Any, to: int | None = None) -> None:
+        """Send something to one process, or to all others. Raises here, not in the thread, if it cannot be pickled."""
+        if to == self.process:
             self.received[kind, number] = what
-        elif self.lines:
+        elif self.connections:
             data = pickle.dumps((kind, number, what))
-            for each in self.lines if to is None else (to,):
+            for each in self.connections if to is None else (to,):
                 self.unsent.put((each, data))
 
-    def listen(self, seconds: float | None = None) -> bool:
-        """Hear what there is, or wait for something; whether there was. Raises `GoneError`."""
-        if not self.lines:
-            assert seconds is not None, "there is nobody who could say it"
+    def receive(self, seconds: float | None = None) -> bool:
+        """Take in what has come, or wait so long for something; whether there was any. Raises `WorkerGoneError`."""
+        if not self.connections:
+            assert seconds is not None, "no other process could send it"
             return False
         from multiprocessing.connection import wait
 
-        talking: list[Any] = wait(self.lines.values(), seconds)
-        for line in talking:
+        ready: list[Any] = wait(self.connections.values(), seconds)
+        for connection in ready:
             try:
-                kind, number, what = pickle.loads(line.recv_bytes())
+                kind, number, what = pickle.loads(connection.recv_bytes())
             except (EOFError, OSError):
-                raise GoneError("a process that worked on the program has ended") from None
+                raise WorkerGoneError("a process that worked on the program has ended") from None
             self.received[kind, number] = what
-        return bool(talking)
+        return bool(ready)
 
-    def waited_for(self, kind: str, number: int) -> Any:
-        """A message, as soon as it is there, once. Raises `GoneError`."""
+    def wait_for(self, kind: str, number: int) -> Any:
+        """Wait for a message and take it out. Raises `WorkerGoneError`."""
         while (kind, number) not in self.received:
-            self.listen()
+            self.receive()
         return self.received.pop((kind, number))
 
     @contextmanager
-    def opened(self, failed: Callable[[], object]) -> Iterator[Post]:
-        """Sends what is told; `failed` is called where that cannot be done, as for want of memory."""
+    def sending(self, failed: Callable[[], object]) -> Iterator[Mailbox]:
+        """Run the thread that sends; it calls `failed` where it cannot, as for want of memory."""
         sender = Thread(target=self._send, args=(failed,), daemon=True)
         sender.start()
         try:
@@ -97,32 +101,32 @@ class Post:
         finally:
             self.unsent.put(None)
             sender.join()
-            for line in self.lines.values():
-                line.close()
+            for connection in self.connections.values():
+                connection.close()
 
     def _send(self, failed: Callable[[], object]) -> None:
         try:
             while message := self.unsent.get():
                 to, data = message
-                self.lines[to].send_bytes(data)
+                self.connections[to].send_bytes(data)
         except Exception:
             failed()
 
 
-def lines_between(count: int, context: Any) -> Lines:
-    """Lines between so many processes."""
-    lines = {}
+def connections_between(count: int, context: Any) -> Connections:
+    """Connections between so many processes."""
+    connections = {}
     for one, other in combinations(range(count), 2):
-        lines[one, other], lines[other, one] = context.Pipe()
-    return lines
+        connections[one, other], connections[other, one] = context.Pipe()
+    return connections
 
 
-def own_lines(lines: Lines, mine: int) -> dict[int, Connection]:
-    """The lines of a process; those of others are closed in it: they would not end with their owner."""
-    for (owner, _), line in lines.items():
-        if owner != mine:
-            line.close()
-    return {other: line for (owner, other), line in lines.items() if owner == mine}
+def own_connections(connections: Connections, process: int) -> dict[int, Connection]:
+    """The connections of this process. It closes those of others: an open copy would hide that their process died."""
+    for (owner, _), connection in connections.items():
+        if owner != process:
+            connection.close()
+    return {other: connection for (owner, other), connection in connections.items() if owner == process}
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +164,7 @@ class PartResult(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Ground:
+class OpenFiles:
     """Files that all processes have open.
 
     text   the one that is corrected, or what of it has been read so far
@@ -174,19 +178,19 @@ class Ground:
 
 
 @dataclass(slots=True)
-class Share:
-    """What of a program a process does: of every `jobs` parts the one with the number `mine`.
+class WorkShare:
+    """The parts of a program that one process corrects: of every `jobs` parts one.
 
     begin  bytes of the corrected text before the part that it works on
     """
 
     jobs: int = 1
-    post: Post = field(default_factory=Post)
+    mailbox: Mailbox = field(default_factory=Mailbox)
     begin: int = 0
 
     def has(self, number: int) -> bool:
         """Whether a part is its own."""
-        return number % self.jobs == self.post.mine
+        return number % self.jobs == self.mailbox.process
 
     def shares(self, number: int) -> bool:
         """Whether a part is its own, and others want to know of it."""
@@ -194,16 +198,16 @@ class Share:
 
     def announce(self, number: int, checkpoint: PartCheckpoint | None) -> None:
         """Tell the others what an own part leaves in the control; None: they have to follow it themselves."""
-        self.post.tell("checkpoint", number, checkpoint)
+        self.mailbox.send("checkpoint", number, checkpoint)
 
     def checkpoint(self, number: int) -> PartCheckpoint | None:
         """What a part of another process leaves in the control; None: it has to be followed. Waits for it."""
-        received, owner = self.post.received, number % self.jobs
+        received, owner = self.mailbox.received, number % self.jobs
         received.pop(("checkpoint", number - 1), None)
         if self.has(number):
             return None
         while ("checkpoint", number) not in received and ("silent", owner) not in received:
-            self.post.listen()
+            self.mailbox.receive()
         found: PartCheckpoint | None = received.get(("checkpoint", number))
         return found
 
@@ -214,7 +218,7 @@ class Share:
         """
         if number == 0:
             return None
-        found: tuple[PrecedingMotion, int] | Exception = self.post.waited_for("before", number)
+        found: tuple[PrecedingMotion, int] | Exception = self.mailbox.wait_for("before", number)
         if isinstance(found, Exception):
             raise found
         before, self.begin = found
@@ -226,12 +230,12 @@ class Share:
 
     def fail(self, number: int, error: Exception) -> None:
         """Let the others know why there is no more to come, from an own part on."""
-        self.post.tell("done", number, error, 0)
+        self.mailbox.send("done", number, error, 0)
         self._hand_on(number, error)
-        self.post.tell("silent", self.post.mine, None)
+        self.mailbox.send("silent", self.mailbox.process, None)
 
     def _hand_on(self, number: int, what: Any) -> None:
-        self.post.tell("before", number + 1, what, (number + 1) % self.jobs)
+        self.mailbox.send("before", number + 1, what, (number + 1) % self.jobs)
 
 
 @dataclass(slots=True)
@@ -264,7 +268,7 @@ class BackgroundReader:
 
     file: int
     whole: bool
-    post: Post
+    mailbox: Mailbox
     at: int = 0
     known: int = 0
     pieces: int = 0
@@ -272,7 +276,7 @@ class BackgroundReader:
     def __call__(self, size: int) -> bytes:
         """The next bytes."""
         while not self.whole and self.known < self.at + size:
-            new = self.post.waited_for("text", self.pieces)
+            new = self.mailbox.wait_for("text", self.pieces)
             self.known, self.pieces, self.whole = self.known + new, self.pieces + 1, not new
         text = os.pread(self.file, size, self.at)
         self.at += len(text)
@@ -282,7 +286,7 @@ class BackgroundReader:
 class Worker(Protocol[Made]):
     """Corrects the parts of a share."""
 
-    def work(self, share: Share) -> Iterator[tuple[int, Made]]:
+    def work(self, share: WorkShare) -> Iterator[tuple[int, Made]]:
         """The number of each own part, and what has been done to it."""
 
 
@@ -293,20 +297,20 @@ class WorkerPool(Generic[Result]):
     given  how many parts have been given back
     """
 
-    share: Share
-    ground: Ground | None = None
+    share: WorkShare
+    files: OpenFiles | None = None
     given: int = 0
 
     def spread(self, read: Read) -> Read:
         """A way to read that lets the others know what is there, and so much ahead that they need not wait for it."""
-        if self.ground is None or self.ground.whole:
+        if self.files is None or self.files.whole:
             return read
         pieces = 0
 
         def spreading(size: int) -> bytes:
             nonlocal pieces
             text = read(size)
-            self.share.post.tell("text", pieces, len(text))
+            self.share.mailbox.send("text", pieces, len(text))
             pieces += 1
             return text
 
@@ -314,13 +318,13 @@ class WorkerPool(Generic[Result]):
 
     def put(self, number: int, result: Result) -> None:
         """Note what this process has done."""
-        self.share.post.received["done", number] = result
+        self.share.mailbox.received["done", number] = result
 
     def ready(self) -> Iterator[Result]:
         """What has been done, in order, as far as it is there."""
-        while self.share.post.listen(0):
+        while self.share.mailbox.receive(0):
             pass
-        while ("done", self.given) in self.share.post.received:
+        while ("done", self.given) in self.share.mailbox.received:
             yield self._next()
 
     def rest(self, count: int) -> Iterator[Result]:
@@ -329,7 +333,7 @@ class WorkerPool(Generic[Result]):
             yield self._next()
 
     def _next(self) -> Result:
-        result: Result | Exception = self.share.post.waited_for("done", self.given)
+        result: Result | Exception = self.share.mailbox.wait_for("done", self.given)
         if isinstance(result, Exception):
             raise result
         self.given += 1
@@ -337,21 +341,24 @@ class WorkerPool(Generic[Result]):
 
 
 @contextmanager
-def worker_pool(jobs: int, worker: Callable[[Read], Worker[Made]], ground: Ground | None) -> Iterator[WorkerPool[Made]]:
+def worker_pool(
+    jobs: int, worker: Callable[[Read], Worker[Made]], files: OpenFiles | None
+) -> Iterator[WorkerPool[Made]]:
     """Those who work on a program: `jobs` processes, of which this is one.
 
     worker  makes what corrects a text in another process
-    ground  the files; without them, and where processes cannot be forked, this one works alone
+    files   all that processes share; without them, and where processes cannot be forked, this one works alone
     """
-    if jobs <= 1 or ground is None or not FORKS:
-        yield WorkerPool(Share())
+    if jobs <= 1 or files is None or not FORKS:
+        yield WorkerPool(WorkShare())
         return
     from multiprocessing import get_context
 
     context = get_context("fork")
-    lines = lines_between(jobs, context)
+    connections = connections_between(jobs, context)
     processes = [
-        context.Process(target=_work, args=(worker, ground, jobs, mine, lines), daemon=True) for mine in range(1, jobs)
+        context.Process(target=_work, args=(worker, files, jobs, number, connections), daemon=True)
+        for number in range(1, jobs)
     ]
 
     def end() -> None:
@@ -362,9 +369,9 @@ def worker_pool(jobs: int, worker: Callable[[Read], Worker[Made]], ground: Groun
     try:
         for process in processes:
             process.start()
-        with Post(0, own_lines(lines, 0)).opened(end) as post:
+        with Mailbox(0, own_connections(connections, 0)).sending(end) as mailbox:
             try:
-                yield WorkerPool(Share(jobs, post), ground)
+                yield WorkerPool(WorkShare(jobs, mailbox), files)
             finally:
                 end()
     finally:
@@ -374,21 +381,24 @@ def worker_pool(jobs: int, worker: Callable[[Read], Worker[Made]], ground: Groun
                 process.join()
 
 
-def _work(worker: Callable[[Read], Worker[Any]], ground: Ground, jobs: int, mine: int, lines: Any) -> None:
+def _work(worker: Callable[[Read], Worker[Any]], files: OpenFiles, jobs: int, process: int, connections: Any) -> None:
     """What another process does; it ends when the first one has all it needs, or is gone."""
     tie()
-    with Post(mine, own_lines(lines, mine)).opened(lambda: os._exit(1)) as post, suppress(GoneError, KeyboardInterrupt):
-        share, number = Share(jobs, post), mine
+    with (
+        Mailbox(process, own_connections(connections, process)).sending(lambda: os._exit(1)) as mailbox,
+        suppress(WorkerGoneError, KeyboardInterrupt),
+    ):
+        share, number = WorkShare(jobs, mailbox), process
         try:
-            for number, done in worker(BackgroundReader(ground.text, ground.whole, post)).work(share):
-                post.tell("done", number, done.placed(ground.out, share.begin), 0)
+            for number, done in worker(BackgroundReader(files.text, files.whole, mailbox)).work(share):
+                mailbox.send("done", number, done.placed(files.out, share.begin), 0)
                 number += jobs
-        except GoneError:
+        except WorkerGoneError:
             raise
         except Exception as error:
             share.fail(number, _portable(blamed(error) or error))
         while True:
-            post.listen()
+            mailbox.receive()
 
 
 def _portable(error: Exception) -> Exception:

@@ -36,4 +36,4 @@ cdef class Scanner:
     cdef int64_t comment_end(self, const uint8_t[::1] text, int64_t place, int64_t stop) except -9 nogil
     cdef bint is_last(self, const uint8_t[::1] text, int64_t place, int64_t stop) except -1 nogil
     @cython.locals(at=int64_t, new=int64_t)
-    cdef inline int64_t led(self, int32_t[:, ::1] tree, int64_t row, int64_t character) except -9 nogil
+    cdef inline int64_t child_row(self, int32_t[:, ::1] tree, int64_t row, int64_t character) except -9 nogil

@@ -143,7 +143,7 @@ class Scanner:
                 elif kind == ODD:
                     return UNTOUCHED
                 while True:
-                    row = self.led(tree, row, character)
+                    row = self.child_row(tree, row, character)
                     shapes[end] = character
                     place, end = place + 1, end + 1
                     if place >= past:
@@ -264,7 +264,7 @@ class Scanner:
             place += 1
         return place == stop
 
-    def led(self, tree: Rows, row: int, character: int) -> int:
+    def child_row(self, tree: Rows, row: int, character: int) -> int:
         """The row of a tree of shapes to which a character leads from another; a new one if none does."""
         at = tree[row, CHILD]
         while at and tree[at, CHARACTER] != character:

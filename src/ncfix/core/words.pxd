@@ -4,7 +4,7 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint64_t
 cdef extern from "math.h" nogil:
     cpdef double copysign(double, double)
 
-cdef int64_t POINT, ZERO, MINUS, PLUS, LED_HEAD, MOST_STEPS, ROOM
+cdef int64_t POINT, ZERO, MINUS, PLUS, VECTOR_HEAD, MOST_STEPS, ROOM
 
 @cython.final
 cdef class NumberRules:

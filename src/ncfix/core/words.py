@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 POINT, ZERO, MINUS, PLUS = 46, 48, 45, 43
 """The characters . 0 - +"""
-LED_HEAD = 1
+VECTOR_HEAD = 1
 """See `writer.bulk_layouts`."""
 MOST_STEPS = 18
 """Decimals of the finest output step that is written here."""
@@ -242,7 +242,7 @@ class Pen:
         """Add words at `place` for axes that must move and have none; whether that is clear."""
         for k in range(self.by_letter.shape[0]):
             axis, begun = self.by_letter[k], self.size
-            if self.heads[shape, axis, 1] == LED_HEAD:
+            if self.heads[shape, axis, 1] == VECTOR_HEAD:
                 self.now[axis], self.told[axis] = self.wanted[axis], 1
             off = abs(self.wanted[axis] - self.now[axis])
             if self.told[axis] or off < self.half[axis]:

@@ -21,9 +21,9 @@ OPENING, CLOSING = 4, 8
 """Bytes that stand at most before and behind the axis words of a further piece."""
 
 
-NONE, LED = -1, -2
+NONE, BY_VECTOR = -1, -2
 """The slots of axes that have no word, and of those that other words of the block lead to where they shall be."""
-LED_HEAD = 1
+VECTOR_HEAD = 1
 """The letter of these."""
 
 
@@ -33,12 +33,12 @@ class Layouts:
 
     known      (s,) blocks of the shape may be written in bulk
     further    (s,) further pieces of their motions, too
-    slots      (s, n_axes) which of the block's numbers an axis has, `NONE`, or `LED`
+    slots      (s, n_axes) which of the block's numbers an axis has, `NONE`, or `BY_VECTOR`
     by_place   (s, n_axes) the axes as their words stand in the block, -1 behind the last one
     by_letter  (n_axes,) the axes in the order in which programs write them
     anchors    (s, 2) slot and offset of the place where missing words go
     heads      (s, n_axes, 2) what stands before the number of a missing word: a blank, or 0 for nothing, and the
-               letter; 0 for it: such an axis gets no word; `LED_HEAD`: it is led
+               letter; 0 for it: such an axis gets no word; `VECTOR_HEAD`: it is led
     leads      (s, 2) slot and offset of the place up to which lines of further pieces repeat the beginning of the block
     openings   (s, k) what stands on them before their words, 0 for nothing
     closings   (s, k) what stands on them behind these
@@ -126,7 +126,7 @@ class Layouts:
         if layout.turns_named:
             self.heads[shape, moves.rotary & (self.slots[shape] < 0), 1] = 0
         if layout.by_vector:
-            self.slots[shape, moves.rotary], self.heads[shape, moves.rotary, 1] = LED, LED_HEAD
+            self.slots[shape, moves.rotary], self.heads[shape, moves.rotary, 1] = BY_VECTOR, VECTOR_HEAD
         if layout.lead is not None:
             self.leads[shape] = layout.lead
         for table, text in ((self.openings, layout.opening), (self.closings, layout.closing)):

@@ -79,7 +79,7 @@ class SecondReading:
 Mask = NDArray[np.bool_]
 
 PINNED = "a refused arc that follows starts from its end"
-LED = "a refused increment that follows would leave the travel"
+BEYOND_TRAVEL = "a refused increment that follows would leave the travel"
 STILL = 1e-9
 """A component of a unit normal so near to 1 is 1."""
 
@@ -90,12 +90,12 @@ class Refusals:
 
     kept      (n,) all of them
     added     those that others need: row -> the row that needs it
-    unmoored  something before the first motion would have to stay, too
+    reaches_back  something before the first motion would have to stay, too
     """
 
     kept: Mask
     added: dict[int, int]
-    unmoored: bool
+    reaches_back: bool
 
 
 def closure_of_refusals(moves: Moves, kept: Mask, bound: Mask | None = None) -> Refusals:
@@ -106,7 +106,7 @@ def closure_of_refusals(moves: Moves, kept: Mask, bound: Mask | None = None) -> 
     walk = _Walk(moves, kept.copy(), np.zeros(len(moves), dtype=bool) if bound is None else bound)
     for row in np.flatnonzero(kept & walk.anchored)[::-1].tolist():
         walk.back_from(row)
-    return Refusals(walk.kept, walk.added, walk.unmoored)
+    return Refusals(walk.kept, walk.added, walk.reaches_back)
 
 
 class _Walk:
@@ -117,7 +117,7 @@ class _Walk:
         self.kept = kept
         self.bound = bound
         self.added: dict[int, int] = {}
-        self.unmoored = False
+        self.reaches_back = False
         self.reached = len(moves)
         self.columns = [moves.axes.index(letter) if letter in moves.axes else -1 for letter in "XYZ"]
         self.passed = moves.rule == Rule.PASS
@@ -154,7 +154,7 @@ class _Walk:
             if self.anchored[row]:
                 needed |= self._plane(row)
                 cause = row
-        self.unmoored |= bool(needed.any())
+        self.reaches_back |= bool(needed.any())
 
     def _plane(self, row: int) -> Mask:
         """The axes of an arc's plane; of other motions those that they name."""

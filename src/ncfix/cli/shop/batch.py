@@ -196,11 +196,11 @@ class FixJob:
             target, not self.setup.assume_zero and self.setup.probed is None, lambda: bool(stream.stamped)
         ) as outlet:
             task = Task(self.machine, self.setup, self.options, find, path, dialect, part_bytes(), source.head)
-            stream = Stream(task, source.read, outlet.put, jobs, source.ground(outlet.kept.fileno()))
+            stream = Stream(task, source.read, outlet.put, jobs, source.files(outlet.kept.fileno()))
             yield stream, outlet
 
     def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find, dialect: Dialect) -> FixedText:
-        from ncfix.compensate.workers import GoneError
+        from ncfix.compensate.workers import WorkerGoneError
         from ncfix.control.trace import NotInPartsError
 
         _let_stay()
@@ -216,7 +216,7 @@ class FixJob:
             fixed = self._whole(source, source.everything(), find)
             assert isinstance(fixed.text, bytes)
             return replace(fixed, text=outlet.after(fixed.text, source.path))
-        except GoneError:
+        except WorkerGoneError:
             text = "one of the processes that worked on it was killed"
             raise FaultError.of("NCF017", text, Place(shown(source.path)), "fix it with --jobs 1") from None
         source.check_unchanged()
@@ -263,8 +263,8 @@ def _recorded(seen: Sequence[tuple[Program, Corrector]], fixed: Fixed) -> PathRe
     record = PathRecord()
     if seen:
         program, corrector = seen[-1 if fixed.lines else 0]
-        assert corrector.together is not None
-        record.take(program, corrector.machine, corrector.together.plans[0])
+        assert corrector.joint is not None
+        record.take(program, corrector.machine, corrector.joint.plans[0])
     if fixed.lines:
         record.in_lines(fixed.lines)
     return record

@@ -28,7 +28,7 @@ from ncfix.compensate.figures.curve import Curve, CurvePoints, Stretches
 from ncfix.compensate.figures.nearest import Nearest, Search, over_holes, over_peaks
 from ncfix.compensate.figures.simulation import Along, actual_tip, lines_of
 from ncfix.compensate.following import Task
-from ncfix.compensate.parts import Units
+from ncfix.compensate.parts import MachineParts
 from ncfix.compensate.plan.arrays import Array, Index
 from ncfix.compensate.plan.intent import Intent, left_in_cuts
 from ncfix.compensate.plan.kinematics import Signs, matters
@@ -143,19 +143,19 @@ class Cuts:
     def __iter__(self) -> Iterator[Cut]:
         """The parts. Raises what reading and following do, and UsageError for what is not given."""
         task = self.task
-        units = Units.of(task, self.read)
-        machine = units.placed
+        parts = MachineParts.of(task, self.read)
+        machine = parts.placed
         around = None
-        for unit in units:
-            moves, lines = unit.part.moves, unit.part.lines
-            if unit.part.last:
-                self.said.extend(units.messages)
+        for continued in parts:
+            moves, lines = continued.part.moves, continued.part.lines
+            if continued.part.last:
+                self.said.extend(parts.messages)
             if not matters(machine):
-                yield Cut.of(Intent(machine, moves, State()), lines, slice(None), unit.part.last, self.meant)
+                yield Cut.of(Intent(machine, moves, State()), lines, slice(None), continued.part.last, self.meant)
                 continue
             intent, lines, counted = _with(around, machine, moves, lines)
-            rows = slice(counted, None if unit.part.last else -BESIDE)
-            cut = Cut.of(intent, lines, rows, unit.part.last, self.meant, around.sides if around else None)
+            rows = slice(counted, None if continued.part.last else -BESIDE)
+            cut = Cut.of(intent, lines, rows, continued.part.last, self.meant, around.sides if around else None)
             yield cut
             assert cut.bodies is not None
             around = Around.behind(cut.bodies, lines)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.following import Followed, Task, looks_corrected, numbers_of
-from ncfix.compensate.parts import Units
+from ncfix.compensate.parts import MachineParts
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, distinct, owners, slices
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import commands_from_joints
@@ -197,15 +197,15 @@ def tip_errors_on(task: Task, read: Read, said: list[Message]) -> Iterator[TipEr
 
     said  gets what there is to say of following it, at the end
     """
-    units = Units.of(task, read)
-    for unit in units:
-        if units.sided:
-            intent, lines = unit.intent, unit.together.lines
-            yield from tip_errors(intent, lines, int(unit.head is not None))
+    parts = MachineParts.of(task, read)
+    for continued in parts:
+        if parts.sided:
+            intent, lines = continued.intent, continued.joined.lines
+            yield from tip_errors(intent, lines, int(continued.head is not None))
         else:
-            yield from tip_errors(Intent(units.placed, unit.part.moves, State()), unit.part.lines)
-    units.blocks_behind()
-    said += units.messages
+            yield from tip_errors(Intent(parts.placed, continued.part.moves, State()), continued.part.lines)
+    parts.blocks_behind()
+    said += parts.messages
 
 
 def samples(intent: Intent, first: int = 0) -> Iterator[tuple[Index, Array]]:

@@ -53,48 +53,48 @@ PLANNED_BATCH = 100_000
 """Samples worked on at a time."""
 
 
-def deviations(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolerance: float) -> Array:
+def deviations(intent: Intent, real: Segments, rows: Index, check_start: Mask, tolerance: float) -> Array:
     """The largest deviation of the tip along motions `rows` (k,) done as `real` has them, mm.
 
-    uneasy  (n,) motions that may not begin where they should: they are looked at there too
+    check_start  (n,) motions that may not begin where they should: they are looked at there too
 
     Motions that by a bound are off by less than half of the tolerance need no look. Short ones of the others get one
     sample in the middle. Those off by more there are looked at as closely as the error model may bend; infinite where
     they are too long for that.
     """
-    worst = bounds(intent, real, rows, uneasy)
+    worst = bounds(intent, real, rows, check_start)
     unknown = np.flatnonzero(~(worst <= SURE * tolerance))
-    worst[unknown] = looked_at(intent, real, rows[unknown], uneasy, tolerance)
+    worst[unknown] = looked_at(intent, real, rows[unknown], check_start, tolerance)
     return worst
 
 
-def looked_at(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolerance: float) -> Array:
+def looked_at(intent: Intent, real: Segments, rows: Index, check_start: Mask, tolerance: float) -> Array:
     """As `deviations`, of motions that no bound speaks for."""
     worst, often = np.full(len(rows), np.inf), bends_closely(intent, rows)
     samples = DENSITY * often + LEAST
     seen = np.flatnonzero(samples < MOST)
     for part in batches(np.ceil(samples[seen]).astype(np.intp), MOST):
         now = seen[part]
-        worst[now] = deviations_seen(intent, real, rows[now], uneasy, FIRST, 1, often[now])
+        worst[now] = deviations_seen(intent, real, rows[now], check_start, FIRST, 1, often[now])
         doubtful = now[~(worst[now] <= SURE * tolerance)]
         if doubtful.size:
-            closer = deviations_seen(intent, real, rows[doubtful], uneasy, DENSITY, LEAST, often[doubtful])
+            closer = deviations_seen(intent, real, rows[doubtful], check_start, DENSITY, LEAST, often[doubtful])
             worst[doubtful] = np.maximum(worst[doubtful], closer)
     return worst
 
 
-def bounds(intent: Intent, real: Segments, rows: Index, uneasy: Mask) -> Array:
+def bounds(intent: Intent, real: Segments, rows: Index, check_start: Mask) -> Array:
     """What the deviation along motions `rows` (k,) does not exceed, mm; inf where that is not known.
 
     Known it is for straight motions from one corrected end to the next.
     """
     most, moves = np.full(len(rows), np.inf), intent.moves
-    plain = ~((moves.kind == MotionKind.ARC)[rows] | uneasy[rows])
+    plain = ~((moves.kind == MotionKind.ARC)[rows] | check_start[rows])
     plain[lacking(intent, rows)] = plain[moves.beside_tip[rows]] = False
     if intent.machine.bow is None or intent.state.inputs or not plain.any():
         return most
-    led = moves.tcp[rows]
-    for chosen, found in ((plain & ~led, _bounds_of_axes), (plain & led, _bounds_of_tip)):
+    tcp = moves.tcp[rows]
+    for chosen, found in ((plain & ~tcp, _bounds_of_axes), (plain & tcp, _bounds_of_tip)):
         if chosen.all():
             return found(intent, real, rows, intent.machine.bow)
         if chosen.any():
@@ -125,10 +125,10 @@ def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Arr
     acceleration = accelerations(machine, start, end, longest, way)
     if acceleration is None or intent.arrival is not None:
         return np.full(len(rows), np.inf)
-    return led_bounds(intent, bow, start, end, acceleration, longest)
+    return tcp_bounds(intent, bow, start, end, acceleration, longest)
 
 
-def led_bounds(intent: Intent, bow: Bow, start: Array, end: Array, acceleration: Array, tool_length: float) -> Array:
+def tcp_bounds(intent: Intent, bow: Bow, start: Array, end: Array, acceleration: Array, tool_length: float) -> Array:
     """As `bounds`, of motions under tool-centre-point control between corrected axis positions (k, n_axes).
 
     acceleration  (k,) of linear axes, as `accelerations` has it
@@ -156,14 +156,14 @@ def straight_bounds(
 
 
 def deviations_seen(
-    intent: Intent, real: Segments, rows: Index, uneasy: Mask, per_bend: float, least: int, often: Array
+    intent: Intent, real: Segments, rows: Index, check_start: Mask, per_bend: float, least: int, often: Array
 ) -> Array:
     """As `deviations`, (k,) mm, by samples alone: at least so many, and so many for each time the error may bend.
 
     often  (k,) times that it may bend along each motion
     """
     counts, fraction = interior(intent, real, rows, per_bend, least, often)
-    starts = np.flatnonzero(uneasy[rows])
+    starts = np.flatnonzero(check_start[rows])
     if starts.size:
         counts, fraction = merged(len(rows), (owners(counts), fraction), (starts, np.full(len(starts), INSTANT)))
     move, off = rows[owners(counts)], np.empty(len(fraction))
@@ -198,22 +198,22 @@ def beside(intent: Intent, real: Segments, rows: Index) -> Array | None:
     return result
 
 
-def uneasy_starts(intent: Intent, kept: Mask) -> Mask:
+def starts_to_check(intent: Intent, kept: Mask) -> Mask:
     """Motions that may not begin where they should, though the one before ended where it should, (n,).
 
     Because that one is kept, or ended with another tool, or elsewhere, or because an axis reverses.
     """
     moves = intent.moves
-    uneasy = np.ones(len(moves), dtype=bool)
+    check_start = np.ones(len(moves), dtype=bool)
     joined = every(moves.start[1:] == moves.end[:-1]) & (moves.tool_length[1:] == moves.tool_length[:-1])
-    uneasy[1:] = kept[:-1] | ~joined
+    check_start[1:] = kept[:-1] | ~joined
     if intent.arrival is not None:
         rows = np.arange(1, len(moves))
         now = intent.direction(rows, np.full(len(rows), INSTANT))
-        uneasy[1:] |= some(now != intent.arrival[:-1])
+        check_start[1:] |= some(now != intent.arrival[:-1])
     if any(np.ndim(values) for values in intent.state.inputs.values()):
-        uneasy[:] = True
-    return uneasy
+        check_start[:] = True
+    return check_start
 
 
 BATCH = 16_384
@@ -276,17 +276,17 @@ def samples(
     density: float = DENSITY,
     tilts: bool = True,
     known: Known | None = None,
-    uneasy: Mask | None = None,
+    check_start: Mask | None = None,
 ) -> Iterator[PathSamples]:
     """Look at pieces `which`, in batches; what is known of their ends need not be looked at.
 
-    uneasy  (n,) motions whose start is looked at, too, if that is known
+    check_start  (n,) motions whose start is looked at, too, if that is known
     """
     counts, along = _counts(written, which, density)
-    if uneasy is None:
-        uneasy = _uneasy(written)
+    if check_start is None:
+        check_start = _starts_to_check(written)
     for batch in batches(counts + 1, BATCH):
-        piece, fraction = _places(written, which[batch], counts[batch], along[batch], uneasy)
+        piece, fraction = _places(written, which[batch], counts[batch], along[batch], check_start)
         yield _errors(written, piece, fraction, known, tilts)
 
 
@@ -301,12 +301,12 @@ def _counts(written: WrittenPieces, which: Index, density: float) -> tuple[Index
     return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 
 
-def _places(written: WrittenPieces, which: Index, counts: Index, along: Mask, uneasy: Mask) -> tuple[Index, Array]:
+def _places(written: WrittenPieces, which: Index, counts: Index, along: Mask, check_start: Mask) -> tuple[Index, Array]:
     """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
     many = counts + 1
     fraction = (places(many) + 1) / np.repeat(many, many)
     begins = np.flatnonzero(written.opens[which])
-    looked_at = uneasy[written.pieces.move[which[begins]]] & along[begins]
+    looked_at = check_start[written.pieces.move[which[begins]]] & along[begins]
     begun = begins[looked_at | _leaps(written, which[begins])]
     extra = [(begun, np.full(len(begun), START))]
     if written.intent.kinks:
@@ -316,7 +316,7 @@ def _places(written: WrittenPieces, which: Index, counts: Index, along: Mask, un
     return which[owners(many)], fraction
 
 
-def _uneasy(written: WrittenPieces) -> Mask:
+def _starts_to_check(written: WrittenPieces) -> Mask:
     """Motions whose start the end of the one before does not show: also those behind rapids, (n,).
 
     Not behind rapids of which an axis is left where it stands: what that leaves is said by itself, and seen in a cut
@@ -325,7 +325,7 @@ def _uneasy(written: WrittenPieces) -> Mask:
     moves = written.intent.moves
     kept = np.ones(len(moves), dtype=bool)
     kept[written.pieces.move] = written.pieces.kept
-    found = uneasy_starts(written.intent, kept)
+    found = starts_to_check(written.intent, kept)
     found[1:] |= (moves.kind[:-1] == MotionKind.RAPID) & ~some(moves.wordless[:-1])
     return found
 

@@ -365,10 +365,10 @@ def as_commands(intent: Intent, rows: Index, programmed: Array, nominal: Array, 
     tcp, lengths = intent.moves.tcp[rows], intent.moves.length_under_tcp[rows]
     if not tcp.any():
         return corrected
-    return led_as_commands(intent.machine, programmed, (nominal, corrected), tcp, lengths)
+    return commands_of_positions(intent.machine, programmed, (nominal, corrected), tcp, lengths)
 
 
-def led_as_commands(
+def commands_of_positions(
     machine: Machine, programmed: Array, positions: tuple[Array, Array], tcp: Mask, lengths: ArrayLike
 ) -> Array:
     """As `as_commands`; `positions` are those of the program and the corrected ones, `tcp` and lengths as there."""

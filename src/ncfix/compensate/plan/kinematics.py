@@ -125,13 +125,13 @@ def reached_joints(machine: Machine, commands: Array, tcp: Mask, tool_length: Ar
         return commands, reached
     q, columns = commands.copy(), linear_columns(machine)
     rows = np.flatnonzero(tcp)
-    led = commands if len(rows) == len(commands) else commands[rows]
-    wanted, length = programmed_tip(machine, led), _of_rows(tool_length, rows)
+    chosen = commands if len(rows) == len(commands) else commands[rows]
+    wanted, length = programmed_tip(machine, chosen), _of_rows(tool_length, rows)
     if moves_as_one(machine):
         x, y, z = columns.tolist()
-        q[rows[:, None], columns] = machine.placed(led, (x, y, z), wanted, length)
+        q[rows[:, None], columns] = machine.placed(chosen, (x, y, z), wanted, length)
         return q, reached
-    maps, offset = affine_tip(machine, led, length)
+    maps, offset = affine_tip(machine, chosen, length)
     maps, fine = regular(maps)
     q[rows[:, None], columns] = solve(maps, wanted - offset)
     reached[rows] = fine
@@ -153,13 +153,13 @@ def commands_from_joints(machine: Machine, q: Array, tcp: Mask, tool_length: Arr
         return q
     commands, columns = q.copy(), linear_columns(machine)
     rows = np.flatnonzero(tcp)
-    led = q if len(rows) == len(q) else q[rows]
-    tip = machine.tip(led, _of_rows(tool_length, rows))
+    chosen = q if len(rows) == len(q) else q[rows]
+    tip = machine.tip(chosen, _of_rows(tool_length, rows))
     if moves_as_one(machine):
         others = np.setdiff1d(np.flatnonzero(~machine.rotary), columns)
-        maps, offset = machine.at_zero[1][None, columns].swapaxes(1, 2), _led_at_zero(machine, led, others)
+        maps, offset = machine.at_zero[1][None, columns].swapaxes(1, 2), _tip_by_linear_axes(machine, chosen, others)
     else:
-        maps, offset = affine_tip(machine, _rotary_at_zero(machine, led))
+        maps, offset = affine_tip(machine, _rotary_at_zero(machine, chosen))
     commands[rows[:, None], columns] = solve(regular(maps)[0], tip - offset)
     return commands
 
@@ -167,13 +167,13 @@ def commands_from_joints(machine: Machine, q: Array, tcp: Mask, tool_length: Arr
 def programmed_tip(machine: Machine, commands: Array) -> Array:
     """Where in the workpiece commands (n, n_axes) with tool-centre-point control want the tip, (n, 3) mm."""
     if moves_as_one(machine):
-        return _led_at_zero(machine, commands, np.flatnonzero(~machine.rotary))
+        return _tip_by_linear_axes(machine, commands, np.flatnonzero(~machine.rotary))
     maps, offset = affine_tip(machine, _rotary_at_zero(machine, commands))
     tip: Array = (maps @ commands[:, linear_columns(machine), None])[..., 0] + offset
     return tip
 
 
-def _led_at_zero(machine: Machine, q: Array, axes: Index) -> Array:
+def _tip_by_linear_axes(machine: Machine, q: Array, axes: Index) -> Array:
     """Where some linear axes at q (n, n_axes) take the tip, the other axes at zero, (n, 3) mm; summed axis by axis."""
     offset, ways = machine.at_zero
     tip = np.empty((3, len(q)))

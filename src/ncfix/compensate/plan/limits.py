@@ -78,7 +78,7 @@ def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
     return _of_axes(written, "NCF405", outside, programmed), _of_axes(written, "NCF404", over, corrected)
 
 
-def led_astray(machine: Machine, moves: Moves, pieces: Pieces, start: Array, state: State) -> Index:
+def increments_beyond_travel(machine: Machine, moves: Moves, pieces: Pieces, start: Array, state: State) -> Index:
     """Increments that are left as they are, and that leave the range of an axis because of where they begin."""
     rows = np.flatnonzero(moves.incremental)
     if not rows.size or not pieces.kept.any():
@@ -207,12 +207,12 @@ def programmed_excess(written: WrittenPieces) -> Array:
     each = np.arange(len(intent.moves))
     ends = written.programmed if len(each) == len(written.pieces) else None
     tcp = intent.moves.tcp
-    curved, led = (
+    curved, tcp_rows = (
         tcp | _arcs_may_leave(intent.machine, intent.segments, tcp),
         np.flatnonzero(tcp & ~intent.segments.arc),
     )
-    if led.size:
-        curved[led] = _may_leave(intent, intent.joints_at, led, None if ends is None else ends[led])
+    if tcp_rows.size:
+        curved[tcp_rows] = _may_leave(intent, intent.joints_at, tcp_rows, None if ends is None else ends[tcp_rows])
     return excess(intent.machine, intent.joints_at, each, curved, ends)
 
 

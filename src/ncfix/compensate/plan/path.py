@@ -30,7 +30,7 @@ from ncfix.compensate.plan.arrays import (
     vector_product,
 )
 from ncfix.compensate.plan.deviation import beside as left_beside
-from ncfix.compensate.plan.deviation import deviations, uneasy_starts
+from ncfix.compensate.plan.deviation import deviations, starts_to_check
 from ncfix.compensate.plan.ends import (
     corrected,
     corrected_approaches,
@@ -318,7 +318,7 @@ def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, followed: 
     """How far the tip leaves the intended path along each motion, (n,) mm; 0 where it is not looked at."""
     deviation = np.zeros(len(kept))
     rows = np.flatnonzero(followed & ~broken)
-    deviation[rows] = deviations(intent, real, rows, uneasy_starts(intent, kept), demands.budget.path)
+    deviation[rows] = deviations(intent, real, rows, starts_to_check(intent, kept), demands.budget.path)
     deviation[followed & broken] = np.inf
     return deviation
 

@@ -60,23 +60,23 @@ def bends_closely(intent: Intent, rows: Index) -> Array:
     of a k-th of the motion a is a k-th of a k-th. Motions that turn far are looked at in `SHARES` shares.
     """
     often, machine = bends(intent, rows), intent.machine
-    led = np.flatnonzero(intent.moves.tcp[rows] & ~intent.segments.arc[rows])
-    if not led.size:
+    tcp = np.flatnonzero(intent.moves.tcp[rows] & ~intent.segments.arc[rows])
+    if not tcp.size:
         return often
-    on = rows[led]
+    on = rows[tcp]
     begin, end = (intent.joints_at(on, np.full(len(on), place)) for place in (0.0, 1.0))
     longest = float(np.nanmax(np.abs(intent.lengths(on)), initial=0.0))
     acceleration = accelerations(machine, begin, end, longest)
     if acceleration is None:
         return often
     beside = np.where(machine.rotary, 0.0, acceleration[:, None] / 3) / features(machine)
-    often[led] = np.fmin(often[led], (np.abs(end - begin) / features(machine) + beside).sum(axis=1))
-    far = np.flatnonzero(often[led] > SHARES)
+    often[tcp] = np.fmin(often[tcp], (np.abs(end - begin) / features(machine) + beside).sum(axis=1))
+    far = np.flatnonzero(often[tcp] > SHARES)
     if far.size:
         places = np.tile(np.arange(SHARES + 1) / SHARES, len(far))
         on_way = intent.joints_at(np.repeat(on[far], SHARES + 1), places).reshape(len(far), SHARES + 1, -1)
         way = np.abs(np.diff(on_way, axis=1)).sum(axis=1)
-        often[led[far]] = np.fmin(often[led[far]], (way / features(machine) + beside[far] / SHARES).sum(axis=1))
+        often[tcp[far]] = np.fmin(often[tcp[far]], (way / features(machine) + beside[far] / SHARES).sum(axis=1))
     return often
 
 
