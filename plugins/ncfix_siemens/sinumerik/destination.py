@@ -14,6 +14,7 @@ from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, POLAR, TURNING, BlockWo
 RUNTIME = "where the axis {} stands is known only at run time"
 RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM90)"
 BAD_POLAR = "NCF223"
+IMPOSSIBLE = "NCF221"
 POLAR_DIAMETER = "polar coordinates (AP, RP) while X is a diameter"
 NO_POLE = "polar coordinates (AP, RP) while no pole is known"
 TWICE = "polar coordinates (AP, RP) beside {} in the plane: which of them counts is not sure"
@@ -66,6 +67,8 @@ def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vect
             words.refusal, step = words.refusal or RADIUS, 2.0 * step
         program[index] += step
     elif form in TURNING:
+        if not control.rotary[index]:
+            raise Fault(IMPOSSIBLE, f"{form.upper()} is for rotary axes, and {letter} is none")
         program[index] = turned(form, program[index], step, known=index not in control.lost)
         control.over += (index,)
         if index in control.lost:

@@ -31,6 +31,8 @@ from ncfix.text.tree import Binary, Constant, Expression, NumberedParameter
 from ncfix_siemens.sinumerik.blocks import BRACKET
 
 CONSTANTS: dict[str, Value] = {"true": 1.0, "false": 0.0, "$pi": math.pi}
+CUTTING = dict.fromkeys(("$p_istest", "$p_sim", "$p_search", "$p_searchl", "$p_dryrun"), 0.0)
+"""Whether a program is tested, simulated, searched or run dry: not while it cuts."""
 INITIAL: dict[str, Value] = {"real": 0.0, "int": 0.0, "bool": 0.0, "string": "", "char": Unknown(), "axis": Unknown()}
 WHOLE = frozenset({"int", "char"})
 
@@ -78,7 +80,7 @@ class SinumerikVariables:
             return CONSTANTS[name]
         scope = self.scope_of(name)
         if scope is None:
-            return self.shared.get(key, Unknown())
+            return self.shared.get(key, CUTTING.get(name, Unknown()))
         return scope.values.get(key, INITIAL.get(scope.kinds[name], Unknown()))
 
     def assign(self, key: Key, value: Value) -> None:

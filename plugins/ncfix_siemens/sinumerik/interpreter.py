@@ -27,7 +27,7 @@ from ncfix.text.tree import Program
 from ncfix_siemens.sinumerik.destination import destination
 from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
-from ncfix_siemens.sinumerik.motion import is_harmless
+from ncfix_siemens.sinumerik.motion import is_harmless, watch
 from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
 from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, SinumerikPlan, is_statement
 from ncfix_siemens.sinumerik.scanning import all_or_none
@@ -179,7 +179,10 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             return False
         modes = control.modes
         busy = control.at_start or modes.carried or modes.modal_cycle or modes.rounds or self.flow.sections
-        return not (busy or control.lost or control.over or modes.diameter == "DIAM90" or leads_along(control))
+        by_block = control.acting or modes.by_block
+        return not (
+            busy or by_block or control.lost or control.over or modes.diameter == "DIAM90" or leads_along(control)
+        )
 
     def note_stretch(self, unit: SinumerikUnit, block: int, done: int) -> None:
         """See `Interpreter`: the axes that these blocks have named have been brought somewhere."""
@@ -258,7 +261,9 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             why = f"the block {say(text)} is not understood, and may move axes or change coordinates"
             control.refuse_rest(why)
             control.warn(NOT_UNDERSTOOD, control.refusal, "all motions after it are refused")
-        if "synchronized" in plan.opaque and not is_harmless(text):
+        if "synchronized" in plan.opaque and is_harmless(text):
+            watch(control, text)
+        elif "synchronized" in plan.opaque:
             why = f"the synchronized action {say(text)} may move axes"
             control.refuse_rest(why)
             control.warn(SYNCHRONOUS, control.refusal, "all motions after it are refused")
@@ -331,6 +336,8 @@ def note_letting(control: Sinumerik, turn: Turn, step: Letting) -> None:
         control.refuse_rest(why)
     elif step.name in PROBING:
         turn.special.add("meas")
+    elif step.index and step.name.upper() in INDEX:
+        control.refuse_rest(f"{step.name.upper()}[..] is not followed")
     elif step.name in UNSEEN and step.index:
         control.refuse_rest(f"{UNSEEN[step.name]} is not followed")
 

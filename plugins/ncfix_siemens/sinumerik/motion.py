@@ -40,6 +40,18 @@ def is_harmless(text: str) -> bool:
     return bool(actions) and HARMLESS.fullmatch(actions[0].strip()) is not None
 
 
+EVERY_BLOCK = re.compile(r"[ \t]*IDS?[ \t]*=", re.IGNORECASE)
+WITHIN_A_BLOCK = re.compile(r"\$AC_(?:PATHN|PLT[BE]B|DT[BE][BW]|TIME[CS]{0,2})(?!\w)", re.IGNORECASE)
+"""How far the motion of a block is, its time too."""
+
+
+def watch(control: Sinumerik, text: str) -> None:
+    """A harmless synchronized action comes into force: for the next block, or with ID for all that follow."""
+    control.acting |= EVERY_BLOCK.match(text) is None
+    if WITHIN_A_BLOCK.search(text):
+        control.modes.by_block |= {"actions"}
+
+
 MACHINE = "machine coordinates ({})"
 MEASURING = Passing(Pass.PROBING, "measuring (MEAS)")
 DWELL = Passing(Pass.DWELL, "dwell")
@@ -74,7 +86,7 @@ def moved(control: Sinumerik, words: BlockWordValues, special: frozenset[str]) -
         mind_carried(control)
     corner = control.modes.rounds or not CORNERS.isdisjoint(words.values)
     control.at_corner = not machine and (corner or control.cornered)
-    words.whole = control.at_corner or is_one_piece(control, words)
+    words.whole = words.whole or control.at_corner or is_one_piece(control, words)
     oriented(control, words)
     drilling = control.modes.modal_cycle
     if drilling is not None and not special and code not in OTHER_WAYS:
@@ -86,7 +98,7 @@ def moved(control: Sinumerik, words: BlockWordValues, special: frozenset[str]) -
         if drilling is not None:
             hole_after(control, words)
     control.wrap()
-    control.cornered, control.at_corner = corner, False
+    control.cornered, control.at_corner, control.acting = corner, False, False
 
 
 def by_itself(control: Sinumerik, words: BlockWordValues, special: frozenset[str], machine: str) -> None:
@@ -112,9 +124,12 @@ def straight(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 
 
 def is_one_piece(control: Sinumerik, words: BlockWordValues) -> bool:
-    """Whether a motion must not be split: its time or feed would be another's, or REPEAT would miss lines."""
+    """Whether a motion must not be split: its time or feed would be another's, REPEAT would miss lines, or what acts
+    by blocks would act otherwise.
+    """
     timed = control.modal.feed_mode == 93 and control.modal.motion != 0 and "F" not in words.values
-    return timed or "FB" in words.values or words.block in control.solitary
+    by_block = control.acting or bool(control.modes.by_block)
+    return timed or "FB" in words.values or words.block in control.solitary or by_block
 
 
 def as_coded(control: Sinumerik, words: BlockWordValues, code: int) -> None:

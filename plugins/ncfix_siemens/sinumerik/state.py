@@ -87,6 +87,7 @@ class Sinumerik(ProgramControl):
     at_start    the tool is still that with which the program began, with its edge D1
     whole       the motion must not be split
     cornered    the last motion ended at a corner that the control rounds or breaks
+    acting      a synchronized action without ID has come since the last motion: it acts in the block of the next
     pattern     the places to which the last pattern of holes has led
     solitary    blocks after which no line may be put, since REPEAT would leave it out
     fresh_tool  a tool has been called since the last motion
@@ -112,7 +113,7 @@ class Sinumerik(ProgramControl):
         self.fresh_tool = self.changed_by_cycle = False
         self.pattern: tuple[tuple[float, float], ...] = ()
         self.heading: Sequence[float] | None = None
-        self.whole = self.cornered = False
+        self.whole = self.cornered = self.acting = False
         self.stated = True
         self.solitary: frozenset[int] = frozenset()
         self.variables = SinumerikVariables.given(run.setup.variables)

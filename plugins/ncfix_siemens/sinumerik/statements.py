@@ -19,7 +19,7 @@ from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import set_pole
 from ncfix_siemens.sinumerik.framing import into_spindle, set_length
 from ncfix_siemens.sinumerik.orientation import swivel
-from ncfix_siemens.sinumerik.plans import LISTS, Calling, SinumerikPlan, evaluates, plain_text
+from ncfix_siemens.sinumerik.plans import LISTS, Calling, Letting, SinumerikPlan, evaluates, plain_text
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.vocabulary import (
@@ -31,6 +31,8 @@ from ncfix_siemens.sinumerik.vocabulary import (
     PATH_WORDS,
     POLAR,
     POLES,
+    PUNCHING,
+    STROKES,
     TURNS_OF_THE_TOOL,
     UNFOLLOWED,
     UNFOLLOWED_MOTIONS,
@@ -40,6 +42,7 @@ from ncfix_siemens.sinumerik.vocabulary import (
 Find = Callable[[str], SinumerikUnit | None]
 
 UNKNOWN_CYCLE = "NCF252"
+WHERE_IT_IS = "if it is a subprogram, say where its file is: --subprograms DIR"
 TRANSFORMING = ("traori", "transmit", "tracyl", "traang", "tracon", "trafoo")
 """How names of transformations by kinematic chains begin, `TRANSMIT_K`."""
 
@@ -68,11 +71,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
 def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
     """A name or number that is no subprogram at hand is taken as a cycle of the builder; it may change the tool."""
     text = f"{name} is not known: it is taken as a cycle that leaves coordinates as they are"
-    control.warn(
-        UNKNOWN_CYCLE,
-        text,
-        "if it is a subprogram, say where its file is: --subprograms DIR",
-    )
+    control.warn(UNKNOWN_CYCLE, text, WHERE_IT_IS)
     control.lose_all(AFTER_CYCLE)
     control.changed_by_cycle |= changes_tool
     if "tool" in control.suspended:
@@ -80,14 +79,17 @@ def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
         set_length(control)
 
 
-def call_by_text(turn: Turn, step: Calling, find: Find) -> bool:
-    """`CALL "NAME"`, `EXTCALL("NAME.SPF")`: whether the program is at hand."""
-    found = FILE.search(plain_text(step.written[0]) or "") if step.written else None
+def call_by_text(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
+    """`CALL "NAME"`, `EXTCALL("NAME.SPF")`."""
+    text = plain_text(step.written[0]) if step.written else None
+    found = FILE.search(text or "")
     unit = find(found["name"]) if found else None
-    if unit is None:
-        return False
-    turn.subprogram, turn.called, turn.times = unit, step, round(turn.words.get("P", 1.0))
-    return True
+    if unit is not None:
+        turn.subprogram, turn.called, turn.times = unit, step, round(turn.words.get("P", 1.0))
+        return
+    control.suspend(step.name, f"{UNFOLLOWED[step.name]} is in force, which ncfix does not follow")
+    told = f"the program {text}" if found else f"a program that {step.name.upper()} names at run time"
+    control.warn(UNKNOWN_CYCLE, f"{told} is not at hand: motions after it are refused", WHERE_IT_IS)
 
 
 def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
@@ -119,9 +121,11 @@ SWITCHED_ON = (
     "whether CYCLE832 switches TRAORI on depends on the version of the control: "
     "older ones take that from its second argument"
 )
+ADDITIVE = "an additive tool offset (DL) is in force, whose value is in the control"
+AFTER_ADDITIVE = "where the axis {} stands after an additive tool offset (DL) is not known"
 AFTER_RESET = "where the axis {} stands after ORIRESET is for machine data"
 _PASSED = """
-    G9 G60 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
+    G9 G60 G62 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
     G972 G973 G290 G471 G472
 """
 PASSED = frozenset(10 * int(code[1:]) for code in _PASSED.split())
@@ -196,8 +200,8 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         control.modal.motion, control.stated = MOTIONS[name], True
     elif name in DIAMETERS.values():
         control.count_in(name)
-    elif name in CALLED_BY_TEXT and call_by_text(turn, step, find):
-        return
+    elif name in CALLED_BY_TEXT:
+        call_by_text(control, turn, step, find)
     elif name == "cycle832":
         tolerance(control, step)
     elif name in UNFOLLOWED:
@@ -210,6 +214,8 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         control.modes.orientation = name
     elif name == "orireset":
         control.lose_all(AFTER_RESET)
+    elif name in PUNCHING:
+        control.modes.by_block = control.modes.by_block - {STROKES} | PUNCHING[name]
     elif name in HARMLESS:
         return
     elif name == "cycle800":
@@ -335,6 +341,7 @@ SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
 def finish_block(control: Sinumerik, turn: Turn) -> None:
     """Codes and words of the block, and its motion."""
     words, plan = turn.words, turn.plan
+    words.whole = turn.subprogram is not None or bool(turn.elsewhere)
     if "G" in words.values:
         control.refuse_rest("a G code that is computed (G=..) is not followed")
     codes(control, turn)
@@ -343,6 +350,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         control.claim_words()
         return
     framing.tool(control, words, 60 in turn.m, turn.at_once and bool(words.values.keys() & {"T"} or words.texts))
+    additive_offset(control, turn)
     feed(control, turn)
     if "OFFN" in words.values:
         allowance = words.values["OFFN"]
@@ -359,6 +367,15 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         motion.moved(control, words, frozenset(turn.special))
     elif "soft" in turn.special:
         control.lose_axes(GEOMETRY, motion.AFTER_APPROACH)  # the next block says where the approach leads
+
+
+def additive_offset(control: Sinumerik, turn: Turn) -> None:
+    """DL: an additive offset of the edge in force, which the setup does not give; D without it takes it away."""
+    letting = next((step for step in turn.plan.steps if isinstance(step, Letting) and step.name == "dl"), None)
+    if letting is not None and (letting.value is None or letting.value(control) != 0.0):
+        control.suspend("dl", ADDITIVE)
+    elif (letting is not None or "D" in turn.words.values) and control.resume("dl"):
+        control.lose_all(AFTER_ADDITIVE)
 
 
 def codes(control: Sinumerik, turn: Turn) -> None:

@@ -78,7 +78,7 @@ _HARMLESS = """
     walcs0 walcs1 walcs2 walcs3 setms spcon spcof cdon cdof cdof2 dynnorm dynpos dynrough dynsemifin dynfinish dynprec
     compof compcurv compcad compon compsurf upath spath stamac rmi rmb rme rmn cfc cftcp cfin fgroup fgref
     cut2d cut2df cut3dc cut3df cut3dff cut3dfs kontc kontt normal gwpson gwpsof tmon tmof fpr fpraon fpraof newconf
-    cancel group_begin group_end group_addend punchacc spof son sof pon pons soff pdelayon pdelayof spif1 spif2
+    cancel group_begin group_end group_addend punchacc sof soff pdelayon pdelayof spif1 spif2
     coupdef coupdel coupon coupof couponc coupofs waitc ctabend ctabdel resetmon tang adisposa
     protd protz proa cutconon cutconof rtlion rtliof delt getselt settcor delobj
     oric orid orirota orirotr orirott orirotc orison orisof oriaxpos
@@ -165,13 +165,18 @@ UNSEEN = {
 """Names that with an index change what motions after them do, in a way that is not followed."""
 
 OF_THE_CONTROL = re.compile(
-    r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans)|toff|tcarr$|cutmod$"
+    r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans|sn_cec_)|toff|tcarr$|cutmod$"
+    r"|\$sc_(?:mirror_tool|wear_|tool_length_(?:type|const_t$)|tool_temp|tocarr|toframe)"
 )
 """Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""
 
 TURNS_OF_THE_TOOL = frozenset({"orivect", "oriaxes", "oriplane", "oripath", "oripaths", "oricurve"})
 TURNS_OF_THE_TOOL |= {"oriconcw", "oriconccw", "oriconio", "oriconto"}
 """How the tool turns between two blocks: the names of one group of G codes."""
+
+STROKES = "strokes"
+PUNCHING = {**dict.fromkeys(("pon", "pons", "son", "sons"), frozenset({STROKES})), "spof": frozenset[str]()}
+"""Names from which on every block ends with a stroke of the punch, and the one that ends that."""
 
 PROBING = frozenset({"measa", "meawa", "meac"})
 """Names that with an axis as index let the motion of the block measure."""
@@ -304,6 +309,7 @@ class Modes:
     orientation_in_machine  ORIMKS
     rounds       RNDM rounds all corners
     angles       ORIEULER, ORIRPY or ORIRPY2, lower case: what A2 B2 C2 are
+    by_block     something acts at the end of every block, or by how far a block is: punching, synchronized actions
     """
 
     added: Sequence[float] | None = ZEROS
@@ -321,6 +327,7 @@ class Modes:
     orientation_in_machine: bool = False
     rounds: bool = False
     angles: str = ""
+    by_block: frozenset[str] = frozenset()
 
 
 @dataclass(slots=True)
