@@ -10,6 +10,7 @@ import pytest
 from measure.poses import machine
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Backlash, Polynomial
+from ncfix.measure.checks import checked
 from ncfix.measure.instruments import observe
 from ncfix.measure.lengths import BallBarFigures, ball_bar_figures
 from ncfix.measure.measurement import Measurement
@@ -76,3 +77,20 @@ def test_the_plane_is_found():
 def test_other_lengths_have_no_such_figures():
     gauge = Measurement("length", (), {f"{end}{axis}": np.ones(3) for end in "ab" for axis in "xyz"})
     assert list(ball_bar_figures(gauge, THREE)) == []
+
+
+def bar(length: float | None) -> Measurement:
+    turn = np.deg2rad(np.arange(0, 360, 5))
+    columns = {"X": RADIUS * np.cos(turn), "Y": RADIUS * np.sin(turn), "Z": np.full(len(turn), 100.0)}
+    centre = THREE.tip(np.array([[0.0, 0.0, 100.0]]), 120.0)[0]
+    columns |= {f"c{axis}": np.full(len(turn), centre[k]) for k, axis in enumerate("xyz")}
+    columns |= {name: np.full(len(turn), RADIUS) for name in ("radius", "length")}
+    if length is not None:
+        columns["tool_length"] = np.full(len(turn), length)
+    return Measurement("length", (), columns)
+
+
+@pytest.mark.parametrize(("length", "codes"), [(120.0, []), (121.0, []), (None, ["NCF625"]), (170.0, ["NCF625"])])
+def test_a_circle_about_another_place_is_remarked(length, codes):
+    """Without its tool length the tip is above the centre ball: errors would come out of another size."""
+    assert [message.code for message in checked(bar(length), THREE).remarks] == codes

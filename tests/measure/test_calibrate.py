@@ -259,3 +259,22 @@ def test_a_model_that_follows_the_noise_is_said_to_be_a_guess():
     assert message.code == "NCF641"
     assert f"{worst.worst_um:.1f} um" in message.text
     assert found.after_um < 1.0 < found.before_um < worst.worst_um
+
+
+def test_pruning_says_what_it_left_out():
+    known = machine("three_axis").replace(effects=())
+    data = simulate(plan(known, "tcp", 200), known, Faults(noise_um=1.0), seed=3)
+    found = calibrate([data], known, "EXX,EC0Y", prune=0.9999)
+    (said,) = (message for message in found.remarks if message.code == "NCF644")
+    assert "EXX, EC0Y;" in said.text
+
+
+def test_held_effects_keep_their_covariance():
+    """One axis measured again: what the others are known to stays in the file."""
+    known = machine("three_axis").replace(effects=())
+    first = calibrate([simulate(plan(known, "tcp", 200), known, Faults(noise_um=1.0))], known, "EC0Y,EA0Z").machine
+    columns = {"position": np.linspace(-300.0, 300.0, 9), "value": np.array([0.001, -0.001, 0.0] * 3)}
+    lasers = Measurement("axis", (), columns, labels={"axis": ("Y",) * 9, "component": ("ECY",) * 9})
+    again = calibrate([lasers], first, "EC0Y,EA0Z,ECY")
+    kept = {effect.name: effect.covariance for effect in again.machine.effects}
+    assert all(kept[effect.name] == effect.covariance is not None for effect in first.effects)

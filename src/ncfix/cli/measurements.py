@@ -181,7 +181,8 @@ def _print(calibration: Calibration, over: Prediction) -> None:
     for row in _positioning(calibration):
         unit = "urad" if row["component"][1] in "ABC" else "um"
         known = [f"{name} {row[name]:.1f}" for name in ("A", "R", "E", "M", "B") if row[name] == row[name]]
-        console.say(f"{row['component']} set {row['name']}, ISO 230-2: {', '.join(known)} {unit}")
+        norm = "ISO 230-2" if row["component"][1] == row["component"][2] else "as in ISO 230-2"
+        console.say(f"{row['component']} set {row['name']}, {norm}: {', '.join(known)} {unit}")
     held = "; what is held counts as known" if any(map(math.isnan, calibration.sigma.tolist())) else ""
     figures = f"{over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms"
     console.say(f"sigma of the tip error over the travels: {figures}{held}")
@@ -214,8 +215,10 @@ def _say_bar(bar: dict[str, Any]) -> None:
     text = f"ball-bar set {bar['name']}: size {bar['size']:+.1f} um, form {bar['form']:.1f} um"
     text += f", centre off by {centre} um"
     if circle := bar["circle"]:
-        names = {"G(b)": "Gb", "H": "H", "D": "D", "Fmax": "F_max", "Fmin": "F_min"}
-        text += "; ISO 230-4: " + ", ".join(f"{name} {circle[key]:.1f}" for name, key in names.items())
+        both = circle["H"] == circle["H"]
+        names = {"G(b)" if both else "G": "Gb", "H": "H", "D": "D", "Fmax": "F_max", "Fmin": "F_min"}
+        known = [f"{name} {circle[key]:.1f}" for name, key in names.items() if circle[key] == circle[key]]
+        text += f"; ISO 230-4: {', '.join(known)}" + ("" if both else " (one way round only)")
     console.say(text)
 
 

@@ -229,7 +229,7 @@ def why(diagnosis: Diagnosis, finding: EffectFinding) -> str:
 
 
 def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:
-    """The fields of docs/formats.md, section 4, and some more."""
+    """The fields of docs/formats.md and docs/diagnose.md."""
     return {
         "verdict": diagnosis.verdict,
         "ladder": [

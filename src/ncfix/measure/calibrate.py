@@ -30,7 +30,7 @@ from ncfix.version import __version__
 ALIKE = 0.02
 """Factors this near to 1 or -1 count as such."""
 NAMED = 20
-"""Outliers that are named one by one."""
+"""Outliers, and coefficients left out, that are named one by one."""
 PLACES = 400
 """Poses over the travels at which the tip error is predicted."""
 UM = 1e3
@@ -72,8 +72,9 @@ def calibrate(
     except UsageError as error:
         why = mistakes.suspected(problem) if error.code == "NCF637" else ()
         raise UsageError((*error.messages, *why, *(each for data in measurements for each in data.remarks))) from error
+    dropped: tuple[str, ...] = ()
     if prune is not None:
-        problem, estimate = pruned(problem, estimate, prune, loss)
+        problem, estimate, dropped = pruned(problem, estimate, prune, loss)
     scale = noise_scale(problem, estimate)
     residuals = Residuals.of(problem, estimate)
     before = _rms_before(problem, residuals)
@@ -88,6 +89,7 @@ def calibrate(
         *mistakes.suspected(problem),
         *(message for seen in problem.observations for message in seen.doubts(found)),
         *time_remarks,
+        *_left_out(dropped, prune),
     ]
     return Calibration(found, problem, estimate, scale, tuple(remarks), before, after)
 
@@ -116,7 +118,9 @@ def _machine(problem: Problem, estimate: Estimate, scale: float, figures: dict[s
 
 
 def _known(effect: Effect, covariance: Array) -> Effect:
-    """The effect with its covariance, if all of its coefficients were estimated."""
+    """The effect with its covariance, if all of its coefficients were estimated; that of the file if all are held."""
+    if np.isnan(covariance).all():
+        return effect
     if not np.isfinite(covariance).all():
         return replace(effect, covariance=None)
     even = (covariance + covariance.T) / 2
@@ -148,6 +152,13 @@ def _outliers(estimate: Estimate, residuals: Residuals) -> Iterator[Message]:
         yield Message("NCF633", text, residuals.place(index), "look at that row; --loss none keeps it")
     if len(aside) > NAMED:
         yield Message("NCF633", f"{len(aside) - NAMED} more outliers")
+
+
+def _left_out(names: Sequence[str], level: float | None) -> Iterator[Message]:
+    if names:
+        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+        listed = ", ".join(names[:NAMED]) + more
+        yield Message("NCF644", f"left out, not significant at {level:g}: {listed}; sigmas count them as zero")
 
 
 def _noise(problem: Problem, scale: float) -> Iterator[Message]:

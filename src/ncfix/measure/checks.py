@@ -10,13 +10,15 @@ import numpy as np
 from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Machine
 from ncfix.machine.axes import COMPONENTS
-from ncfix.measure.measurement import ENDS, Array, Index, Measurement, component_of, groups
+from ncfix.measure.measurement import CENTRE, ENDS, Array, Index, Measurement, component_of, groups
 
 LARGE_MM, LARGE_RAD = 2.0, 0.02
 """Errors of which half the rows exceed this are in another unit."""
 ROUND_DEG = 1e-6
 FAR = 0.4
 """Of the travel: positions in radians that go so far are no corner of it in degrees."""
+ELSEWHERE = 2.0
+"""mm: a ball-bar reads a millimetre or two, so poses that are farther from its circle belong to another one."""
 BEYOND = 1e-6
 """How far outside its range a position may be, for numbers that were rounded: mm, rad."""
 
@@ -39,6 +41,7 @@ def checked(measurement: Measurement, machine: Machine, lines: Sequence[str] = (
         *_radians(measurement, machine),
         *_ranges(measurement, machine),
         *_micrometres(measurement),
+        *_circles(measurement, machine),
     ]
     return replace(measurement, remarks=(*measurement.remarks, *(_shown(each, lines) for each in remarks)))
 
@@ -189,6 +192,22 @@ def _micrometres(measurement: Measurement) -> Iterator[Message]:
             text = f"{name} is {size:g} {unit} in the median: errors are given in {unit}"
             hint = "are they in degrees, in seconds of arc, or in mrad?" if turns else "divide by 1000?"
             yield Message("NCF616", text, measurement.place(int(rows[0])), hint)
+
+
+def _circles(measurement: Measurement, machine: Machine) -> Iterator[Message]:
+    """Ball-bars whose poses are not about the stated centre: what they show of errors would be of another size."""
+    if measurement.kind != "length" or not {*CENTRE, "radius"} <= measurement.columns.keys():
+        return
+    tip = machine.tip(measurement.positions(machine), measurement.column("tool_length"))
+    distance = np.linalg.norm(tip - measurement.stacked(*CENTRE), axis=1)
+    names, sets = groups(measurement.sets)
+    for index, name in enumerate(names):
+        rows = np.flatnonzero(sets == index)
+        found, stated = (float(np.median(each[rows])) for each in (distance, measurement.columns["radius"]))
+        if abs(found - stated) > ELSEWHERE:
+            text = f"the poses of set {name} are {found:.1f} mm from its centre, but the bar is {stated:g} mm long"
+            hint = "is tool_length given, and the centre (cx, cy, cz) in the workpiece frame?"
+            yield Message("NCF625", text, measurement.place(int(rows[0])), hint)
 
 
 def _errors(measurement: Measurement) -> Iterator[tuple[str, Index, Array]]:

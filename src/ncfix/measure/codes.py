@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ncfix.diagnostics import Code
 
-FORMATS = "docs/formats.md, section 3, describes the measurement file."
+FORMATS = "docs/formats.md describes the measurement file."
 
 CODES = {
     "NCF600": Code(
@@ -115,6 +115,12 @@ CODES = {
         "row was given a set of its own by mistake, which would leave nothing to tell errors from set-ups.",
         "Rows that were measured in one set-up have one and the same `set`.",
     ),
+    "NCF625": Code(
+        "a ball-bar whose poses are elsewhere",
+        "The commanded tool tip is not at the length of the bar from the stated centre. The direction of the bar is "
+        "worked out from both, so errors would come out too large or too small, though the fit is as good as ever.",
+        "Give `tool_length`, and the centre where it is in the workpiece frame: X Y Z of the tip, not of the axes.",
+    ),
     "NCF630": Code(
         "too few rows for the unknowns",
         "There are more unknowns (errors, and the set-up of the instrument) than measured values, or just as many: "
@@ -193,5 +199,14 @@ CODES = {
         "taken: as near the tip of the row's `tool_length`, or the base origin (`carried_by: spindle` or `workpiece`), "
         "as the readings allow.",
         "A line `# target: NAME x y z` in the header says where one of them nearly is.",
+    ),
+    "NCF644": Code(
+        "coefficients that were left out",
+        "With `--prune` they are not significant at the level that was asked for, so they are zero in the new machine "
+        "file. The standard deviations of the others count them as known to be zero. That is too little where a "
+        "coefficient that was left out acts like one that stays, as squareness errors and tilts of rotary axes may: "
+        "one of them then carries the others.",
+        "Calibrate without `--prune` to see how well each one is known; name those that must stay with `--effects`, "
+        "and leave `--prune` out.",
     ),
 }

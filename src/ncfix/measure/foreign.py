@@ -270,7 +270,7 @@ class Rtl:
             raise self.odd(f"the axis is {text!r}" if line else "there is no line `Axis:`", line, "a letter: Axis: X")
         if match[1].upper() in "ABC":
             said = "the unit of a rotary axis's deviations is not public: give them as kind axis, in rad"
-            raise self.odd(said, line, "docs/formats.md, section 3")
+            raise self.odd(said, line, "docs/formats.md, Measurement file")
         for key in ("title", "filetype", "location"):
             other, where = self.texts.get(key, ("", 0))
             if OTHER.search(other):

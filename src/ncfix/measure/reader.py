@@ -338,7 +338,8 @@ def _number(text: MeasurementLines, cell: Cell, name: str) -> float:
     try:
         value = float(cell.text.replace("_", "?"))
     except ValueError:
-        text.mark(cell, "NCF608", f"column {name!r}: {cell.text!r} is not a number")
+        hint = "1 towards plus, -1 towards minus, 0 not known" if name == "direction" or name.startswith("dir_") else ""
+        text.mark(cell, "NCF608", f"column {name!r}: {cell.text!r} is not a number", hint)
         return math.nan
     if not math.isfinite(value):
         text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is not a finite number")

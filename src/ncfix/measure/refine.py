@@ -12,7 +12,7 @@ each try (variable projection).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from ncfix.measure.estimate import Estimate, Problem, fit
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Mask
-from ncfix.measure.selection import Selection
+from ncfix.measure.selection import Selection, labels_of
 
 SCALE = 24
 """Time constants tried first, from the shortest step of time to three times the whole."""
@@ -34,13 +34,29 @@ STEP = 1e-3
 """Relative change of a time constant that is none."""
 
 
-def pruned(problem: Problem, estimate: Estimate, level: float, loss: str) -> tuple[Problem, Estimate]:
-    """The problem with only the coefficients that are significant at this level, and its solution."""
+def pruned(
+    problem: Problem, estimate: Estimate, level: float, loss: str
+) -> tuple[Problem, Estimate, tuple[str, ...]]:
+    """The problem with only the coefficients that are significant at this level, its solution, and what is left out."""
     chosen = _significant(problem, estimate, 1 - level)
     if chosen.all():
-        return problem, estimate
+        return problem, estimate, ()
     smaller = _without(problem, chosen)
-    return smaller, fit(smaller, loss)
+    return smaller, fit(smaller, loss), tuple(_left_out(problem.selection, chosen))
+
+
+def _left_out(selection: Selection, chosen: Mask) -> Iterator[str]:
+    """The coefficients that `_without` leaves out, by their names; an effect of which nothing stays by its own."""
+    at = 0
+    for effect in selection.estimated:
+        keep = chosen[at : at + effect.basis.size]
+        at += effect.basis.size
+        labels = labels_of(effect, selection.estimated)
+        kept = _reduced(effect, keep)
+        if kept is None:
+            yield labels[0].removesuffix(f" {effect.basis.labels[0]}")
+        elif kept is not effect:
+            yield from (label for label, stays in zip(labels, keep, strict=True) if not stays)
 
 
 def _significant(problem: Problem, estimate: Estimate, risk: float) -> Mask:

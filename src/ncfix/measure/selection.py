@@ -73,12 +73,17 @@ def labels_of(effect: Effect, among: Sequence[Effect]) -> list[str]:
     same = [other for other in among if other.name == effect.name]
     head = effect.name
     if len(same) > 1:
-        own = [other for other in same if other.basis.name == effect.basis.name]
+        own = [other for other in same if _told_apart_by(other) == _told_apart_by(effect)]
         head += f" {effect.basis.name}" + (f" {own.index(effect) + 1}" if len(own) > 1 else "")
         head += f" of {effect.input}" if effect.input else ""
+        head += f" x {effect.times}" if effect.times else ""
     if isinstance(effect.basis, ConstantBasis):
         return [head]
     return [f"{head} {label}" for label in effect.basis.labels]
+
+
+def _told_apart_by(effect: Effect) -> tuple[str, str | None, str | None]:
+    return effect.basis.name, effect.input, effect.times
 
 
 def select(
