@@ -34,9 +34,7 @@ STEP = 1e-3
 """Relative change of a time constant that is none."""
 
 
-def pruned(
-    problem: Problem, estimate: Estimate, level: float, loss: str
-) -> tuple[Problem, Estimate, tuple[str, ...]]:
+def pruned(problem: Problem, estimate: Estimate, level: float, loss: str) -> tuple[Problem, Estimate, tuple[str, ...]]:
     """The problem with only the coefficients that are significant at this level, its solution, and what is left out."""
     chosen = _significant(problem, estimate, 1 - level)
     if chosen.all():
