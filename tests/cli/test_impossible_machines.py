@@ -87,8 +87,21 @@ IMPOSSIBLE = {
     "a point in um": (changed("[0, 0, 120]", "[0, 0, 420000]"), "NCF322", "point"),
     "table in metres": (FIVE + table("EXX", [0, 0.25, 0.5], [0, 0.002, 0.004]), "NCF323", "speck"),
     "table in radians": (FIVE + table("ECC", QUARTERS, [0, 1e-5, 2e-5, 1e-5, 0]), "NCF323", "radians"),
+    "table in inches": (FIVE + table("EXX", [0, 9.84, 19.68], [0, 0.002, 0.004]), "NCF323", "positions in inches?"),
+    "a travel in inches": (
+        changed("[0, 500]", "[0, 19.685]") + table("EXX", [0, 250, 500], [0, 0.002, 0.004]),
+        "NCF323",
+        "range in inches?",
+    ),
     "table of another axis": (FIVE + table("EZZ", [100, 200, 300], [0, 0.002, 0.004]), "NCF323", "outside"),
 }  # fmt: skip
+
+
+def test_a_machine_whose_travels_may_be_in_inches_is_remarked_on() -> None:
+    small = changed("[0, 500]", "[0, 20]").replace("[0, 400]", "[0, 16]").replace("[-300, 0]", "[-12, 0]")
+    (found,) = doubts(loads(small), "m.toml")
+    assert (found.message.code, found.impossible) == ("NCF322", False)
+    assert found.message.hint == "is it in inches, 508 mm? `range` is in mm"
 
 
 @pytest.mark.parametrize("what", IMPOSSIBLE)

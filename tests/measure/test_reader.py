@@ -175,6 +175,19 @@ def test_radians_at_no_round_degree_are_told_by_how_far_they_go():
     assert not remarks(rows(-170.0, 170.0), FIVE)
 
 
+@pytest.mark.parametrize(
+    ("size", "code", "said"),
+    [(1 / 25.4, "NCF614", "inches"), (1e-3, "NCF614", "metres"), (1e3, "NCF615", "um"), (1.0, "", "")],
+)
+def test_linear_positions_in_another_unit_are_remarked(size: float, code: str, said: str):
+    low, high = THREE.axis("X").range  # type: ignore[union-attr]
+    head = "# ncfix-measurement: 1\n# kind: axis\naxis,component,position,value\n"
+    rows = "".join(f"X,EXX,{place * size:.5f},0.001\n" for place in np.linspace(low, 0.9 * high, 6))
+    found = reads((head + rows).encode(), THREE).remarks
+    assert [message.code for message in found] == ([code] if code else [])
+    assert all(said in message.text + message.hint for message in found)
+
+
 def test_direct_readings_in_radians_or_micrometres_are_remarked():
     head = "# ncfix-measurement: 1\n# kind: axis\naxis,component,position,value\n"
     turns = "".join(f"C,ECC,{np.deg2rad(30 * k):.6f},{4 * k}e-6\n" for k in range(12))

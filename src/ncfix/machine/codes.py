@@ -126,7 +126,7 @@ CODES = {
     "NCF323": Code(
         "positions of an error that its axis does not have",
         "The positions of a table, or the knots of a curve, are outside the range of the axis, cover next to nothing "
-        "of it, or look like radians. They are in mm or degrees, after `center` and `scale`.",
+        "of it, or look like radians or inches. They are in mm or degrees, after `center` and `scale`.",
         FORMATS,
     ),
     "NCF324": Code(

@@ -43,6 +43,11 @@ COARSEST = (0.1, 1.0)
 """mm and degree: no control counts in coarser steps."""
 MOST_CORRECTION = (50.0, 10.0)
 """mm and degree: who allows corrections of this size has meant another unit."""
+INCH = 25.4
+SMALL_TRAVEL = 42.0
+"""mm; where no linear axis goes farther, travels may be in inches."""
+NEARLY = 0.02
+"""Of the travel: so near to its ends do positions in another unit begin and end."""
 CORNER = 1 / 300
 """Of the travel: a table that covers less is in another unit."""
 TURN_RAD = 2 * np.pi + 0.01
@@ -209,6 +214,10 @@ def _span(machine: Machine) -> Iterator[Fault]:
 
 
 def _travels(machine: Machine) -> Iterator[Fault]:
+    travels = [axis.range[1] - axis.range[0] for axis in machine.axes if axis.name in "XYZ" and not axis.rotary]
+    if len(travels) == 3 and min(travels) >= LEAST_TRAVEL and max(travels) < SMALL_TRAVEL:
+        text = f"no axis has a travel above {max(travels):g} mm"
+        yield "NCF322", text, f"is it in inches, {INCH * max(travels):g} mm? `range` is in mm", False
     for axis in machine.axes:
         low, high = (limit / axis.unit for limit in axis.range)
         if axis.rotary:
@@ -224,6 +233,15 @@ def _travels(machine: Machine) -> Iterator[Fault]:
             yield "NCF322", text, "`pitch` is in mm a turn", True
         if np.abs(axis.point).max() > MOST_TRAVEL:
             yield "NCF322", f"{axis.name}: its point is {np.abs(axis.point).max():g} mm away", "`point` is in mm", True
+
+
+def _inches(places: Array, low: float, high: float) -> str:
+    """What to ask where positions and the travel that they cover are in two units; "" where they are not."""
+    ends, close = places[[0, -1]], NEARLY * (high - low)
+    if np.abs(INCH * ends - (low, high)).max() < close:
+        return "are the positions in inches? All lengths are in mm"
+    far = np.abs(ends - INCH * np.array([low, high])).max() >= close
+    return "" if far else "is the range in inches? All lengths are in mm"
 
 
 def _radians(limits: tuple[float, float]) -> bool:
@@ -271,6 +289,8 @@ def _positions(machine: Machine) -> Iterator[Fault]:
             yield "NCF323", f"{shown} are outside the range of {axis.name}, {low:g} ... {high:g}", "", True
         elif axis.rotary and high - low > 45 and np.abs(places).max() <= TURN_RAD and _radians((places[0], places[-1])):
             yield "NCF323", f"{shown} look like radians: {axis.name} is in degrees", "", True
+        elif not axis.rotary and (whose := _inches(places, low, high)):
+            yield "NCF323", f"{shown} beside the range of {axis.name}, {low:g} ... {high:g}", whose, True
         elif np.ptp(places) < CORNER * (high - low):
             text = f"{shown} cover a speck of the range of {axis.name}, {low:g} ... {high:g}"
             yield "NCF323", text, f"positions are in {'degrees' if axis.rotary else 'mm'}", True

@@ -19,6 +19,10 @@ FAR = 0.4
 """Of the travel: positions in radians that go so far are no corner of it in degrees."""
 ELSEWHERE = 2.0
 """mm: a ball-bar reads a millimetre or two, so poses that are farther from its circle belong to another one."""
+UNITS = {"inches": 25.4, "metres": 1000.0}
+"""mm."""
+MOST = 0.8
+"""Of the travel: positions in another unit that go so far are meant to cover it."""
 BEYOND = 1e-6
 """How far outside its range a position may be, for numbers that were rounded: mm, rad."""
 
@@ -39,6 +43,7 @@ def checked(measurement: Measurement, machine: Machine, lines: Sequence[str] = (
     remarks = [
         *_twice(measurement),
         *_radians(measurement, machine),
+        *_lengths_in_another_unit(measurement, machine),
         *_ranges(measurement, machine),
         *_micrometres(measurement),
         *_circles(measurement, machine),
@@ -171,6 +176,23 @@ def _looks_like_radians(values: Array, low: float, high: float) -> bool:
     return bool(uneven.mean() > 0.5 and (even_in_degrees.mean() > 0.5 or far))
 
 
+def _lengths_in_another_unit(measurement: Measurement, machine: Machine) -> Iterator[Message]:
+    """A word on positions that are a corner of the travel, and in another unit would be most of it."""
+    for axis in machine.axes:
+        rows = _rows_of(measurement, axis.name)
+        values = _positions(measurement, axis.name)[rows]
+        low, high = axis.range
+        if axis.rotary or not np.isfinite(high - low) or len(np.unique(values)) < 3:
+            continue
+        for unit, size in UNITS.items():
+            first, last = float(values.min()) * size, float(values.max()) * size
+            slack = 0.01 * (high - low)
+            if last - first > MOST * (high - low) and first > low - slack and last < high + slack:
+                text = f"the positions of {axis.name}, {first / size:g} ... {last / size:g}, look like {unit}: "
+                row = int(rows[np.abs(values).argmax()])
+                yield Message("NCF614", f"{text}mm are asked for", measurement.place(row))
+
+
 def _ranges(measurement: Measurement, machine: Machine) -> Iterator[Message]:
     for axis in machine.axes:
         rows = _rows_of(measurement, axis.name)
@@ -179,8 +201,10 @@ def _ranges(measurement: Measurement, machine: Machine) -> Iterator[Message]:
         if outside.size:
             low, high = (limit / axis.unit for limit in axis.range)
             found = values[outside[0]] / axis.unit
+            small = outside.size > len(values) / 2 and low <= (values / 1000).min() and (values / 1000).max() <= high
             text = f"{axis.name} = {found:g} is outside its range {low:g} ... {high:g}, {outside.size} rows are"
-            yield Message("NCF615", text, measurement.place(int(rows[outside[0]])), "are columns swapped?")
+            hint = "are they in um?" if small and not axis.rotary else "are columns swapped?"
+            yield Message("NCF615", text, measurement.place(int(rows[outside[0]])), hint)
 
 
 def _micrometres(measurement: Measurement) -> Iterator[Message]:

@@ -64,9 +64,10 @@ CODES = {
         "A column `repeat` says that it is meant.",
     ),
     "NCF614": Code(
-        "degrees look like radians",
+        "positions look like radians, inches or metres",
         "All positions of a rotary axis lie within one turn in radians and not on any round degree, while the axis can "
-        "do far more. Rotary positions are in degrees.",
+        "do more; or those of a linear axis are a corner of its travel, which they would cover in inches or metres. "
+        "Positions are in mm and degrees.",
     ),
     "NCF615": Code(
         "a position outside the range of its axis",
