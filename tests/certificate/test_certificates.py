@@ -68,6 +68,13 @@ def test_blocks_that_are_numbered_anew(
     assert found["proved_motions"]
 
 
+def test_tools_may_have_numbers_and_names(example: Example, ncfix: Ncfix, tmp_path: Path) -> None:
+    options = ("-o", tmp_path / "fixed.h", "--certificate", "--tool", "DRILL 8.5=85", *example.arguments())
+    done = ncfix("fix", example.program, *options)
+    assert done.code == 0, done.err
+    assert len(_certificate(tmp_path / "fixed.h.certificate.json")["setup_sha256"]) == 64
+
+
 def test_fix_writes_a_certificate(fixed: Path) -> None:
     found = _certificate(fixed.with_name("fixed.h.certificate.json"))
     assert found["verdict"] == "proved in part"

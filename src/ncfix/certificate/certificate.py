@@ -48,7 +48,7 @@ class Subject:
             "original": _file(*self.original),
             "corrected": _file(*self.corrected),
             "machine": {**_file(*self.machine_file), "name": self.machine.name, "hash": self.machine.hash},
-            "setup_sha256": _digest(json.dumps(asdict(self.given), sort_keys=True, default=str).encode()),
+            "setup_sha256": _digest(json.dumps(_in_order(asdict(self.given)), default=str).encode()),
             "dialect": self.dialect,
             "strategy": stamp.strategy if stamp else None,
             "tolerance_um": stamp.tolerance_um if stamp else self.tolerance_um,
@@ -79,6 +79,13 @@ def verdict_of(proof: BlockProof) -> str:
 
 def _file(path: str, content: bytes) -> dict[str, str]:
     return {"path": path, "sha256": _digest(content)}
+
+
+def _in_order(value: Any) -> Any:
+    """Mappings by key, numbers before names: of tools, both may occur."""
+    if not isinstance(value, Mapping):
+        return value
+    return {key: _in_order(value[key]) for key in sorted(value, key=lambda key: (isinstance(key, str), key))}
 
 
 def _digest(content: bytes) -> str:
