@@ -121,6 +121,36 @@ def test_what_cannot_be_one_text_is_refused_with_its_line(between: str, behind: 
     assert "(line 4)" in refused.reason
 
 
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc", "siemens"])
+def test_a_rapid_leaves_axes_that_it_does_not_name_where_they_stand(dialect: str, machine: Machine) -> None:
+    text = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 Y0 F500\n/G1 X10.4 Y0.4\nG0 Z80\nG0 X20 Y25\nG1 Z0 F500\nM30\n"
+    text = text.replace("G21", "G71") if dialect == "siemens" else text
+    done = fixed(text, machine, dialect)
+    assert done.report.refused == ()
+    (retract,) = [each for each in done.text.decode().splitlines() if each.startswith("G0 Z")]
+    assert "X" not in retract
+    assert "Y" not in retract
+    left = {each.code: each.text for each in done.report.warnings}["NCF439"]
+    assert "which cuts nothing" in left
+    for on in (False, True):
+        meant, found = (
+            way(in_position(each, on), machine, dialect, actual)
+            for each, actual in ((text, False), (done.text.decode(), True))
+        )
+        assert off(found[-21:], meant) < 3 * TOLERANCE + ROUNDING
+
+
+def test_a_rapid_whose_own_words_differ_is_refused(machine: Machine) -> None:
+    text = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 Y0 F500\n/G55\nG0 X20 Y25 Z80\nM2\n"
+    assert [each.code for each in fixed(text, machine).report.refused] == ["NCF451"]
+
+
+def test_in_turned_coordinates_such_a_rapid_is_refused(machine: Machine) -> None:
+    text = "G21 G90 G17\nG68 X0 Y0 R30\nG0 X0 Y0 Z0\nG1 X10 Y0 F500\n/G1 X60 Y90\nG0 X20\nG69\nG0 X0 Y0 Z80\nM30\n"
+    refused = fixed(text, machine, "fanuc").report.refused
+    assert [(each.code, each.line) for each in refused][0] == ("NCF451", 6)
+
+
 def test_words_that_only_one_position_needs_are_written(machine: Machine) -> None:
     """Z has to move behind the one, and not behind the other."""
     for way_there in ("/G1 X10.4 Y0.4", "/G1 X-80 Y70", "/G0 X50 Y-60"):

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from itertools import combinations
+from itertools import combinations, repeat
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from ncfix.compensate.solve import (
     differences,
     plan_and_write,
 )
-from ncfix.control.moves import Moves, Trace
+from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.state import BLOCK_DELETE, named_switches
 from ncfix.diagnostics import Message, NcfixError, Place, RefusedError, SourceError, UsageError
@@ -239,7 +239,8 @@ def plan_and_write_all(
     if len(moves) == 1:
         solution = plan_and_write(program, moves[0], machine, options, readings[0], before, first)
         return JointPlan((solution,), solution.emission.splices, solution.emission.added_blocks)
-    refused, whole, spelled = dict[int, Reason](), _starting_elsewhere(moves), dict[int, Mask]()
+    refused, whole = dict[int, Reason](), _starting_elsewhere(moves)
+    spelled, resting = dict[int, Mask](), set[int]()
     while True:
         found: list[WrittenPlan] = []
         for k, own in enumerate(moves):
@@ -248,7 +249,9 @@ def plan_and_write_all(
                 found.append(found[twin])
                 continue
             found.append(
-                plan_and_write(program, _held(own, whole, spelled), machine, options, readings[k], refused=refused)
+                plan_and_write(
+                    program, _held(own, whole, spelled, resting), machine, options, readings[k], refused=refused
+                )
             )
         more = {block: why for each in found for block, why in each.reasons.items()}
         if more.keys() > refused.keys():
@@ -264,22 +267,39 @@ def plan_and_write_all(
             spelled[block] = _named(found, block)
             whole.add(block)
             differing.remove(block)
+        rapids = {block for block in differing - resting if all(map(_only_rapids, moves, repeat(block)))}
+        resting |= rapids
+        differing -= rapids
         deletable = np.array([any(isinstance(item, Skip) for item in each.items) for each in program.templates])
         for block in differing:  # because of the nearest block with a `/` before it, or of that block itself
             causes = np.flatnonzero(deletable[program.template[: block + 1]])
             refused[block] = Reason(DIFFERS, WHY, int(causes[-1]) if causes.size else -1)
 
 
-def _held(moves: Moves, whole: set[int], spelled: Mapping[int, Mask]) -> Moves:
-    """The motions, those of blocks `whole` not to be split, and of `spelled` with words for the axes that need one."""
+def _held(moves: Moves, whole: set[int], spelled: Mapping[int, Mask], resting: set[int]) -> Moves:
+    """The motions, those of blocks `whole` not to be split, and of `spelled` with words for the axes that need one.
+
+    In blocks `resting` axes that have no word get none.
+    """
     if whole:
         moves = replace(moves, compensated=moves.compensated | np.isin(moves.block, list(whole)))
+    if resting:
+        rests = np.isin(moves.block, list(resting))[:, None] & ~moves.programmed
+        moves = replace(moves, resting=rests if moves.resting is None else moves.resting | rests)
     if not spelled:
         return moves
     named = np.zeros(moves.end.shape, dtype=np.bool_)
     for block, axes in spelled.items():
         named[moves.block == block] = axes
     return replace(moves, spelled=named & ~moves.programmed)
+
+
+def _only_rapids(moves: Moves, block: int) -> bool:
+    """Whether a block does nothing but lead axes, each by its own word, in rapids that are corrected."""
+    own = moves.block == block
+    rapid = (moves.kind == MotionKind.RAPID) & (moves.rule == Rule.CORRECT) & ~moves.incremental
+    turned = (np.count_nonzero(moves.frames[k].rotation, axis=1).max() > 1 for k in set(moves.frame[own].tolist()))
+    return bool(rapid[own].all()) and not any(turned)
 
 
 def _named(found: Sequence[WrittenPlan], block: int) -> Mask:
