@@ -44,6 +44,7 @@ class MacroControl(RS274Control):
     defining, definition  P of the tilted plane that is being defined, and its blocks so far by their Q
     dynamic        the work offset turns with the tables (G254 of Haas)
     vectors        the direction of the tool is given by I J K (G43.5)
+    outside        number of the program that the block has called, if that is in the control and not at hand
     """
 
     def __init__(self, run: Run, dialect: Dialect, rules: Rules) -> None:
@@ -59,6 +60,7 @@ class MacroControl(RS274Control):
         self.definition: dict[int, Block] = {}
         self.dynamic = False
         self.vectors = False
+        self.outside = ""
 
     def lasting(self) -> None:
         """Not said."""

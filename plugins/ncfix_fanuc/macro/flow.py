@@ -23,8 +23,8 @@ from ncfix.control.state import NO_MOTION
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
 from ncfix.text.tree import OWordLine as FlowItem
+from ncfix_fanuc.macro.control import MacroControl
 from ncfix_fanuc.macro.variables import number
-from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.parameters import Store
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit, has_words
 
@@ -39,7 +39,7 @@ def is_builders(label: str) -> bool:
     return label.isdigit() and int(label) in LOCKED
 
 
-def ran(control: RS274Control, label: str) -> None:
+def ran(control: MacroControl, label: str) -> None:
     """Such a program has run."""
     control.warn(
         NOT_AT_HAND,
@@ -49,7 +49,7 @@ def ran(control: RS274Control, label: str) -> None:
     control.lose(control.machine, AFTER.format(label=label))
     control.places.lose(mask_of(control.machine))
     control.modal.motion, control.modal.feed, control.modal.cycle.initial = NO_MOTION, math.nan, None
-    control.unwritten = control.unwritten or f"the program O{label} is not at hand"
+    control.outside = label
 
 
 BAD_JUMP = "NCF242"
@@ -171,7 +171,7 @@ class MacroFlow(ProgramFlow[RS274Unit]):
     """Ten of subprograms, five of macros."""
 
     def __init__(
-        self, control: RS274Control, main: RS274Unit, find: Callable[[str], RS274Unit | None], *, in_parts: bool = False
+        self, control: MacroControl, main: RS274Unit, find: Callable[[str], RS274Unit | None], *, in_parts: bool = False
     ) -> None:
         super().__init__(main, control.budget)
         self.control, self.main, self.find = control, main, find

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z, mask_of
 from ncfix.control.expressions import Fault, Unknown, Value, nominal
+from ncfix.control.interpreter import RUNTIME
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
@@ -32,6 +33,7 @@ NO_UNIT = "NCF215"
 NOT_SET = "NCF244"
 BY_ANGLE = "a line that is given by its angle (,A) is not followed"
 AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
+MODAL_CALL = "G66 calls the program O{}, which is not at hand, so the program cannot be written out flat"
 COMMAND_NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
 
@@ -305,6 +307,8 @@ class MacroInterpreter(RS274Interpreter):
                 times, number = divmod(number, LAST_PROGRAM + 1)
             name = str(number)
         self.flow.begin(name, times, None)
+        if self.is_outside() and self.watcher:
+            self.watcher.write(f"M98 P{name}" if times == 1 else f"M98 P{name} L{times}")
         if "Q" in block.values:
             if times != 1:
                 raise Fault(BAD_JUMP, "where a repeated call begins that names a block (Q of M98) is not certain")
@@ -341,6 +345,8 @@ class MacroInterpreter(RS274Interpreter):
         store = local_variables(self.arguments(plan))
         if code == G65:
             self.flow.begin(label, times, store)
+            if self.is_outside() and self.watcher:
+                self.watcher.call(self.flow.unit, self.flow.block - 1)
             return
         if code == G66_1:
             self.control.refuse_rest("a macro is called by every block (G66.1)")
@@ -368,3 +374,10 @@ class MacroInterpreter(RS274Interpreter):
         call = self.modal_calls[-1]
         if len(self.flow.calls) <= call.depth:
             self.flow.begin(call.label, call.times, call.arguments)
+            if self.is_outside() and self.watcher:
+                raise Fault(RUNTIME, MODAL_CALL.format(call.label))
+
+    def is_outside(self) -> bool:
+        """Whether the program that was called just now is in the control; a flat program calls it, too."""
+        label, self.control.outside = self.control.outside, ""
+        return bool(label)

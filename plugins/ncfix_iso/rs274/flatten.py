@@ -30,6 +30,7 @@ CALL_WORDS = frozenset("PLQ")
 KEPT = frozenset({"program name", "control character", "command"})
 """Opaque text that a flat program keeps."""
 
+COMPUTED_CALL = "a macro that is not at hand is called with computed values, so the program cannot be written out flat"
 OTHER_DECIMALS, VARIABLE_DECIMALS = 4, 6
 PLAIN = Spelling()
 LENGTHS = frozenset((*CENTRE_LETTERS, "R", "Q"))
@@ -72,6 +73,16 @@ class RS274Flattener(Flattener):
         for block in range(start, start + count):
             self.watch(unit, block)
             self.put([self.dropped(word) for word in self.template_words() if word.address == "N"])
+
+    def call(self, unit: TextUnit[RS274Plan], block: int) -> None:
+        """The call of a macro that is in the control: as it stands, without its number.
+
+        Raises `Fault` if arguments are computed: what they are computed from falls away.
+        """
+        self.watch(unit, block)
+        if any(not isinstance(word.value, (Literal, Constant)) for word in self.template_words()):
+            raise Fault(RUNTIME, COMPUTED_CALL)
+        self.put([self.dropped(word) for word in self.template_words() if word.address == "N"])
 
     def template_words(self) -> tuple[Word, ...]:
         """The words of the block as they are written."""
