@@ -148,7 +148,8 @@ def test_a_rapid_whose_own_words_differ_is_refused(machine: Machine) -> None:
 def test_in_turned_coordinates_such_a_rapid_is_refused(machine: Machine) -> None:
     text = "G21 G90 G17\nG68 X0 Y0 R30\nG0 X0 Y0 Z0\nG1 X10 Y0 F500\n/G1 X60 Y90\nG0 X20\nG69\nG0 X0 Y0 Z80\nM30\n"
     refused = fixed(text, machine, "fanuc").report.refused
-    assert [(each.code, each.line) for each in refused][0] == ("NCF451", 6)
+    assert refused[0].code == "NCF451"
+    assert refused[0].line == 6
 
 
 def test_words_that_only_one_position_needs_are_written(machine: Machine) -> None:

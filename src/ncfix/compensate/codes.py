@@ -158,8 +158,8 @@ CODES = {
         "or another work offset. A word for it would send it to where the setup says that it is; if that is wrong, "
         "into the part. So it gets none, and the next block that names it gets the whole correction. The same holds "
         "for X and Y (the axes of the plane) in blocks that only move across it under cutter radius compensation, and "
-        "after it until the program names them: the control would offset even the smallest motion by the radius. And for "
-        "rapids behind blocks with `/`, if the axis stands elsewhere where these are skipped.",
+        "after it until the program names them: the control would offset even the smallest motion by the radius. And "
+        "for rapids behind blocks with `/`, if the axis stands elsewhere where these are skipped.",
         "Let the program name X, Y and Z in the first blocks, and again after such a change. At the start `--initial` "
         "with `--offset` and `--tool`, without `--assume-zero`, says it as well.",
     ),
