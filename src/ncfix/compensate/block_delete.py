@@ -240,7 +240,7 @@ def plan_and_write_all(
         solution = plan_and_write(program, moves[0], machine, options, readings[0], before, first)
         return JointPlan((solution,), solution.emission.splices, solution.emission.added_blocks)
     refused, whole = dict[int, Reason](), _starting_elsewhere(moves)
-    spelled, resting = dict[int, Mask](), set[int]()
+    spelled, resting, tried = dict[int, Mask](), set[int](), set[int]()
     while True:
         found: list[WrittenPlan] = []
         for k, own in enumerate(moves):
@@ -267,8 +267,9 @@ def plan_and_write_all(
             spelled[block] = _named(found, block)
             whole.add(block)
             differing.remove(block)
-        rapids = {block for block in differing - resting if all(map(_only_rapids, moves, repeat(block)))}
-        resting |= rapids
+        rapids = {block for block in differing - tried if all(map(_only_rapids, moves, repeat(block)))}
+        tried |= rapids
+        resting = resting - differing | rapids
         differing -= rapids
         deletable = np.array([any(isinstance(item, Skip) for item in each.items) for each in program.templates])
         for block in differing:  # because of the nearest block with a `/` before it, or of that block itself
