@@ -8,8 +8,8 @@ CODES: dict[str, Code] = {
     "NCF201": Code(
         "Work offset not given",
         "The program moves in a coordinate system (G54 ... G59.3) whose offset is set on the control. A correction "
-        "depends on where the axes stand, so it has to be known. A program that moves before it calls one is in that of "
-        "the control's start: G54, on SINUMERIK G500, which is zero unless there is a basic offset.",
+        "depends on where the axes stand, so it has to be known. A program that moves before it calls one is in that "
+        "of the control's start: G54, on SINUMERIK G500, which is zero unless there is a basic offset.",
         "--offset G54=x,y,z, or work_offsets in the setup file; --assume-zero takes what is missing as zero.",
     ),
     "NCF202": Code(
