@@ -262,3 +262,21 @@ def test_tables_do_not_take_the_place_of_inputs(shop: Any, ncfix: Any, tables: P
     result = ncfix("export", "linuxcnc", "-m", machine, "-o", tables, "--force")
     assert (result.code, "NCF005" in result.err) == (ExitCode.USAGE, True)
     assert machine.read_bytes() == Path(shop.machine).read_bytes()
+
+
+def test_tables_hold_for_the_temperature_that_is_given(shop: Any, ncfix: Any) -> None:
+    """No table follows a temperature: export asks for it, and emulate says what is left at another one."""
+    warm = 'times = "temp_x"\ntimes_center = 20\ntimes_scale = 1\n'
+    grows = f'[[effect]]\nname = "EXX"\nbasis = "polynomial"\ndegree = [1]\n{warm}coefficients = [1e-5]\n'
+    shop.machine.write_text(shop.machine.read_text() + grows)
+    at = ("-m", shop.machine, "--input", "temp_x=22")
+    assert "NCF340" in ncfix("export", "linuxcnc", "-m", shop.machine, "-o", shop.folder / "none").err
+    made = ncfix("export", "linuxcnc", *at, "-o", shop.folder / "t", "--json").json()
+    assert made["residual_um"]["before"]["max"] == pytest.approx(60, abs=0.1)  # 50 um, and 2 K of 10 um/m on 500 mm
+    assert made["residual_um"]["after"]["max"] < 0.002
+    assert any("temp_x = 22" in note for note in made["notes"])
+    assert ncfix("emulate", "linuxcnc", shop.folder / "t", *at).code == ExitCode.DONE
+    other = ("emulate", "linuxcnc", shop.folder / "t", "-m", shop.machine, "--input", "temp_x=24", "--json")
+    assert "NCF487" in ncfix(*other).err
+    left = ncfix(*other, "--other-machine").json()["residual_um"]["after"]["max"]
+    assert left == pytest.approx(10, abs=0.1)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ncfix.machine import State, loads
-from ncfix.machine.effects import effect_curves, tip_curves
+from ncfix.machine import State, load, loads
+from ncfix.machine.effects import at_inputs, effect_curves, library, rest_of, tip_curves
 
 MACHINE = """
 ncfix = 1
@@ -79,3 +80,31 @@ def test_drifts_are_what_the_machine_does(root: Path) -> None:
         q[:, index] = [limit * machine.axes[index].unit for limit in (drift.x[0], drift.x[-1])]
         error = machine.actual_tip(q, State(tool_length=50.0, direction=1)) - machine.tip(q, 50.0)
         assert drift.error[[0, -1]] == pytest.approx(error, abs=1e-12)
+
+
+def test_a_machine_at_given_inputs_has_the_same_errors(root: Path) -> None:
+    """Every physical effect that follows a signal: at a fixed value it is the same error without the signal."""
+    start = load(root / "examples/machines/wCAYFXZSt.toml")
+    effects = [effect for each in library(start).values() for effect in each.effects]
+    rng = np.random.default_rng(1)
+    sized = [replace(each, coefficients=tuple(1e-5 * rng.standard_normal(each.basis.size))) for each in effects]
+    following = [each for each in sized if start.replace(effects=(each,)).inputs]
+    assert len(following) > 10
+    known = start.replace(effects=tuple(following))
+    values = {name: float(20 + 5 * rng.random()) for name in sorted(known.inputs)}
+    fixed = at_inputs(known, values)
+    assert not fixed.inputs
+    low, high = np.nan_to_num(known.ranges, posinf=3.0, neginf=-3.0).T
+    q = low + (high - low) * rng.random((50, len(low)))
+    way = rng.integers(-1, 2, q.shape).astype(float)
+    expected = known.error(q, State(120.0, way, {name: np.full(50, value) for name, value in values.items()}))
+    assert np.abs(fixed.error(q, State(120.0, way)) - expected).max() < 1e-12
+    assert at_inputs(start, values) is start
+
+
+def test_curves_are_drawn_where_thermal_effects_rest(root: Path) -> None:
+    start = load(root / "examples/machines/three_axis.toml").replace(effects=())
+    warm = start.replace(effects=library(start)["expansion-X"].effects)
+    warm = warm.replace(effects=tuple(replace(each, coefficients=(1e-5,)) for each in warm.effects))
+    assert rest_of(warm) == {"temp_x": 20.0}
+    assert max(float(np.abs(each.error).max()) for each in tip_curves(warm)) == 0

@@ -49,14 +49,21 @@ def table_request(
     ranges: Mapping[str, tuple[float, float]] | None,
     settings: Mapping[str, str],
     complete: bool = True,
+    inputs: Mapping[str, float] | None = None,
 ) -> Request:
-    """What to make tables of; ranges in mm and rad. `complete`: options without a default must be given."""
+    """What to make tables of; ranges in mm and rad.
+
+    complete  options without a default must be given
+    inputs    what temperatures and the like are: tables follow none, and hold for these values
+    """
+    from ncfix.machine.effects import at_inputs
     from ncfix.tables.control import Request
     from ncfix.tables.correction import ranges_of
 
     space = ranges_of(machine, dict(ranges or {}))
     options = control.settings(settings, complete=complete)
-    return Request(machine, space, tool_length, 1e-3 * target_um, options)
+    held = {name: value for name, value in (inputs or {}).items() if name in machine.inputs}
+    return Request(at_inputs(machine, held), space, tool_length, 1e-3 * target_um, options, held)
 
 
 def export(
@@ -80,6 +87,7 @@ def export(
     ranges       axis -> what the tables cover, mm and rad; others: the travel
     settings     options of the control
     program      a program to run with them, with its `setup`; for gcode, to rewrite
+    setup        its `inputs` are what the tables hold for: temperatures and the like, which no table follows
     output       a folder for the files
     """
     from ncfix.tables.control import get_control
@@ -89,7 +97,9 @@ def export(
     if output is not None:
         check_folder(os.fspath(output))
     known = sound_machine(machine, force)
-    made = exported(chosen, table_request(chosen, known, tool_length, target_um, ranges, settings or {}))
+    inputs = as_setup(setup, known).inputs
+    request = table_request(chosen, known, tool_length, target_um, ranges, settings or {}, inputs=inputs)
+    made = exported(chosen, request)
     if program is not None:
         made = with_program(made, chosen, *_to_run(program, known, setup), rewrite=True)
     if output is not None:
@@ -113,7 +123,10 @@ def emulate(
     other_machine  run tables that were made for another machine or other errors
     name           what the folder is called in messages, if files are given
     program        a program to run with them, with its `setup`
+    setup          its `inputs` are what temperatures and the like are; with other ones than `export` had it is another
+                   machine
     """
+    from ncfix.machine.effects import at_inputs
     from ncfix.tables.control import get_control
     from ncfix.tables.export import emulate as emulated
 
@@ -122,7 +135,7 @@ def emulate(
         name = os.fspath(tables)
         tables = read_folder(name)
     known = as_machine(machine)
-    found = emulated(chosen, tables, known, name, other_machine)
+    found = emulated(chosen, tables, at_inputs(known, as_setup(setup, known).inputs), name, other_machine)
     return found if program is None else with_program(found, chosen, *_to_run(program, known, setup))
 
 

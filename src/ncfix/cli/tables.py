@@ -107,7 +107,8 @@ def export(
     sound(machine, machine_path, force)
     covered = given_ranges(machine, ranges)
     pairs = dict(_pair(each, "--set NAME=VALUE") for each in settings)
-    request = table_request(chosen, machine, tool_length, target_um, covered, pairs, complete=not probe)
+    held = following.setup.inputs
+    request = table_request(chosen, machine, tool_length, target_um, covered, pairs, not probe, held)
     if probe:
         found = called("controls", chosen.name, chosen.probe, request, gives=Written)
         files.write_folder(output, found.files, force, inputs)
@@ -221,7 +222,8 @@ def emulate(
     with console.busy("running the tables"):
         try:
             name = folder.rstrip(os.sep)
-            found = ncfix.emulate(chosen, content, following.machine, other_machine=other_machine, name=name)
+            machine, setup = following.machine, following.setup
+            found = ncfix.emulate(chosen, content, machine, other_machine=other_machine, name=name, setup=setup)
         except ConfigError as error:
             raise ConfigError.collected(_below(folder, error.messages, content)) from error
         if program is not None:

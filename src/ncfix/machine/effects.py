@@ -8,17 +8,17 @@ section 2.5, rule 1).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 from math import nan
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, is_arm
-from ncfix.machine.basis import SMOOTH, Backlash, Basis, Fourier, Periodic, Polynomial
+from ncfix.machine.basis import SMOOTH, Backlash, Basis, ConstantBasis, Fourier, Periodic, Polynomial
 from ncfix.machine.error_model import dependence_of, signals_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.piecewise import PIECEWISE
@@ -34,6 +34,7 @@ LEVER = 100.0
 STATES_S = (900.0, 7200.0)
 """Time constants of thermal states, s: where their estimation begins."""
 LINEAR = Polynomial(degree=(1,))
+NO_TIMES: Mapping[str, Any] = {"times": None, "times_center": None, "times_scale": None}
 
 
 class PluginEffect(Protocol):
@@ -272,6 +273,44 @@ def functions_at(machine: Machine, effect: Effect, q: Array, state: State, input
     return dependence_of(machine.axes, effect).rows(poses)
 
 
+def at_inputs(machine: Machine, inputs: Mapping[str, float]) -> Machine:
+    """The machine while inputs such as temperatures stay at these values: effects no longer depend on them.
+
+    Lags are over. Inputs that the machine does not have do nothing; effects that depend on others stay as they are.
+    """
+    if machine.inputs.isdisjoint(inputs):
+        return machine
+    return machine.replace(effects=tuple(_at_inputs(effect, inputs) for effect in machine.effects))
+
+
+def _at_inputs(effect: Effect, inputs: Mapping[str, float]) -> Effect:
+    if effect.times is not None and effect.times in inputs:
+        center, scale = _of_times(effect)
+        factor = (inputs[effect.times] - center) / scale
+        spread = effect.covariance and tuple(tuple(factor**2 * value for value in row) for row in effect.covariance)
+        coefficients = tuple(factor * value for value in effect.coefficients)
+        effect = replace(effect, coefficients=coefficients, covariance=spread, **NO_TIMES)
+    if effect.input is None or effect.input not in inputs or effect.basis.needs_direction:
+        return effect
+    low, high = effect.range or (-np.inf, np.inf)
+    u = (np.clip(inputs[effect.input], low, high) - effect.center) / effect.scale
+    rows = effect.basis.rows(np.array([u]), np.zeros(1))[:, 0]
+    value = float(np.asarray(effect.coefficients) @ rows)
+    spread = None if effect.covariance is None else ((float(rows @ np.asarray(effect.covariance) @ rows),),)
+    fixed = replace(effect, coefficients=(value,), covariance=spread, range=None, input=None, time_constant_s=None)
+    if effect.times is None:
+        return replace(fixed, basis=ConstantBasis(), center=0.0, scale=1.0)
+    center, scale = _of_times(effect)
+    over = None if effect.times == effect.name[2:] else effect.times
+    return replace(fixed, basis=LINEAR, center=center, scale=scale, input=over, **NO_TIMES)
+
+
+def _of_times(effect: Effect) -> tuple[float, float]:
+    """Centre and scale of the second signal."""
+    center = effect.center if effect.times_center is None else effect.times_center
+    return center, effect.scale if effect.times_scale is None else effect.times_scale
+
+
 def with_unit(machine: Machine, name: str) -> str:
     """The name of an axis with the unit of its positions; that of a signal as it is."""
     units = {axis.name: "degree" if axis.rotary else "mm" for axis in machine.axes}
@@ -360,13 +399,24 @@ def effect_curves(machine: Machine, effect: Effect) -> list[EffectCurve]:
     return []
 
 
+def rest_of(machine: Machine) -> dict[str, float]:
+    """For each input the value at which its effects are zero: the `center` of the first that has it."""
+    found: dict[str, float] = {}
+    for effect in machine.effects:
+        for name, value in ((effect.times, _of_times(effect)[0]), (effect.input, effect.center)):
+            if name is not None and name in machine.inputs:
+                found.setdefault(name, value)
+    return {name: found.get(name, 0.0) for name in sorted(machine.inputs)}
+
+
 def tip_curves(machine: Machine, tool_length: float = 0.0) -> list[TipCurve]:
-    """The error of the tip along each axis; of approach from below, and with all inputs at zero."""
+    """The error of the tip along each axis; of approach from below, and with all inputs at rest."""
     found = []
+    inputs = rest_of(machine)
     for index, axis in enumerate(machine.axes):
         q = _moved(machine, index)
         if q is not None and np.isfinite(q).all():
-            state = State(tool_length=tool_length, direction=1, inputs=dict.fromkeys(machine.inputs, 0.0))
+            state = State(tool_length=tool_length, direction=1, inputs=inputs)
             error = machine.actual_tip(q, state) - machine.tip(q, tool_length)
             found.append(TipCurve(axis.name, q[:, index] / axis.unit, error))
     return found

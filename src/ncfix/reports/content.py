@@ -13,6 +13,7 @@ from ncfix.machine.effects import (
     effect_curves,
     extent,
     facts,
+    rest_of,
     tip_curves,
     title_of,
     travel_of,
@@ -55,8 +56,10 @@ def machine_sections(machine: Machine, path: str) -> list[ReportSection]:
         return [head, ReportSection("Errors", [Paragraph("None: a perfect machine.")])]
     words = (
         "Actual minus nominal position of the tool tip in the workpiece frame, as one axis moves and the others stand "
-        "in the middle of their travel; tool length zero, approached from below."
+        "in the middle of their travel; tool length zero, approached from below"
     )
+    rest = ", ".join(f"{name} at {value:g}" for name, value in rest_of(machine).items())
+    words += f"; {rest}." if rest else "."
     tip = ReportSection("Error of the tool tip", [Paragraph(words), *_tip_plots(machine)])
     rows = [
         (effect.name, title_of(machine, effect), depends_on(effect), _size(machine, effect))

@@ -129,6 +129,7 @@ class Request:
     tool_length  the length for which they hold, mm
     target       how much correction may be lost between nodes, mm
     settings     the control's options, all of them
+    inputs       what temperatures and the like were taken to be for the machine's errors
 
     Raises `UsageError` NCF025.
     """
@@ -138,6 +139,7 @@ class Request:
     tool_length: float
     target: float
     settings: Mapping[str, str] = field(default_factory=dict)
+    inputs: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         TOOL_LENGTH.check("tool_length", self.tool_length)

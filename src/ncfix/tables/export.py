@@ -113,7 +113,10 @@ def check_origin(manifest: Manifest, control: str, machine: Machine | None, path
         raise RefusedError.of("NCF487", text, place, hint)
     if machine is not None and manifest.hash != machine.hash:
         text = f"these tables were made for another machine, or for other errors of it: {manifest.machine}"
-        raise RefusedError.of("NCF487", text, place, "export them again for this machine file, or say --other-machine")
+        hint = "export them again for this machine file, or say --other-machine"
+        if machine.inputs:
+            hint = f"give {', '.join(sorted(machine.inputs))} with --input as export had it, or {hint}"
+        raise RefusedError.of("NCF487", text, place, hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,6 +191,8 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     made = Manifest(control.name, *of_machine, request.tool_length, dict(request.settings), hashes)
     sheet = as_markdown(control, request, tables, left, written)
     said = {"ncfix": __version__, **control.described(), "residual_um": left.figures(), "notes": written.notes}
+    if request.inputs:
+        said["inputs"] = dict(request.inputs)
     if written.least:
         said["least_um"] = {"max": 1e3 * written.least.value, "why": written.least.why}
     more = {SIDE_FILE: made.as_bytes(**said), f"{SHEET}.md": sheet.encode(), f"{SHEET}.html": as_html(sheet).encode()}
@@ -267,6 +272,12 @@ def _remarks(control: Control, request: Request, tables: Tables, left: Residual,
         text = f"{name} turns without end and these tables do not repeat: they hold while the control counts it from "
         text += f"{covered}; elsewhere {control.properties.extrapolation}"
         yield f"{text}. --range {name}=LOW,HIGH makes them for other counts."
+    if request.inputs:
+        known = ", ".join(f"{name} = {value:g}" for name, value in request.inputs.items())
+        again = (
+            f"ncfix emulate --other-machine --input {next(iter(request.inputs))}=VALUE says what they leave elsewhere"
+        )
+        yield f"They hold for {known}: no table follows it. {again}."
     if not control.any_tool and not request.tool_length and machine.depends_on_tool_length:
         yield "They are for a tool of no length: --tool-length was not given, and the error depends on it."
 
