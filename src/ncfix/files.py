@@ -55,13 +55,13 @@ UNKNOWN = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
-class Whole:
+class WholeFile:
     """All that stands in an open file."""
 
     handle: IO[bytes]
 
     @classmethod
-    def of(cls, parts: Iterable[bytes], handle: IO[bytes]) -> Whole:
+    def of(cls, parts: Iterable[bytes], handle: IO[bytes]) -> WholeFile:
         """Parts, put into an empty file as they come."""
         at = 0
         for part in parts:
@@ -311,12 +311,12 @@ def _put(folder: int, name: str, data: bytes | Iterable[bytes], like: Like, repl
 @contextmanager
 def _without_a_name(folder: int, data: bytes | Iterable[bytes], like: Like) -> Iterator[int | None]:
     """A file with this content and no name, on the disk; None where there is no such thing."""
-    handle = os.dup(data.handle.fileno()) if isinstance(data, Whole) else _new_without_a_name(folder)
+    handle = os.dup(data.handle.fileno()) if isinstance(data, WholeFile) else _new_without_a_name(folder)
     if handle is None:
         yield None
         return
     try:
-        if not isinstance(data, Whole):
+        if not isinstance(data, WholeFile):
             _fill(handle, data)
         _make_like(handle, like)
         os.fsync(handle)

@@ -88,7 +88,7 @@ def test_a_file_without_a_name_is_given_one_and_not_copied(tmp_path: Path) -> No
     usual.touch()
     with files.unnamed(str(tmp_path)) as kept:
         kept.write(NEW)
-        files.write_whole(str(target), files.Whole(kept))
+        files.write_whole(str(target), files.WholeFile(kept))
         assert os.fstat(kept.fileno()).st_ino == target.stat().st_ino
         assert target.stat().st_mode == usual.stat().st_mode
     assert target.read_bytes() == NEW
@@ -106,7 +106,7 @@ def test_a_file_that_cannot_be_given_a_name_is_copied(
     monkeypatch.setattr(files, "_named", lambda *_: False)
     with files.unnamed(folder) as kept:
         kept.write(NEW)
-        files.write_whole(str(target), files.Whole(kept), replace=True)
+        files.write_whole(str(target), files.WholeFile(kept), replace=True)
     assert target.read_bytes() == NEW
     assert stat.S_IMODE(target.stat().st_mode) == 0o640
 
@@ -118,7 +118,7 @@ def test_a_full_disk_leaves_no_torn_copy_of_a_file_without_a_name(
     monkeypatch.setattr(files, "_named", lambda *_: False)
     with files.unnamed(str(tmp_path)) as kept:
         kept.write(NEW)
-        write = lambda: files.write_whole(str(target), files.Whole(kept), replace=True)  # noqa: E731
+        write = lambda: files.write_whole(str(target), files.WholeFile(kept), replace=True)  # noqa: E731
         for _ in fail_at_every_call(monkeypatch, lambda: target.write_bytes(OLD) and None, write):
             assert target.read_bytes() in (OLD, NEW)
             assert [path.name for path in tmp_path.iterdir()] == ["out.ngc"]

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ncfix.cli.following import Following
+from ncfix.cli.following import FollowingSetup
 from ncfix.diagnostics import ExitCode
 
 HEAD = ["%", "(LONG)", "G21 G90 G94 G54 G17 F900.", "G0 X10. Y20. Z5."]
@@ -43,7 +43,7 @@ def check(ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
 @pytest.fixture
 def only_in_parts(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Nothing may be checked as a whole."""
-    monkeypatch.setattr(Following, "checked", never)
+    monkeypatch.setattr(FollowingSetup, "checked", never)
     return monkeypatch
 
 

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ncfix.compensate.figures.comparison import Cut, SideBySide
-from ncfix.compensate.figures.simulation import Along
+from ncfix.compensate.figures.comparison import CutPath, RunningComparison
+from ncfix.compensate.figures.simulation import SimulatedErrors
 from ncfix.compensate.plan.intent import Intent
 from ncfix.control.moves import Moves
 from ncfix.machine import Machine, State
@@ -20,25 +20,25 @@ NEAR = 1e-5
 
 def compared(
     machine: Machine, original: Moves, other: Moves, near: float = NEAR, parts: int = 1
-) -> tuple[Along, Along, Along]:
+) -> tuple[SimulatedErrors, SimulatedErrors, SimulatedErrors]:
     """How far the original is from what it means, the other one from that, and that from the other one.
 
     Lines are the rows of the motions. Raises `DifferenceError` NCF420 if the two are not the same cut at all.
 
     parts  in how many both are given, one after the other
     """
-    found = SideBySide(near, 0.0)
+    found = RunningComparison(near, 0.0)
     found.run(divided(cut(machine, original, meant=True), parts), divided(cut(machine, other, meant=False), parts))
     before, there, back = found.matches
     return before.along, there.along, back.along
 
 
-def cut(machine: Machine, moves: Moves, meant: bool) -> Cut:
+def cut(machine: Machine, moves: Moves, meant: bool) -> CutPath:
     """What motions cut, at once."""
-    return Cut.of(Intent(machine, moves, State()), np.arange(len(moves)), slice(None), True, meant)
+    return CutPath.of(Intent(machine, moves, State()), np.arange(len(moves)), slice(None), True, meant)
 
 
-def divided(whole: Cut, parts: int) -> Iterator[Cut]:
+def divided(whole: CutPath, parts: int) -> Iterator[CutPath]:
     """The same in so many parts."""
     for begin, end in pairwise(np.linspace(0, 1, parts + 1)):
         actual, intended = (

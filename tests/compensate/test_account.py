@@ -18,9 +18,9 @@ from ncfix.compensate.account import (
     REFUSED,
     UNKNOWN,
     Account,
-    Left,
+    LeftAxis,
+    NoFigureReason,
     Reason,
-    Why,
     either,
     in_stretches,
     joined,
@@ -48,8 +48,8 @@ def mask(*rows: int) -> np.ndarray:
     return np.array(rows, dtype=bool)
 
 
-def left(axis: str = "X", motions: int = 1, cuts: int = 0, lines: Any = ((4, 4),), most: float = 0.002) -> Left:
-    return Left(axis, axis in "ABC", motions, cuts, tuple(lines), most)
+def left(axis: str = "X", motions: int = 1, cuts: int = 0, lines: Any = ((4, 4),), most: float = 0.002) -> LeftAxis:
+    return LeftAxis(axis, axis in "ABC", motions, cuts, tuple(lines), most)
 
 
 def test_a_block_is_refused_before_it_is_passed_before_it_is_corrected() -> None:
@@ -87,7 +87,7 @@ def test_of_several_ways_through_a_program_the_worst_counts() -> None:
 def test_the_rule_of_a_motion_is_named(rule: Pass) -> None:
     moves = moved([FEED, FEED], passing=np.array([Pass.NONE, rule], dtype=np.int8))
     assert rule_of(moves, 1) == (PASS_RULES[rule].name, PASS_RULES[rule].cuts)
-    assert rule_of(moves, 0) == rule_of(moved([FEED]), 0) == Why(BY_RULE, True)
+    assert rule_of(moves, 0) == rule_of(moved([FEED]), 0) == NoFigureReason(BY_RULE, True)
 
 
 def test_each_motion_without_a_figure_is_counted_once_by_its_first_reason() -> None:
@@ -125,9 +125,13 @@ def test_what_a_look_along_the_path_leaves_out() -> None:
     )
     moves.start[4] = moves.end[3] = moves.start[2] = np.nan
     found = {why: rows.tolist() for why, rows in not_looked_at(moves).items()}
-    assert found == {Why(BY_RULE, True): [0], Why(MEASURED, False): [1], Why(UNKNOWN, True): [3]}
+    assert found == {
+        NoFigureReason(BY_RULE, True): [0],
+        NoFigureReason(MEASURED, False): [1],
+        NoFigureReason(UNKNOWN, True): [3],
+    }
     moves.end[4] = moves.start[5] = np.nan
-    assert not_looked_at(moves)[Why(UNKNOWN, True)].tolist() == [3, 4, 5]
+    assert not_looked_at(moves)[NoFigureReason(UNKNOWN, True)].tolist() == [3, 4, 5]
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 
 from compensate.side import compared
 from compensate.test_comparison import fixed, moves_of
-from ncfix.compensate.figures.backlash import Bodies
+from ncfix.compensate.figures.backlash import BacklashBodies
 from ncfix.compensate.figures.curve import Stretches
 from ncfix.compensate.plan.intent import Intent
 from ncfix.control.moves import MotionKind, Moves
@@ -192,5 +192,5 @@ def test_play_that_is_taken_up_where_a_motion_ends_divides_none(machine: Machine
     intent = Intent(
         alone, moves_of("\n".join(["G21 G90 G94 G17 F900", "G0 X5 Y5 Z5", *steps, "M2", ""]), alone), State()
     )
-    stretches = Bodies.of(intent, Stretches.of(intent), None).divided()
+    stretches = BacklashBodies.of(intent, Stretches.of(intent), None).divided()
     assert (stretches.stop - stretches.start).min() > 1e-6

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compensate.side import compared
-from ncfix.compensate.figures.simulation import Along, TipError, tip_errors
+from ncfix.compensate.figures.simulation import SimulatedErrors, TipError, tip_errors
 from ncfix.compensate.following import follow
 from ncfix.compensate.plan.intent import Intent
 from ncfix.control.moves import Moves
@@ -47,34 +47,36 @@ def error(machine: str, text: str) -> TipError:
     return found
 
 
-def figures(machine: str, text: str) -> Along:
-    return Along.of(errors(machine, text))
+def figures(machine: str, text: str) -> SimulatedErrors:
+    return SimulatedErrors.of(errors(machine, text))
 
 
 def test_the_error_at_every_sample_is_that_of_its_place() -> None:
     found = error(LONG, "G0 X10 Y0 Z0\nG1 X110\nY50\nG3 X110 Y70 J10\n")
     assert np.allclose(found.size, 1e-4 * found.intended[:, 0], atol=1e-12)
     assert np.allclose(found.actual - found.intended, found.size[:, None] * [1, 0, 0], atol=1e-12)
-    assert Along.of([found]).max == pytest.approx(1e-4 * 120.0, rel=1e-3)
+    assert SimulatedErrors.of([found]).max == pytest.approx(1e-4 * 120.0, rel=1e-3)
 
 
 def test_weights_are_the_length_of_the_path() -> None:
     found = error(LONG, "G0 X10 Y0 Z0\nG1 X110\nG0 Z50\nG1 Y50\n")
     assert found.weight.sum() == pytest.approx(150.0)
     # 100 mm with x from 10 to 110, 50 mm at 110; the trapezoidal rule over 5 stretches is within 1 %
-    assert Along.of([found]).rms == pytest.approx(1e-4 * np.sqrt(((110**3 - 10**3) / 3 + 50 * 110**2) / 150), rel=0.01)
+    assert SimulatedErrors.of([found]).rms == pytest.approx(
+        1e-4 * np.sqrt(((110**3 - 10**3) / 3 + 50 * 110**2) / 150), rel=0.01
+    )
 
 
 def test_a_kink_is_not_stepped_over() -> None:
     found = error(STEP, "G0 X0 Y0 Z0\nG1 X50.5\n")
-    assert Along.of([found]).max == pytest.approx(0.01, rel=1e-6)
+    assert SimulatedErrors.of([found]).max == pytest.approx(0.01, rel=1e-6)
     assert np.isclose(found.intended[:, 0], 50.0, atol=1e-6).any()
 
 
 def test_rapids_do_not_count_and_cycles_count_at_their_end() -> None:
     found = error(LONG, "G0 X10 Y0 Z5\nG0 X400\nG98 G81 X100 Y10 Z-5 R2 F100\nG80\n")
     assert found.intended.tolist() == [[100.0, 10.0, -5.0]]
-    assert Along.of([found]).max == pytest.approx(0.01)
+    assert SimulatedErrors.of([found]).max == pytest.approx(0.01)
 
 
 def test_a_program_that_cuts_nothing_has_no_error() -> None:
@@ -88,7 +90,7 @@ def test_figures_are_the_same_to_the_last_bit_in_whatever_parts(unknown: tuple[i
     rng = np.random.default_rng(3)
     lines, size, weight = np.arange(1000) // 3, rng.exponential(size=1000), rng.random(1000)
     size[list(unknown)] = np.nan
-    whole, parts = Along(1.0), Along(1.0)
+    whole, parts = SimulatedErrors(1.0), SimulatedErrors(1.0)
     whole.add(lines, size, weight)
     cuts = [0, 0, 1, 250, 251, 600, 1000]
     for start, stop in pairwise(cuts):

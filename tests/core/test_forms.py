@@ -81,7 +81,7 @@ def test_machines(seed: int) -> None:
 def test_programs_of_other_controls(source: bytes, dialect: str, root: Path) -> None:
     assert fixed(source, load(root / "benchmarks/five_axis.toml"), dialect)
     assert CALLS["chain.tips"]
-    assert CALLS["words.Pen.write"]
+    assert CALLS["words.WordPrinter.write"]
 
 
 @pytest.mark.parametrize("folder", ["linuxcnc", "fanuc", "heidenhain"])

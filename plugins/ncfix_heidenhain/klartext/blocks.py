@@ -19,7 +19,7 @@ from ncfix import core
 from ncfix.control.expressions import Fault, Unknown
 from ncfix.text.build import MAX_DEPTH, Branch, Node, Parsed, TooDeepError, TreeBuilder, edges, kind, tokens_of
 from ncfix.text.dialect import Dialect
-from ncfix.text.grammar import Squeezed, parse
+from ncfix.text.grammar import UnspacedBlock, parse
 from ncfix.text.numbers import POINT, SIGN, table
 from ncfix.text.reach import UNREAD
 from ncfix.text.shapes import (
@@ -256,9 +256,9 @@ def remark_block(text: str, match: re.Match[str]) -> Parsed:
     return Parsed(Template(items, len(spans)), spans, values, comment)
 
 
-def identity(text: str) -> Squeezed:
+def identity(text: str) -> UnspacedBlock:
     """A block of which nothing was taken out."""
-    return Squeezed(text, list(range(len(text))))
+    return UnspacedBlock(text, list(range(len(text))))
 
 
 def built(tree: Branch, text: str) -> Parsed:

@@ -219,7 +219,7 @@ def circles_of(
     """
     shapes, count = unit.program.template[start : start + len(motion)], len(motion)
     rows = np.flatnonzero((unit.lanes.arc != "")[shapes])
-    offset, found, swung = control.offset, [], Swung(unit, path, shapes)
+    offset, found, swung = control.offset, [], PolarArcEnds(unit, path, shapes)
     for row, arc in zip(rows.tolist(), arcs_of(control, unit, start, shapes, rows, motion), strict=True):
         x, y, z = path[row, :3].tolist()
         begin = x - offset[X], y - offset[Y]
@@ -308,7 +308,7 @@ def circle(control: KlartextControl, arc: ArcBlock, begin: Point, end: Point) ->
     return centre, arc.value * DEGREE
 
 
-class Swung:
+class PolarArcEnds:
     """Where arcs end that say so by an angle: from there on X and Y stand there, until the next word.
 
     path  (n + 1, 9) as in `circles_of`

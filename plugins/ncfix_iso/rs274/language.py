@@ -16,7 +16,7 @@ from ncfix.plugins import working
 from ncfix.text.build import Parsed, TooDeepError, build, check_exponents, check_numbers, start_of
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, bare_expression, explain
-from ncfix.text.grammar import Squeezed, parse, squeeze
+from ncfix.text.grammar import UnspacedBlock, parse, squeeze
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
 from ncfix.text.reach import tape_end
@@ -62,7 +62,7 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
     return parsed
 
 
-def check_products(squeezed: Squeezed) -> None:
+def check_products(squeezed: UnspacedBlock) -> None:
     """Refuse `X#1*2`: it would be read as X#1 and a check number, which no program with parameters has."""
     if found := PRODUCT.search(squeezed.code):
         raise bare_expression(squeezed.places[found.start("operator")])

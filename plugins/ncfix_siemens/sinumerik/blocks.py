@@ -29,7 +29,7 @@ from ncfix.text.build import (
 )
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError
-from ncfix.text.grammar import Squeezed, parse
+from ncfix.text.grammar import UnspacedBlock, parse
 from ncfix.text.tree import (
     END,
     START,
@@ -65,7 +65,7 @@ def build(tree: Branch, text: str) -> Parsed:
     tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
     spans = tuple(edges(token) for token in tokens)
     slots = {edges(token): slot for slot, token in enumerate(tokens)}
-    whole = Squeezed(text, list(range(len(text) + 1)))
+    whole = UnspacedBlock(text, list(range(len(text) + 1)))
     builder = SinumerikBuilder(text, whole, slots, tuple(stop for _, stop in spans))
     items = tuple(builder.block(tree))
     last = tree.children[-1] if tree.children else None

@@ -30,7 +30,7 @@ from ncfix.text.tree import (
 )
 from ncfix_siemens.sinumerik.cycles import PATTERNS
 from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
-from ncfix_siemens.sinumerik.plans import ANY_PARAMETER, Calling, Letting, names_in
+from ncfix_siemens.sinumerik.plans import ANY_PARAMETER, AssignedVariable, Calling, names_in
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
@@ -86,7 +86,9 @@ class SinumerikFlattener(Flattener):
 
     def assignment(self, item: Assignment) -> Change | None:
         """What becomes of an assignment; the block has been executed, so the variable has its value already."""
-        step = next(step for step in self.turn.plan.steps if isinstance(step, Letting) and step.span == item.span)
+        step = next(
+            step for step in self.turn.plan.steps if isinstance(step, AssignedVariable) and step.span == item.span
+        )
         variables = self.control.variables
         if variables.scope_of(step.name) is not None:
             return self.dropped(item)

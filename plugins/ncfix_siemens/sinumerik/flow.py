@@ -10,7 +10,7 @@ from ncfix.control.expressions import Evaluate, Fault, Unknown, Value, number
 from ncfix.control.flow import NO_LABEL, Jump, Let, OpenCall, Operation, ProgramFlow, Repeat
 from ncfix.text.tree import Expression, NamedParameter, NumberedParameter
 from ncfix_siemens.sinumerik.expressions import Key, Local, compiled
-from ncfix_siemens.sinumerik.plans import Branching, Letting
+from ncfix_siemens.sinumerik.plans import AssignedVariable, Branching
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import BROKEN, SinumerikUnit
 
@@ -180,7 +180,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
 
     # -- variables ----------------------------------------------------------------------------------------------------
 
-    def let(self, step: Letting) -> None:
+    def let(self, step: AssignedVariable) -> None:
         """Give a variable its value."""
         variables = self.control.variables
         if step.value is None:

@@ -29,7 +29,7 @@ from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
 from ncfix_siemens.sinumerik.motion import is_harmless, watch
 from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
-from ncfix_siemens.sinumerik.plans import Branching, Calling, Letting, SinumerikPlan, is_statement
+from ncfix_siemens.sinumerik.plans import AssignedVariable, Branching, Calling, SinumerikPlan, is_statement
 from ncfix_siemens.sinumerik.scanning import all_or_none
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn, act, call_word, finish_block, ran_elsewhere, say
@@ -210,9 +210,9 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         for step in plan.steps:
             self.span = step.span
             match step:
-                case Letting(name) if name in BY_THEMSELVES:
+                case AssignedVariable(name) if name in BY_THEMSELVES:
                     let_axis_go(control, turn, step)
-                case Letting():
+                case AssignedVariable():
                     note_letting(control, turn, step)
                     flow.let(step)
                 case Calling():
@@ -291,7 +291,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
 # -- what the run decides ----------------------------------------------------------------------------------------------
 
 
-def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
+def let_axis_go(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
     """POS[X]=.. and its like: an axis that moves by itself; where it arrives is not followed."""
     name = step.index[0](control) if step.index else None
     known = isinstance(name, str) and name in INDEX and INDEX[name] in control.machine
@@ -314,7 +314,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
         control.refuse_rest(f"{why} is not followed")
 
 
-def follow_polynomial(control: Sinumerik, turn: Turn, step: Letting, letter: str | None) -> None:
+def follow_polynomial(control: Sinumerik, turn: Turn, step: AssignedVariable, letter: str | None) -> None:
     """PO[X]=(end, a2, a3): the axis ends where the first number says; without one, or for an angle, nobody knows."""
     first = next(iter(step.listed), step.value)
     value = first(control) if first is not None and letter is not None else None
@@ -327,7 +327,7 @@ def follow_polynomial(control: Sinumerik, turn: Turn, step: Letting, letter: str
     )
 
 
-def note_letting(control: Sinumerik, turn: Turn, step: Letting) -> None:
+def note_letting(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
     """A name that gets a value and is no variable, or one with which the control changes."""
     if step.name in DESELECTED and step.value is not None and step.value(control) == 0.0:
         return
@@ -430,7 +430,7 @@ def bypassed(control: Sinumerik, flow: SinumerikFlow, step: Branching, steps: It
         return False
     for block in range(here + 1, end):
         for each in unit.plan(block).steps:
-            if isinstance(each, Letting):
+            if isinstance(each, AssignedVariable):
                 control.variables.forget(each.name)
     flow.block = end if jump is not None else end + 1
     return True
@@ -448,7 +448,7 @@ def is_quiet(plan: SinumerikPlan) -> bool:
 def is_quiet_step(step: object) -> bool:
     """Whether an assignment, a name or a control structure does no more than that."""
     match step:
-        case Letting(name):
+        case AssignedVariable(name):
             quiet = not name.startswith("$") and not OF_THE_CONTROL.match(name)
             return quiet and name not in BY_THEMSELVES | UNSEEN.keys() | PROBING
         case Calling(name):

@@ -58,7 +58,7 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True)
-class Letting:
+class AssignedVariable:
     """A variable that gets a value: its name, the index if it is an element, and the value (None: a list).
 
     listed    the values of a list, `SET(..)` or `REP(..)`
@@ -95,7 +95,7 @@ class Branching:
     span: Span
 
 
-Step = Letting | Calling | Branching
+Step = AssignedVariable | Calling | Branching
 
 
 @dataclass(slots=True)
@@ -196,12 +196,12 @@ def names_in(expression: Expression) -> Iterator[str]:
             yield from (each for part in arguments if part is not None for each in names_in(part))
 
 
-def letting(item: Assignment) -> Letting:
+def letting(item: Assignment) -> AssignedVariable:
     """An assignment with its value as a function."""
     name, index = target_of(item)
     if isinstance(item.value, FunctionCall) and item.value.name in LISTS:
-        return Letting(name, index, None, item.span, evaluates(item.value.arguments), item.value.name == "rep")
-    return Letting(name, index, compiled(item.value), item.span)
+        return AssignedVariable(name, index, None, item.span, evaluates(item.value.arguments), item.value.name == "rep")
+    return AssignedVariable(name, index, compiled(item.value), item.span)
 
 
 def target_of(item: Assignment) -> tuple[str, tuple[Evaluate, ...]]:

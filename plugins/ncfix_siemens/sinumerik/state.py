@@ -47,7 +47,7 @@ from ncfix_siemens.sinumerik.vocabulary import (
     TURNING,
     BlockWordValues,
     Modes,
-    Named,
+    NamedTools,
     ProgrammedMotion,
 )
 
@@ -117,7 +117,7 @@ class Sinumerik(ProgramControl):
         self.stated = True
         self.solitary: frozenset[int] = frozenset()
         self.variables = SinumerikVariables.given(run.setup.variables)
-        self.named = Named()
+        self.named = NamedTools()
         self.refresh()
         self.lost = dict(self.unknown)
         self.counted: list[Footing] = list(self.footing)

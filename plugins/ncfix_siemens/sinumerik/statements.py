@@ -19,7 +19,7 @@ from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import set_pole
 from ncfix_siemens.sinumerik.framing import into_spindle, set_length
 from ncfix_siemens.sinumerik.orientation import swivel
-from ncfix_siemens.sinumerik.plans import LISTS, Calling, Letting, SinumerikPlan, evaluates, plain_text
+from ncfix_siemens.sinumerik.plans import LISTS, AssignedVariable, Calling, SinumerikPlan, evaluates, plain_text
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.vocabulary import (
@@ -371,7 +371,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
 
 def additive_offset(control: Sinumerik, turn: Turn) -> None:
     """DL: an additive offset of the edge in force, which the setup does not give; D without it takes it away."""
-    letting = next((step for step in turn.plan.steps if isinstance(step, Letting) and step.name == "dl"), None)
+    letting = next((step for step in turn.plan.steps if isinstance(step, AssignedVariable) and step.name == "dl"), None)
     if letting is not None and (letting.value is None or letting.value(control) != 0.0):
         control.suspend("dl", ADDITIVE)
     elif (letting is not None or "D" in turn.words.values) and control.resume("dl"):

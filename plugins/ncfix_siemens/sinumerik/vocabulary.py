@@ -331,7 +331,7 @@ class Modes:
 
 
 @dataclass(slots=True)
-class Named:
+class NamedTools:
     """Tools that are called by name: numbers that stand for them here, beyond those that a magazine has."""
 
     numbers: dict[str, int] = field(default_factory=dict)

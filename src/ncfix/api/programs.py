@@ -198,11 +198,11 @@ def simulate(
 def _path_errors(program: Program, machine: Machine, setup: Setup) -> PathErrors:
     import numpy as np
 
-    from ncfix.compensate.figures.simulation import Along, tip_errors_of
+    from ncfix.compensate.figures.simulation import SimulatedErrors, tip_errors_of
     from ncfix.compensate.following import follow
 
     found = follow(program, machine, setup, subprograms_of(setup, program))
-    along = Along()
+    along = SimulatedErrors()
     parts = list(along.adding(tip_errors_of(program, found)))
     total = along.figures()
     lines = [each.lines for each in parts]

@@ -171,7 +171,7 @@ def with_program(
     import numpy as np
 
     from ncfix.compensate import FixOptions
-    from ncfix.compensate.figures.simulation import Along, seems_corrected, tip_errors_of, tip_with
+    from ncfix.compensate.figures.simulation import SimulatedErrors, seems_corrected, tip_errors_of, tip_with
     from ncfix.compensate.following import follow
     from ncfix.tables.export import SIDE_FILE, ProgramWithTables, read_manifest
     from ncfix.text import stamp
@@ -181,7 +181,7 @@ def with_program(
         text = "the program has been corrected already: with tables of the same errors it would be corrected twice"
         raise RefusedError.of("NCF493", text, program.place(block), INSTEAD)
     followed = follow(program, machine, setup, resolve)
-    before = Along.of(tip_errors_of(program, followed)).figures()
+    before = SimulatedErrors.of(tip_errors_of(program, followed)).figures()
     if control.rewrites:
         options = FixOptions(manifest.settings["strategy"], float(manifest.settings["tolerance_um"]))
         found = fixed(program, machine, setup, options, resolve)
@@ -195,7 +195,7 @@ def with_program(
         text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
         raise RefusedError.of("NCF438", text, Place(program.path), INSTEAD)
     tip = tip_with(lambda q, way, length: made.tables.for_tool(length).at(names, q, way))
-    after = Along.of(tip_errors_of(program, followed, made=tip)).figures()
+    after = SimulatedErrors.of(tip_errors_of(program, followed, made=tip)).figures()
     remarks: tuple[str, ...] = ()
     if not control.any_tool and machine.depends_on_tool_length:
         used = moves.tool_length[np.isfinite(moves.tool_length)].tolist()

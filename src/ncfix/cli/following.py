@@ -35,7 +35,7 @@ Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, slots=True)
-class Following:
+class FollowingSetup:
     """What is needed to follow programs. Without errors to correct, what is not given may be zero."""
 
     machine: Machine | None
@@ -43,7 +43,7 @@ class Following:
     dialect: str | None
 
     @classmethod
-    def of(cls, machine_path: str | None, dialect: str | None, given: SetupOptions) -> Following:
+    def of(cls, machine_path: str | None, dialect: str | None, given: SetupOptions) -> FollowingSetup:
         """Load what the options name."""
         machine = load_machine(machine_path) if machine_path else None
         setup = given.load(machine)
@@ -123,12 +123,12 @@ def tell_of_stamp(source: Source) -> None:
         console.tell(remark(source.stamp))
 
 
-def dialect_in(following: Following, source: Source) -> Dialect:
+def dialect_in(following: FollowingSetup, source: Source) -> Dialect:
     """The dialect of a program of which the beginning has been read."""
     return dialect_of(source.head, shown(source.path), following.dialect, following.machine)
 
 
-def task_of(following: Following, source: Source, dialect: Dialect, *beside: str) -> Task:
+def task_of(following: FollowingSetup, source: Source, dialect: Dialect, *beside: str) -> Task:
     """A long program on the machine; `beside`: files beside which its subprograms may be, too."""
     from ncfix.compensate.checking import OPTIONS
     from ncfix.compensate.following import Task
@@ -138,7 +138,7 @@ def task_of(following: Following, source: Source, dialect: Dialect, *beside: str
     return Task(following.machine, following.setup, OPTIONS, find, path, dialect, part_bytes(), source.head)
 
 
-def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Parts, Iterator[Part]]:
+def parts_of(following: FollowingSetup, source: Source, dialect: Dialect) -> tuple[Parts, Iterator[Part]]:
     """A long program as the control follows it, and its parts; without a machine, with the axes that it names first.
 
     Going through the parts raises what following does, and `NotInPartsError`.

@@ -11,11 +11,11 @@ import click
 
 from ncfix.batch.programs import program_files
 from ncfix.cli import console
-from ncfix.cli.following import Following, dialect_in, parts_of, task_of, through
+from ncfix.cli.following import FollowingSetup, dialect_in, parts_of, task_of, through
 from ncfix.cli.options import PATH, dialect_option, force_option, json_option, optional_machine_option, table_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import ProjectCommand, after_next_groups, group_of, project_options
-from ncfix.cli.streams import Keep, Source, source_of
+from ncfix.cli.streams import HeldOutput, Source, source_of
 from ncfix.cli.targets import Outputs, shown, targets
 from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
 
@@ -33,7 +33,7 @@ Found = tuple["Checked", str]
 """What is found in a program, and the name of the dialect in which it was read."""
 
 
-def _in_parts(following: Following, source: Source) -> Found:
+def _in_parts(following: FollowingSetup, source: Source) -> Found:
     """While it is read; raises what that does, and `NotInPartsError`."""
     from ncfix.compensate.checking import survey_alone, survey_on
 
@@ -43,7 +43,7 @@ def _in_parts(following: Following, source: Source) -> Found:
     return survey_on(task_of(following, source, dialect), source.read), dialect.name
 
 
-def _whole(following: Following, source: Source) -> Found:
+def _whole(following: FollowingSetup, source: Source) -> Found:
     program = following.read(source.path, source.everything())
     return following.checked(program, source.path), program.dialect.name
 
@@ -63,7 +63,7 @@ def check(
     With a machine file also: does it stay within the travel, and what would its correction refuse? Exit code 1 with
     findings.
     """
-    following = Following.of(machine_path, dialect, given)
+    following = FollowingSetup.of(machine_path, dialect, given)
     context = click.get_current_context()
     only, outcomes = group_of(context).programs, context.meta.setdefault(OUTCOMES, [])
     paths = (program.path for program in program_files(programs))
@@ -75,7 +75,7 @@ def check(
     return max(int(code) for code, _ in outcomes)
 
 
-def _outcome(following: Following, path: str) -> tuple[int, dict[str, Any]]:
+def _outcome(following: FollowingSetup, path: str) -> tuple[int, dict[str, Any]]:
     """What is found in one program: the exit code, and the entry in the JSON object."""
     entry: dict[str, Any] = {"path": shown(path)}
     try:
@@ -115,10 +115,10 @@ def trace(
 ) -> None:
     """Print the motions of PROGRAM as a table: where each leads, in machine axes and at the tool tip."""
     (target,) = targets([program], Outputs(output, force=force), (machine_path, *given.files))
-    following = Following.of(machine_path, dialect, given)
+    following = FollowingSetup.of(machine_path, dialect, given)
     with source_of(program) as source, ExitStack() as opened:
-        csv = None if as_json and target.file is None else Keep(target.file, opened)
-        motions = Motions(following, source, csv, Keep(None, opened) if as_json else None)
+        csv = None if as_json and target.file is None else HeldOutput(target.file, opened)
+        motions = Motions(following, source, csv, HeldOutput(None, opened) if as_json else None)
         with console.busy(f"following {shown(program)}"):
             table, messages = through([source], motions.in_parts, motions.whole)
         console.tell(*messages)
@@ -138,10 +138,10 @@ class TableTexts(NamedTuple):
 class Motions:
     """The motions of a program, to be written as a table: `csv`, `json`, or both."""
 
-    following: Following
+    following: FollowingSetup
     source: Source
-    csv: Keep | None
-    json: Keep | None
+    csv: HeldOutput | None
+    json: HeldOutput | None
 
     def written(self, tables: Iterable[Columns]) -> TableTexts:
         """The table as text."""

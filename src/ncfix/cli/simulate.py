@@ -15,7 +15,7 @@ from click.core import ParameterSource
 import ncfix
 from ncfix.arguments import FAULT, SEED
 from ncfix.cli import console
-from ncfix.cli.following import Following, dialect_in, task_of, tell_of_stamp, through
+from ncfix.cli.following import FollowingSetup, dialect_in, task_of, tell_of_stamp, through
 from ncfix.cli.options import (
     PATH,
     dialect_option,
@@ -26,12 +26,12 @@ from ncfix.cli.options import (
     numbers,
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.streams import Keep, Source, source_of
+from ncfix.cli.streams import HeldOutput, Source, source_of
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, read, shown, targets
 
 if TYPE_CHECKING:
     from ncfix.cli.columns import Columns
-    from ncfix.compensate.figures.simulation import Along, TipError
+    from ncfix.compensate.figures.simulation import SimulatedErrors, TipError
     from ncfix.diagnostics import Message
     from ncfix.measure.instruments import Faults
 
@@ -87,13 +87,13 @@ def simulate(
         inputs = (machine_path, *given.files)
         target = targets([program], Outputs(output, force=force), inputs)[0] if output else None
         check_streams(JSON if as_json else None, table=target)
-        _simulate_program(Following.of(machine_path, dialect, given), program, target, as_json)
+        _simulate_program(FollowingSetup.of(machine_path, dialect, given), program, target, as_json)
 
 
-def _simulate_program(following: Following, program: str, target: OutputTarget | None, as_json: bool) -> None:
+def _simulate_program(following: FollowingSetup, program: str, target: OutputTarget | None, as_json: bool) -> None:
     """Say how large the errors along a program are, and write them to a table if there is to be one."""
     with source_of(program) as source, ExitStack() as opened:
-        errors = Errors(following, source, Keep(target.file, opened) if target else None)
+        errors = Errors(following, source, HeldOutput(target.file, opened) if target else None)
         with console.busy(f"simulating {shown(program)}"):
             table, along, messages = through([source], errors.in_parts, errors.whole)
         tell_of_stamp(source)
@@ -123,11 +123,11 @@ def _check_apt(of_plan: bool, of_program: bool) -> None:
 class Errors:
     """The errors along the path of a program; `keep`: with a table of them."""
 
-    following: Following
+    following: FollowingSetup
     source: Source
-    keep: Keep | None
+    keep: HeldOutput | None
 
-    def in_parts(self) -> tuple[Iterable[bytes], Along, Sequence[Message]]:
+    def in_parts(self) -> tuple[Iterable[bytes], SimulatedErrors, Sequence[Message]]:
         """The table, the figures and what else there is to say, of a program that is read.
 
         Raises what reading does, and `NotInPartsError`.
@@ -139,7 +139,7 @@ class Errors:
         table, along = self._gone_along(tip_errors_on(task, self.source.read, messages), self.keep)
         return table, along, messages
 
-    def whole(self) -> tuple[Iterable[bytes], Along, Sequence[Message]]:
+    def whole(self) -> tuple[Iterable[bytes], SimulatedErrors, Sequence[Message]]:
         """The same of a program as a whole."""
         from ncfix.compensate.figures.simulation import tip_errors_of
 
@@ -151,11 +151,11 @@ class Errors:
 
     def _gone_along(
         self, errors: Iterable[TipError], keep: Callable[[Iterable[bytes]], Iterable[bytes]] | None
-    ) -> tuple[Iterable[bytes], Along]:
+    ) -> tuple[Iterable[bytes], SimulatedErrors]:
         from ncfix.cli.columns import as_csv
-        from ncfix.compensate.figures.simulation import Along, TipError
+        from ncfix.compensate.figures.simulation import SimulatedErrors, TipError
 
-        along = Along()
+        along = SimulatedErrors()
         tables = map(_columns, chain([TipError.none()], along.adding(errors)))
         if keep:
             return keep(as_csv(tables)), along

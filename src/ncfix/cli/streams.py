@@ -210,7 +210,7 @@ class Outlet:
         """What was not sent, with the stamp as it has to be."""
         if self.sent:
             return self._unsent()
-        kept = files.Whole(self.kept)
+        kept = files.WholeFile(self.kept)
         return kept if stamp.written == stamp.wanted else StampedText(kept, stamp)
 
     def after(self, text: bytes, path: str) -> bytes:
@@ -253,7 +253,7 @@ def room_for(output: str | None) -> Iterator[IO[bytes]]:
 
 
 @dataclass(frozen=True, slots=True)
-class Keep:
+class HeldOutput:
     """Keeps the parts of a long output until they are all there; `opened`: what is to be closed then."""
 
     output: str | None
@@ -261,4 +261,4 @@ class Keep:
 
     def __call__(self, parts: Iterable[bytes]) -> Iterable[bytes]:
         """Take the parts as they come; what has been kept."""
-        return files.Whole.of(parts, self.opened.enter_context(room_for(self.output)))
+        return files.WholeFile.of(parts, self.opened.enter_context(room_for(self.output)))

@@ -17,7 +17,7 @@ from ncfix import files
 from ncfix.arguments import TARGET_UM
 from ncfix.batch.programs import subprograms
 from ncfix.cli import console
-from ncfix.cli.following import Following
+from ncfix.cli.following import FollowingSetup
 from ncfix.cli.options import (
     CONTROL,
     FOLDER,
@@ -101,7 +101,7 @@ def export(
     chosen = get_control(control)
     check_folder(output)
     inputs = identities(each for each in (machine_path, program, *given.files) if each)
-    following = Following.of(machine_path, dialect, given)
+    following = FollowingSetup.of(machine_path, dialect, given)
     machine = following.machine
     assert machine is not None
     sound(machine, machine_path, force)
@@ -124,7 +124,9 @@ def export(
     return ExitCode.DONE
 
 
-def _with_program(made: Exported, control: Control, following: Following, path: str, rewrite: bool = False) -> Exported:
+def _with_program(
+    made: Exported, control: Control, following: FollowingSetup, path: str, rewrite: bool = False
+) -> Exported:
     from ncfix.api.tables import with_program
 
     assert following.machine is not None
@@ -216,7 +218,7 @@ def emulate(
     from ncfix.tables.control import get_control
 
     chosen = get_control(control)
-    following = Following.of(machine_path, dialect, given)
+    following = FollowingSetup.of(machine_path, dialect, given)
     assert following.machine is not None
     content = files.read_folder(folder)
     with console.busy("running the tables"):

@@ -13,7 +13,7 @@ import click
 
 from ncfix.batch.programs import subprograms
 from ncfix.cli import console
-from ncfix.cli.following import Following, dialect_in, task_of, tell_of_stamp, through
+from ncfix.cli.following import FollowingSetup, dialect_in, task_of, tell_of_stamp, through
 from ncfix.cli.options import PATH, dialect_option, json_option, machine_option, read_program, tolerance_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import ProjectCommand, project_options
@@ -22,7 +22,7 @@ from ncfix.cli.targets import STREAM, shown
 from ncfix.diagnostics import ExitCode, Message
 
 if TYPE_CHECKING:
-    from ncfix.compensate.figures.comparison import SideBySide
+    from ncfix.compensate.figures.comparison import RunningComparison
     from ncfix.compensate.figures.verification import Compared
     from ncfix.text.tree import Program
 
@@ -36,30 +36,30 @@ FEW = 5
 class ProgramPair:
     """The two texts, and what is needed to follow them."""
 
-    following: Following
+    following: FollowingSetup
     original: Source
     fixed: Source
     tolerance_um: float
 
-    def compared(self) -> tuple[Sequence[SideBySide], Said]:
+    def compared(self) -> tuple[Sequence[RunningComparison], Said]:
         """What this machine does with the two, measured against what the first one means, in each position of block
         delete; what is said of following them.
         """
         return through((self.original, self.fixed), self._in_parts, self._as_wholes)
 
-    def _in_parts(self) -> tuple[Sequence[SideBySide], Said]:
-        """While they are read; raises what that does, `NotInPartsError` and `LostError`."""
-        from ncfix.compensate.figures.comparison import Cuts
+    def _in_parts(self) -> tuple[Sequence[RunningComparison], Said]:
+        """While they are read; raises what that does, `NotInPartsError` and `NearestNotHereError`."""
+        from ncfix.compensate.figures.comparison import CutPaths
 
         found, dialect = self._side_by_side(), dialect_in(self.following, self.original)
         cuts = []
         for source, beside in ((self.original, ()), (self.fixed, (self.original.path,))):
             task = task_of(self.following, source, dialect, *beside)
-            cuts.append(Cuts(task, source.read, meant=source is self.original))
+            cuts.append(CutPaths(task, source.read, meant=source is self.original))
         found.run(*map(iter, cuts))
         return [found], tuple(each.said for each in cuts)
 
-    def _as_wholes(self) -> tuple[Sequence[SideBySide], Said]:
+    def _as_wholes(self) -> tuple[Sequence[RunningComparison], Said]:
         from ncfix.compensate.figures.verification import side_by_side
 
         machine, setup = self.following.machine, self.following.setup
@@ -69,12 +69,12 @@ class ProgramPair:
         resolves = subprograms(setup, first), subprograms(setup, second, first)
         return side_by_side(meant, self._read(self.fixed, meant), machine, setup, self.tolerance_um, resolves)
 
-    def _side_by_side(self) -> SideBySide:
-        from ncfix.compensate.figures.comparison import SideBySide
+    def _side_by_side(self) -> RunningComparison:
+        from ncfix.compensate.figures.comparison import RunningComparison
         from ncfix.compensate.plan.written import rounding
 
         assert self.following.machine is not None
-        return SideBySide(self.tolerance_um / 1e3, rounding(self.following.machine))
+        return RunningComparison(self.tolerance_um / 1e3, rounding(self.following.machine))
 
     def _read(self, source: Source, like: Program | None = None) -> Program:
         """A program; one from a file in the dialect of another one, if it can be."""
@@ -83,7 +83,7 @@ class ProgramPair:
         return read_program(source.path, following.dialect, following.machine, text, like)
 
 
-def compared(following: Following, original: str, fixed: str, tolerance_um: float) -> Compared:
+def compared(following: FollowingSetup, original: str, fixed: str, tolerance_um: float) -> Compared:
     """What this machine does with two programs, measured against what the first one means."""
     with source_of(original) as first, source_of(fixed) as second:
         beside, messages = ProgramPair(following, first, second, tolerance_um).compared()
@@ -127,7 +127,7 @@ def verify(
     Exit code 1 if the tool tip leaves the intended path by more than the tolerance and what the control's digits
     add, or may, where nobody can look.
     """
-    following = Following.of(machine_path, dialect, given)
+    following = FollowingSetup.of(machine_path, dialect, given)
     if certificate is not None or against is not None:
         from ncfix.cli.shop.certificates import verify_certificate
 

@@ -29,17 +29,21 @@ BY_RULE = "passed by rule"
 """Of motions of which nobody says by which."""
 
 
-class Why(NamedTuple):
+class NoFigureReason(NamedTuple):
     """Why motions have no figure; `cuts`: they may cut, and not be right."""
 
     reason: str
     cuts: bool
 
 
-def rule_of(moves: Moves, row: int) -> Why:
+def rule_of(moves: Moves, row: int) -> NoFigureReason:
     """The rule by which a motion passes."""
     rule = Pass.NONE if moves.passing is None else Pass(int(moves.passing[row]))
-    return Why(BY_RULE, True) if rule is Pass.NONE else Why(PASS_RULES[rule].name, PASS_RULES[rule].cuts)
+    return (
+        NoFigureReason(BY_RULE, True)
+        if rule is Pass.NONE
+        else NoFigureReason(PASS_RULES[rule].name, PASS_RULES[rule].cuts)
+    )
 
 
 def at_feed(moves: Moves) -> Mask:
@@ -70,17 +74,17 @@ def without_figure(moves: Moves, kept: Mask, left: Mask | None, own: Mask | None
     return +found
 
 
-def not_looked_at(moves: Moves) -> dict[Why, Index]:
+def not_looked_at(moves: Moves) -> dict[NoFigureReason, Index]:
     """The feeds, arcs and holes that a look along the path leaves out."""
     ends, starts = (np.isfinite(places).all(axis=1) for places in (moves.end, moves.start))
     lost = np.where(moves.kind == MotionKind.CYCLE, ~ends, ~(ends & starts))
-    found: dict[Why, list[int]] = {}
+    found: dict[NoFigureReason, list[int]] = {}
     measured = at_measured_places(moves)
     for row in np.flatnonzero(at_feed(moves) & (lost | measured | (moves.rule == Rule.PASS))).tolist():
         if moves.rule[row] == Rule.PASS:
             why = rule_of(moves, row)
         else:
-            why = Why(UNKNOWN, True) if lost[row] else Why(MEASURED, False)
+            why = NoFigureReason(UNKNOWN, True) if lost[row] else NoFigureReason(MEASURED, False)
         found.setdefault(why, []).append(row)
     return {why: np.array(rows, dtype=np.intp) for why, rows in found.items()}
 
@@ -91,7 +95,7 @@ HINT = "name it in one of the first blocks, and again after a change of tool or 
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
+class LeftAxis:
     """One axis that was left where it stands.
 
     motions    how many motions would have moved it
@@ -117,11 +121,11 @@ class Left:
         """The last of them."""
         return self.stretches[-1][1]
 
-    def with_later(self, other: Left) -> Left:
+    def with_later(self, other: LeftAxis) -> LeftAxis:
         """This and what comes later in the program."""
         motions, cuts = self.motions + other.motions, self.cuts + other.cuts
         stretches, most = merged(self.stretches, other.stretches), max(self.most, other.most)
-        return Left(self.axis, self.rotary, motions, cuts, stretches, most)
+        return LeftAxis(self.axis, self.rotary, motions, cuts, stretches, most)
 
     def message(self, path: str) -> Message:
         """In words."""
@@ -156,7 +160,7 @@ class Lacking:
     off: Array
 
 
-def left_where_they_stand(program: Program, moves: Moves, left: Lacking | None) -> dict[str, Left]:
+def left_where_they_stand(program: Program, moves: Moves, left: Lacking | None) -> dict[str, LeftAxis]:
     """The axes that were left, by name."""
     if left is None:
         return {}
@@ -165,7 +169,7 @@ def left_where_they_stand(program: Program, moves: Moves, left: Lacking | None) 
         rows = np.flatnonzero(lacking[:, column])
         axis, turns, most = moves.axes[column], bool(moves.rotary[column]), float(off[rows, column].max())
         cuts, stretches = int(moves.cutting[rows].sum()), stretches_of(program, moves.block[rows])
-        found[axis] = Left(axis, turns, len(rows), cuts, stretches, most)
+        found[axis] = LeftAxis(axis, turns, len(rows), cuts, stretches, most)
     return in_order(found)
 
 
@@ -188,13 +192,13 @@ def merged(before: tuple[tuple[int, int], ...], later: tuple[tuple[int, int], ..
     return (*before[:-1], (before[-1][0], later[0][1]), *later[1:])
 
 
-def joined(before: Mapping[str, Left], later: Mapping[str, Left]) -> dict[str, Left]:
+def joined(before: Mapping[str, LeftAxis], later: Mapping[str, LeftAxis]) -> dict[str, LeftAxis]:
     """What was left in two parts of a program, one behind the other."""
     both = {axis: before[axis].with_later(later[axis]) for axis in before.keys() & later.keys()}
     return in_order({**before, **later, **both})
 
 
-def either(found: Sequence[Mapping[str, Left]]) -> dict[str, Left]:
+def either(found: Sequence[Mapping[str, LeftAxis]]) -> dict[str, LeftAxis]:
     """What is left in any of several ways in which a program may run: the most of each axis."""
     together = dict(found[0])
     for other in found[1:]:
@@ -211,7 +215,7 @@ def either(found: Sequence[Mapping[str, Left]]) -> dict[str, Left]:
     return in_order(together)
 
 
-def in_order(found: Mapping[str, Left]) -> dict[str, Left]:
+def in_order(found: Mapping[str, LeftAxis]) -> dict[str, LeftAxis]:
     """Those that are left in the earliest lines first."""
     return dict(sorted(found.items(), key=lambda item: (item[1].first, item[0])))
 

@@ -40,7 +40,7 @@ from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import REST, matters, moves_as_one, reached_joints
 from ncfix.compensate.plan.limits import FUZZ, JUMP, excess
-from ncfix.compensate.plan.path import Demands, PathTolerance, Plan, in_pieces, not_split
+from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements, in_pieces, not_split
 from ncfix.compensate.plan.sampling import passed
 from ncfix.compensate.plan.segments import Segments, accelerations, arcs_within, skew, stays_within
 from ncfix.compensate.plan.splitting import Split
@@ -248,7 +248,7 @@ class Planner:
     machine: Machine
     options: FixOptions
     strategy: Strategy
-    demands: Demands
+    demands: Requirements
 
     @classmethod
     def of(cls, machine: Machine, options: FixOptions) -> Planner | None:
@@ -265,7 +265,7 @@ class Planner:
             or machine.linear_ways is None
         ):
             return None
-        demands = Demands(budget, Closure(), options.split_rapids, arc_pieces=False)
+        demands = Requirements(budget, Closure(), options.split_rapids, arc_pieces=False)
         return cls(machine, options, strategy, demands)
 
     def plan(self, continued: ContinuedPart) -> PlainPlan | None:

@@ -13,7 +13,7 @@ import numpy as np
 from ncfix.compensate import FixOptions
 from ncfix.compensate.account import (
     Account,
-    Left,
+    LeftAxis,
     either,
     joined,
     left_where_they_stand,
@@ -85,7 +85,7 @@ class FixReport:
     warnings: tuple[Message, ...] = ()
     strategy: str = ""
     leaves: str = ""
-    left: tuple[Left, ...] = ()
+    left: tuple[LeftAxis, ...] = ()
     rounding_um: float = 0.0
     block_delete: tuple[list[int], ...] = ()
     passed_by_rule: Mapping[str, int] = field(default_factory=dict)
@@ -189,7 +189,7 @@ class Tally:
     refused: list[Refusal] = field(default_factory=list)
     notes: dict[tuple[str, str], Message] = field(default_factory=dict)
     found: Notes = field(default_factory=Notes)
-    left: dict[str, Left] = field(default_factory=dict)
+    left: dict[str, LeftAxis] = field(default_factory=dict)
     numbers: Numbers = field(default_factory=dict)
 
     def add(self, program: Program, joint: JointPlan, own: Mask | None, machine: Machine) -> None:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ncfix.control.builder import MotionBuilder, MotionStyle
 from ncfix.control.coordinates import LETTERS, Vector, mask_of, rotated
-from ncfix.control.flow import Budget
+from ncfix.control.flow import BlockBudget
 from ncfix.control.moves import (
     AT_START,
     PASS_RULES,
@@ -89,7 +89,7 @@ class ProgramControl(ControlState):
     def __init__(self, run: Run, dialect: Dialect) -> None:
         super().__init__(run, dialect)
         self.builder = MotionBuilder(run.axes, run.rotary)
-        self.budget = Budget(run.setup.most_blocks, run.setup.most_blocks)
+        self.budget = BlockBudget(run.setup.most_blocks, run.setup.most_blocks)
         self.needs_feed = False
         self.refusal = ""
         self.suspended: dict[str, str] = {}

@@ -31,7 +31,7 @@ NO_LABEL = "NCF230"
 
 
 @dataclass(slots=True)
-class Budget:
+class BlockBudget:
     """How much may still be executed; a hole of a cycle, and a subprogram that is gone through, count as blocks too.
 
     most  blocks beyond those of the text, for what is said
@@ -181,7 +181,7 @@ class ProgramFlow(Generic[U]):
     most_calls = 0
     too_deep = ""
 
-    def __init__(self, unit: U, budget: Budget) -> None:
+    def __init__(self, unit: U, budget: BlockBudget) -> None:
         self.unit, self.block, self.budget = unit, unit.begin, budget
         self.calls: list[OpenCall[U]] = []
         self.sections: list[Section] = []

@@ -110,11 +110,11 @@ START_POSITION = "NCF203"
 REFERENCE_POINT = "NCF204"
 ASSUMED = "NCF205"
 PROBED = "results of probing"
-"""What `Knowledge.assumed` calls them where they count as nominal; all else in it was taken as zero."""
+"""What `SetupLookup.assumed` calls them where they count as nominal; all else in it was taken as zero."""
 
 
 @dataclass(slots=True)
-class Knowledge:
+class SetupLookup:
     """The setup, and the book of what was asked of it in vain.
 
     place    where in the program we are, for messages

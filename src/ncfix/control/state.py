@@ -33,7 +33,7 @@ from ncfix.control.frames import WORLD, FrameStack, mixed_into
 from ncfix.control.moves import AT_START, UnknownAxes
 from ncfix.control.pointing import Pair
 from ncfix.control.posture import NEAREST, SQUARE, MachinePosture, Postures, WayRules, normal_of
-from ncfix.control.setup import Knowledge, Run
+from ncfix.control.setup import Run, SetupLookup
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect
 from ncfix.text.reach import Deletable
@@ -193,7 +193,7 @@ class ControlState(ABC):
         self.frames = FrameStack(self.frame_order)
         self.composed = WORLD
         self.tools = Tools()
-        self.knowledge = Knowledge(run.setup, self.place)
+        self.knowledge = SetupLookup(run.setup, self.place)
         self.messages: dict[str, Message] = {}
         self.rolled: dict[str, Message] = {}
         self.increments = (1.0, 1.0)

@@ -13,7 +13,7 @@ cdef class NumberRules:
     cdef double largest, tie, rounded
 
 @cython.final
-cdef class Pen:
+cdef class WordPrinter:
     cdef NumberRules rules
     cdef const uint8_t[::1] text
     cdef const int64_t[:, ::1] edges

@@ -3,8 +3,8 @@
 
 What `writer.block.BlockWriter` does block by block, so that the bytes are the same; a test holds the two together.
 
-No index is looked at again inside: `Pen` looks at its tables, and `write` at what it uses of them for a motion before
-it writes that.
+No index is looked at again inside: `WordPrinter` looks at its tables, and `write` at what it uses of them for a motion
+before it writes that.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class NumberRules:
             raise IndexError("these are not the rules of numbers that are written here")
 
 
-class Pen:
+class WordPrinter:
     """Writes motions of a program into a buffer.
 
     text       of the program

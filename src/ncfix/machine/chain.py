@@ -18,7 +18,7 @@ import numpy as np
 from ncfix import core
 from ncfix.machine import se3
 from ncfix.machine.axes import Axis, GaugeLine, Vector
-from ncfix.machine.error_model import ErrorModel, Slot, Sort
+from ncfix.machine.error_model import ErrorModel, Slot, SmallMotionKind
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.steps import dot
@@ -335,8 +335,12 @@ def build_chain(axes: tuple[Axis, ...], model: ErrorModel) -> JointChain:
     rotating = frozenset(slot for slot in slots if model.rotates(slot))
     joints = []
     for index, axis in enumerate((*axes, None)):
-        own = {sort: tuple(s for s in slots if s.joint == index and s.sort is sort) for sort in Sort}
-        joints.append(JointModel(axis, own[Sort.MOTION], own[Sort.LOCATION], own[Sort.CARRIED], rotating))
+        own = {sort: tuple(s for s in slots if s.joint == index and s.sort is sort) for sort in SmallMotionKind}
+        joints.append(
+            JointModel(
+                axis, own[SmallMotionKind.MOTION], own[SmallMotionKind.LOCATION], own[SmallMotionKind.CARRIED], rotating
+            )
+        )
     return JointChain(tuple(joints))
 
 

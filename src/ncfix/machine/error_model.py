@@ -21,7 +21,7 @@ from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal, inputs_of, middle_of_gap, signal_called
 
 
-class Sort(Enum):
+class SmallMotionKind(Enum):
     """What a small motion does to its joint."""
 
     MOTION = "moves the body"
@@ -34,7 +34,7 @@ class Slot:
     """Where contributions are summed. `joint` is an index (n_axes: the spindle); `reference`: base frame, at zero."""
 
     joint: int
-    sort: Sort
+    sort: SmallMotionKind
     reference: Vector
 
 
@@ -157,9 +157,9 @@ def slot_of(axes: tuple[Axis, ...], tool: GaugeLine, effect: Effect) -> Slot:
     """Where the effect's small motion belongs. The spindle has no motion of its own: its body is what is carried."""
     joint = joint_index(axes, effect)
     default = tool.point if joint == len(axes) else axes[joint].reference
-    sort = Sort.MOTION
+    sort = SmallMotionKind.MOTION
     if effect.location:
-        sort = Sort.CARRIED if effect.carried or joint == len(axes) else Sort.LOCATION
+        sort = SmallMotionKind.CARRIED if effect.carried or joint == len(axes) else SmallMotionKind.LOCATION
     return Slot(joint, sort, effect.reference if effect.reference is not None else default)
 
 
@@ -283,7 +283,7 @@ TWICE = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Bow:
+class DeviationBounds:
     """Bounds of all small motions of a machine together, and how far the error of the tip may bow on straight motions.
 
     Along a motion the tip's error is the sum over all joints of Q (t + r x a): t and r the joint's small motion, a the
@@ -343,7 +343,7 @@ class Bow:
         return bow, angle
 
 
-def bow_of(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...]) -> Bow | None:
+def bow_of(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...]) -> DeviationBounds | None:
     """The bounds of a machine; None if one of its effects does not say its own, or depends on more than one axis."""
     sizes, slopes, curvatures = np.zeros(2), np.zeros((2, len(axes))), np.zeros((2, len(axes)))
     for effect in effects:
@@ -363,11 +363,11 @@ def bow_of(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...])
             rate = 1 / abs(signal.scale * signal.unit)
             slopes[kind, signal.axis] += bounds[1] * rate
             curvatures[kind, signal.axis] += bounds[2] * rate * rate
-    return Bow(float(sizes[0]), float(sizes[1]), slopes, curvatures, _reach(axes, tool, effects))
+    return DeviationBounds(float(sizes[0]), float(sizes[1]), slopes, curvatures, _reach(axes, tool, effects))
 
 
 def _reach(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...]) -> float:
-    """`Bow.reach`: from a reference point over the rotary axes between it and the tool, along the chain.
+    """`DeviationBounds.reach`: from a reference point over the rotary axes between it and the tool, along the chain.
 
     However an axis turns what is behind it, it keeps its distance from that axis.
     """

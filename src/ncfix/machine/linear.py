@@ -17,7 +17,15 @@ import numpy as np
 
 from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, GaugeLine
 from ncfix.machine.chain import advance, columns, cross, turned_with
-from ncfix.machine.error_model import Dependence, Slot, Sort, dependence_of, joint_index, slot_of, unit_motion
+from ncfix.machine.error_model import (
+    Dependence,
+    Slot,
+    SmallMotionKind,
+    dependence_of,
+    joint_index,
+    slot_of,
+    unit_motion,
+)
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
 
@@ -181,11 +189,11 @@ def unit_twist(axes: tuple[Axis, ...], tool: GaugeLine, effect: Effect, poses: P
 
 def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Array:
     """The twist about the base origin, (6, 1, n) or (6, 1, 1)."""
-    if slot.sort is Sort.MOTION:
+    if slot.sort is SmallMotionKind.MOTION:
         turned = turned_with(axis, position, motion[:, None])
         return _twist(turned, advance(axis, position, columns(slot.reference)))
     fixed = _twist(motion, columns(slot.reference))
-    if slot.sort is Sort.CARRIED:
+    if slot.sort is SmallMotionKind.CARRIED:
         return fixed
     along = slice(3, 6) if axis.rotary else slice(0, 3)
     direction = np.asarray(axis.direction)

@@ -16,7 +16,7 @@ from ncfix.machine import error_model, linear, se3
 from ncfix.machine.aim import Aim, aimed, aimed_ahead, gaps
 from ncfix.machine.axes import ORIGIN, Axis, Effect, GaugeLine, Vector, degrees
 from ncfix.machine.chain import JointChain, build_chain, carried_frames, carried_tips
-from ncfix.machine.error_model import Bow, ErrorModel, bow_of, compile_effects, direction_axis
+from ncfix.machine.error_model import DeviationBounds, ErrorModel, bow_of, compile_effects, direction_axis
 from ncfix.machine.linear import Jacobians
 from ncfix.machine.route import Route, SplitRoute, Turns, route_of, split_route_of
 from ncfix.machine.se3 import Array
@@ -173,7 +173,7 @@ class Machine:
         return bool(self.directed)
 
     @cached_property
-    def bow(self) -> Bow | None:
+    def bow(self) -> DeviationBounds | None:
         """How far the error of the tip may bow on straight motions; None if not known."""
         return bow_of(self.axes, self.tool, self.effects)
 

@@ -10,7 +10,7 @@ from html import escape
 import numpy as np
 
 from ncfix.compensate import FixOptions
-from ncfix.compensate.figures.path_record import EDGES, LISTED, Extent, ListedBlock, PathRecord, Spot
+from ncfix.compensate.figures.path_record import EDGES, LISTED, Extent, ListedBlock, ListedPlace, PathRecord
 from ncfix.compensate.report import FixReport
 from ncfix.machine import Axis, Machine
 from ncfix.machine.se3 import Array
@@ -54,7 +54,7 @@ class ProgramPage:
     options: FixOptions
     text: bytes
     output: str | None = None
-    _spots: list[Spot] = field(default_factory=list)
+    _spots: list[ListedPlace] = field(default_factory=list)
     _lines: list[bytes] = field(default_factory=list)
 
     def html(self, beside: str | None = None) -> bytes:
@@ -196,11 +196,11 @@ class ProgramPage:
             f"{table(('line', 'why', 'block'), rows, right=(0,))}</div></section>"
         )
 
-    def _button(self, spot: Spot) -> str:
+    def _button(self, spot: ListedPlace) -> str:
         self._spots.append(spot)
         return f'<button type="button" class="row" data-spot="{len(self._spots) - 1}">{spot.line}</button>'
 
-    def _place(self, spot: Spot) -> str:
+    def _place(self, spot: ListedPlace) -> str:
         return " ".join(f"{value:.2f}" for value in spot.tip)
 
     def _text(self, line: int) -> str:
@@ -261,7 +261,7 @@ def _percent(share: Array) -> list[list[float]]:
     return np.round(100 * share / total, 4).tolist()  # type: ignore[no-any-return]
 
 
-def _flat(spot: Spot) -> dict[str, object]:
+def _flat(spot: ListedPlace) -> dict[str, object]:
     found = asdict(spot)
     found.update(zip("xyz", found.pop("tip"), strict=True))
     return found

@@ -10,7 +10,7 @@ from math import isfinite
 from lark import Token, Tree
 
 from ncfix.text.faults import BlockError
-from ncfix.text.grammar import Squeezed
+from ncfix.text.grammar import UnspacedBlock
 from ncfix.text.tree import (
     END,
     START,
@@ -72,7 +72,7 @@ class Parsed:
 def build(
     tree: Branch,
     text: str,
-    squeezed: Squeezed,
+    squeezed: UnspacedBlock,
     maker: type[TreeBuilder] | None = None,
     keywords: Iterable[tuple[str, str]] = (),
 ) -> Parsed:
@@ -123,7 +123,7 @@ class TreeBuilder:
     """
 
     text: str
-    squeezed: Squeezed
+    squeezed: UnspacedBlock
     slots: dict[tuple[int, int], int]
     stops: tuple[int, ...]
     keywords: Mapping[str, str] = field(default_factory=dict)

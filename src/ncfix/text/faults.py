@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from lark import UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
-from ncfix.text.grammar import Squeezed
+from ncfix.text.grammar import UnspacedBlock
 
 FLOW = re.compile(r"/?(n[\d.]*)?o(<[^<>]*>|\d+|\[.*?\](?=[a-z])|#\d+)(?P<keyword>[a-z]*)", re.IGNORECASE | re.DOTALL)
 """The start of a squeezed block of flow control."""
@@ -49,7 +49,7 @@ class BlockError(Exception):
     hint: str = ""
 
 
-def explain(error: UnexpectedInput, text: str, squeezed: Squeezed) -> BlockError:
+def explain(error: UnexpectedInput, text: str, squeezed: UnspacedBlock) -> BlockError:
     """The fault behind a complaint of the parser about one squeezed block."""
     stop = Stop(text, squeezed, position_of(error, squeezed.code))
     found = (look(stop) for look in (in_comment, in_number, in_expression, in_brackets, in_flow, in_word))
@@ -78,7 +78,7 @@ class Stop:
     """
 
     text: str
-    squeezed: Squeezed
+    squeezed: UnspacedBlock
     position: int
     at: str = field(init=False)
     before: str = field(init=False)

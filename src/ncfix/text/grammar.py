@@ -34,7 +34,7 @@ PIECE = re.compile(r"\([^()]*\)|;.*|[^ \t]", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)
-class Squeezed:
+class UnspacedBlock:
     """A block without the blanks outside comments.
 
     code    what is left
@@ -51,11 +51,11 @@ class Squeezed:
         return self.places[start], self.places[stop - 1] + 1
 
 
-def squeeze(text: str, piece: re.Pattern[str] = PIECE) -> Squeezed:
+def squeeze(text: str, piece: re.Pattern[str] = PIECE) -> UnspacedBlock:
     """Take out the blanks outside comments; `piece`: what is kept."""
     kept = [match.span() for match in piece.finditer(text)]
     code = "".join(text[start:stop] for start, stop in kept)
-    return Squeezed(code, [place for span in kept for place in range(*span)])
+    return UnspacedBlock(code, [place for span in kept for place in range(*span)])
 
 
 def find_grammar(name: str) -> Path:

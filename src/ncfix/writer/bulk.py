@@ -195,7 +195,7 @@ class Bulk:
         edits = (stop - row) * (axes + 1)
         blocks = self.moves.block[row:stop]
         start, end, length = (np.empty(edits, dtype=np.int64) for _ in range(3))
-        pen = words.Pen(
+        pen = words.WordPrinter(
             rules(),
             steps.text,
             program.blocks,

@@ -24,7 +24,7 @@ from ncfix.writer.block import STRAIGHT_AND_ARCS
 from ncfix.writer.bulk import Bulk, write_alone
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces, SecondReading
-from ncfix.writer.target import TANGENTIAL, FrameMap, LevelBook, Rendered, Target, plane_across
+from ncfix.writer.target import TANGENTIAL, FrameMap, Rendered, RetractLevels, Target, plane_across
 
 FloatArray = NDArray[np.float64]
 
@@ -130,7 +130,7 @@ class _Emitter:
         self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
         self.replaced: int | None = None
         self.cycle_end: FloatArray | None = None
-        self.levels = LevelBook(moves, pieces)
+        self.levels = RetractLevels(moves, pieces)
         self.written: dict[int, Rendered] = {}
         self.latest, self.added = list[int](), 0
         self.in_stretch = np.zeros(len(moves), dtype=bool)

@@ -3,8 +3,8 @@
 In inverse time LinuxCNC moves linear axes no slower than `LEAST_PACE`. A turn that this would hurry gets the F of its
 little linear motion too, in feed per minute (G94), and G93 again behind it.
 
-`FrameMap` goes from commands to the numbers of a program and back. `LevelBook` knows the level R of canned cycles: what
-it shall be in a block, what is in force, and where the control stands then.
+`FrameMap` goes from commands to the numbers of a program and back. `RetractLevels` knows the level R of canned cycles:
+what it shall be in a block, what is in force, and where the control stands then.
 """
 
 from __future__ import annotations
@@ -309,7 +309,7 @@ def _turned(points: FloatArray, rotation: FloatArray) -> FloatArray:
     return result
 
 
-class LevelBook:
+class RetractLevels:
     """The book that the control keeps of R.
 
     Where a control stands at R and is to come back to where the series of holes began (G98), LinuxCNC goes up there

@@ -70,7 +70,7 @@ class Runs:
 
 
 @dataclass(frozen=True, slots=True)
-class Bodies:
+class BacklashBodies:
     """The bodies of the axes on which errors depend on the direction, along a program.
 
     A leg is a stretch of a motion that cuts, or all of a motion of another sort.
@@ -92,7 +92,7 @@ class Bodies:
     runs: dict[int, Runs]
 
     @classmethod
-    def of(cls, intent: Intent, stretches: Stretches, first: Array | None) -> Bodies:
+    def of(cls, intent: Intent, stretches: Stretches, first: Array | None) -> BacklashBodies:
         """Along the stretches of a program; `first` as above, 0 where that is not known."""
         legs, own = _legs(intent, stretches)
         q = np.stack([intent.joints_at(legs.rows, each) for each in (legs.start, legs.stop)])
@@ -245,7 +245,7 @@ class Flank:
     aside: NDArray[np.float32]
 
     @classmethod
-    def of(cls, bodies: Bodies, actual: Curve) -> Flank:
+    def of(cls, bodies: BacklashBodies, actual: Curve) -> Flank:
         """Of a path on the real machine."""
         at, aside = CurvePoints.of(actual), np.zeros((len(actual), 3, 3), dtype=np.float32)
         rows, place = actual.rows[at.piece], (2 * at.share).astype(np.intp)

@@ -22,11 +22,11 @@ from functools import partial
 
 import numpy as np
 
-from ncfix.compensate.account import Why, not_looked_at
-from ncfix.compensate.figures.backlash import Bodies, Flank
+from ncfix.compensate.account import NoFigureReason, not_looked_at
+from ncfix.compensate.figures.backlash import BacklashBodies, Flank
 from ncfix.compensate.figures.curve import Curve, CurvePoints, Stretches
 from ncfix.compensate.figures.nearest import Nearest, Search, over_holes, over_peaks
-from ncfix.compensate.figures.simulation import Along, actual_tip, lines_of
+from ncfix.compensate.figures.simulation import SimulatedErrors, actual_tip, lines_of
 from ncfix.compensate.following import Task
 from ncfix.compensate.parts import MachineParts
 from ncfix.compensate.plan.arrays import Array, Index
@@ -45,7 +45,7 @@ BESIDE = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Cut:
+class CutPath:
     """What a part of a program cuts; motions are called by their lines.
 
     actual    what the machine makes of it
@@ -61,18 +61,20 @@ class Cut:
     actual: Curve
     intended: Curve | None
     flank: Flank | None
-    unseen: dict[Why, Index]
+    unseen: dict[NoFigureReason, Index]
     left: dict[str, Index]
     last: bool
     rounding: float
-    bodies: Bodies | None = None
+    bodies: BacklashBodies | None = None
 
     @classmethod
-    def of(cls, intent: Intent, lines: Index, rows: slice, last: bool, meant: bool, first: Array | None = None) -> Cut:
+    def of(
+        cls, intent: Intent, lines: Index, rows: slice, last: bool, meant: bool, first: Array | None = None
+    ) -> CutPath:
         """Of motions, of which some `rows` count and others stand before and behind them; `meant`: with what they mean.
 
         lines  (n,) those of the motions
-        first  (n_axes,) where the bodies of axes are before them, see `Bodies`
+        first  (n_axes,) where the bodies of axes are before them, see `BacklashBodies`
         """
 
         def counted(curve: Curve) -> slice:
@@ -88,7 +90,7 @@ class Cut:
             return lines[found[(found >= first) & (found < stop)]]
 
         stretches = Stretches.of(intent)
-        bodies = Bodies.of(intent, stretches, first) if matters(intent.machine) else None
+        bodies = BacklashBodies.of(intent, stretches, first) if matters(intent.machine) else None
         stretches = bodies.divided() if bodies else stretches
         actual = Curve.through(stretches, bodies.tip if bodies else partial(actual_tip, intent))
         intended = in_lines(Curve.through(stretches, intent.tip)) if meant else None
@@ -99,13 +101,13 @@ class Cut:
         return cls(in_lines(actual), intended, flank, unseen, left, last, digits, bodies)
 
 
-def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[Cut]:
+def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[CutPath]:
     """What a program cuts, at once."""
-    yield Cut.of(Intent(machine, moves, State()), program.lines(moves.block), slice(None), True, meant)
+    yield CutPath.of(Intent(machine, moves, State()), program.lines(moves.block), slice(None), True, meant)
 
 
 @dataclass(frozen=True, slots=True)
-class Around:
+class PartEnd:
     """The last motions of a part, where it matters which way axes go next.
 
     moves      up to twice `BESIDE`; the last `BESIDE` count when the next part is known
@@ -120,14 +122,14 @@ class Around:
     sides: Array
 
     @classmethod
-    def behind(cls, bodies: Bodies, lines: Index) -> Around:
+    def behind(cls, bodies: BacklashBodies, lines: Index) -> PartEnd:
         """Those at the end of motions in lines (n,)."""
         start, moves = max(len(lines) - 2 * BESIDE, 0), bodies.intent.moves
         return cls(taken(moves, np.arange(start, len(lines))), lines[start:], bodies.came(start), bodies.before(start))
 
 
 @dataclass(frozen=True, slots=True)
-class Cuts:
+class CutPaths:
     """What a program cuts, part after part while it is read.
 
     read   gives the next so many bytes of the text; none at its end
@@ -140,7 +142,7 @@ class Cuts:
     meant: bool
     said: list[Message] = field(default_factory=list)
 
-    def __iter__(self) -> Iterator[Cut]:
+    def __iter__(self) -> Iterator[CutPath]:
         """The parts. Raises what reading and following do, and UsageError for what is not given."""
         task = self.task
         parts = MachineParts.of(task, self.read)
@@ -151,17 +153,17 @@ class Cuts:
             if continued.part.last:
                 self.said.extend(parts.messages)
             if not matters(machine):
-                yield Cut.of(Intent(machine, moves, State()), lines, slice(None), continued.part.last, self.meant)
+                yield CutPath.of(Intent(machine, moves, State()), lines, slice(None), continued.part.last, self.meant)
                 continue
             intent, lines, counted = _with(around, machine, moves, lines)
             rows = slice(counted, None if continued.part.last else -BESIDE)
-            cut = Cut.of(intent, lines, rows, continued.part.last, self.meant, around.sides if around else None)
+            cut = CutPath.of(intent, lines, rows, continued.part.last, self.meant, around.sides if around else None)
             yield cut
             assert cut.bodies is not None
-            around = Around.behind(cut.bodies, lines)
+            around = PartEnd.behind(cut.bodies, lines)
 
 
-def _with(around: Around | None, machine: Machine, moves: Moves, lines: Index) -> tuple[Intent, Index, int]:
+def _with(around: PartEnd | None, machine: Machine, moves: Moves, lines: Index) -> tuple[Intent, Index, int]:
     """Motions behind those before them, the lines of all, and how many of them have been counted."""
     if around is None:
         return Intent(machine, moves, State()), lines, 0
@@ -254,7 +256,7 @@ class Match:
     path: Track
     other: Track
     near: float
-    along: Along
+    along: SimulatedErrors
     done: int = 0
     ahead: float = 0.0
     last: Nearest | None = None
@@ -306,18 +308,18 @@ class Match:
 
 
 @dataclass(slots=True)
-class SideBySide:
+class RunningComparison:
     """Two programs on their way, and what was found so far.
 
     tolerance    of the path before rounding, mm
     rounding     what the control's digits may add to it, mm; arcs that are met make it more
-    unseen, left as `Cut` has them, of the original, by parts; `blind`: what is unseen of the other
+    unseen, left as `CutPath` has them, of the original, by parts; `blind`: what is unseen of the other
     """
 
     tolerance: float
     rounding: float
-    unseen: dict[Why, list[Index]] = field(default_factory=dict)
-    blind: Counter[Why] = field(default_factory=Counter)
+    unseen: dict[NoFigureReason, list[Index]] = field(default_factory=dict)
+    blind: Counter[NoFigureReason] = field(default_factory=Counter)
     left: dict[str, list[Index]] = field(default_factory=dict)
     intended: Track = field(default_factory=Track.empty)
     unfixed: Track = field(default_factory=Track.empty)
@@ -326,9 +328,9 @@ class SideBySide:
 
     def __post_init__(self) -> None:
         self.matches = (
-            Match(self.unfixed, self.intended, self.limit, Along()),
-            Match(self.fixed, self.intended, self.limit, Along(self.limit)),
-            Match(self.intended, self.fixed, self.limit, Along(self.limit)),
+            Match(self.unfixed, self.intended, self.limit, SimulatedErrors()),
+            Match(self.fixed, self.intended, self.limit, SimulatedErrors(self.limit)),
+            Match(self.intended, self.fixed, self.limit, SimulatedErrors(self.limit)),
         )
 
     @property
@@ -342,7 +344,7 @@ class SideBySide:
         return lines_of([lines for why, parts in self.unseen.items() if why.cuts for lines in parts])
 
     @property
-    def no_figure(self) -> Counter[Why]:
+    def no_figure(self) -> Counter[NoFigureReason]:
         """How many motions at feed are not looked at, and why: of the program that has more of them."""
         return Counter({why: sum(map(len, parts)) for why, parts in self.unseen.items()}) | self.blind
 
@@ -351,8 +353,8 @@ class SideBySide:
         """Linear axis -> lines of the original in which nothing can be corrected along it."""
         return {axis: lines_of(lines) for axis, lines in self.left.items()}
 
-    def run(self, original: Iterator[Cut], other: Iterator[Cut]) -> None:
-        """Go along both programs; raises what reading them does, `LostError`, and `DifferenceError` NCF420."""
+    def run(self, original: Iterator[CutPath], other: Iterator[CutPath]) -> None:
+        """Go along both programs. Raises what reading them does, `NearestNotHereError`, `DifferenceError` NCF420."""
         while not (self.intended.complete and self.fixed.complete):
             behind = self.intended.reached <= self.fixed.reached
             if self.fixed.complete or (behind and not self.intended.complete):
@@ -370,7 +372,7 @@ class SideBySide:
             text = f"the two programs do not cut the same: {meant:.3f} mm and {made:.3f} mm of path"
             raise DifferenceError.of("NCF420", text, hint="give the original program first, then the corrected one")
 
-    def _take_original(self, cut: Cut | None) -> None:
+    def _take_original(self, cut: CutPath | None) -> None:
         if cut is None:
             self.unfixed.complete = self.intended.complete = True
             return
@@ -382,7 +384,7 @@ class SideBySide:
         for axis, lines in cut.left.items():
             self.left.setdefault(axis, []).append(lines)
 
-    def _take_other(self, cut: Cut | None) -> None:
+    def _take_other(self, cut: CutPath | None) -> None:
         if cut is None:
             self.fixed.complete = True
         else:

@@ -45,7 +45,7 @@ PAIRS = 1 << 18
 """Points and parabolas that are looked at together."""
 
 
-class LostError(NotInPartsError):
+class NearestNotHereError(NotInPartsError):
     """The nearest point may lie on a part of the path that is not at hand."""
 
 
@@ -100,7 +100,7 @@ class Search:
     ends: bool = True
 
     def all(self, points: Array, lengths: Array, groups: Index) -> Nearest:
-        """For points (n, 3) of another path, in order, at lengths (n,) of it. Raises `LostError`.
+        """For points (n, 3) of another path, in order, at lengths (n,) of it. Raises `NearestNotHereError`.
 
         groups  where others begin for which the difference of the two lengths of path is taken as the same, at first
         """
@@ -124,7 +124,9 @@ class Search:
         return [found]
 
     def around(self, points: Array, expected: Array, lengths: Array | None = None) -> Nearest:
-        """For points (n, 3), near the lengths (n,) of the curve at which they are expected. Raises `LostError`.
+        """For points (n, 3), near the lengths (n,) of the curve at which they are expected.
+
+        Raises `NearestNotHereError`.
 
         lengths  (n,) of the other path to the points, if they are in order along it
         """
@@ -217,7 +219,7 @@ class Search:
         for some in batches(counts, PAIRS):
             self._among(points, expected, found, rows[some], (first[some], counts[some]))
         if self._lacks(low, high) and self._lacks(*self._range(expected, found, far)):
-            raise LostError
+            raise NearestNotHereError
 
     def _range(self, expected: Array, found: Nearest, which: Index) -> tuple[Array, Array]:
         """The ways along the curve between which there may be a nearer point, (k,) mm."""
@@ -335,7 +337,7 @@ HALVINGS = 24
 
 
 @dataclass(frozen=True, slots=True)
-class Between:
+class NearestInterval:
     """Ways (n,) along parabolas, and what is nearest to where they begin and end.
 
     piece             (n,) the parabola
@@ -349,12 +351,12 @@ class Between:
     before: Nearest
     behind: Nearest
 
-    def taken(self, which: Index) -> Between:
+    def taken(self, which: Index) -> NearestInterval:
         """Some of them."""
         ends = (each.taken(which) for each in (self.before, self.behind))
-        return Between(self.piece[which], self.low[which], self.high[which], *ends)
+        return NearestInterval(self.piece[which], self.low[which], self.high[which], *ends)
 
-    def leaping(self, search: Search, path: Curve) -> Between:
+    def leaping(self, search: Search, path: Curve) -> NearestInterval:
         """Those on which there may be a peak beyond what is near enough."""
         way, near = path.ways[self.piece] * (self.high - self.low), search.near
         begin, end = (search.curve.way(each.piece, each.share) for each in (self.before, self.behind))
@@ -374,11 +376,11 @@ class Between:
         found.put(nearer, other.taken(nearer))
         return found
 
-    def halves(self, middle: Nearest) -> Between:
+    def halves(self, middle: Nearest) -> NearestInterval:
         """Both halves of each, by what is nearest to its middle."""
         piece, half = np.tile(self.piece, 2), (self.low + self.high) / 2
         low, high = np.append(self.low, half), np.append(half, self.high)
-        return Between(piece, low, high, self.before.and_more(middle), middle.and_more(self.behind))
+        return NearestInterval(piece, low, high, self.before.and_more(middle), middle.and_more(self.behind))
 
 
 def over_peaks(
@@ -391,7 +393,7 @@ def over_peaks(
     """
     joined = np.flatnonzero((samples.share > 0) & (path.ways[samples.piece] > 0))
     share = samples.share[joined]
-    left = Between(samples.piece[joined], share - 0.5, share, before.taken(joined), found.taken(joined))
+    left = NearestInterval(samples.piece[joined], share - 0.5, share, before.taken(joined), found.taken(joined))
     for _ in range(HALVINGS):
         left = left.leaping(search, path)
         if not len(left.piece):

@@ -46,7 +46,7 @@ COLUMNS = {"x": "f4", "y": "f4", "z": "f4", "way": "f4", "before": "f4", "after"
 
 
 @dataclass(frozen=True, slots=True)
-class Spot:
+class ListedPlace:
     """A place of the path that a list names: line, way along the path and tip (mm), error before and after (um)."""
 
     line: int
@@ -62,7 +62,7 @@ class ListedBlock:
 
     line: int
     reason: str
-    spot: Spot | None
+    spot: ListedPlace | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class PathRecord:
     way: float = 0.0
     total: int = 0
     share: Array = field(default_factory=lambda: np.zeros((2, len(EDGES) - 1)))
-    worst: list[Spot] = field(default_factory=list)
+    worst: list[ListedPlace] = field(default_factory=list)
     corrections: dict[str, Extent] = field(default_factory=dict)
     linear: Extent = Extent()
     refused: list[ListedBlock] = field(default_factory=list)
@@ -234,12 +234,12 @@ class PathRecord:
         def at(line: int) -> int:
             return int(table[line]) if line < len(table) else line
 
-        def moved(spot: Spot | None) -> Spot | None:
+        def moved(spot: ListedPlace | None) -> ListedPlace | None:
             return None if spot is None else replace(spot, line=at(spot.line))
 
         for values, _ in self._parts:
             values["line"] = table[np.minimum(values["line"], len(table) - 1)].astype("i4")
-        best: dict[int, Spot] = {}
+        best: dict[int, ListedPlace] = {}
         for each in self.worst:  # the largest first
             best.setdefault(at(each.line), replace(each, line=at(each.line)))
         self.worst = list(best.values())
@@ -320,10 +320,10 @@ def _said(reason: Reason) -> str:
     return f"{reason.code}: {reason.text}"
 
 
-def _spot(values: Mapping[str, Array], row: int) -> Spot:
+def _spot(values: Mapping[str, Array], row: int) -> ListedPlace:
     tip = tuple(round(float(values[name][row]), 4) for name in "xyz")
     way, before, after = (round(float(values[name][row]), 4) for name in ("way", "before", "after"))
-    return Spot(int(values["line"][row]), way, (tip[0], tip[1], tip[2]), before, after)
+    return ListedPlace(int(values["line"][row]), way, (tip[0], tip[1], tip[2]), before, after)
 
 
 def selection(values: Mapping[str, Array], most: int) -> Index:

@@ -49,7 +49,7 @@ SomeErrors = TypeVar("SomeErrors", bound=SampledErrors)
 
 
 @dataclass(slots=True)
-class Along:
+class SimulatedErrors:
     """Errors along a path; of as many parts as there may be, the same.
 
     limit   mm; where the error is larger is noted; may become larger
@@ -86,7 +86,7 @@ class Along:
                 self.beyond.append((lines[over[first]], np.maximum.reduceat(error[over], first)))
 
     @classmethod
-    def of(cls, errors: Iterable[SampledErrors]) -> Along:
+    def of(cls, errors: Iterable[SampledErrors]) -> SimulatedErrors:
         """Of all samples of a path."""
         along = cls()
         deque(along.adding(errors), maxlen=0)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ncfix.arguments import TOLERANCE_UM
-from ncfix.compensate.account import Why
+from ncfix.compensate.account import NoFigureReason
 from ncfix.compensate.block_delete import SwitchSetting, in_pairs, messages_of, positions_of
-from ncfix.compensate.figures.comparison import SideBySide, whole
+from ncfix.compensate.figures.comparison import RunningComparison, whole
 from ncfix.compensate.following import Resolve, follow, placed
 from ncfix.compensate.plan.written import rounding
 from ncfix.control.setup import Setup
@@ -56,12 +56,12 @@ class Compared:
         return not self.beyond_somewhere and not self.blind
 
     @classmethod
-    def of_all(cls, comparisons: Sequence[SideBySide], said: Sequence[Sequence[Message]]) -> Compared:
+    def of_all(cls, comparisons: Sequence[RunningComparison], said: Sequence[Sequence[Message]]) -> Compared:
         """The worst of several ways in which the programs may run, and what is said of following the two."""
         return replace(cls.together([cls.of(each) for each in comparisons]), messages=tuple(told_once(*said)))
 
     @classmethod
-    def of(cls, comparison: SideBySide) -> Compared:
+    def of(cls, comparison: RunningComparison) -> Compared:
         """What was found along both programs."""
         before, there, back = (match.along for match in comparison.matches)
         return cls(
@@ -108,7 +108,7 @@ def _lines(several: Iterable[Sequence[int]]) -> list[int]:
     return sorted({line for each in several for line in each})
 
 
-def reason_counts(found: Mapping[Why, int]) -> dict[str, int]:
+def reason_counts(found: Mapping[NoFigureReason, int]) -> dict[str, int]:
     """Counts by reason, in plain words."""
     return {why.reason: count for why, count in sorted(found.items())}
 
@@ -120,7 +120,7 @@ def side_by_side(
     setup: Setup,
     tolerance_um: float,
     resolves: tuple[Resolve | None, Resolve | None] = (None, None),
-) -> tuple[list[SideBySide], tuple[Sequence[Message], Sequence[Message]]]:
+) -> tuple[list[RunningComparison], tuple[Sequence[Message], Sequence[Message]]]:
     """Two programs gone along side by side, once for each position of block delete; what is said of following them.
 
     resolves  of each: gives the text of a subprogram by its name
@@ -133,9 +133,9 @@ def side_by_side(
         return positions_of(setup, lambda own: follow(program, machine, own, resolve).trace)
 
     known, of_first, of_second = placed(machine, setup), positions(original, resolves[0]), positions(other, resolves[1])
-    found: list[SideBySide] = []
+    found: list[RunningComparison] = []
     for first, second in in_pairs(of_first, of_second):
-        found.append(SideBySide(tolerance_um / 1e3, rounding(machine)))
+        found.append(RunningComparison(tolerance_um / 1e3, rounding(machine)))
         cuts = whole(known, original, first.trace.moves, meant=True)
         found[-1].run(cuts, whole(known, other, second.trace.moves))
     return found, (messages_of(of_first), messages_of(of_second))

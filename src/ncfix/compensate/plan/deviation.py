@@ -38,7 +38,7 @@ from ncfix.compensate.plan.written import Known, WrittenPieces
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
-from ncfix.machine.error_model import Bow
+from ncfix.machine.error_model import DeviationBounds
 from ncfix.writer.pieces import Pieces
 
 SURE = 0.5
@@ -102,7 +102,7 @@ def bounds(intent: Intent, real: Segments, rows: Index, check_start: Mask) -> Ar
     return most
 
 
-def _bounds_of_axes(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Array:
+def _bounds_of_axes(intent: Intent, real: Segments, rows: Index, bow: DeviationBounds) -> Array:
     """As `bounds`, of motions in axis positions.
 
     The tip's error leaves its chord by its bow; what is added to the linear axes goes straight from end to end, but
@@ -116,7 +116,7 @@ def _bounds_of_axes(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Ar
     return most
 
 
-def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Array:
+def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: DeviationBounds) -> Array:
     """As `bounds`, of motions under tool-centre-point control."""
     machine, longest = intent.machine, float(np.abs(intent.lengths(rows)).max())
     commands = picked(real.start, rows), picked(real.end, rows)
@@ -128,7 +128,9 @@ def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Arr
     return tcp_bounds(intent, bow, start, end, acceleration, longest)
 
 
-def tcp_bounds(intent: Intent, bow: Bow, start: Array, end: Array, acceleration: Array, tool_length: float) -> Array:
+def tcp_bounds(
+    intent: Intent, bow: DeviationBounds, start: Array, end: Array, acceleration: Array, tool_length: float
+) -> Array:
     """As `bounds`, of motions under tool-centre-point control between corrected axis positions (k, n_axes).
 
     acceleration  (k,) of linear axes, as `accelerations` has it
@@ -144,7 +146,7 @@ def tcp_bounds(intent: Intent, bow: Bow, start: Array, end: Array, acceleration:
 
 
 def straight_bounds(
-    bow: Bow, start: Array, end: Array, shifts: tuple[Array, Array], tool_lengths: Array, linear: Mask
+    bow: DeviationBounds, start: Array, end: Array, shifts: tuple[Array, Array], tool_lengths: Array, linear: Mask
 ) -> Array:
     """As `bounds`, of straight motions (k, n_axes) between corrected ends, with `shifts` of their linear axes there."""
     most_far = np.maximum(farthest(start), farthest(end))

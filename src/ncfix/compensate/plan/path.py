@@ -158,7 +158,7 @@ class PathTolerance:
 
 
 @dataclass(frozen=True, slots=True)
-class Demands:
+class Requirements:
     """What the corrected program has to meet.
 
     budget        the tolerance, and what rounding does besides
@@ -207,7 +207,7 @@ def plan(
     if machine.is_perfect or kept.all():
         as_it_is = untouched(moves, kept)
         return as_it_is if before is None else _behind(machine, as_it_is, moves, before)
-    demands = Demands(PathTolerance(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
+    demands = Requirements(PathTolerance(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
     return _plan(Intent(machine, moves, state, before), strategy, demands, kept)
 
 
@@ -218,7 +218,7 @@ def _behind(machine: Machine, as_it_is: Plan, moves: Moves, before: Array) -> Pl
     return replace(as_it_is, start=where.start, pieces=replace(as_it_is.pieces, end=where.end))
 
 
-def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> Plan:
+def _plan(intent: Intent, strategy: Strategy, demands: Requirements, kept: Mask) -> Plan:
     ends = corrected(intent, strategy, np.flatnonzero(~kept))
     kept = kept | ends.failed
     if strategy.corrects_orientation:
@@ -262,7 +262,7 @@ def _with(kept: Mask, rows: Index) -> Mask:
     return also
 
 
-def _worse_contours(intent: Intent, beside: OffsetPoints | None, kept: Mask, demands: Demands) -> Finding:
+def _worse_contours(intent: Intent, beside: OffsetPoints | None, kept: Mask, demands: Requirements) -> Finding:
     """NCF454: contours (k,) with a corner that the control would make worse of what is corrected than it is without.
 
     Worse is what is beyond the tolerance, and more than before and what the control's digits do there.
@@ -284,7 +284,7 @@ def _worse_contours(intent: Intent, beside: OffsetPoints | None, kept: Mask, dem
 
 
 def _real(
-    intent: Intent, wanted: Array, kept: Mask, demands: Demands, approaches: Array | None
+    intent: Intent, wanted: Array, kept: Mask, demands: Requirements, approaches: Array | None
 ) -> tuple[Segments, Mask]:
     """What the control would be told without splitting, and the arcs (n,) that cannot stay arcs."""
     moves, programmed = intent.moves, intent.segments
@@ -302,7 +302,7 @@ def _real(
     return replace(real, centre=centre, sweep=sweep, arc=programmed.arc & ~broken), broken
 
 
-def _followed(intent: Intent, real: Segments, kept: Mask, strategy: Strategy, demands: Demands) -> Mask:
+def _followed(intent: Intent, real: Segments, kept: Mask, strategy: Strategy, demands: Requirements) -> Mask:
     """(n,) motions that are looked at along their way."""
     if not strategy.follows_path:
         return np.zeros(len(kept), dtype=bool)
@@ -314,7 +314,7 @@ def _followed(intent: Intent, real: Segments, kept: Mask, strategy: Strategy, de
     return result
 
 
-def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, followed: Mask, demands: Demands) -> Array:
+def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, followed: Mask, demands: Requirements) -> Array:
     """How far the tip leaves the intended path along each motion, (n,) mm; 0 where it is not looked at."""
     deviation = np.zeros(len(kept))
     rows = np.flatnonzero(followed & ~broken)
@@ -324,7 +324,7 @@ def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, followed: 
 
 
 def in_pieces(
-    intent: Intent, real: Segments, rows: Index, deviation: Array, strategy: Strategy, demands: Demands
+    intent: Intent, real: Segments, rows: Index, deviation: Array, strategy: Strategy, demands: Requirements
 ) -> Split:
     """Motions `rows` in pieces: of arcs in arcs, where the control and the tolerance allow, else in straight ones."""
     limit = demands.budget.path
@@ -392,7 +392,7 @@ def not_split(rows: Index, deviation: Array) -> Finding:
 
 
 def _remarks(
-    intent: Intent, deviation: Array, oriented: Mask, kept: Mask, strategy: Strategy, demands: Demands
+    intent: Intent, deviation: Array, oriented: Mask, kept: Mask, strategy: Strategy, demands: Requirements
 ) -> list[Finding]:
     """What is not as it was asked for, though nothing is kept for it."""
     remarks = []

@@ -41,7 +41,7 @@ STRETCH = 1024
 """Nodes of a motion after which a piece ends in any case."""
 
 
-class Cuttable(Protocol):
+class Splittable(Protocol):
     """Motions with nodes between which there may be pieces."""
 
     @property
@@ -96,7 +96,7 @@ class PathNodes:
         return np.zeros(len(first), dtype=bool), np.full((len(first), 3), np.nan)
 
 
-def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
+def fewest(grid: Splittable, tolerance: float) -> tuple[Mask, Array]:
     """Which nodes end a piece (k,), and the largest deviation of each motion's pieces (g,) mm.
 
     A piece from one node to the next is always allowed: it has no nodes between.
