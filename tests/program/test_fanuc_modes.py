@@ -138,3 +138,9 @@ def test_calls_that_are_not_certain_are_errors(text: str) -> None:
 def test_what_cannot_be_seen_in_the_program_is_said(text: str, code: str) -> None:
     codes = {message.code for message in follow(text, "XYZA", setup=SETUP, dialect="fanuc").messages}
     assert codes & {"NCF217", "NCF218"} == ({code} if code else set())
+
+
+@pytest.mark.parametrize(("dialect", "refused"), [("haas", True), ("fanuc", False)])
+def test_m96_of_haas_jumps_by_an_input(dialect: str, refused: bool) -> None:
+    found = reasons(follow("G21G0X1.\nM96P5Q8\nX2.\nN5X3.", setup=SETUP, dialect=dialect))
+    assert ["M96" in reason for reason in found] == [False, refused, refused]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -231,3 +232,40 @@ def test_behind_a_change_of_what_numbers_count_from_axes_have_to_be_named_again(
     moves = follow(f"G1 X1 Y1 Z1 F9\n{change}\nX2", tools={2: Tool(50.0)}).moves
     found = np.ones(3, dtype=bool) if moves.placed is None else moves.placed[-1]
     assert found.tolist() == placed
+
+
+NUMBERED = {number: Tool(10.0 * number, 3.0) for number in range(5)}
+
+
+@pytest.mark.parametrize(
+    ("text", "heights"),
+    [
+        ("G43 H1 G0 Z5\nH2\nZ6\nZ7 H0", [15, 26, 7]),
+        ("G43 H2 G0 Z5\nH2 Z6\nG49 Z7\nH0 Z8", [25, 26, 7, 8]),
+        ("G0 Z5\nG0 Z6\nG43 H2 Z7", [5, 6, 27]),
+    ],
+)
+def test_h_alone_is_another_length_where_one_is_in_force(text: str, heights: list[float]) -> None:
+    found = follow(text, dialect="iso", tools=NUMBERED)
+    assert [row[2] for row in ends(found)] == heights
+    assert set(reasons(found)) == {""}
+
+
+@pytest.mark.parametrize("text", ["H2 G0 Z5", "G43 H1 Z3\nG91 Z1 H2", "G44 H1 Z3\nH2 Z4"])
+def test_h_alone_is_doubtful_elsewhere_until_g43(text: str) -> None:
+    found = reasons(follow(f"G0 X1 Y1\n{text}\nX2\nG90 G43 H1 Z5\nX3", dialect="iso", tools=NUMBERED))
+    assert ["H without G43" in reason for reason in found[-4:]] == [True, True, False, False]
+
+
+@pytest.mark.parametrize("dialect", ["iso", "fanuc", "mitsubishi"])
+def test_g52_in_g91_may_be_added_to_the_shift_in_force(dialect: str) -> None:
+    setup: dict[str, Any] = {"dialect": dialect, "no_point": "calculator"}
+    assert reasons(follow("G21 G91 G52 X5.\nG90 G0 X1.", **setup)) == [""]
+    assert reasons(follow("G21 G52 X3.\nG91 G52 Y5.\nG90 G0 X1. Y1.", **setup)) == [""]
+    assert "G52" in reasons(follow("G21 G52 X3.\nG91 G52 X5.\nG90 G0 X1.", **setup))[0]
+
+
+@pytest.mark.parametrize(("text", "known"), [("G5 P10000", True), ("G5 P3", True), ("G5 P10000 X0 Y0", False)])
+def test_g5_that_switches_names_no_axes(text: str, known: bool) -> None:
+    found = reasons(follow(f"G21 G0 X1.\n{text}\nX2.", dialect="fanuc", no_point="calculator"))
+    assert (found[-1] == "") is known

@@ -96,7 +96,8 @@ def set_offset(control: RS274Control, block: Block) -> None:
     """L2 Pn: the words are the offset of G54 (P1) to G59 (P6), or are added to it in G91."""
     system = whole(block.get("P"), "P of G10")
     if not 1 <= system <= WORK_OFFSETS:
-        control.refuse_rest("the program sets the external work offset (G10 L2 P0)")
+        external = "the external work offset (G10 L2 P0)"
+        control.refuse_rest(f"the program sets {external if system == 0 else f'a work offset P{system} (G10 L2)'}")
         return
     first = first_parameter(system)
     before = stored(control, first)

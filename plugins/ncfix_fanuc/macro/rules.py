@@ -15,6 +15,7 @@ from dataclasses import replace
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.expressions import Fault
+from ncfix.control.operations import Refuse
 from ncfix_fanuc.macro import coordinates, data, lengths, references, tilt
 from ncfix_fanuc.macro.variables import compiled, is_lasting, is_system
 from ncfix_iso.rs274 import groups
@@ -153,6 +154,7 @@ HAAS_OFFSETS = (1540, *range(1100, 1300, 10))
 HAAS_MADE = (120, 130, 470, 700, 710, 720, 1500)
 """Circular pockets, engraving, rows of holes, pockets: G12, G13, G47, G70 to G72, G150."""
 
+HAAS_JUMP, BY_INPUT = 960, "which blocks are executed after M96 is for an input of the machine"
 HAAS = replace(
     FANUC,
     g_groups=FANUC_G
@@ -171,8 +173,9 @@ HAAS = replace(
     repeats="L",
     adds_rotations=True,
 )
+HAAS = groups.with_m_code(HAAS, HAAS_JUMP, (Refuse(BY_INPUT),))
 """Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), mills texts and pockets by itself,
-and pecks by I J K."""
+pecks by I J K, and M96 P Q jumps while an input is off."""
 
 MITSUBISHI_MADE = (120, 130, 340, 350, 360, 371)
 """Circular pockets and rows of holes: G12, G13, G34 to G37.1."""

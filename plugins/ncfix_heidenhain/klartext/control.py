@@ -119,6 +119,7 @@ class KlartextControl(base.ProgramControl):
         self.m128 = run.setup.tcp
         self.shortest = False
         self.auto_feed = math.nan
+        self.oversize = 0.0
         self.preset_checked = False
         self.tool_called = False
         self.defined_tools: dict[int, Tool] = {}

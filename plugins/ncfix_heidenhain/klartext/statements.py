@@ -92,6 +92,9 @@ CHOSEN = "M138: the control takes only some of the rotary axes into account"
 UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
 RETRACT = Passing(Pass.RETRACTION, "retract along the tool axis (M140)")
 COUNTED = "from where the axis {} counts after M126 depends on a parameter of the machine: it went past a turn"
+BESIDE_RETRACTION = (
+    "M140 retracts the tool at the start of its block: where the words of axes beside it lead is not sure"
+)
 COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}
 
 
@@ -118,6 +121,8 @@ def before_motion(control: KlartextControl, step: Step) -> None:
         reduce_turns(control, step.flags)
     if 138 in step.codes:
         choose_axes(control, step.flags)
+    if 140 in step.codes and control.path_word(step.words.values):
+        control.suspend("M140", BESIDE_RETRACTION)
 
 
 def end_of_short_ways(control: KlartextControl) -> None:
@@ -168,6 +173,7 @@ def after_motion(control: KlartextControl, code: int, own: MotionWords, flags: f
     elif code in ENDING:
         control.resume(f"M{ENDING[code]}")
     elif code == 140:
+        control.resume("M140")
         control.pass_here(RETRACT, RETRACTED, "XYZ" if control.tcp else "Z")
 
 
@@ -175,6 +181,7 @@ NAMED = -1
 """The number that stands for a tool that is called by name."""
 
 OTHER_AXIS = "the tool axis is {}: only tools along Z are followed"
+OVERSIZE = "whether the oversize (DL) stays in force where TOOL CALL names no tool is not certain"
 AT_RUN_TIME = "the length of the tool is known only at run time"
 
 
@@ -201,6 +208,8 @@ def call_tool(
     if tool is None and "DR" in words.values:
         control.tools.cutter = math.nan
     if tool is None and "DL" not in words.values:
+        if control.oversize:
+            control.suspend(TOOL, OVERSIZE)
         return
     control.resume(TOOL)
     if isinstance(tool, float) and not tool.is_integer():
@@ -224,7 +233,8 @@ def call_tool(
     if named is not None and named.radius is not None:
         control.tools.cutter = named.radius + words.values.get("DR", 0.0) * control.modal.unit
     length = length_by_name(control, tool) if isinstance(tool, str) else length_of(control, int(control.tools.spindle))
-    set_length(control, length + words.values.get("DL", 0.0) * control.modal.unit)
+    control.oversize = words.values.get("DL", 0.0) * control.modal.unit
+    set_length(control, length + control.oversize)
 
 
 def tell_radius(control: KlartextControl, oversize: float) -> None:

@@ -170,6 +170,7 @@ class Rules:
     cycles      G codes of canned cycles
     repeats     addresses that say how often a canned cycle drills
     takes       G codes that take the axis words of their block for themselves, besides those of `plans`
+    length_by_h_alone  H without G43 in its block may be another length, or none, as the control has it
     adds_rotations  in G91 the angle of G68 is added to that in force
     scales_named  scaling (G51) acts on the axes only that its block names
     offset_group  the group of the work offsets' codes: 14 where #4014 tells which is in force
@@ -189,6 +190,7 @@ class Rules:
     cycles: frozenset[int] = frozenset(CYCLES)
     repeats: str = "LK"
     takes: frozenset[int] = frozenset()
+    length_by_h_alone: bool = False
     adds_rotations: bool = False
     scales_named: bool = False
     offset_group: int = 14
@@ -201,7 +203,7 @@ class Rules:
 
 
 LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")
-ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40}))
+ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40}), length_by_h_alone=True)
 RULES = {"iso": ISO, "linuxcnc": LINUXCNC}
 """By `Dialect.semantics`."""
 

@@ -39,6 +39,7 @@ from ncfix_iso.rs274.settings import (
     compensation,
     diameter,
     distance,
+    lone_length,
     plane,
     retract,
     select_radius,
@@ -145,6 +146,8 @@ def steps_of(g_codes: Mapping[str, int], m_codes: Mapping[str, int], letters: fr
     if single == DWELL:
         steps.append((dwell, single))
     steps += [(own.get(g_codes[group], step), g_codes[group]) for group, step in G_STEPS if group in g_codes]
+    if "H" in letters and rules.length_by_h_alone and groups.LENGTH not in g_codes and groups.CALL not in m_codes:
+        steps.append((lone_length, 0))
     if single in NON_MODAL or (single in own and single != DWELL):
         steps.append((own.get(single) or NON_MODAL[single], single))
     written = [*(("M", code) for code in m_codes.values()), *(("G", code) for code in g_codes.values())]

@@ -43,7 +43,7 @@ DWELL_WORDS = "P"
 NO_WORDS = frozenset("GMNO")
 """Addresses that do not come as values to the steps of a block."""
 
-SMOOTHING = 51
+LOOK_AHEAD, SMOOTHING = 50, 51
 """G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, say for which axes it is, and move nothing."""
 
 LANE_LETTERS = frozenset("FN") | INDEX.keys()
@@ -271,7 +271,7 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
             code = tenths(like)
         if word.address == "G":
             named |= code == SMOOTHING and "Q" in letters
-            if code in rules.harmless_g and not (code in groups.SPLINES and is_spline(letters)):
+            if code in rules.harmless_g and not (code in groups.SPLINES and is_spline(code, letters)):
                 continue
             if code not in rules.g_groups:
                 unknown.append(code)
@@ -319,9 +319,12 @@ def takes_axes(code: int, rules: Rules) -> bool:
     return code in rules.takes or (code in AXES_TAKEN and not own)
 
 
-def is_spline(letters: frozenset[str]) -> bool:
-    """Whether a block with G5 or G5.1 is a spline, as LinuxCNC and Marlin have them: with points besides its end."""
-    return not letters.isdisjoint("IJ") and not letters.isdisjoint(INDEX)
+def is_spline(code: int, letters: frozenset[str]) -> bool:
+    """Whether a block with G5 or G5.1 is a spline, as LinuxCNC and Marlin have them: with points besides its end.
+
+    G5 that switches look-ahead on (P10000) names no axes.
+    """
+    return not letters.isdisjoint(INDEX) and (code == LOOK_AHEAD or not letters.isdisjoint("IJ"))
 
 
 def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules) -> None:

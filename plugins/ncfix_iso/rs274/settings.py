@@ -128,6 +128,8 @@ def restore(control: RS274Control, saved: Modal) -> None:
 
 BAD_LENGTH = "NCF224"
 
+BY_H_ALONE = "what H without G43 makes of the tool length differs from control to control"
+AFTER_H_ALONE = "where the axis {} stands after H without G43 differs from control to control"
 DIFFERS = "what G10 L{} sets differs from control to control (--dialect says which one it is)"
 
 
@@ -160,6 +162,8 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     was not given and is taken as zero is one.
     """
     tool, number, lacking = offset_of(control, block, code)
+    if control.resume(BY_H_ALONE):
+        control.lose((X, Y, Z) if control.tcp else (Z,), AFTER_H_ALONE)
     given = number is not None
     control.tip_control = code in (434, 435)
     on = control.setup.tcp or control.tip_control or control.tilted
@@ -175,6 +179,17 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     control.tools.vector, control.tools.offset = tool, number
     control.modal.tool_code = 430 if given else 490
     control.refresh()
+
+
+def lone_length(control: RS274Control, block: Block, code: int) -> None:
+    """H in a block without G43: another length where one is in force, elsewhere not to all controls."""
+    tools, known = control.tools, "H" not in block.unknown
+    if known and block.values["H"] == float(tools.offset or 0):
+        return
+    if known and tools.offset is not None and tools.vector[Z] >= 0 and not control.modal.incremental:
+        tool_offset(control, block, 434 if control.tip_control else 430)
+    else:
+        control.suspend(BY_H_ALONE, BY_H_ALONE)
 
 
 def offset_of(control: RS274Control, block: Block, code: int) -> tuple[Vector, int | None, bool]:

@@ -41,6 +41,7 @@ REFERENCES = {"G28": 5161, "G30": 5181}
 """The parameters of X of the reference points."""
 
 BAD_G10 = "NCF222"
+ON_TOP = "whether a shift (G52) is added to the one in force in G91 differs from control to control"
 TURNED_WITH_SHIFT = "where {} stands after a rotation while G92 is active differs from control to control"
 TURNED = "turned"
 MOVED_WHILE_TURNED = "what {} does while coordinates are turned, mirrored or tilted differs from control to control"
@@ -283,6 +284,8 @@ def shift_system(control: RS274Control, block: Block, code: int) -> None:
             raise Fault("NCF221", f"G{code // 10} needs an axis word")
         return
     moved_while_turned(control, f"G{code // 10}")
+    if code == 520 and not control.rules.strict and is_on_top(control, block):
+        control.refuse_rest(ON_TOP)
     if not control.rules.strict and code in (520, 920):
         set_local(control, block, cancelled=code == 920)
     if code == 520 and not control.rules.strict:
@@ -306,6 +309,12 @@ def shift_system(control: RS274Control, block: Block, code: int) -> None:
     else:
         after, doubtful = control.frames.additive.shift, doubtful | {*control.composed.unknown}
         control.places.shift(mask_of(i for i in control.machine if before[i] != after[i] or i in doubtful))
+
+
+def is_on_top(control: RS274Control, block: Block) -> bool:
+    """Whether G52 stands in G91 where a shift is in force along an axis that it names."""
+    local = control.frames.local
+    return control.modal.incremental and any(local.shift[i] or i in local.unknown for i in words_of(block))
 
 
 def set_local(control: RS274Control, block: Block, *, cancelled: bool) -> None:

@@ -31,6 +31,16 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
     ),
     ("Okuma OSP code", rb"(?im)^[^(;\n]*(?<![A-Z])(?:G1[56][ \t]*H[ \t]*\d|VC\d+[ \t]*=|CALL[ \t]+O[A-Z\d])"),
     (
+        "Okuma OSP code",
+        rb"(?im)\A(?=(?s:.*?)G[ \t]*56(?![\d.]))(?!(?s:.*)^[^(;\n]*(?<![A-Z])G[ \t]*4[34](?!\d))(?s:.*?)"
+        rb"^[^(;\n]*(?<![A-Z])(G[ \t]*56(?![\d.])[^(;\n]*(?<![A-Z])H[ \t]*[A-C1-9])",
+    ),
+    (
+        "code of Philips or MAHO controls",
+        rb"(?im)^[ \t]*(?:N\d+[ \t]*)?(G[ \t]*9[89](?=[^(;\n]*X)(?=[^(;\n]*I)(?=[^(;\n]*J)(?=[^(;\n]*K)"
+        rb"[ \t]*(?:[XYZIJK][ \t]*[-+]?[\d.]+[ \t]*)+\r?$)",
+    ),
+    (
         "NUM code",
         rb"(?i)\A[ \t\r\n]*(%[ \t]*\d+)(?=(?s:.*?)(?<![A-Z])"
         rb"(?:G[ \t]*5[12][ \t]*[XYZ]|G[ \t]*7[79][ \t]*N[ \t]*\d|E[ \t]*[5-8]\d{4}\b|L\d+[ \t]*=))",
@@ -39,7 +49,8 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
 )
 """Other families of controls: what people call their language, and what shows it; for `Dialect.foreign`.
 
-With Okuma G54 to G59 are tool lengths, and G15 H selects work offsets. With NUM G52 is a motion in machine coordinates.
+With Okuma G54 to G59 are tool lengths, and G15 H selects work offsets. MAHO shifts the zero point by G93, and draws a
+window by G98 and G99. With NUM G52 is a motion in machine coordinates.
 """
 
 LATHE = "lathe code (X a diameter, U and W increments)"

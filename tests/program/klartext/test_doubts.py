@@ -218,3 +218,19 @@ def test_an_axis_that_is_led_nowhere_known_in_machine_coordinates_says_why() -> 
     body = "L X+0 Y+0 Z+50 C+30 FMAX M128\nL Z+5 FMAX M92\nL X+1 Y+1 F100"
     moves = follow(body, "XYZC").moves
     assert moves.reasons[moves.reason[-1]].startswith("where the axis Z stands after M92 depends on a datum")
+
+
+def test_m140_beside_words_of_axes() -> None:
+    found = reasons("L X+1 F100\nL X+5 M140 MB+50\nL X+6 Y+0 Z+5 FMAX\nL X+7 F100")
+    assert len(found) == 1
+    assert "M140" in found[0]
+    assert reasons("L X+1 F100\nL M140 MB+50\nL X+6 Y+0 Z+5 FMAX\nL X+7 F100") == []
+
+
+@pytest.mark.parametrize(
+    ("call", "sure"), [("TOOL CALL S500", False), ("TOOL CALL F500 DR+0.1", False), ("TOOL CALL DL+2", True)]
+)
+def test_an_oversize_may_end_where_no_tool_is_named(call: str, sure: bool) -> None:
+    found = reasons(f"TOOL CALL 5 Z DL+1\nL X+1 Y+0 Z+5 FMAX\n{call}\nL X+5 F100\nTOOL CALL 5 Z\nL X+6 Y+0 Z+5 FMAX")
+    assert ["DL" in why for why in found] == ([] if sure else [True])
+    assert reasons("TOOL CALL 5 Z\nL X+1 Y+0 Z+5 FMAX\nTOOL CALL S500\nL X+5 F100") == []
