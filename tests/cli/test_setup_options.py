@@ -99,3 +99,16 @@ def test_a_file_that_is_not_there(ncfix: Any, option: str, tmp_path: Path) -> No
     result = ncfix("check", tmp_path / "part.ngc", option, tmp_path / "nosuch")
     assert result.code == 3
     assert "nosuch" in result.err
+
+
+def test_tools_of_a_table_whose_lengths_are_not_what_they_seem(ncfix: Any, tmp_path: Path, root: Path) -> None:
+    """One that may be in inches is remarked on; a tool beside the spindle axis has no length that is known."""
+    part, table = tmp_path / "part.ngc", tmp_path / "tools.tbl"
+    part.write_text("G21 G90 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z0\nG1 X5 F100\nM2\n")
+    machine = root / "examples/machines/three_axis.toml"
+    command = ("check", part, "-m", machine, "--dialect", "linuxcnc", "--offset", "G54=0,0,200", "--tool-table", table)
+    table.write_text("T1 P1 Z3.5 D0.25 U1 ; mill\nT2 P2 Z4\n")
+    assert "NCF386: no tool is longer than 4 mm: is the table in inches?" in ncfix(*command).err
+    table.write_text("T1 P1 X2 Z100\n")
+    found = ncfix(*command).err
+    assert "NCF202: length of tool 1, which the tool table has at X2 as well, is used and not given" in found

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ncfix.control.setup import Setup, Tool
-from ncfix.control.setup_file import load, load_tool_table, loads
+from ncfix.control.setup_file import load, load_tool_table, loads, may_be_in_inches
 from ncfix.diagnostics import ConfigError, ExitCode, SourceError
 
 FULL = """
@@ -139,6 +139,26 @@ def test_linuxcnc_tables(tmp_path: Path) -> None:
     }
 
 
+def test_linuxcnc_tables_of_other_programs_begin_with_lines_for_people(tmp_path: Path) -> None:
+    text = "Tool Table\n----\n(of a screen)\nGenerated on: 01/29/2029\n\n;Tool Pocket\nT1 P1 Z100 ; MILL\n"
+    assert table(tmp_path, "tool.tbl", text) == {1: Tool(100.0)}
+
+
+def test_a_tool_that_is_offset_along_another_axis_has_no_known_length(tmp_path: Path) -> None:
+    path = tmp_path / "t.tbl"
+    path.write_text("T1 X0.5 Z100\nT2 Z100 U1 B45\nT3 X0 Z100\n")
+    assert load_tool_table(str(path), "XYZ") == {1: Tool(None, None, "X0.5"), 2: Tool(100.0), 3: Tool(100.0)}
+    assert load_tool_table(str(path))[2] == Tool(None, None, "B45 U1")
+
+
+@pytest.mark.parametrize(
+    ("lengths", "inches"),
+    [([3.9, 8.3], True), ([3.9, 98.0], False), ([0.5], False), ([0.0, 0.0], False), ([-3.0, -5.0], False)],
+)
+def test_a_table_without_any_tool_of_a_length_may_be_in_inches(lengths: list[float], inches: bool) -> None:
+    assert bool(may_be_in_inches({n: Tool(length) for n, length in enumerate(lengths)})) == inches
+
+
 def test_csv_tables(tmp_path: Path) -> None:
     assert table(tmp_path, "tools.csv", "tool,length,radius\n1,100.5,5\n\n2, 80 ,2.5\n") == {
         1: Tool(100.5, 5.0),
@@ -153,7 +173,8 @@ def test_csv_tables(tmp_path: Path) -> None:
     [
         ("t.tbl", "T1 Z1\nnonsense\nP2 Z1\nT1 Z2\n", [2, 3, 4]),
         ("t.tbl", "; nothing\n", [0]),
-        ("t.tbl", "T1 Z100 X0.5\nT2 Z100 B45\nT3 Z1 Z2\nT4 Z1.2.3\nT5 Z1,2\nT6 R5 Z1\n", [1, 2, 3, 4, 5, 6]),
+        ("t.tbl", "T3 Z1 Z2\nT4 Z1.2.3\nT5 Z1,2\nT6 R5 Z1\n", [1, 2, 3, 4]),
+        ("t.tbl", "POC FMS LEN DIAM\n1 1 100.0 6.0\n", [2]),
         ("t.csv", "tool,length\n1,2,3\n2,1.5x\n-1,1\n1.5,2\n", [2, 3, 4, 5]),
         ("t.csv", "tool;length\n1;2\n", [1]),
         ("t.csv", "tool,length,colour\n1,2,red\n", [1]),

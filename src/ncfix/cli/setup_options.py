@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ncfix.cli.console import tell
 from ncfix.cli.options import PATH
+from ncfix.diagnostics import Message, Place
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup
@@ -221,9 +223,12 @@ class SetupOptions:
             setup = load(self.setup_file)
         tools = dict(setup.tools)
         if self.tool_table is not None:
-            from ncfix.control.setup_file import load_tool_table
+            from ncfix.control.setup_file import ASIDE, load_tool_table, may_be_in_inches
 
-            tools |= load_tool_table(self.tool_table)
+            found = load_tool_table(self.tool_table, ASIDE if machine is None else machine.axis_names)
+            if doubt := may_be_in_inches(found):
+                tell(Message("NCF386", doubt, Place(self.tool_table), "lengths are mm: 25.4 times as much"))
+            tools |= found
         given = {key.strip('"'): Tool(*values) for key, values in self.tools}
         tools |= {int(key): tool for key, tool in given.items() if key.isdecimal()}
         named = {key: tool for key, tool in given.items() if not key.isdecimal()}

@@ -310,4 +310,10 @@ CODES: dict[str, Code] = {
         "A line of the tool table cannot be understood, or a tool stands twice.",
         "LinuxCNC: `T1 P1 Z120.5 D10`; CSV: a header `tool,length,radius`, decimal points.",
     ),
+    "NCF386": Code(
+        "Tool table that may be in inches",
+        "No tool of the table is as long as tools with their holders are in mm. Tables are read in mm; one of LinuxCNC "
+        "has the unit of its machine, and does not say which.",
+        "Write lengths and diameters in mm if they are in inches.",
+    ),
 }

@@ -40,10 +40,15 @@ CALCULATOR = "calculator"
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A tool as the control's table has it, mm."""
+    """A tool as the control's table has it, mm.
+
+    aside  offsets of the table along other axes of the machine, `X1.5`, which a length offset adds, too: the length of
+           such a tool is not known
+    """
 
     length: float | None = None
     radius: float | None = None
+    aside: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +154,8 @@ class SetupLookup:
         if length is not None:
             return length
         what = f"length of tool {number}" if number else "length of the tool that is in the spindle at the start"
+        if number in self.setup.tools and self.setup.tools[number].aside:
+            what += f", which the tool table has at {self.setup.tools[number].aside} as well,"
         self.lack(TOOL_LENGTH, what, "is used", f"--tool {number}=LENGTH")
         return 0.0
 

@@ -3,8 +3,9 @@
 Tool tables: LinuxCNC's `.tbl`, Heidenhain's TOOL.T, and CSV with a header.
 
 - LinuxCNC: one tool a line, `T1 P1 Z120.5 D10 ; comment`. Z is the length offset and D the diameter, both in mm here,
-  since the machine's unit is mm. G43 adds the offsets of all other axes, too: one that is not zero is refused. I, J and
-  Q are of a lathe's tool nose. Source: LinuxCNC documentation, "Tool table format".
+  since the machine's unit is mm. G43 adds the offsets of all other axes, too: the length of a tool that has one is not
+  known. I, J and Q are of a lathe's tool nose. Lines above the first tool that are none are for people, as the control
+  takes them. Source: LinuxCNC documentation, "Tool table format".
 - TOOL.T: columns at fixed places under a line of names. L and R count with their oversizes DL and DR. A tool with an
   index (5.1) and a row without a length are left out. A word that begins in one column and ends in the next is refused:
   columns are at other places then. Source: TNC 640 user's manual, "Entering tool data in the table".
@@ -16,9 +17,10 @@ import csv
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import partial
 from pathlib import PurePath
 from typing import Any
 
@@ -54,6 +56,8 @@ ENTRY = re.compile(r"([TPXYZABCUVWDIJQ])\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+
 """A word of LinuxCNC's tool table."""
 ASIDE = "XYABCUVW"
 """Axes along which a tool has no length here."""
+SHORT = 15.0
+"""mm; no tool with its holder is as short."""
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)\Z")
 LONGEST = 1e6
 """mm; a number beyond it is a slip."""
@@ -288,8 +292,10 @@ def flattened(table: Mapping[str, Any]) -> dict[str, Any]:
 # -- tool tables -------------------------------------------------------------------------------------------------------
 
 
-def load_tool_table(path: str) -> dict[int, Tool]:
+def load_tool_table(path: str, axes: Collection[str] = ASIDE) -> dict[int, Tool]:
     """The tools in a control's table, by number: Heidenhain's by its first line, CSV by its suffix, else LinuxCNC's.
+
+    axes  of the machine: offsets along others do nothing
 
     Raises SourceError NCF002, ConfigError NCF385 with every line that is wrong.
     """
@@ -297,7 +303,7 @@ def load_tool_table(path: str) -> dict[int, Tool]:
     if b"\0" in source:
         raise ConfigError.of(BAD_TABLE, "not plain text, or text in UTF-16", Place(path), "save it as UTF-8")
     text = source.decode("utf-8-sig", "replace")
-    reader = csv_rows if PurePath(path).suffix.lower() == ".csv" else linuxcnc_rows
+    reader = csv_rows if PurePath(path).suffix.lower() == ".csv" else partial(linuxcnc_rows, axes=axes)
     if TOOL_T_BEGIN.match(text):
         reader = tool_t_rows
     faults: list[Message] = []
@@ -324,15 +330,25 @@ Row = tuple[int, tuple[int, Tool] | str]
 """Line number, and a tool or what is wrong."""
 
 
-def linuxcnc_rows(text: str) -> Iterator[Row]:
-    """The lines of a LinuxCNC table."""
+def may_be_in_inches(tools: Mapping[int, Tool]) -> str:
+    """What is said of a table in which no tool is as long as tools are in mm; "" of any other."""
+    lengths = [tool.length for tool in tools.values() if tool.length is not None and tool.length > 0]
+    if len(lengths) < 2 or max(lengths) > SHORT:
+        return ""
+    return f"no tool is longer than {max(lengths):g} mm: is the table in inches?"
+
+
+def linuxcnc_rows(text: str, axes: Collection[str]) -> Iterator[Row]:
+    """The lines of a LinuxCNC table for a machine with these axes."""
+    begun = False
     for line, content in enumerate(text.splitlines(), 1):
         entry = content.partition(";")[0].strip()
-        if not entry:
+        begun = begun or re.match(r"[TP]\s*\d", entry, re.IGNORECASE) is not None
+        if not entry or not (begun or re.match(r"\d", entry)):
             continue
         rest, words = ENTRY.sub("", entry).strip(), ENTRY.findall(entry.upper())
         values = {letter: float(number) for letter, number in words}
-        offset = next((f"{letter}{number}" for letter, number in words if letter in ASIDE and float(number)), "")
+        aside = [f"{letter}{values[letter]:g}" for letter in ASIDE if letter in axes and values.get(letter)]
         if rest:
             yield line, f"{rest!r} is not understood in a tool table"
         elif len(values) < len(words):
@@ -340,11 +356,9 @@ def linuxcnc_rows(text: str) -> Iterator[Row]:
             yield line, f"{twice} stands twice"
         elif "T" not in values or not values["T"].is_integer():
             yield line, "the line names no tool (T)"
-        elif offset:
-            yield line, f"{offset} is an offset that G43 adds, too; only lengths along Z are known here"
         else:
-            radius = values["D"] / 2 if "D" in values else None
-            yield line, (int(values["T"]), Tool(values.get("Z", 0.0), radius))
+            length, radius = values.get("Z", 0.0), values["D"] / 2 if "D" in values else None
+            yield line, (int(values["T"]), Tool(None if aside else length, radius, " ".join(aside)))
 
 
 def csv_rows(text: str) -> Iterator[Row]:
