@@ -229,7 +229,7 @@ class SetupOptions:
             if doubt := may_be_in_inches(found):
                 tell(Message("NCF386", doubt, Place(self.tool_table), "lengths are mm: 25.4 times as much"))
             tools |= found
-        given = {key.strip('"'): Tool(*values) for key, values in self.tools}
+        given = {key.strip('"'): Tool(values[0], values[1] if len(values) > 1 else None) for key, values in self.tools}
         tools |= {int(key): tool for key, tool in given.items() if key.isdecimal()}
         named = {key: tool for key, tool in given.items() if not key.isdecimal()}
         probed = {axis: value for given in self.probed for axis, value in given.items()}
