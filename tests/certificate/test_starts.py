@@ -58,3 +58,10 @@ def test_full_circles_end_within_the_tolerance_and_inches_to_the_digit_of_the_co
     text = b"G20 G90 G17\nG0 X1.5 Y0.25 Z0.5\nG1 X1.00000000 Y0.50000000 F10.\nG2 Z0.5 I0.25 J0.\nG1 X2.\nM2\n"
     proof = proof_of(text, "table", {})
     assert (proof.faults, proof.unproved) == ([], 0)
+
+
+@pytest.mark.parametrize("words", ["G5.1 Q1 R5", "G5.1 Q2 X0 Y0 Z0", "G5.1Q3X0Y0Z0A0C0", "G05 P10000", "G5.1 Q0"])
+def test_what_smooths_the_path_moves_nothing(words: str) -> None:
+    text = LINES.replace(b"G1 X15.", words.encode() + b"\nG1 X15.")
+    proof = proof_of(text, "table", {}, "fanuc")
+    assert (proof.faults, proof.unproved, proof.proved_motions) == ([], 0, 5)

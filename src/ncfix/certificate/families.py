@@ -45,7 +45,7 @@ class WordAddressFollower(AxisFollower):
         codes = [round(10 * word.value) for word in line.codes if word.name == "G" and word.value is not None]
         if line.odd and (codes or line.path):
             self.lost["odd"] = line.odd
-        if self._shifted(line, codes):
+        if self._shifted(line, codes) or self._smooths(line, codes):
             return None
         apart, fixed = self._modes(line, codes)
         words = {word.name: word for word in line.path if word.name in AXES}
@@ -72,6 +72,13 @@ class WordAddressFollower(AxisFollower):
         if self.kind == Kind.ARC and not step.why:
             return self._arc_of_words(step, line, start)
         return step
+
+    def _smooths(self, line: TextLine, codes: Sequence[int]) -> bool:
+        """Whether a line does nothing but say how the control smooths the path, and for which axes (G5.1 Q2 X0 Y0)."""
+        own = {word.name for word in line.codes}
+        if self.family is not Family.WORDS or line.odd:
+            return False
+        return (codes == [51] and "Q" in own) or (codes in ([50], [1870]) and not line.path)
 
     def _shifted(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Take in a shift by G52, G92, G92.1, TRANS or ATRANS that stands alone in its line; False if it is none."""
