@@ -63,6 +63,19 @@ def test_an_option_wins_over_the_environment_and_that_over_the_file(
     assert not (yard / "done").exists()
 
 
+def test_tables_of_a_program_need_no_options_and_are_no_corrected_programs(ncfix: Any, yard: Path) -> None:
+    traced = ncfix("trace", "jobs/plate.ngc")
+    assert traced.code == ExitCode.DONE, traced.err
+    assert b",tip_x," in traced.out
+    assert "ncfix.toml" in traced.err
+    simulated = ncfix("simulate", "--program", "jobs/plate.ngc")
+    assert simulated.code == ExitCode.DONE, simulated.err
+    assert simulated.out.startswith(b"tip error: max ")
+    assert not (yard / "done").exists()
+    assert ncfix("simulate", "--program", "jobs/plate.ngc", "--no-project").code == ExitCode.USAGE
+    assert ncfix("simulate", "--plan", "poses.csv").code == ExitCode.USAGE
+
+
 def test_without_the_file(ncfix: Any, yard: Path) -> None:
     result = ncfix("fix", "jobs/plate.ngc", "--no-project")
     assert result.code == ExitCode.USAGE

@@ -56,7 +56,7 @@ MODULES = {
 }
 """In which module of `ncfix.cli` the command of a verb is, if not in one of its own name."""
 
-PROJECT_VERBS = ("fix", "verify")
+PROJECT_VERBS = ("fix", "verify", "simulate")
 """Verbs that need a machine, and find it in a project file."""
 
 INTERRUPTED = 130

@@ -14,7 +14,7 @@ from ncfix.cli import console
 from ncfix.cli.following import FollowingSetup, dialect_in, parts_of, task_of, through
 from ncfix.cli.options import PATH, dialect_option, force_option, json_option, optional_machine_option, table_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.shop.projects import ProjectCommand, after_next_groups, group_of, project_options
+from ncfix.cli.shop.projects import ProjectCommand, TableCommand, after_next_groups, group_of, project_options
 from ncfix.cli.streams import HeldOutput, Source, source_of
 from ncfix.cli.targets import Outputs, shown, targets
 from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
@@ -96,13 +96,14 @@ def _outcome(following: FollowingSetup, path: str) -> tuple[int, dict[str, Any]]
     return ExitCode.FINDINGS if count else ExitCode.DONE, entry
 
 
-@click.command()
+@click.command(cls=TableCommand)
 @click.argument("program", type=PATH)
 @optional_machine_option
 @table_option
 @force_option
 @dialect_option
 @setup_options
+@project_options
 @json_option
 def trace(
     program: str,

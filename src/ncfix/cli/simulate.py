@@ -26,6 +26,7 @@ from ncfix.cli.options import (
     numbers,
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.shop.projects import TableCommand, project_options
 from ncfix.cli.streams import HeldOutput, Source, source_of
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, read, shown, targets
 
@@ -40,7 +41,7 @@ OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
 """Options that say nothing of a program."""
 
 
-@click.command()
+@click.command(cls=TableCommand)
 @machine_option
 @click.option("--program", type=PATH, metavar="FILE", help="The program that the machine runs.")
 @click.option("--plan", type=PATH, metavar="FILE", help="Poses to be measured, as `ncfix plan` writes them (CSV).")
@@ -55,6 +56,7 @@ OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
 @force_option
 @dialect_option
 @setup_options
+@project_options
 @json_option
 def simulate(
     machine_path: str,

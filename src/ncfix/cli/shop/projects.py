@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
 
@@ -56,7 +56,12 @@ class _Groups:
 
 
 class ProjectCommand(click.Command):
-    """A verb on programs; what the project file says of its options are defaults."""
+    """A verb on programs; what the project file says of its options are defaults.
+
+    not_of_it  options by their names in a project file that mean something else for this verb
+    """
+
+    not_of_it: ClassVar[frozenset[str]] = frozenset()
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Find the project of the programs first."""
@@ -68,7 +73,7 @@ class ProjectCommand(click.Command):
 
     def _groups(self, ctx: click.Context, args: list[str]) -> list[ProgramGroup]:
         options, _, _ = self.make_parser(ctx).parse_args(args=list(args))
-        first = next(param.name for param in self.params if isinstance(param, click.Argument))
+        first = next((param.name for param in self.params if isinstance(param, click.Argument)), "program")
         given = options.get(first or "")
         given = [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else []
         ctx.meta[QUIET] = options.get("quiet") is True
@@ -131,9 +136,17 @@ class ProjectCommand(click.Command):
             if key in COMMAND_LINE_ONLY:
                 text = "is said on the command line, and not in a project file"
                 raise _wrong(project, key, value, text, f"--{key.replace('_', '-')}")
+            if key in self.not_of_it:
+                continue
             if (option := own.get(key)) and option.name and (taken := _taken(option, key, value, project)) is not None:
                 found[option.name] = taken
         return found
+
+
+class TableCommand(ProjectCommand):
+    """A verb that writes a table of a program: where a project wants corrected programs is not where that goes."""
+
+    not_of_it = frozenset({"output"})
 
 
 def tell_of(*projects: Project) -> None:
