@@ -119,10 +119,10 @@ class Heidenhain(Control):
         machine = request.machine
         most = int(settings["points"])
         lines = additive(machine, request.space, request.tool_length, most, request.target, both=both)
-        kept = [line for line in map(_rounded, lines) if line.values.any() or line.reverse.any()]
-        tables = {line.input: f"AXIS{'-' if old else '_'}{line.input}.COM" for line in kept}
+        needed = [line for line in map(_rounded, lines) if line.values.any() or line.reverse.any()]
+        tables = {line.input: f"AXIS{'-' if old else '_'}{line.input}.COM" for line in needed}
         files = {}
-        for line in kept:
+        for line in needed:
             com = _as_file(line, sense, axes if old else None, both)
             largest = max(float(np.abs(values).max()) for values in com.columns.values())
             if largest > LARGEST:
@@ -212,9 +212,9 @@ def _rounded(line: AxisTables) -> AxisTables:
     """What is left of a line when its values have four decimals: columns of zeros go."""
     units = np.array([unit_of(name) for name in line.outputs])
     values = np.round(line.values / units, 4) * units
-    kept = [i for i, name in enumerate(line.outputs) if values[:, i].any() or name == line.input]
+    columns = [i for i, name in enumerate(line.outputs) if values[:, i].any() or name == line.input]
     reverse = np.round(line.reverse / unit_of(line.input), 4) * unit_of(line.input)
-    return AxisTables(line.input, line.nodes, tuple(line.outputs[i] for i in kept), values[:, kept], reverse)
+    return AxisTables(line.input, line.nodes, tuple(line.outputs[i] for i in columns), values[:, columns], reverse)
 
 
 def _as_file(line: AxisTables, sense: float, numbered: tuple[str, ...] | None, both: bool) -> ComTable:

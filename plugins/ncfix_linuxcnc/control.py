@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -40,6 +39,7 @@ from ncfix.plugin import (
     wrong_setting,
 )
 from ncfix.tables.table_files import ALONE, DEGREE, NUMBER, ORDER, TURNING
+from ncfix.values import dataclass
 
 MOST = 256
 """EMCMOT_COMP_SIZE of LinuxCNC."""

@@ -15,7 +15,6 @@ import os
 import stat
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import IO
@@ -24,6 +23,7 @@ from ncfix import inputs
 from ncfix.diagnostics import Place, SourceError, UsageError
 from ncfix.inputs import FileIdentity
 from ncfix.outputs import check_folder, check_output, check_own, check_target, exists_already, linked, way_to
+from ncfix.values import dataclass
 
 READING = {
     errno.EACCES: "get the right to read it",
@@ -222,15 +222,15 @@ def replace_keeping(path: str, backup: str, data: bytes | Iterable[bytes]) -> No
     """Give `path` new content and keep the old file as `backup`; at every moment both names hold whole files."""
     check_output(path)
     with _coded(path), _folder(path, None) as (folder, name):
-        kept = os.path.basename(backup)
+        second = os.path.basename(backup)
         like = _as_it_is(name, folder)
         with _without_a_name(folder, data, like) as handle, _written_beside(folder, data, like, handle) as temporary:
-            if not _link(name, kept, folder):
+            if not _link(name, second, folder):
                 write_whole(backup, Path(path).read_bytes())
             try:
                 os.replace(temporary, name, src_dir_fd=folder, dst_dir_fd=folder)
             except OSError:
-                os.unlink(kept, dir_fd=folder)
+                os.unlink(second, dir_fd=folder)
                 raise
         _sync(folder)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z, mask_of
 from ncfix.control.expressions import Fault, Unknown, Value, nominal
@@ -13,6 +12,7 @@ from ncfix.control.interpreter import RUNTIME
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
+from ncfix.values import dataclass
 from ncfix_fanuc.macro import coordinates, system, tilt
 from ncfix_fanuc.macro.blocks import CORNER, G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl
@@ -170,8 +170,8 @@ class MacroInterpreter(RS274Interpreter):
         key = id(plan), frozenset(spans)
         if key not in self.reduced:
             items = plan.template.items
-            kept = tuple(item for item in items if not (isinstance(item, Word) and item.span in spans))
-            self.reduced[key] = plan_of(Template(kept, plan.template.n_numbers), self.control.rules)
+            remaining = tuple(item for item in items if not (isinstance(item, Word) and item.span in spans))
+            self.reduced[key] = plan_of(Template(remaining, plan.template.n_numbers), self.control.rules)
         return self.reduced[key]
 
     def evaluate(self, plan: RS274Plan, index: int) -> Block:

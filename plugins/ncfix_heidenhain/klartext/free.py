@@ -12,7 +12,9 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+
+from ncfix.values import dataclass
 
 FLAT = 1e-9
 

@@ -177,8 +177,8 @@ class KlartextWriter(BlockWriter):
     def _direction_words(self, end: FloatArray) -> list[str]:
         """TX TY TZ of a further piece; its normal is that of the block."""
         normals = [w for w in self.program.items_of(self.block) if isinstance(w, Word) and w.address[0] == "N"]
-        kept = [self.program.slice(self.block, word.span) for word in normals if len(word.address) == 2]
-        return kept + super()._direction_words(end)
+        words = [self.program.slice(self.block, word.span) for word in normals if len(word.address) == 2]
+        return words + super()._direction_words(end)
 
     # -- arcs ---------------------------------------------------------------------------------------------------------
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ncfix.control import control as shared
 from ncfix.control.coordinates import INCH, LETTERS
@@ -11,6 +11,7 @@ from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
 from ncfix.control.setup import Run
 from ncfix.control.state import Saved
 from ncfix.text.dialect import Dialect
+from ncfix.values import dataclass
 from ncfix_iso.rs274.groups import ARCS, RULES, Rules, with_own_codes
 from ncfix_iso.rs274.parameters import NumberedParameters, Store
 
@@ -94,10 +95,10 @@ class RS274Control(shared.ProgramControl):
         """See `RS274Control`."""
         modal, parameters, knowledge = self.modal, self.parameters, self.knowledge
         cycle = replace(modal.cycle, initial=None)
-        kept = [each for name, each in vars(self).items() if name not in PASSING]
-        kept.append(replace(modal, motion=0, straight=0, feed=0.0, feed_given=False, cycle=cycle))
-        kept += (parameters.scopes, parameters.returned, knowledge.missing, knowledge.assumed)
-        return repr(kept)
+        state = [each for name, each in vars(self).items() if name not in PASSING]
+        state.append(replace(modal, motion=0, straight=0, feed=0.0, feed_given=False, cycle=cycle))
+        state += (parameters.scopes, parameters.returned, knowledge.missing, knowledge.assumed)
+        return repr(state)
 
     def set_variables(self) -> Store:
         """See `RS274Control`: the numbered parameters."""

@@ -6,7 +6,7 @@ Everything that does not depend on numbers is settled once per shape, so that a 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from ncfix.text.tree import (
     Template,
     Word,
 )
+from ncfix.values import dataclass
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.control import POLAR
 from ncfix_iso.rs274.groups import TOOL_CHANGE, Rules
@@ -207,15 +208,15 @@ def take_aliases(plan: RS274Plan, rules: Rules) -> None:
     for code in codes:
         given = dict(rules.aliases[code].words) if code in rules.aliases else {}
         family = {own: address for address, own in given.items() if isinstance(own, str)}
-        kept = plan.letters - family.keys()
-        if kept & given.keys():
-            plan.fault = Fault(CONFLICT, f"{min(kept & given.keys())} is no word of {code[0]}{code[1] / 10:g}")
+        untouched = plan.letters - family.keys()
+        if untouched & given.keys():
+            plan.fault = Fault(CONFLICT, f"{min(untouched & given.keys())} is no word of {code[0]}{code[1] / 10:g}")
             return
         plan.literals = tuple((family.get(address, address), slot) for address, slot in plan.literals)
         plan.pointless = tuple(family.get(address, address) for address in plan.pointless)
         plan.computed = tuple((family.get(each[0], each[0]), *each[1:]) for each in plan.computed)
         plan.fixed |= {address: own for address, own in given.items() if not isinstance(own, str)}
-        plan.letters = kept | {family[own] for own in plan.letters & family.keys()} | plan.fixed.keys()
+        plan.letters = untouched | {family[own] for own in plan.letters & family.keys()} | plan.fixed.keys()
 
 
 def take_statements(plan: RS274Plan, rules: Rules) -> None:

@@ -229,14 +229,14 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
             key = self.key_of(written[place]) if given else None
             if parameter.by_reference and key is not None:
                 results[parameter.name] = key
-        kept = (copy.copy(control.modal), copy.copy(control.modes), control.frames) if unit.saves else None
+        saved = (copy.copy(control.modal), copy.copy(control.modes), control.frames) if unit.saves else None
 
         def leave() -> None:
             control.variables.scopes.pop()
             for name, theirs in results.items():
                 control.variables.assign(theirs, local.values.get(name, Unknown()))
-            if kept is not None:
-                control.restore(*kept)
+            if saved is not None:
+                control.restore(*saved)
 
         control.variables.scopes.append(local)
         return OpenCall(unit.name, (unit, unit.begin), times - 1, leave=leave)

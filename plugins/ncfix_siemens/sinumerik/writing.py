@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +43,7 @@ from ncfix.text.tree import (
     Tape,
     Word,
 )
+from ncfix.values import dataclass
 from ncfix.writer.block import BlockWriter
 from ncfix.writer.target import LINE, TANGENTIAL, Target
 from ncfix_siemens.sinumerik.circles import VIA, circle_through
@@ -109,8 +109,8 @@ class SinumerikWriter(BlockWriter):
         if not self.layout.polar:
             return super()._first_piece(position, end)
         if self._polar_stays(end):
-            kept = super()._first_piece(position, np.where(self._polar_columns(), position, end))
-            return np.where(self._polar_columns(), self.target.nominal, kept)
+            first = super()._first_piece(position, np.where(self._polar_columns(), position, end))
+            return np.where(self._polar_columns(), self.target.nominal, first)
         for word in self.layout.polar.values():
             self._remove(word)
         position = super()._first_piece(position, end)

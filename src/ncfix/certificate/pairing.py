@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from ncfix.certificate.findings import BlockFault
 from ncfix.certificate.reading import Family, TextLine
 from ncfix.certificate.text import Text
+from ncfix.values import dataclass
 
 AHEAD = 8
 """Lines that are looked at for where a line that should be here has gone."""
@@ -244,8 +245,8 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
     for name in names:
         if name not in left:
             found.append(f"the word {name} is not there any more")
-    kept = [name for name in left if name in names]
-    if not found and kept != names:
+    common = [name for name in left if name in names]
+    if not found and common != names:
         found.append("words have changed their places")
     if klartext and head.block != line.block:
         found.append("the block has another number")

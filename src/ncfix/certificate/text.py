@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate
 from typing import NamedTuple, overload
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.reading import AXES, DECIMAL, NUMBER, PATH_WORDS, READERS, Family, TextLine, TextWord
+from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,20 +245,20 @@ class Lines(Sequence[TextLine]):
         held: list[int] = []
         head = found.end(1) if self.klartext and found[1] else 0
         begin, end = found.span(found.re.groups)
-        count, pieces, kept = int(head > 0), list[str](), key[head:begin]
+        count, pieces, literal = int(head > 0), list[str](), key[head:begin]
         for word in PLAIN_WORD.finditer(key, begin, end):
             name = (word[1] or word[2]).upper()
             if word[1] and name[-1] in AXES and (self.klartext or len(name) == 1):
                 path.append((name, count))
-                kept = kept.rstrip(" \t")
-                pieces.append(kept)
-                kept = ""
+                literal = literal.rstrip(" \t")
+                pieces.append(literal)
+                literal = ""
             else:
-                kept += word[0].replace(MARK, "{}")
+                literal += word[0].replace(MARK, "{}")
                 codes.append((name, count if word[1] else -1))
                 held += [count] if word[1] else []
             count += bool(word[1])
-        pieces.append(kept + key[end:])
+        pieces.append(literal + key[end:])
         names = [name[-1] for name, _ in path]
         if len(set(names)) < len(names):
             return None

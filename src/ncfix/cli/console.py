@@ -39,7 +39,7 @@ MOST = 20
 """Messages of one code that are written out."""
 BUSY_AFTER_S = 2.0
 """Progress is shown for what takes longer, on a terminal."""
-_kept: ContextVar[list[str] | None] = ContextVar("kept", default=None)
+_collected: ContextVar[list[str] | None] = ContextVar("collected", default=None)
 DEBUG = "NCFIX_DEBUG"
 """The environment variable that asks for tracebacks; workers inherit it."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -97,9 +97,9 @@ class ReaderGoneError(Exception):
 
 def say(text: str) -> None:
     """A line for people, on standard error; the first code of a message in it is bold on a terminal."""
-    kept = _kept.get()
-    if kept is not None:
-        kept.append(text)
+    lines = _collected.get()
+    if lines is not None:
+        lines.append(text)
         return
     seen = CODE.sub(lambda found: click.style(found[0], bold=True), visible(text, lines=True), count=1)
     with suppress(OSError, AttributeError):  # nobody can be told that nobody can be told; exit codes still say it
@@ -114,18 +114,18 @@ def forewarn(text: str) -> None:
 
 def _watched() -> bool:
     """Whether somebody sees on a terminal what is said while it is said."""
-    return _kept.get() is None and sys.stderr is not None and sys.stderr.isatty()
+    return _collected.get() is None and sys.stderr is not None and sys.stderr.isatty()
 
 
 @contextmanager
 def keeping() -> Iterator[list[str]]:
     """Keep what is said, instead of saying it, in this thread; `say` may say it elsewhere."""
     lines: list[str] = []
-    token = _kept.set(lines)
+    token = _collected.set(lines)
     try:
         yield lines
     finally:
-        _kept.reset(token)
+        _collected.reset(token)
 
 
 def tell(*messages: Message) -> None:

@@ -7,13 +7,14 @@ import os
 import stat
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import IO, TYPE_CHECKING
 
 from ncfix import files, inputs
 from ncfix.cli import console
 from ncfix.cli.targets import STREAM, OutputTarget, shown, stdin
 from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
+from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.driver import Stamp
@@ -60,8 +61,8 @@ class FixedText:
 def source_of(path: str) -> Iterator[Source]:
     """An input file, or standard input, to be read from its beginning."""
     if path == STREAM:
-        with files.unnamed(None) as kept:
-            yield Source(path, stdin(), kept)
+        with files.unnamed(None) as spool:
+            yield Source(path, stdin(), spool)
         return
     try:
         handle = inputs.opened(path)
@@ -72,13 +73,13 @@ def source_of(path: str) -> Iterator[Source]:
         if stat.S_ISREG(began.st_mode):
             yield Source(path, handle, None, began)
             return
-        with files.unnamed(None) as kept:
-            yield Source(path, handle, kept)
+        with files.unnamed(None) as spool:
+            yield Source(path, handle, spool)
 
 
 @dataclass(slots=True)
 class Source:
-    """A text that can be read part by part, and again as a whole: what is read of a pipe is kept in a file.
+    """A text that can be read part by part, and again as a whole: what is read of a pipe goes to a file, its `spool`.
 
     began  what the system said of a file at first
     stamp  where the mark of a corrected program stands, if one of the first lines has it
@@ -86,7 +87,7 @@ class Source:
 
     path: str
     handle: IO[bytes]
-    kept: IO[bytes] | None
+    spool: IO[bytes] | None
     began: os.stat_result | None = None
     head: bytes = b""
     taken: int = 0
@@ -96,8 +97,7 @@ class Source:
         """What other processes need to read the text, too, and to write into the file `out`."""
         from ncfix.compensate.workers import OpenFiles
 
-        kept = self.kept is not None
-        return OpenFiles((self.kept or self.handle).fileno(), not kept, out)
+        return OpenFiles((self.spool or self.handle).fileno(), self.spool is None, out)
 
     def check_unchanged(self) -> None:
         """Raise SourceError NCF002 if the file is not what it was at first: parts of it may not fit together."""
@@ -115,7 +115,7 @@ class Source:
         from ncfix.text.dialect import PROBE_BYTES
 
         many = long_bytes()
-        self.head = self._read(many if named and self.kept is not None else max(many, PROBE_BYTES))
+        self.head = self._read(many if named and self.spool is not None else max(many, PROBE_BYTES))
         self.stamp = self._stamp(self.head[:PROBE_BYTES].splitlines())
         return len(self.head) >= many
 
@@ -145,9 +145,9 @@ class Source:
             part = self.handle.read(size)
         except OSError as error:
             raise files.unreadable(shown(self.path), error) from error
-        if self.kept is not None:
+        if self.spool is not None:
             with files.said_of(None):
-                files.put_at(self.kept.fileno(), self.taken, part)
+                files.put_at(self.spool.fileno(), self.taken, part)
             self.taken += len(part)
             try:
                 inputs.check_size(self.taken)
@@ -157,12 +157,12 @@ class Source:
 
     def everything(self) -> bytes:
         """The whole text."""
-        if self.kept is None:
+        if self.spool is None:
             return files.read_bytes(self.path)
         while self._read(files.COPIED):
             pass
-        self.kept.seek(0)
-        return self.kept.read()
+        self.spool.seek(0)
+        return self.spool.read()
 
 
 @dataclass(slots=True)
@@ -173,7 +173,7 @@ class Outlet:
     taken    bytes so far, of which so many were `sent`; the others stand in the file, at their places
     """
 
-    kept: IO[bytes]
+    spool: IO[bytes]
     direct: bool
     stamped: Callable[[], bool]
     taken: int = 0
@@ -186,7 +186,7 @@ class Outlet:
         if isinstance(data, int):
             self.taken += data
         elif not direct:
-            files.put_at(self.kept.fileno(), self.taken, data)
+            files.put_at(self.spool.fileno(), self.taken, data)
             self.taken += len(data)
         if direct:
             for part in self._unsent():
@@ -202,7 +202,7 @@ class Outlet:
 
     def _unsent(self) -> Iterator[bytes]:
         at = self.sent
-        while part := os.pread(self.kept.fileno(), min(files.COPIED, self.taken - at), at):
+        while part := os.pread(self.spool.fileno(), min(files.COPIED, self.taken - at), at):
             yield part
             at += len(part)
 
@@ -210,8 +210,8 @@ class Outlet:
         """What was not sent, with the stamp as it has to be."""
         if self.sent:
             return self._unsent()
-        kept = files.WholeFile(self.kept)
-        return kept if stamp.written == stamp.wanted else StampedText(kept, stamp)
+        spool = files.WholeFile(self.spool)
+        return spool if stamp.written == stamp.wanted else StampedText(spool, stamp)
 
     def after(self, text: bytes, path: str) -> bytes:
         """What is left of a text of which the beginning was sent; raises RefusedError NCF013 if it was another."""
@@ -225,13 +225,13 @@ class Outlet:
 
 @dataclass(frozen=True, slots=True)
 class StampedText:
-    """A text that is kept, with the stamp as it has to be."""
+    """A text with the stamp as it has to be."""
 
-    kept: Iterable[bytes]
+    text: Iterable[bytes]
     stamp: Stamp
 
     def __iter__(self) -> Iterator[bytes]:
-        parts, stamp = iter(self.kept), self.stamp
+        parts, stamp = iter(self.text), self.stamp
         first = next(parts, b"")
         yield first[: stamp.at] + stamp.wanted + first[stamp.at + len(stamp.written) :]
         yield from parts
@@ -240,16 +240,16 @@ class StampedText:
 @contextmanager
 def outlet_for(target: OutputTarget, sure: bool, stamped: Callable[[], bool]) -> Iterator[Outlet]:
     """An outlet; `sure`: everything that the stamp says is known from the beginning."""
-    with room_for(target.file) as kept:
-        yield Outlet(kept, target.path == STREAM and sure, stamped)
+    with room_for(target.file) as spool:
+        yield Outlet(spool, target.path == STREAM and sure, stamped)
 
 
 @contextmanager
 def room_for(output: str | None) -> Iterator[IO[bytes]]:
     """A file without a name for what is to be an output, in its folder; None: in that for temporary files."""
     folder = None if output is None else os.path.dirname(output) or "."
-    with files.said_of(output), files.unnamed(folder) as kept:
-        yield kept
+    with files.said_of(output), files.unnamed(folder) as spool:
+        yield spool
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -27,6 +26,7 @@ from numpy.typing import NDArray
 from ncfix.control.coordinates import LETTERS, Vector
 from ncfix.control.pointing import Pointing
 from ncfix.diagnostics import Message
+from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,7 +8,7 @@ Outside the first and last place of a table, spline or step the end values hold.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ncfix.machine.basis import Basis, columns_like, distinct, key, powers
 from ncfix.machine.se3 import Array
+from ncfix.values import dataclass
 
 
 def splines(knots: Array, degree: int, coefficients: Array, u: Array) -> Array:

@@ -10,7 +10,7 @@ machine of a metre.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -22,6 +22,7 @@ from ncfix.machine.error_model import signals_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State
+from ncfix.values import dataclass
 
 BEYOND = 10.0
 """Times what is much: no machine that runs is so wrong."""

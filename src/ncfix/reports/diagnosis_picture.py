@@ -38,9 +38,9 @@ def picture(diagnosis: Diagnosis, form: str) -> bytes:
             _against(axes, curve)
         for axes in panels[1 + len(curves) :]:
             axes.set_visible(False)
-        kept = BytesIO()
-        figure.savefig(kept, format=form, dpi=200, metadata=UNDATED[form])
-    return kept.getvalue()
+        picture = BytesIO()
+        figure.savefig(picture, format=form, dpi=200, metadata=UNDATED[form])
+    return picture.getvalue()
 
 
 def _rungs(axes: Any, diagnosis: Diagnosis) -> None:

@@ -75,9 +75,9 @@ def picture(page: ProgramPage, form: str) -> bytes:
         along, spread = lower.subplots(1, 2, width_ratios=(1.6, 1))
         _along(along, columns)
         _spread(spread, page.record.share)
-        kept = BytesIO()
-        figure.savefig(kept, format=form, dpi=200, metadata=UNDATED[form])
-    return kept.getvalue()
+        picture = BytesIO()
+        figure.savefig(picture, format=form, dpi=200, metadata=UNDATED[form])
+    return picture.getvalue()
 
 
 def _path(axes: Any, columns: dict[str, Array], error: Array, most: float, side: str) -> Any:

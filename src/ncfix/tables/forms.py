@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from itertools import pairwise
 
@@ -19,6 +19,7 @@ from ncfix.plugins import called
 from ncfix.tables.control import Control, Files, controls, get_control
 from ncfix.tables.export import SHEET, SIDE_FILE, linted, read_manifest
 from ncfix.tables.table_files import AGAIN, BYTE_ORDER, NUMBER, Remarks
+from ncfix.values import dataclass
 
 N = f"({NUMBER})"
 GAP = r"[ \t]+"
@@ -140,9 +141,9 @@ def _slotted(kind: str, row: str, match: re.Match[str]) -> FileLine:
         at = stop
     words = [row[start:stop] for start, stop in spans]
     numbers = tuple(Decimal(word) for word in words)
-    kept = all(str(value) == word.lstrip("+") for value, word in zip(numbers, words, strict=True))
+    as_written = all(str(value) == word.lstrip("+") for value, word in zip(numbers, words, strict=True))
     plus = tuple(word.startswith("+") for word in words)
-    return FileLine(kind, text + row[at:], numbers, plus, "" if kept else row)
+    return FileLine(kind, text + row[at:], numbers, plus, "" if as_written else row)
 
 
 def _ascending(kind: str) -> Check:

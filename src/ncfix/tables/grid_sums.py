@@ -11,7 +11,7 @@ middle of their range, the second what it lacks there, and so on: where the sum 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ncfix.tables.correction import random_poses
 from ncfix.tables.grid import Array, Grid, on_full_grid
 from ncfix.tables.volume import CHECKS, Volume, search
+from ncfix.values import dataclass
 
 COARSE = 6
 """Positions of each axis at which the correction is taken apart."""
@@ -112,14 +113,14 @@ def _coarse(low: float, high: float, number: int) -> Array:
 
 def _largest_sets(sizes: Mapping[Set, float], target: float) -> list[Set]:
     """The sets that matter, without those within another; the smallest that are below the share together are left."""
-    kept = dict(sizes)
+    remaining = dict(sizes)
     total = 0.0
     for key in sorted(sizes, key=lambda key: sizes[key]):
         total += sizes[key] ** 2
         if total > (SHARE * target) ** 2:
             break
-        del kept[key]
-    return [key for key in sorted(kept, key=sorted) if not any(key < other for other in kept)]
+        del remaining[key]
+    return [key for key in sorted(remaining, key=sorted) if not any(key < other for other in remaining)]
 
 
 def _shared_out(sets: Sequence[Set], owners: Sequence[int]) -> dict[int, Set] | None:

@@ -12,7 +12,6 @@ function of the kind leaves less at the worst than the weighted root mean square
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache, reduce
 from itertools import combinations, pairwise
 from math import comb
@@ -35,6 +34,7 @@ from ncfix.tables.correction import (
 )
 from ncfix.tables.grid import Array, hats, on_full_grid, spline_weights
 from ncfix.tables.volume import Volume, even_line
+from ncfix.values import dataclass
 
 ROUNDS = 40
 SWEEPS = 2
@@ -131,13 +131,13 @@ class _Sums:
         self.known = {tuple(range(axes)): values}
         self.axes, self.before = axes, values.ndim - axes
 
-    def over(self, kept: Axes) -> Array:
-        """The sums that depend on the axes `kept`; the others are left with one place."""
-        if kept not in self.known:
-            gone = max(axis for axis in range(self.axes) if axis not in kept)
-            larger = self.over(tuple(sorted((*kept, gone))))
-            self.known[kept] = larger.sum(axis=self.before + gone, keepdims=True)
-        return self.known[kept]
+    def over(self, subset: Axes) -> Array:
+        """The sums that depend on the axes of `subset`; the others are left with one place."""
+        if subset not in self.known:
+            gone = max(axis for axis in range(self.axes) if axis not in subset)
+            larger = self.over(tuple(sorted((*subset, gone))))
+            self.known[subset] = larger.sum(axis=self.before + gone, keepdims=True)
+        return self.known[subset]
 
 
 Functions = dict[Axes, Array]
@@ -153,31 +153,31 @@ def _fitted(left: Array, weights: Array, sets: Sequence[Axes], sweeps: int) -> t
     the weighted sums of `left` over all but the axes of each set, and of the weights over all but those of each two.
     """
     totals, sums = _Sums(weights, weights.ndim), _Sums(weights * left, weights.ndim)
-    ends = np.cumsum([0, *(totals.over(kept).size for kept in sets)]).tolist()
+    ends = np.cumsum([0, *(totals.over(subset).size for subset in sets)]).tolist()
     places = [slice(*each) for each in pairwise(ends)]
-    wanted = np.concatenate([sums.over(kept).reshape(len(left), -1) for kept in sets], axis=1)
+    wanted = np.concatenate([sums.over(subset).reshape(len(left), -1) for subset in sets], axis=1)
     found = np.zeros_like(wanted)
-    shared = [_shared(totals, sets, places, kept, ends[-1]) for kept in sets]
+    shared = [_shared(totals, sets, places, subset, ends[-1]) for subset in sets]
     for number in list(range(len(sets))) * sweeps:
         place = places[number]
         change = wanted[:, place] / totals.over(sets[number]).ravel()
         found[:, place] += change
         wanted -= change @ shared[number]
     both = [
-        {kept: values[:, place].reshape(sums.over(kept).shape) for kept, place in zip(sets, places, strict=True)}
+        {subset: values[:, place].reshape(sums.over(subset).shape) for subset, place in zip(sets, places, strict=True)}
         for values in (found, wanted)
     ]
     return both[0], both[1]
 
 
-def _shared(totals: _Sums, sets: Sequence[Axes], places: Sequence[slice], kept: Axes, count: int) -> Array:
-    """The weight that places of the set `kept` have in common with places of all sets, (n_kept, count)."""
-    shape = totals.over(kept).shape
+def _shared(totals: _Sums, sets: Sequence[Axes], places: Sequence[slice], subset: Axes, count: int) -> Array:
+    """The weight that places of the set `subset` have in common with places of all sets, (n_subset, count)."""
+    shape = totals.over(subset).shape
     found = np.zeros((np.prod(shape), count))
     for other, place in zip(sets, places, strict=True):
-        both, subscripts, without = _union(kept, other, totals.axes)
+        both, subscripts, without = _union(subset, other, totals.axes)
         total = totals.over(both)
-        block = found[:, place].reshape([total.shape[axis] for axis in (*kept, *other)])
+        block = found[:, place].reshape([total.shape[axis] for axis in (*subset, *other)])
         np.einsum(subscripts, block)[...] = total[without]
     return found
 
@@ -193,8 +193,8 @@ def _union(one: Axes, other: Axes, axes: int) -> tuple[Axes, str, tuple[Any, ...
 def _together(functions: Functions) -> Array:
     """The sum of functions of some axes each, those that end with one axis first: most sums are over few axes."""
     total: Array = np.zeros(())
-    for last in sorted({kept[-1:] for kept in functions}):
-        group = [functions[kept] for kept in sorted(functions) if kept[-1:] == last]
+    for last in sorted({subset[-1:] for subset in functions}):
+        group = [functions[subset] for subset in sorted(functions) if subset[-1:] == last]
         total = total + reduce(np.add, group)
     return total
 
@@ -219,11 +219,11 @@ def _proven(left: Array, weights: Array, sums: Functions) -> float:
     """
     axes, order = weights.ndim, len(next(iter(sums)))
     seen: Functions = {}
-    for kept, values in sums.items():
+    for subset, values in sums.items():
         for size in range(order + 1):
             share = (-1) ** (order - size) * (comb(axes - size - 1, order - size) if size < order else 1)
-            for fewer in combinations(kept, size):
-                others = tuple(1 + axis for axis in kept if axis not in fewer)
+            for fewer in combinations(subset, size):
+                others = tuple(1 + axis for axis in subset if axis not in fewer)
                 if share and fewer not in seen:
                     count = np.prod([weights.shape[axis] for axis in range(axes) if axis not in fewer])
                     seen[fewer] = values.sum(axis=others, keepdims=True) * (share / count)
@@ -288,9 +288,9 @@ def _correction(machine: Machine, q: Array, tool_length: float) -> Array:
 
 def _mixed(space: Array, chosen: Array) -> Array:
     """Positions of the axes that are chosen, each with many of the others, ends first: (PLACES * OTHERS, n_axes)."""
-    kept = np.concatenate([corners(space), even_poses(space, PLACES)])[:PLACES]
+    standing = np.concatenate([corners(space), even_poses(space, PLACES)])[:PLACES]
     varied = np.concatenate([corners(space), even_poses(space, OTHERS)])[:OTHERS]
-    q: Array = np.where(chosen, kept[:, None], varied[None]).reshape(-1, len(space))
+    q: Array = np.where(chosen, standing[:, None], varied[None]).reshape(-1, len(space))
     return q
 
 

@@ -1,7 +1,7 @@
 """The automatic scheme: which one-input tables, sums and products of pairs a machine's correction takes.
 
 Any chain, any errors: the exact correction is taken apart on a grid and put into as few tables as possible
-(`separable`); of its parts all are kept that matter, or those that matter most if tables are few (`PartSelection`).
+(`separable`); of its parts all are chosen that matter, or those that matter most if tables are few (`PartSelection`).
 Their functions are then followed along every axis (`scheme_tables`). Rotary axes come first; the linear axes then
 correct what is left where that leads, so that the tip is right whatever the rotary tables miss. What changes with the
 way an axis moves becomes tables for one way each.
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 
 import numpy as np
@@ -32,6 +32,7 @@ from ncfix.tables.separable import (
     taken_apart,
     taken_apart_along,
 )
+from ncfix.values import dataclass
 
 MANY_MORE = 12
 """Tables than there are: down to so many, parts are left out by their size alone."""
@@ -65,26 +66,26 @@ MERGED = 0.25
 
 @dataclass(slots=True)
 class PartSelection:
-    """The parts that are kept of each face, and the layouts that say them.
+    """The parts that are chosen of each face, and the layouts that say them.
 
     faces      what each face consists of
     tolerance  rms that a layout may be off by when it merges tables
     free       axes whose sum over themselves takes no table of this kind (it goes into another one)
-    kept       the parts that are kept
-    silent     faces of which not even the constant is kept
+    chosen     the parts that tables are made for
+    silent     faces of which not even the constant is chosen
     beside     tables more for each that multiplies others, and for each that is multiplied
     """
 
     faces: Mapping[OutputWay, Separation]
     tolerance: float
     free: frozenset[int] = frozenset()
-    kept: frozenset[Key] = frozenset()
+    chosen: frozenset[Key] = frozenset()
     silent: frozenset[OutputWay] = frozenset()
     beside: tuple[int, int] = (0, 0)
     _known: dict[tuple[OutputWay, bool, tuple[int, ...]], tuple[TableLayout, TableLayout]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.kept = frozenset((face, n) for face, parts in self.faces.items() for n in range(len(parts.parts)))
+        self.chosen = frozenset((face, n) for face, parts in self.faces.items() for n in range(len(parts.parts)))
 
     def again(self) -> PartSelection:
         """The same, to be changed on its own."""
@@ -118,85 +119,85 @@ class PartSelection:
     @property
     def lost(self) -> float:
         """Rms of the parts that were left out."""
-        gone = (part.size**2 for face in self.faces for n, part in self._numbered(face) if (face, n) not in self.kept)
+        gone = (part.size**2 for face in self.faces for n, part in self._numbered(face) if (face, n) not in self.chosen)
         return float((sum(gone) + sum(self.faces[face].constant ** 2 for face in self.silent)) ** 0.5)
 
     def drop_small(self, budget: float) -> None:
         """Leave out the smallest parts as long as they are below `budget` (rms) together."""
         total = 0.0
-        for key in sorted(self.kept, key=lambda key: self.part(key).size):
+        for key in sorted(self.chosen, key=lambda key: self.part(key).size):
             total += self.part(key).size ** 2
             if total > budget**2:
                 return
-            self.kept -= {key}
+            self.chosen -= {key}
 
     def fit_into(self, tables: int) -> None:
-        """Keep what takes off most with no more than `tables`.
+        """Choose what takes off most with no more than `tables`.
 
         Parts are taken away, cheapest first, and put together, most worth first; then the largest that are left out are
         tried in the better of the two, in place of others.
         """
         self._leave_smallest(tables + MANY_MORE)
-        whole = self.kept
+        whole = self.chosen
         self._thin(tables)
-        best = self.kept, self.silent, self.lost
+        best = self.chosen, self.silent, self.lost
         if best[0] == whole:
             return
         self._grow(whole, tables)
-        best = min(best, (self.kept, self.silent, self.lost), key=lambda found: found[2])
+        best = min(best, (self.chosen, self.silent, self.lost), key=lambda found: found[2])
         for key in sorted(whole - best[0], key=lambda key: -self.part(key).size)[:TRIED]:
-            self.kept, self.silent = best[0] | {key}, best[1]
+            self.chosen, self.silent = best[0] | {key}, best[1]
             self._thin(tables)
-            best = min(best, (self.kept, self.silent, self.lost), key=lambda found: found[2])
-        self.kept, self.silent, _ = best
+            best = min(best, (self.chosen, self.silent, self.lost), key=lambda found: found[2])
+        self.chosen, self.silent, _ = best
 
     def _leave_smallest(self, tables: int) -> None:
         """Leave out the smallest parts until no more than `tables` are taken: they will not come back."""
-        for key in sorted(self.kept, key=lambda key: self.part(key).size):
+        for key in sorted(self.chosen, key=lambda key: self.part(key).size):
             if self.total <= tables:
                 return
-            self.kept -= {key}
+            self.chosen -= {key}
 
     def _thin(self, tables: int) -> None:
         """Leave out what costs least for the tables that it frees, until no more than `tables` are taken."""
         while self.total > max(tables, 0):
-            if not self.kept:
+            if not self.chosen:
                 order = sorted(self.faces, key=lambda face: -abs(self.faces[face].constant))
                 self.silent = frozenset(order[max(tables, 0) :])
                 return
-            self.kept -= {min(sorted(self.kept, key=str), key=self._price)}
+            self.chosen -= {min(sorted(self.chosen, key=str), key=self._price)}
 
     def _price(self, key: Key) -> tuple[bool, float]:
         """What a part costs for each table that it frees; parts that free none come last."""
-        saved = self._change(key, self.kept - {key})
+        saved = self._change(key, self.chosen - {key})
         return saved >= 0, self.part(key).size ** 2 / max(-saved, 1)
 
     def _grow(self, whole: frozenset[Key], tables: int) -> None:
         """Begin with nothing, and add what takes off most for the tables that it takes."""
-        self.kept = frozenset()
+        self.chosen = frozenset()
         self._thin(tables)
         room = tables - self.total
         while True:
-            costs = {key: self._change(key, self.kept | {key}) for key in sorted(whole - self.kept, key=str)}
+            costs = {key: self._change(key, self.chosen | {key}) for key in sorted(whole - self.chosen, key=str)}
             allowed = [key for key, cost in costs.items() if cost <= room]
             if not allowed:
                 return
             best = max(allowed, key=lambda key: self.part(key).size ** 2 / max(costs[key], 0.1))
-            self.kept |= {best}
+            self.chosen |= {best}
             room -= costs[best]
 
-    def _change(self, key: Key, kept: frozenset[Key]) -> int:
-        """How many tables more the axis takes if other parts are kept."""
-        output, before = key[0][0], self.kept
+    def _change(self, key: Key, chosen: frozenset[Key]) -> int:
+        """How many tables more the axis takes if other parts are chosen."""
+        output, before = key[0][0], self.chosen
         now = self.tables(output)
-        self.kept = kept
+        self.chosen = chosen
         then = self.tables(output)
-        self.kept = before
+        self.chosen = before
         return then - now
 
     def _layouts(self, face: OutputWay) -> tuple[TableLayout, TableLayout]:
         """The layout of a face, and the same absorbed."""
-        numbers = tuple(n for n, _ in self._numbered(face) if (face, n) in self.kept)
+        numbers = tuple(n for n, _ in self._numbered(face) if (face, n) in self.chosen)
         key = (face, face in self.silent, numbers)
         if key not in self._known:
             constant = 0.0 if face in self.silent else self.faces[face].constant

@@ -14,13 +14,14 @@ as a multiple of another, and hiding a sum in a factor, (a + f(q)) g(p) = a g(p)
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 from itertools import combinations, product
 
 import numpy as np
 
 from ncfix.tables.grid import Array
+from ncfix.values import dataclass
 
 NOISE = 2e-6
 """mm: below what is solved for, and far below what any control resolves."""
@@ -96,14 +97,14 @@ def taken_apart_along(values: Array, axis: int) -> Separation:
 def _peeled(constant: float, left: Array, sets: Sequence[tuple[int, ...]]) -> Separation:
     """Take off what depends on each of some axes or pairs of axes in turn: the mean over the others."""
     found: list[Part] = []
-    for kept in sets:
-        mean = left.mean(axis=tuple(axis for axis in range(left.ndim) if axis not in kept), keepdims=True)
+    for subset in sets:
+        mean = left.mean(axis=tuple(axis for axis in range(left.ndim) if axis not in subset), keepdims=True)
         left = left - mean
-        part = mean.reshape([left.shape[axis] for axis in kept])
-        found += [Single(kept[0], part)] if len(kept) == 1 else products(part, (kept[0], kept[1]))
+        part = mean.reshape([left.shape[axis] for axis in subset])
+        found += [Single(subset[0], part)] if len(subset) == 1 else products(part, (subset[0], subset[1]))
     lost = sum(part.size**2 for part in found if part.size <= NOISE)
-    kept_parts = sorted((part for part in found if part.size > NOISE), key=lambda part: -part.size)
-    return Separation(constant, tuple(kept_parts), float(np.sqrt(np.mean(left**2) + lost)))
+    parts = sorted((part for part in found if part.size > NOISE), key=lambda part: -part.size)
+    return Separation(constant, tuple(parts), float(np.sqrt(np.mean(left**2) + lost)))
 
 
 def products(both: Array, pair: tuple[int, int]) -> list[Product]:

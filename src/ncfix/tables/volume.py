@@ -9,7 +9,7 @@ looked for among those.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ncfix.machine import Machine, State
 from ncfix.tables.correction import corners, even_poses, exact_correction, linear_axes, random_poses
 from ncfix.tables.grid import WITHIN, Array, Bending, Grid, between, fitted, on_full_grid
+from ncfix.values import dataclass
 
 LINES = 32
 """Random lines along an axis on which its bending is judged."""
@@ -356,8 +357,8 @@ def _undominated(counts: Counts, missed: Array) -> tuple[Counts, Array]:
     order = np.lexsort((missed, counts.prod(axis=1)))
     sorted_missed = missed[order]
     before = np.minimum.accumulate(np.concatenate([[np.inf], sorted_missed[:-1]]))
-    kept = order[sorted_missed < before]
-    return counts[kept], missed[kept]
+    better = order[sorted_missed < before]
+    return counts[better], missed[better]
 
 
 def _at(volume: Volume, counts: Counts, target: float) -> Mesh:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import combinations, product
 
 from ncfix.compensate.driver import fix_program
@@ -21,6 +21,7 @@ from ncfix.machine import Machine
 from ncfix.testing.judging import OPTIONS, SETUP, Judged, judged, shifted_machine
 from ncfix.text.dialect import Dialect, get
 from ncfix.text.reader import read, shapes_of, texts_of
+from ncfix.values import dataclass
 
 NUMBERS: dict[str, float] = {
     "5.": 5.0,
@@ -245,8 +246,8 @@ def check_bytes(dialect: Dialect, sample: Statements) -> None:
     for result in (plain, remarked):
         assert result.stopped is None, f"{dialect.name}: its own plain motions stop: {result.stopped}"
         assert not result.wrong, f"{dialect.name}: its own plain motions: {result.wrong}"
-    kept = remarked.text.count(remark)
-    assert kept == len(lines), f"{dialect.name}: {len(lines)} comments became {kept}:\n{remarked.text}"
+    found_again = remarked.text.count(remark)
+    assert found_again == len(lines), f"{dialect.name}: {len(lines)} comments became {found_again}:\n{remarked.text}"
     assert list(plain.lines.values()) == list(remarked.lines.values()), f"{dialect.name}: comments mean something"
 
 

@@ -10,7 +10,6 @@ import os
 import re
 import sys
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.host import cache_folders
 from ncfix.plugins import describe, working
+from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree
@@ -53,9 +53,9 @@ class UnspacedBlock:
 
 def squeeze(text: str, piece: re.Pattern[str] = PIECE) -> UnspacedBlock:
     """Take out the blanks outside comments; `piece`: what is kept."""
-    kept = [match.span() for match in piece.finditer(text)]
-    code = "".join(text[start:stop] for start, stop in kept)
-    return UnspacedBlock(code, [place for span in kept for place in range(*span)])
+    spans = [match.span() for match in piece.finditer(text)]
+    code = "".join(text[start:stop] for start, stop in spans)
+    return UnspacedBlock(code, [place for span in spans for place in range(*span)])
 
 
 def find_grammar(name: str) -> Path:

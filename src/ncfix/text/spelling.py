@@ -10,7 +10,7 @@ outputs that a product of doubles cannot tell which of them is nearer is marked,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ncfix import core
 from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
+from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.core.words import NumberRules
@@ -248,17 +249,17 @@ def rounded(values: FloatArray, decimals: IntArray | int) -> FloatArray:
 
 def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> NumberColumns:
     """Values in the styles of written numbers, as `NumberStyle.write` does it; all `is_plain`, all `clear`."""
-    kept = np.maximum(decimals, styles.decimals)
-    steps = _steps(values, kept)
-    rows = np.flatnonzero(kept > styles.decimals)
+    places = np.maximum(decimals, styles.decimals)
+    steps = _steps(values, places)
+    rows = np.flatnonzero(places > styles.decimals)
     while len(rows):
-        rows = rows[(steps[rows] % 10 == 0) & (kept[rows] > styles.decimals[rows])]
+        rows = rows[(steps[rows] % 10 == 0) & (places[rows] > styles.decimals[rows])]
         steps[rows] //= 10
-        kept[rows] -= 1
+        places[rows] -= 1
     sign = styles.plus * np.uint8(PLUS)
     sign[(values < 0) & (steps != 0)] = MINUS
-    least = np.maximum(styles.width, styles.leading_zero | (kept == 0))
-    return NumberColumns(np.zeros(len(steps), np.uint32), sign, steps, kept, least, styles.point | (kept > 0))
+    least = np.maximum(styles.width, styles.leading_zero | (places == 0))
+    return NumberColumns(np.zeros(len(steps), np.uint32), sign, steps, places, least, styles.point | (places > 0))
 
 
 def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8], *, signed: bool = False) -> NumberColumns:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
+from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,9 +95,9 @@ class Splices:
         """Those that are not within spans (k, 2) of the source, which are apart from each other; in any order."""
         starts, stops = np.sort(spans, axis=0).T
         at = np.searchsorted(starts, self.start, side="right") - 1
-        kept = (at < 0) | (self.start > stops[at])
-        data = np.frombuffer(self.data, dtype=np.uint8)[np.repeat(kept, self.length)]
-        return Splices(self.start[kept], self.stop[kept], self.length[kept], data.tobytes())
+        outside = (at < 0) | (self.start > stops[at])
+        data = np.frombuffer(self.data, dtype=np.uint8)[np.repeat(outside, self.length)]
+        return Splices(self.start[outside], self.stop[outside], self.length[outside], data.tobytes())
 
     def edits(self) -> Iterator[Edit]:
         """One by one."""

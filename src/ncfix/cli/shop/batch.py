@@ -9,7 +9,7 @@ import gc
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -27,6 +27,7 @@ from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
 from ncfix.host import limited
 from ncfix.plugins import load_plugins
+from ncfix.values import dataclass
 from ncfix.version import __version__
 
 if TYPE_CHECKING:
@@ -196,7 +197,7 @@ class FixJob:
             target, not self.setup.assume_zero and self.setup.probed is None, lambda: bool(stream.stamped)
         ) as outlet:
             task = Task(self.machine, self.setup, self.options, find, path, dialect, part_bytes(), source.head)
-            stream = Stream(task, source.read, outlet.put, jobs, source.files(outlet.kept.fileno()))
+            stream = Stream(task, source.read, outlet.put, jobs, source.files(outlet.spool.fileno()))
             yield stream, outlet
 
     def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find, dialect: Dialect) -> FixedText:
@@ -353,24 +354,24 @@ class Batch:
         with Journal.opened(self.folder) as journal:
             job = self.job.noted_in(journal.path)
             targets = [self._known(target, journal) for target in self.targets]
-            kept = {target: record for target in targets if (record := self._kept(job, target, journal))}
-            rest = [target for target in targets if target not in kept]
+            before = {target: record for target in targets if (record := self._record_of(job, target, journal))}
+            rest = [target for target in targets if target not in before]
             fresh = self._fresh(job, rest, jobs, make, partial(_note, journal, repr(job.limits)))
-            yield from self._told(targets, kept, fresh)
+            yield from self._told(targets, before, fresh)
 
     @property
     def _many(self) -> bool:
         return len(self.targets) > 1 if self.many is None else self.many
 
     def _told(
-        self, targets: Sequence[OutputTarget], kept: Mapping[OutputTarget, JournalRecord], fresh: Iterator[Finished]
+        self, targets: Sequence[OutputTarget], before: Mapping[OutputTarget, JournalRecord], fresh: Iterator[Finished]
     ) -> Iterator[FixOutcome]:
         """All outcomes in their order, each with what there is to say of it."""
         reporter = OutcomeReporter(self.verbosity, self._many)
         with progress(len(targets)) as step:
             for target in targets:
-                if target in kept:
-                    outcome, lines = _done_before(target, kept[target])
+                if target in before:
+                    outcome, lines = _done_before(target, before[target])
                 else:
                     outcome, lines = next(fresh)
                 reporter.report(outcome.entry, lines)
@@ -382,7 +383,7 @@ class Batch:
         made = journal.made(target.name, target.source) if self.resume else frozenset[str]()
         return replace(target, made=made, resume=True)
 
-    def _kept(self, job: FixJob, target: OutputTarget, journal: Journal) -> JournalRecord | None:
+    def _record_of(self, job: FixJob, target: OutputTarget, journal: Journal) -> JournalRecord | None:
         """The record of a program that need not be fixed again; None if it is to be fixed."""
         record = journal.records.get(target.name) if self.resume else None
         if record is None or (self.retry and not record.digest):

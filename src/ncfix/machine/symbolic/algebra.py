@@ -146,8 +146,8 @@ def raised(powers: Powers, index: int, by: int) -> Powers:
 def _rounded(poly: Poly) -> Poly:
     field = poly.ring.domain
     limit = field(1, ROUNDING)
-    kept = {powers: factor for powers, factor in poly.items() if abs(factor) > limit}
-    fine = {powers: factor.numerator * FINENESS // factor.denominator for powers, factor in kept.items()}
+    large = {powers: factor for powers, factor in poly.items() if abs(factor) > limit}
+    fine = {powers: factor.numerator * FINENESS // factor.denominator for powers, factor in large.items()}
     return poly.new({powers: field(factor, FINENESS) for powers, factor in fine.items()})
 
 

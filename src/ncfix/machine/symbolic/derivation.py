@@ -12,7 +12,6 @@ second-order terms out.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import product
 
@@ -38,6 +37,7 @@ from ncfix.machine.symbolic.chain import (
     skew,
 )
 from ncfix.machine.symbolic.from_machine import DEFAULT, from_machine
+from ncfix.values import dataclass
 
 Series = dict[Monomial, DomainMatrix]
 
