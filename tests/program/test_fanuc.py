@@ -351,6 +351,7 @@ def test_rows_of_holes_that_the_control_makes_up_are_refused(dialect: str, block
         ("G1X5.F9.M99P3\nN3X9.\nM30", "fanuc", [True, False]),
         ("G1X5.F9.\nX9.M99", "fanuc", [False, False]),
         ("G1X5.F9.\nG60X9.\nX1.", "fanuc", [False, True, False]),
+        ("G1X5.F9.\nG2X9.I2.P1M62\nG2X5.I-2.P1\nG1X9.M62P1", "linuxcnc", [False, True, False, False]),
     ],
 )
 def test_a_motion_behind_which_something_is_called_is_not_split(text: str, dialect: str, held: list[bool]) -> None:

@@ -181,15 +181,19 @@ FRAME = re.compile(
 
 
 def unread_line(control: KlartextControl, text: str) -> None:
-    """A line that could not be read is reached; raises `Fault` if the program may go on elsewhere."""
-    if FLOW.match(text):
+    """A line that could not be read is reached; raises `Fault` if the program may go on elsewhere.
+
+    Lines that look like blocks of their own behind a remark with `~` may be that.
+    """
+    behind = [line for line in text.split("\n")[1:] if BLOCK_BEHIND.match(f"\n{line}")]
+    if any(FLOW.match(each) for each in (text, *behind)):
         raise Fault(UNREADABLE, DECIDES, "correct the line")
     for name in PARAMETER.findall(text):
         control.scope.parameters.assign(name.upper(), Unknown())
-    if ASSIGNED.match(text):
+    if ASSIGNED.match(text) and not behind:
         return
     control.warn(UNREADABLE, NOT_KLARTEXT, HINT)
-    if FRAME.search(text):
+    if any(FRAME.search(each) for each in (text, *behind)):
         control.refuse_rest(NOT_FOLLOWED.format(control.place().line))
     control.refuse_here(NOT_KLARTEXT)
 

@@ -309,8 +309,12 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return codes.call is not None and (codes.call != RETURN or "P" in block.values)
 
     def move(self, block: Block, codes: Codes, motion: int) -> None:
-        """The motion of a block; behind the pieces of one a subprogram would be called in between."""
-        with self.control.in_one_piece() if self.calls_behind(block, codes) else nullcontext():
+        """The motion of a block; behind the pieces of one a subprogram would be called in between.
+
+        P of an arc, which its pieces have not, may be that of an M code, too.
+        """
+        shared = motion in ARCS and "P" in block.values and self.flow.unit.plan(self.flow.block - 1).template.m_codes
+        with self.control.in_one_piece() if shared or self.calls_behind(block, codes) else nullcontext():
             self.move_axes(block, codes, motion)
 
     def move_axes(self, block: Block, codes: Codes, motion: int) -> None:

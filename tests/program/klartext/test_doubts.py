@@ -234,3 +234,10 @@ def test_an_oversize_may_end_where_no_tool_is_named(call: str, sure: bool) -> No
     found = reasons(f"TOOL CALL 5 Z DL+1\nL X+1 Y+0 Z+5 FMAX\n{call}\nL X+5 F100\nTOOL CALL 5 Z\nL X+6 Y+0 Z+5 FMAX")
     assert ["DL" in why for why in found] == ([] if sure else [True])
     assert reasons("TOOL CALL 5 Z\nL X+1 Y+0 Z+5 FMAX\nTOOL CALL S500\nL X+5 F100") == []
+
+
+def test_a_block_behind_a_formula_with_a_remark_is_not_passed_over() -> None:
+    assert "not understood" in reasons("Q1 = 4 + 5 ; note ~\nL X+1 F100\nL X+2 Y+2 Z+2 FMAX")[0]
+    assert reasons("Q1 = 4 + 5 ; note ~\n goes on\nL X+2 Y+2 Z+2 FMAX") == []
+    with pytest.raises(SourceError, match="where the program goes on"):
+        follow("L X+1 F100\n; note ~\nCALL LBL 1\nL X+2")
