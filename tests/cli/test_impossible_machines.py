@@ -194,3 +194,17 @@ def test_a_quill_may_be_parallel_to_the_column() -> None:
     text = FIVE.replace("X Y Z t", "X Y Z W t")
     text += 'axis.W = { type = "linear", direction = [0, 0, 1], range = [-200, 0] }\n'
     assert doubts(loads(text), "m") == []
+
+
+def test_what_cannot_be_is_shown_where_it_stands(shop: Any, ncfix: Any) -> None:
+    text = changed("pitch = 10.0", "pitch = 0.01") + effect("EC0Y", 12.0) + table("EXX", [0, 0.25, 0.5], [0, 0, 0.004])
+    shop.machine.write_text(text)
+    rows = text.splitlines()
+    remarks = ncfix("machine", "check", shop.machine, "--json").json()["remarks"]
+    assert [(each["code"], rows[each["line"] - 1]) for each in remarks] == [
+        ("NCF320", "coefficients = [12.0]"),
+        ("NCF322", next(row for row in rows if row.startswith("axis.X"))),
+        ("NCF323", "positions = [0, 0.25, 0.5]"),
+    ]
+    refused = ncfix("fix", shop.program, "-m", shop.machine, "-o", shop.folder / "out.ngc")
+    assert all(f":{each['line']}:{each['column']}: {each['code']}" in refused.err for each in remarks)

@@ -55,7 +55,7 @@ def check(file: str, as_json: bool) -> int:
     from ncfix.machine.plausible import doubts
 
     found = load_machine(file)
-    odd = doubts(found, shown(file))
+    odd = doubts(found, shown(file), lines=True)
     impossible = sum(doubt.impossible for doubt in odd)
     remarks = [*(doubt.message for doubt in odd), *_remarks(found, shown(file))]
     console.tell(*remarks)

@@ -9,19 +9,21 @@ machine of a metre.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise
+from pathlib import Path
 
 import numpy as np
 
-from ncfix.diagnostics import Message, Place, RefusedError
+from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, is_arm, large_size
 from ncfix.machine.effects import functions_at, travel
 from ncfix.machine.error_model import signals_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State
+from ncfix.toml_text import decoded, key_lines, line_of, parsed, place_of
 from ncfix.values import dataclass
 
 BEYOND = 10.0
@@ -69,11 +71,37 @@ class Doubt:
     impossible: bool
 
 
-def doubts(machine: Machine, path: str) -> list[Doubt]:
-    """All that machines do not have or hardly have: NCF320 to NCF323; `path` is that of the file."""
-    place = Place(path)
+def doubts(machine: Machine, path: str, lines: bool = False) -> list[Doubt]:
+    """All that machines do not have or hardly have: NCF320 to NCF323.
+
+    path   that of its file
+    lines  the file is looked up for where in it things stand
+    """
     found = [*_sizes(machine), *_span(machine), *_travels(machine), *_settings(machine), *_positions(machine)]
-    return [Doubt(Message(code, text, place, hint), impossible) for code, text, hint, impossible in found]
+    places = _places(path) if found and lines else lambda keys: Place(path)
+    return [Doubt(Message(code, text, places(keys), hint), impossible) for code, text, hint, impossible, *keys in found]
+
+
+def _places(path: str) -> Callable[[Sequence[str]], Place]:
+    """Where keys of a machine file stand: `axis.X.range`, or of the first effect of a name `effect.EXX.positions`.
+
+    Of what is no file that can be read again (standard input, a pipe), its name.
+    """
+    try:
+        text = decoded(Path(path).read_bytes(), path, "NCF301") if Path(path).is_file() else ""
+        names = [str(table.get("name")) for table in parsed(text, path, "NCF301").get("effect", ())]
+    except (ConfigError, OSError, AttributeError):
+        text, names = "", []
+    lines = key_lines(text)
+
+    def place(keys: Sequence[str]) -> Place:
+        first, name, *rest = *keys, "", ""
+        if not text or not keys or (first == "effect" and name not in names):
+            return Place(path)
+        way = (first, names.index(name) if first == "effect" else name, *rest)
+        return place_of(line_of(tuple(key for key in way if key != ""), lines), text, path)
+
+    return place
 
 
 def required(machine: Machine, path: str, accepted: str) -> list[Message]:
@@ -82,15 +110,15 @@ def required(machine: Machine, path: str, accepted: str) -> list[Message]:
     Raises `RefusedError` with all that cannot be; `accepted` says how the user can have it all the same.
     """
     found = doubts(machine, path)
-    impossible = [each.message for each in found if each.impossible]
-    if impossible:
+    if any(each.impossible for each in found):
+        impossible = [each.message for each in doubts(machine, path, lines=True) if each.impossible]
         text = f"no machine is like this one: nothing is made with it; {accepted}"
         raise RefusedError((*impossible, Message("NCF324", text, Place(path))))
     return [each.message for each in found]
 
 
-Fault = tuple[str, str, str, bool]
-"""Code, text, hint, and whether it cannot be."""
+Fault = tuple[str, str, str, bool, *tuple[str, ...]]
+"""Code, text, hint, whether it cannot be, and the keys of the file that it is about."""
 
 
 # -- sizes -------------------------------------------------------------------------------------------------------------
@@ -170,9 +198,25 @@ def _sizes(machine: Machine) -> Iterator[Fault]:
             meant = [f"{size:.4g} {unit}" for unit, factor in UNITS[angle] if LEAST * limit <= size * factor <= limit]
             hint = f"is {' or '.join(meant)} meant? Coefficients are in {'rad' if angle else 'mm'}"
             hint = hint if meant else "see the unit, and `center`, `scale` and `range`"
-            yield "NCF320", f"{text} {size / limit:.3g} times what is much, {sized(limit, angle)}", hint, True
+            yield (
+                "NCF320",
+                f"{text} {size / limit:.3g} times what is much, {sized(limit, angle)}",
+                hint,
+                True,
+                "effect",
+                name,
+                "coefficients",
+            )
         else:
-            yield "NCF320", f"{text} much, and more than {sized(limit, angle)}", "", False
+            yield (
+                "NCF320",
+                f"{text} much, and more than {sized(limit, angle)}",
+                "",
+                False,
+                "effect",
+                name,
+                "coefficients",
+            )
 
 
 def _largest(machine: Machine, effects: Sequence[Effect]) -> float:
@@ -204,14 +248,14 @@ def _span(machine: Machine) -> Iterator[Fault]:
         dependent = next(parallel, linear)
         names = " and ".join(axis.name for axis in dependent)
         text = f"{names} do not span {'a plane' if len(dependent) == 2 else 'space'}: one moves as others do"
-        yield "NCF321", text, "see their `direction`", True
+        yield "NCF321", text, "see their `direction`", True, "axis", dependent[-1].name, "direction"
     for first, second in pairwise(machine.axes):
         if not (first.rotary and second.rotary and first.workpiece_side == second.workpiece_side):
             continue
         apart = np.cross(np.asarray(second.point) - np.asarray(first.point), first.direction)
         if np.linalg.norm(np.cross(first.direction, second.direction)) < SAME and np.linalg.norm(apart) < SAME_MM:
             text = f"{first.name} and {second.name} turn about the same line, with no axis between them"
-            yield "NCF321", text, "see `direction` and `point` of both", True
+            yield "NCF321", text, "see `direction` and `point` of both", True, "axis", second.name, "direction"
 
 
 def _travels(machine: Machine) -> Iterator[Fault]:
@@ -221,19 +265,27 @@ def _travels(machine: Machine) -> Iterator[Fault]:
         yield "NCF322", text, f"is it in inches, {INCH * max(travels):g} mm? `range` is in mm", False
     for axis in machine.axes:
         low, high = (limit / axis.unit for limit in axis.range)
+        range_of = ("axis", axis.name, "range")
         if axis.rotary:
             if np.isfinite(high - low) and _radians((low, high)):
                 text = f"{axis.name}: the range {low:g} ... {high:g} looks like radians: degrees are asked for"
-                yield "NCF322", text, f"is {np.degrees(low):.4g} ... {np.degrees(high):.4g} degrees meant?", True
+                yield (
+                    "NCF322",
+                    text,
+                    f"is {np.degrees(low):.4g} ... {np.degrees(high):.4g} degrees meant?",
+                    True,
+                    *range_of,
+                )
         elif np.isfinite(high - low) and not LEAST_TRAVEL <= high - low <= MOST_TRAVEL:
             meant = "metres" if high - low < LEAST_TRAVEL else "um"
             text = f"{axis.name}: no axis has a travel of {high - low:g} mm"
-            yield "NCF322", text, f"is it in {meant}? `range` is in mm", True
+            yield "NCF322", text, f"is it in {meant}? `range` is in mm", True, *range_of
         if axis.pitch is not None and not PITCHES[0] <= axis.pitch <= PITCHES[1]:
             text = f"{axis.name}: no screw and no rack has a pitch of {axis.pitch:g} mm"
-            yield "NCF322", text, "`pitch` is in mm a turn", True
+            yield "NCF322", text, "`pitch` is in mm a turn", True, "axis", axis.name, "pitch"
         if np.abs(axis.point).max() > MOST_TRAVEL:
-            yield "NCF322", f"{axis.name}: its point is {np.abs(axis.point).max():g} mm away", "`point` is in mm", True
+            text = f"{axis.name}: its point is {np.abs(axis.point).max():g} mm away"
+            yield "NCF322", text, "`point` is in mm", True, "axis", axis.name, "point"
 
 
 def _inches(places: Array, low: float, high: float) -> str:
@@ -262,11 +314,11 @@ def _settings(machine: Machine) -> Iterator[Fault]:
         for value, limit, unit in zip((values[0], np.degrees(values[1])), limits, ("mm", "degree"), strict=True):
             if value > limit:
                 text = f"{key}: {value:.4g} {unit} is more than any machine has"
-                yield "NCF322", text, "it is in mm and degrees: 0.001 is a micrometre", True
+                yield "NCF322", text, "it is in mm and degrees: 0.001 is a micrometre", True, key
     for name, place in ("workpiece_offset", machine.workpiece_offset), ("tool.point", machine.tool.point):
         if np.abs(place).max() > MOST_TRAVEL:
             text = f"{name}: {np.abs(place).max():g} mm is further than any machine reaches"
-            yield "NCF322", text, "it is in mm", True
+            yield "NCF322", text, "it is in mm", True, *name.split(".")
 
 
 # -- positions of tables and curves ------------------------------------------------------------------------------------
@@ -285,13 +337,14 @@ def _positions(machine: Machine) -> Iterator[Fault]:
             low, high = 0.0, 360.0
         if not np.isfinite(high - low):
             continue
+        keys = ("effect", effect.name, "positions" if hasattr(effect.basis, "positions") else "knots")
         shown = f"{effect.name}: its positions, {places[0]:g} ... {places[-1]:g},"
         if (places[-1] <= low and not axis.endless) or (places[0] >= high and not axis.endless):
-            yield "NCF323", f"{shown} are outside the range of {axis.name}, {low:g} ... {high:g}", "", True
+            yield "NCF323", f"{shown} are outside the range of {axis.name}, {low:g} ... {high:g}", "", True, *keys
         elif axis.rotary and high - low > 45 and np.abs(places).max() <= TURN_RAD and _radians((places[0], places[-1])):
-            yield "NCF323", f"{shown} look like radians: {axis.name} is in degrees", "", True
+            yield "NCF323", f"{shown} look like radians: {axis.name} is in degrees", "", True, *keys
         elif not axis.rotary and (whose := _inches(places, low, high)):
-            yield "NCF323", f"{shown} beside the range of {axis.name}, {low:g} ... {high:g}", whose, True
+            yield "NCF323", f"{shown} beside the range of {axis.name}, {low:g} ... {high:g}", whose, True, *keys
         elif np.ptp(places) < CORNER * (high - low):
             text = f"{shown} cover a speck of the range of {axis.name}, {low:g} ... {high:g}"
-            yield "NCF323", text, f"positions are in {'degrees' if axis.rotary else 'mm'}", True
+            yield "NCF323", text, f"positions are in {'degrees' if axis.rotary else 'mm'}", True, *keys
