@@ -140,6 +140,11 @@ def test_a_rapid_leaves_axes_that_it_does_not_name_where_they_stand(dialect: str
         assert off(found[-21:], meant) < 3 * TOLERANCE + ROUNDING
 
 
+def test_a_rapid_from_which_a_cut_begins_is_refused(machine: Machine) -> None:
+    text = "G21 G90 G17\nG0 X0 Y0 Z90\nG1 X10 Y0 F500\n/G1 X10.4 Y0.4\nG0 Z10\nG1 X20 Y25\nM2\n"
+    assert [each.line for each in fixed(text, machine).report.refused if each.code == "NCF451"] == [5]
+
+
 def test_a_rapid_whose_own_words_differ_is_refused(machine: Machine) -> None:
     text = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 Y0 F500\n/G55\nG0 X20 Y25 Z80\nM2\n"
     assert [each.code for each in fixed(text, machine).report.refused] == ["NCF451"]

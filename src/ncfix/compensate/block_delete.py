@@ -297,11 +297,16 @@ def _held(moves: Moves, whole: set[int], spelled: Mapping[int, Mask], resting: s
 
 
 def _only_rapids(moves: Moves, block: int) -> bool:
-    """Whether a block does nothing but lead axes, each by its own word, in rapids that are corrected."""
+    """Whether a block does nothing but lead axes, each by its own word, in rapids that are corrected.
+
+    Nor may a cut begin where it ends.
+    """
     own = moves.block == block
     rapid = (moves.kind == MotionKind.RAPID) & (moves.rule == Rule.CORRECT) & ~moves.incremental
     turned = (np.count_nonzero(moves.frames[k].rotation, axis=1).max() > 1 for k in set(moves.frame[own].tolist()))
-    return bool(rapid[own].all()) and not any(turned)
+    moving = np.flatnonzero(moves.kind != MotionKind.DWELL)
+    begun = moving[:-1][moves.cutting[moving[1:]]]
+    return bool((rapid[own] & ~np.isin(np.flatnonzero(own), begun)).all()) and not any(turned)
 
 
 def _named(found: Sequence[WrittenPlan], block: int) -> Mask:
