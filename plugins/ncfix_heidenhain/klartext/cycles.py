@@ -67,6 +67,7 @@ HARMLESS = frozenset({9, 13, 32, 239, 392})
 OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
 AFTER_HOLE = "where the axis {} stands after a hole of unknown depth is not followed"
 DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
+NOT_EXECUTED = "the depth of the cycle is zero: controls do not execute it, or stop"
 PATTERN = "a pattern of holes ({}): the control works out where they are; --flatten writes them out"
 FROM_INCREMENT = "an old cycle is called from a height in increments (IZ)"
 
@@ -177,7 +178,7 @@ def drill(control: KlartextControl, where: FramePosition, axes: int, heights: tu
     control.make(Motion(MotionKind.CYCLE, programmed, end, code, refusal=refusal))
     over.inner[Z] = clear
     over.unknown.pop(Z, None)
-    if refusal == DEPTH_AT_RUN_TIME:
+    if refusal in (DEPTH_AT_RUN_TIME, NOT_EXECUTED):
         over.unknown[Z] = AFTER_HOLE
     if control.cycle.number in MILLING:
         over.unknown |= {X: AFTER_CYCLE, Y: AFTER_CYCLE}
@@ -195,6 +196,8 @@ def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
         depth, gap = value_of_any(cycle.steps, DEPTH_WORDS), value_of_any(cycle.steps, GAP_WORDS)
         if depth is None or gap is None or any(key.endswith(":?") for key in cycle.steps):
             return height, height, DEPTH_AT_RUN_TIME
+        if depth == 0.0:
+            return height, height, NOT_EXECUTED
         sign = -1.0 if depth < 0 else 1.0
         return height + sign * unit * (abs(gap) + abs(depth)), height, ""
     parameters = control.scope.parameters
@@ -203,6 +206,8 @@ def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
     if known is None or by_diameter != 0.0:
         return height, height, DEPTH_AT_RUN_TIME
     gap, depth, surface, second = known
+    if depth == 0.0:
+        return height, height, NOT_EXECUTED
     clear = surface + max(gap, second)
     return unit * (surface + depth), unit * clear, ""
 

@@ -338,6 +338,8 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         control = self.control
         if step.name == "cc":
             set_pole(control, step.words)
+            if step.codes & {91, 92}:
+                control.path.pole = None  # in coordinates of the machine
             control.claim_words()
             return
         if step.name in CORNERS:

@@ -62,9 +62,15 @@ TURNING: tuple[tuple[str, bytes], ...] = (
         LATHE,
         rb"(?im)\A(?!(?s:.*)^[^(;\n]*(?<![A-Z])Y[ \t]*[-+.\d#\[])(?s:.*?)^[^(;\n]*(?<![A-Z])(G[ \t]*96(?![\d.]))",
     ),
+    (
+        LATHE,
+        rb"(?im)\A(?=(?s:.*?)T[ \t]*\d{4})(?!(?s:.*)^[^(;\n]*(?<![A-Z])(?:Y[ \t]*[-+.\d#\[]|M[ \t]*0*6(?!\d)))(?s:.*?)"
+        rb"^[^(;\n]*(?<![A-Z])(T[ \t]*(?!0000)\d{4}(?![\d.]))(?=(?s:.*?)X[ \t]*[-+.\d#\[])",
+    ),
 )
 """What shows that a text of the Fanuc family is for a lathe: the spindle's limit (G50 S), turning cycles that name the
-blocks of a contour (P and Q), or constant surface speed (G96) in a text that names no Y."""
+blocks of a contour (P and Q), or, in a text that names no Y, constant surface speed (G96) or a tool with its offset
+(T0101) and no M6."""
 
 CODE = re.compile(r"[GM](0|[1-9]\d{0,3})(\.[1-9])?")
 """How a code of a dialect's own is written."""

@@ -241,3 +241,16 @@ def test_a_block_behind_a_formula_with_a_remark_is_not_passed_over() -> None:
     assert reasons("Q1 = 4 + 5 ; note ~\n goes on\nL X+2 Y+2 Z+2 FMAX") == []
     with pytest.raises(SourceError, match="where the program goes on"):
         follow("L X+1 F100\n; note ~\nCALL LBL 1\nL X+2")
+
+
+def test_a_pole_in_machine_coordinates_is_not_followed() -> None:
+    with pytest.raises(SourceError, match="no pole"):
+        follow("CC X+10 Y+0 M91\nC X+20 Y+0 DR+ F100")
+
+
+@pytest.mark.parametrize("depth", ["+0", "-0"])
+def test_a_cycle_without_depth_is_not_executed(depth: str) -> None:
+    cycle = f"CYCL DEF 200 D Q200=2 Q201={depth} Q203=+1 Q204=10"
+    found = reasons(f"{cycle}\nL X+5 Y+0 Z+50 FMAX M99\nL X+6 FMAX\nL X+7 F100\nL Z+60 FMAX\nL X+8 F100")
+    assert "depth of the cycle is zero" in found[0]
+    assert all("hole of unknown depth" in why for why in found[1:])
