@@ -54,6 +54,7 @@ BALLS, BARS, FREE = Design("balls"), Design("bars", "bars", count=480), Design("
 ONE_TOOL = Design("one tool", tools=1)
 ORDERED = Design("one tool, in order, one-sided", tools=1, ordered=True, one_sided=True)
 SMALL = Design("small", count=110, balls=3, repeated=8)
+FEW = Design("small, one tool", count=120, balls=3, tools=1, repeated=8)
 ON_PITCH = Design("pitch multiples", "free", on_pitch=True)
 
 TABLES = {

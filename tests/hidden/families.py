@@ -14,7 +14,7 @@ from . import designs
 from .designs import Design
 
 FINAL_RANGE = 2**40
-_SALT = "hidden effects, final run, 8"
+_SALT = "hidden effects, final run, 9"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +61,8 @@ FAMILIES = {
                gap=True),
         Family("blind", "pitch and backlash that the poses cannot show", 16, amplitudes_um=(10.0,), source="blind",
                layouts=(designs.ON_PITCH,), extra=True),
+        Family("alike", "one of a pair, 120 rows: asked by promises.py, as many as it wants", 0, amplitudes_um=(10.0,),
+               source="pair", layouts=(designs.FEW,), extra=True),
     )
 }  # fmt: skip
 

@@ -96,7 +96,7 @@ def judge(
     if any(kin.get(name, 0.0) > 0.8 for name in before):
         return None
     if spec.source == "pair":
-        return Verdict(_top(kin)) if _told_later(rng, draft, specimen, truth, kin, rivals) else None
+        return Verdict(_top(kin)) if _told_later(rng, spec, draft, specimen, truth, kin, rivals) else None
     larger = max(1.0, USUAL_MM / specimen.moved_mm)
     fellows = _fellows(rng, draft, seen_from, specimen.entry, larger * truth, kin, rivals)
     if fellows and not (spec.extra or spec.alone):
@@ -129,17 +129,20 @@ def _fellows(
 
 def _told_later(
     rng: Generator,
+    spec: Family,
     draft: Draft,
     specimen: Specimen,
     truth: Array,
     kin: dict[str, float],
     rivals: tuple[Entry, ...],
 ) -> bool:
-    """Whether the closest relative could take its place within the noise, and no relative once there are more poses."""
+    """Whether the closest relative could take its place within the noise, and no relative once there are more poses;
+    the latter is not asked where the design is poor on purpose.
+    """
     strength = _strength(draft.sight, truth)
     alike = {name for name, share in kin.items() if strength * (1 - share) < TOLD_APART}
     confused = strength * (1 - max(kin.values())) < CONFUSED
-    return confused and _told_by_more(rng, draft, specimen, tuple(e for e in rivals if e.name in alike))
+    return confused and (spec.extra or _told_by_more(rng, draft, specimen, tuple(e for e in rivals if e.name in alike)))
 
 
 def _top(kin: dict[str, float]) -> dict[str, float]:

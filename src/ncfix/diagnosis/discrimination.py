@@ -15,6 +15,7 @@ from scipy.special import ndtr
 
 from ncfix.diagnosis.evidence import Evidence
 from ncfix.diagnosis.forms import EffectForm
+from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.diagnosis.selection import ALIKE
 from ncfix.measure.instruments import observe
 from ncfix.measure.measurement import Array, Measurement
@@ -170,9 +171,7 @@ class HypothesisPairs:
     @staticmethod
     def of(evidence: Evidence, sides: Sequence[Hypothesis], offered: Measurement, sigma: float) -> HypothesisPairs:
         """Those between the sides; `sigma` is the noise of a value, um."""
-        data = evidence.background.data
-        seen = {name for each in data.measurements if each.kind == offered.kind for name in each.measured}
-        new = observe(offered.with_columns({name: np.zeros(len(offered)) for name in sorted(seen)}), data.machine)
+        new = seen_at(evidence.background.data, offered)
         pairs = [[(true, other) for other in sides if other is not true] for true in sides]
         contests = [[_contest(evidence, new, *pair, sigma) for pair in own] for own in pairs]
         return HypothesisPairs(tuple(side.group.owner.name for side in sides), contests, len(offered))
@@ -198,6 +197,12 @@ class HypothesisPairs:
     def stuck(self) -> tuple[str, ...]:
         """The names that some other would imitate at all poses, were they true."""
         return tuple(name for name, can in zip(self.names, self.able, strict=True) if not all(can))
+
+
+def seen_at(data: ResidualData, plan: Measurement) -> Observation:
+    """What is seen at the poses of a plan: the components that files of its kind have, without values."""
+    seen = {name for each in data.measurements if each.kind == plan.kind for name in each.measured}
+    return observe(plan.with_columns({name: np.zeros(len(plan)) for name in sorted(seen)}), data.machine)
 
 
 def _contest(evidence: Evidence, new: Observation, true: Hypothesis, other: Hypothesis, sigma: float) -> Discrimination:

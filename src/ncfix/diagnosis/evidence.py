@@ -246,6 +246,11 @@ class Evidence:
         """The likeliest share of everything in the background beside these members."""
         return SHARES[int(self._likelihoods(members, beside).argmax())]
 
+    def by_share(self, members: Sequence[Member], beside: Array | None = None) -> list[tuple[float, float]]:
+        """Log likelihood of the data with each share of everything, its prior counted in; and the share."""
+        found = self._likelihoods(members, beside)
+        return [(float(own), share) for own, share in zip(found, SHARES, strict=True) if np.isfinite(own)]
+
     def squares(self, members: Sequence[Member], share: float) -> float:
         """The sum of squares of the data in units of their covariance with these members."""
         _, own = self._solved(members, None, share)
@@ -402,14 +407,15 @@ class Comparison:
         """Log likelihood of the data with these members, less their prices."""
         key = frozenset(members.values())
         if key not in self.weights:
-            self.weights[key] = self._likelihood(members) - self._paid(members)
+            self.weights[key] = self._likelihood(members) - self.paid(members)
         return self.weights[key]
 
     def sketched(self, members: Members) -> float:
         """The same at first sight: of effects that are shaped as in the catalogue."""
-        return self._plain(members) - self._paid(members)
+        return self._plain(members) - self.paid(members)
 
-    def _paid(self, members: Members) -> float:
+    def paid(self, members: Members) -> float:
+        """What all members pay."""
         return sum(map(self.price, members)) + entry_price(len(members))
 
     def _plain(self, members: Members) -> float:
@@ -459,14 +465,18 @@ class Comparison:
         return self.allowed[key]
 
     def _allowance(self, members: Members) -> Array | None:
-        evidence = self.evidence
-        named = [each for name, each in members.items() if name in evidence.names and not evidence.constant(name)]
+        evidence, named = self.evidence, self.shaped(members)
         if not named:
             return None
         every = self.all(members)
         shown = evidence.shown(every, USUAL_SHARE)
         whole = np.sum([each for member, each in zip(every, shown, strict=True) if member in named], axis=0)
         return evidence.background.seen(MISSHAPEN * whole[:, None] * self._slow)
+
+    def shaped(self, members: Members) -> list[Member]:
+        """The members whose shape may differ: those with a name, but constants."""
+        evidence = self.evidence
+        return [each for name, each in members.items() if name in evidence.names and not evidence.constant(name)]
 
     @cached_property
     def _slow(self) -> Array:

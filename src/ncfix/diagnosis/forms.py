@@ -38,13 +38,13 @@ from ncfix.diagnosis.catalogue.candidate import (
     weighed,
     zero,
 )
-from ncfix.diagnosis.residual_data import UNTELLABLE, ResidualData
+from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE, Axis, component_title
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
-from ncfix.measure.least_squares import orthonormal
+from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
-from ncfix.measure.observation import base_from_workpiece
+from ncfix.measure.observation import Observation, base_from_workpiece
 from ncfix.values import dataclass
 
 VISIBLE = 0.05
@@ -186,12 +186,7 @@ def without_lacking_constants(data: ResidualData, columns: Array, named: Sequenc
     constants = [group.columns for group in named if group.owner.constant]
     if not constants:
         return columns
-    lacking = np.concatenate(constants, axis=1)
-    free = np.concatenate([data.base, lacking], axis=1) / data.relative[:, None]
-    size = np.linalg.norm(free, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    shares = np.linalg.lstsq(free / size, columns / data.relative[:, None], rcond=UNTELLABLE)[0] / size[:, None]
-    rest: Array = columns - lacking @ shares[data.base.shape[1] :]
+    rest: Array = columns - np.concatenate(constants, axis=1) @ data.shares(columns, constants)
     return rest
 
 
@@ -303,12 +298,12 @@ def _directions(data: ResidualData) -> Array:
     return np.stack([data.column(name) for name in names], axis=-1) if names else np.zeros((data.count, 0))
 
 
-def scaled_axes(data: ResidualData) -> Array:
-    """The axes that moved, -1 ... 1 each; full turns as points of a circle, (n, k)."""
+def scaled_axes(data: ResidualData, q: Array | None = None) -> Array:
+    """The axes that moved, -1 ... 1 each; full turns as points of a circle, (n, k). Of the rows, or of positions q."""
     columns = []
     for index, axis in enumerate(data.machine.axes):
-        values = data.q[:, index]
-        low, high = float(values.min()), float(values.max())
+        values = (data.q if q is None else q)[:, index]
+        low, high = float(data.q[:, index].min()), float(data.q[:, index].max())
         if not data.measured.moved(axis) or high == low:  # of a length both ends count for the reach, one is the row's
             continue
         if axis.rotary and high - low > 1.5 * np.pi:
@@ -329,10 +324,23 @@ def kernel_functions(kernel: Array, most: int = MOST_FUNCTIONS) -> Array:
 
 def shape_variations(data: ResidualData) -> Array:
     """Smooth functions of each axis and of the time, of variance one together, (m, k)."""
-    time = data.column("time_s")
-    signals = [*scaled_axes(data).T, *([2 * (time - time.mean()) / np.ptp(time)] if np.ptp(time) > 0 else [])]
+    return _variations(data, scaled_axes(data), data.column("time_s"))[np.maximum(data.row, 0)]
+
+
+def shape_variations_with(data: ResidualData, new: Observation) -> tuple[Array, Array]:
+    """The same functions of the values, (m, k), and of those of further poses, (v, k)."""
+    places = np.concatenate([scaled_axes(data), scaled_axes(data, new.q)])
+    time = np.concatenate([data.column("time_s"), new.measurement.column("time_s")])
+    both = _variations(data, places, time)
+    return both[np.maximum(data.row, 0)], both[data.count + np.maximum(new.rows, 0)]
+
+
+def _variations(data: ResidualData, places: Array, time: Array) -> Array:
+    """Of rows at scaled places (n, a) and times (n,), (n, k)."""
+    known = data.column("time_s")
+    signals = [*places.T, *([2 * (time - known.mean()) / np.ptp(known)] if np.ptp(known) > 0 else [])]
     kernel = sum(np.exp(-0.5 * (u[:, None] - u) ** 2 / VARIATION_LENGTH**2) for u in signals) / len(signals)
-    return kernel_functions(np.asarray(kernel), VARIATIONS)[np.maximum(data.row, 0)]
+    return kernel_functions(np.asarray(kernel), VARIATIONS)
 
 
 def combined_form(data: ResidualData, owner: Candidate, parts: Sequence[Array]) -> EffectForm | None:
@@ -464,10 +472,8 @@ def _beside(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> l
     """What each form shows beside an orthonormal basis of what is free, in units of each value's noise."""
     if not groups:
         return []
-    left = np.concatenate([group.columns.T for group in groups]) / data.relative
-    for _ in range(2):  # twice, for the last digits
-        left -= (left @ basis) @ basis.T
-    return np.split(left.T, _ends(groups)[1:-1], axis=1)
+    columns = side_by_side(group.columns for group in groups) / data.relative[:, None]
+    return np.split(without(basis, columns), _ends(groups)[1:-1], axis=1)
 
 
 def _span(columns: Array) -> Array:

@@ -15,10 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.diagnosis.discrimination import Hypothesis, HypothesisPairs, chance, exchanged, worst
+from ncfix.diagnosis.discrimination import Hypothesis, HypothesisPairs, chance, exchanged, seen_at, worst
 from ncfix.diagnosis.evidence import Comparison, Evidence, Members
 from ncfix.diagnosis.forms import EffectForm
 from ncfix.diagnosis.joint_fit import Mask
+from ncfix.diagnosis.preposterior import prospect
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.diagnosis.selection import Selected, aliases
 from ncfix.machine import Machine
@@ -101,14 +102,18 @@ def proposed(scale: Comparison, selected: Selected, sigma: float) -> Proposal | 
     evidence = scale.evidence
     runners_up = selected.runners_up[name]
     ordered = sorted(runners_up, key=lambda n: -runners_up[n])
-    near = aliases(selected, name) or [n for n in ordered if runners_up[n] > selected.odds[name] - NEAR]
     owners = {group.owner.name: group.owner for group in evidence.groups}
-    near = [n for n in near if not owners[n].kept_out][:RIVALS_MOST]
+    near = [n for n in ordered if runners_up[n] > selected.odds[name] - NEAR and not owners[n].kept_out]
+    near = [n for n in aliases(selected, name) if n in near] or near
     if not near or owners[name].kept_out:
         return None
     others = {key: member for key, member in selected.members.items() if key != name}
-    sides = [_side(scale, others, each) for each in (name, *near)]
-    return propose(evidence, sides, sigma)
+    sides = [_side(scale, others, each) for each in (name, *near[:RIVALS_MOST])]
+    found = propose(evidence, sides, sigma)
+    if found.plan is None:
+        return found
+    new = seen_at(evidence.background.data, found.plan)
+    return replace(found, chance=prospect(scale, selected, (name, *near), new, sigma).chance)
 
 
 def _side(scale: Comparison, others: Members, name: str) -> Hypothesis:

@@ -27,7 +27,12 @@ from scipy.linalg import cholesky, eigh, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
 from ncfix.diagnosis.evidence import MISSHAPEN, Background, entry_price, in_noise, log_odds, marginal
-from ncfix.diagnosis.forms import EffectForm, shape_variations, side_by_side, without_lacking_constants
+from ncfix.diagnosis.forms import (
+    EffectForm,
+    shape_variations,
+    side_by_side,
+    without_lacking_constants,
+)
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse, orthonormal
 from ncfix.measure.measurement import Array, groups
@@ -117,13 +122,34 @@ def everything_covariance(data: ResidualData, named: Sequence[EffectForm]) -> Ar
 
     But nothing of the constants that the machine file lacks: those are looked for, not taken for granted.
     """
-    groups = [group for group in named if not group.owner.constant]
-    forms = Counter(group.owner.name for group in groups)
-    parts = [group.columns / np.sqrt(forms[group.owner.name] * len(forms)) for group in groups]
-    columns = side_by_side([np.zeros((len(data.y), 0)), *parts])
-    columns = without_lacking_constants(data, columns, named)
+    columns = without_lacking_constants(
+        data, _everything(named, [group.columns for group in named], len(data.y)), named
+    )
     covariance: Array = columns @ columns.T
     return covariance
+
+
+def everything_at(data: ResidualData, named: Sequence[EffectForm], ahead: Sequence[Array]) -> tuple[Array, Array]:
+    """The same of v values at further poses, of which each form shows `ahead` (v, p) um: (v, v), and with the old
+    values, (v, m).
+    """
+    new = _everything(named, ahead, len(ahead[0]) if ahead else 0)
+    old = _everything(named, [group.columns for group in named], len(data.y))
+    lacking = [k for k, group in enumerate(named) if group.owner.constant]
+    if lacking:
+        constants = [named[k].columns for k in lacking]
+        shares = data.shares(old, constants)
+        old = old - np.concatenate(constants, axis=1) @ shares
+        new = new - np.concatenate([ahead[k] for k in lacking], axis=1) @ shares
+    return new @ new.T, new @ old.T
+
+
+def _everything(named: Sequence[EffectForm], shown: Sequence[Array], count: int) -> Array:
+    """Columns (count, p) of a little of every name: what each form shows, each name with the same share."""
+    kept = [(group, own) for group, own in zip(named, shown, strict=True) if not group.owner.constant]
+    forms = Counter(group.owner.name for group, _ in kept)
+    parts = [own / np.sqrt(forms[group.owner.name] * len(forms)) for group, own in kept]
+    return side_by_side([np.zeros((count, 0)), *parts])
 
 
 def estimated_background(

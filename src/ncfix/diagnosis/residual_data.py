@@ -139,6 +139,15 @@ class ResidualData:
             parts.append(-shown.reshape(len(shown), -1))
         return UM * np.concatenate(parts)
 
+    def shares(self, columns: Array, of: Sequence[Array]) -> Array:
+        """What least squares of columns (m, p) give each of some other columns, beside all that is free, (k, p)."""
+        free = np.concatenate([self.base, *of], axis=1) / self.relative[:, None]
+        size = np.linalg.norm(free, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        shares = np.linalg.lstsq(free / size, columns / self.relative[:, None], rcond=UNTELLABLE)[0] / size[:, None]
+        found: Array = shares[self.base.shape[1] :]
+        return found
+
     @cached_property
     def q(self) -> Array:
         """Axis positions of all rows, (n, n_axes)."""

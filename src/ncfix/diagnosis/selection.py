@@ -67,6 +67,15 @@ def _acts_alike(evidence: Evidence, members: Sequence[Member], own: Member, othe
     return any(act_alike(first, shown, _white(evidence, form, share), largest) for form in evidence.forms[other])
 
 
+def untold(scale: Comparison, selected: Selected, name: str, other: str) -> float:
+    """Squared noise units of what a member shows that another name cannot, with its best form."""
+    evidence, members = scale.evidence, scale.all(selected.members)
+    share, own = evidence.share(members), selected.members[name]
+    shown = _white(evidence, own.group, share) @ evidence.numbers(members, share)[members.index(own)]
+    largest = evidence.background.data.sizes[-1]
+    return min(_unexplained(shown, largest * _white(evidence, form, share)) for form in evidence.forms[other])
+
+
 def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> bool:
     """Whether a name can show some of what `own`, one of the members, shows: else it acts in other directions."""
     share = evidence.share(members)

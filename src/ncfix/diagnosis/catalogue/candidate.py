@@ -202,6 +202,14 @@ def bent_loading(length: float) -> Array:
 
 
 @lru_cache(maxsize=64)
+def leaning_loading(length: float) -> Array:
+    """The same without its mean, and with half of its slope: where there is no constant for that, others stand for it
+    in part.
+    """
+    return smooth_loading(length) - 0.5 * (_straight(length, 1) + _straight(length, 2))
+
+
+@lru_cache(maxsize=64)
 def turned_loading(length: float) -> Array:
     """The same with half of its mean: where a tilt is zero, nobody knows; in part that is a constant of the machine."""
     return smooth_loading(length) - 0.5 * _straight(length, 1)

@@ -23,6 +23,7 @@ from ncfix.diagnosis.catalogue.candidate import (
     along,
     bent_loading,
     harmonic_variances,
+    leaning_loading,
     spline,
     stacked,
     turned_loading,
@@ -67,7 +68,8 @@ def _curves(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
         parts = zero([Effect(each, (), spline(), **span) for each in (name, *swept(component, axis))])
         shift = [bent_loading(length) for length in SMOOTH]
         tilt = [turned_loading(length) for length in SMOOTH]
-        own = shift if component in LETTERS else tilt
+        leaning = [leaning_loading(length) for length in SMOOTH] if _slope_lacks(measured, axis, component) else shift
+        own = leaning if component in LETTERS else tilt
         loadings = tuple(stacked(a, *[PIVOT * b] * (len(parts) - 1)) for a, b in zip(own, shift, strict=True))
         yield Candidate(
             name, component_title(name, axis), axis.name, f"{axis.name} geometry", parts, loadings, (), WORN, lead=1
@@ -224,6 +226,18 @@ def location_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
             yield Candidate(
                 f"scale {axis.name}", title, axis.name, f"{axis.name} geometry", gain, ONE, (), "", constant=True
             )
+
+
+def _slope_lacks(measured: MeasuredRange, axis: Axis, component: str) -> bool:
+    """Whether no constant is the slope of this shift of a linear axis, though the file says how others lie.
+
+    Then other constants stand for it as long as only one tool is used, and no longer.
+    """
+    own = along(axis)
+    if component not in LETTERS or own is None or LETTERS.index(component) == own or not _located(measured, axis):
+        return False
+    turn = TURNS[3 - own - LETTERS.index(component)]
+    return all(effect.name != f"E{turn}0{axis.name}" for effect in measured.machine.effects)
 
 
 def _gain(axis: Axis) -> str:

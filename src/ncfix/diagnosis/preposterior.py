@@ -1,0 +1,212 @@
+"""How likely further poses leave one name: what would be measured there is drawn, and each name is weighed anew.
+
+Preposterior analysis (Raiffa and Schlaifer 1961). A name that may be true says what the new values will be, with a
+covariance: its size and shape are known only as far as the old rows tell, the set-up will be new, the instrument has
+noise, and a little of everything goes on where nothing was measured. Values are drawn from each such prediction. The
+odds of a name afterwards are those it has now times how much likelier it makes the values than another does. So what
+the old rows happen to say is not counted a second time, and a prediction that is vague tells little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import logsumexp
+
+from ncfix.diagnosis.evidence import MISSHAPEN, Comparison, Member, Members
+from ncfix.diagnosis.forms import EffectForm, shape_variations_with
+from ncfix.diagnosis.noise import everything_at
+from ncfix.diagnosis.selection import ALIKE, ASSUMED, TOLD_APART, Selected, untold
+from ncfix.measure.measurement import Array
+from ncfix.measure.observation import Observation
+from ncfix.values import dataclass
+
+FORMS = 2
+"""Forms of each name that are considered, as where names are weighed."""
+DRAWS = 500
+"""Draws for each name that may be true; the chance is then known to 0.02."""
+UNLIKELY = 5.0
+"""What is less likely than the likeliest by this log likelihood is left out."""
+WIDE_UM = 1e3
+"""How far what is free may be off."""
+
+
+@dataclass(frozen=True, repr=False)
+class PredictedValues:
+    """What a name, in one form and shape, says of the new values.
+
+    weight  log of how likely it is so, less what it pays
+    mean (v,), factor (v, v)  of a normal distribution, um; the factor is that of Cholesky
+    """
+
+    name: str
+    weight: float
+    mean: Array
+    factor: Array
+
+    def likelihood(self, values: Array) -> Array:
+        """Log likelihood of values (v, d), (d,)."""
+        white = solve_triangular(self.factor, values - self.mean[:, None], lower=True, check_finite=False)
+        found: Array = -0.5 * (white**2).sum(axis=0) - np.log(np.diag(self.factor)).sum()
+        return found
+
+    def drawn(self, random: np.random.Generator, count: int) -> Array:
+        """Values (v, count)."""
+        found: Array = self.mean[:, None] + self.factor @ random.standard_normal((len(self.mean), count))
+        return found
+
+
+def shown_at(new: Observation, groups: Sequence[EffectForm]) -> list[Array]:
+    """What the numbers of each form show at further poses, (v, p) um; nothing of what is no error of the machine."""
+    owners = {group.owner.name: group.owner for group in groups if not group.owner.kept_out}
+    design = 1e3 * new.design([effect for owner in owners.values() for effect in owner.effects])
+    ends = np.cumsum([sum(effect.basis.size for effect in owner.effects) for owner in owners.values()])
+    designs = dict(zip(owners, np.split(design, ends[:-1], axis=1), strict=True))
+    nothing = [np.zeros((len(design), group.columns.shape[1])) for group in groups]
+    return [
+        none if group.owner.kept_out else designs[group.owner.name] @ group.loading
+        for none, group in zip(nothing, groups, strict=True)
+    ]
+
+
+@dataclass(frozen=True, repr=False)
+class Prospect:
+    """What may come of further poses.
+
+    names     that may be true
+    chances   for each name, were it true, how often it stands alone afterwards
+    weights   how likely each name is true
+    """
+
+    names: tuple[str, ...]
+    chances: Array
+    weights: Array
+
+    @property
+    def chance(self) -> float:
+        """How often one name stands alone, and it is the true one."""
+        return float(self.weights @ self.chances)
+
+
+def prospect(scale: Comparison, selected: Selected, names: Sequence[str], new: Observation, sigma: float) -> Prospect:
+    """What further poses may come to, if one of these names is true; `sigma` is the noise of a value, um.
+
+    One of the names is a member of what was selected, and the other members stay. Names that act alike in old and new
+    rows together need more to be told apart, as where aliases are told.
+    """
+    own = next(name for name in names if name in selected.members)
+    others = {key: member for key, member in selected.members.items() if key != own}
+    predictor, random = _Predictor(scale, new, sigma), np.random.default_rng(0)
+    by_name = [list(predictor.predictions(others, name)) for name in names]
+    now = np.array([logsumexp([each.weight for each in forms]) for forms in by_name])
+    apart = {own: 0.0} | {each: untold(scale, selected, own, each) for each in selected.acting_alike.get(own, ())}
+    chances = np.zeros(len(names))
+    for k, forms in enumerate(by_name):
+        share = np.exp([each.weight - now[k] for each in forms])
+        counts = random.multinomial(DRAWS, share / share.sum())
+        values = np.concatenate([each.drawn(random, int(n)) for each, n in zip(forms, counts, strict=True)], axis=1)
+        odds = np.stack([_weighed(every, values) for every in by_name])
+        alone = np.ones(DRAWS, dtype=bool)
+        for j in range(len(names)):
+            if j != k:
+                ahead, before = odds[k] - odds[j], max(apart.get(names[i], np.inf) for i in (j, k))
+                told = before + 2 * (float(ahead.mean()) - now[k] + now[j])
+                alone &= ahead > ALIKE * (ASSUMED if told < TOLD_APART else 1.0)
+        chances[k] = alone.mean()
+    tempered = [(w - now[0]) / (ASSUMED if name in apart else 1.0) for name, w in zip(names, now, strict=True)]
+    return Prospect(tuple(names), chances, np.exp(tempered - logsumexp(tempered)))
+
+
+def _weighed(predictions: Sequence[PredictedValues], values: Array) -> Array:
+    """How likely a name is after values (v, d), less what it pays, (d,)."""
+    found: Array = logsumexp([each.weight + each.likelihood(values) for each in predictions], axis=0)
+    return found
+
+
+class _Predictor:
+    """What names say of the values at some new poses, given the old ones."""
+
+    def __init__(self, scale: Comparison, new: Observation, sigma: float) -> None:
+        self.scale, self.new = scale, new
+        self.background = scale.evidence.background
+        data = self.background.data
+        self.noise = (sigma / self.background.sigma) ** 2
+        constants = data.problem.design.shape[1]
+        used = data.base.shape[1] - constants
+        setup = 1e3 * new.unknown_design(new.unknowns.start)
+        kinematic = 1e3 * new.design(data.problem.selection.estimated)
+        old = np.concatenate(
+            [data.base[:, :used], np.zeros((len(data.y), setup.shape[1])), data.base[:, used:]], axis=1
+        )
+        rows = np.concatenate([np.zeros((len(setup), used)), setup, kinematic], axis=1)
+        size = np.sqrt((old**2).mean(axis=0) + (rows**2).mean(axis=0))
+        size = np.where(size > 0, size, 1.0) / WIDE_UM
+        self.free = (old / size, rows / size)
+        named = scale.evidence.groups[: scale.evidence.named]
+        self.named = shown_at(new, named)
+        self.everything, self.across = everything_at(data, named, self.named)
+        self.variations = shape_variations_with(data, new)
+        self.carried: dict[float, tuple[Array, Array]] = {}
+
+    def shown(self, group: int) -> Array:
+        """What the numbers of a form show in the new poses, um; nothing where it has no name."""
+        if group < len(self.named):
+            return self.named[group]
+        return np.zeros((len(self.variations[1]), self.scale.evidence.groups[group].columns.shape[1]))
+
+    def _carried(self, share: float) -> tuple[Array, Array]:
+        """What a little of everything carries from the old values to the new ones, (v, m), and the columns of what is
+        free, turned and weighed by the precision of the old values, (k, m).
+        """
+        precision = self.background.precision(share) / self.noise
+        size = share**2 * self.noise * self.background.sigma**2
+        return size * self.across @ precision, self.free[0].T @ precision
+
+    def predictions(self, others: Members, name: str) -> Iterator[PredictedValues]:
+        """Of a name beside others: in its likeliest forms, each shaped as in the catalogue and a little otherwise, with
+        every likely share of the background.
+        """
+        scale, evidence = self.scale, self.scale.evidence
+        asked: list[tuple[list[Member], list[Member], float, float]] = []
+        for member in scale.candidate_odds(others).likeliest(evidence.forms[name], FORMS):
+            members = {**others, name: member}
+            every, paid = scale.all(members), scale.paid(members)
+            asked += [(every, [], own - paid, share) for own, share in evidence.by_share(every)]
+            allowance = scale.allowance(members)
+            if allowance is not None:
+                bent = scale.shaped(members)
+                asked += [(every, bent, own - paid, share) for own, share in evidence.by_share(every, allowance)]
+        least = max(weight for _, _, weight, _ in asked) - UNLIKELY
+        for every, bent, weight, share in asked:
+            if weight > least:
+                yield self._predicted(name, every, weight, share, bent)
+
+    def _predicted(
+        self, name: str, every: Sequence[Member], weight: float, share: float, bent: Sequence[Member]
+    ) -> PredictedValues:
+        """Normal predictions in closed form: columns whose numbers the old rows tell, and the background (kriging)."""
+        evidence, background, data = self.scale.evidence, self.background, self.background.data
+        old = [self.free[0], *(m.size * evidence.groups[m.group].columns for m in every)]
+        rows = [self.free[1], *(m.size * self.shown(m.group) for m in every)]
+        if bent:
+            numbers = evidence.numbers(every, share)
+            both = [(m, z) for m, z in zip(every, numbers, strict=True) if m in bent]
+            whole = np.sum([evidence.groups[m.group].columns @ z for m, z in both], axis=0)
+            ahead = np.sum([self.shown(m.group) @ z for m, z in both], axis=0)
+            old.append(MISSHAPEN * whole[:, None] * self.variations[0])
+            rows.append(MISSHAPEN * ahead[:, None] * self.variations[1])
+        columns, new = np.concatenate(old, axis=1), np.concatenate(rows, axis=1)
+        if share not in self.carried:
+            self.carried[share] = self._carried(share)
+        carried, free = self.carried[share]
+        more = columns[:, self.free[0].shape[1] :].T @ background.precision(share) / self.noise
+        inside, size = np.concatenate([free, more]), share**2 * self.noise * background.sigma**2
+        spread = np.linalg.inv(np.eye(columns.shape[1]) + inside @ columns)
+        ahead_of = new - carried @ columns
+        mean = carried @ data.y + ahead_of @ (spread @ (inside @ data.y))
+        white = self.noise * background.sigma**2 * (1 + background.drift**2)
+        covariance = ahead_of @ spread @ ahead_of.T + size * (self.everything - carried @ self.across.T)
+        covariance[np.diag_indices_from(covariance)] += white
+        return PredictedValues(name, weight, mean, cholesky((covariance + covariance.T) / 2, lower=True))
