@@ -176,7 +176,8 @@ def left_where_they_stand(program: Program, moves: Moves, left: Lacking | None) 
 
 def stretches_of(program: Program, blocks: NDArray[np.int32]) -> tuple[tuple[int, int], ...]:
     """The lines of blocks, as stretches without gaps, from and to."""
-    return in_stretches(np.unique(program.lines(blocks)))
+    lines = np.sort(program.lines(blocks))
+    return in_stretches(lines[np.diff(lines, prepend=-1) != 0])
 
 
 def in_stretches(lines: NDArray[np.int64]) -> tuple[tuple[int, int], ...]:

@@ -152,10 +152,12 @@ def with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup
 
 def _first_motions(moves: Moves, chosen: NDArray[np.bool_]) -> dict[int, int]:
     """Tool -> the first of the chosen motions (n,) that is made with it, in the order of the program."""
-    if not chosen.any():
-        return {}
-    tools, rows = np.unique(np.where(chosen, moves.tool, -1), return_index=True)
-    return {int(tools[each]): int(rows[each]) for each in np.argsort(rows) if tools[each] >= 0}
+    rows = np.flatnonzero(chosen & (moves.tool >= 0))
+    rows = rows[np.diff(moves.tool[rows], prepend=-1) != 0]
+    found: dict[int, int] = {}
+    for tool, row in zip(moves.tool[rows].tolist(), rows.tolist(), strict=True):
+        found.setdefault(tool, row)
+    return found
 
 
 PART_BYTES = 1 << 20
@@ -266,7 +268,9 @@ def looks_corrected(numbers: Numbers, step: float) -> bool:
 
 
 def _different(values: Array, change: Array, step: float) -> tuple[Array, Array]:
-    _, first = np.unique(np.rint(values / step), return_index=True)
+    steps = np.rint(values / step)
+    order = np.argsort(steps, kind="stable")
+    first = order[np.diff(steps[order], prepend=-np.inf) != 0]
     return values[first], change[first]
 
 

@@ -8,6 +8,7 @@ Outside the first and last place of a table, spline or step the end values hold.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import Any, ClassVar, Self
 
@@ -124,9 +125,9 @@ class Spline(Basis):
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        places, counts = np.unique(self.knots, return_counts=True)
-        inside = (places > self.domain[0]) & (places < self.domain[1])
-        return tuple(float(place) for place in places[inside & (counts >= self.degree)])
+        low, high = self.domain
+        inside = Counter(knot for knot in self.knots if low < knot < high)
+        return tuple(sorted(place for place, count in inside.items() if count >= self.degree))
 
     def feature(self, span: float) -> float:
         low, high = self.domain

@@ -209,7 +209,10 @@ class ProgramReading:
 
     def learned(self, first: int, scan: Scan, known: list[int | None]) -> bool:
         """Learn the shapes that are not known yet from the first block of each; whether that will do."""
-        rows = range(len(known)) if scan.group is None else np.unique(scan.group, return_index=True)[1].tolist()
+        first_rows = np.arange(len(known))
+        if scan.group is not None:
+            first_rows[scan.group[::-1]] = np.arange(len(scan.group))[::-1]
+        rows = first_rows.tolist()
         new = {scan.shapes[number]: rows[number] for number in range(len(known) - 1, -1, -1) if known[number] is None}
         return None not in new and all(
             self.understood(first, row, scan, shape) is not None

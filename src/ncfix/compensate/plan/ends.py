@@ -206,7 +206,7 @@ def _over_the_hole(moves: Moves, rows: Index, commands: Array, wanted: Array) ->
     """Commands (k, n_axes) moved over the bottom of their hole, in the frame of the program."""
     assert moves.approach is not None
     result = commands.copy()
-    for number in np.unique(moves.frame[rows]):
+    for number in sorted(set(moves.frame[rows].tolist())):
         part = np.flatnonzero(moves.frame[rows] == number)
         frame = FrameMap(moves.frames[number], moves.axes, moves.rotary)
         own = rows[part]

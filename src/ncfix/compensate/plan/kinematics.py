@@ -155,8 +155,10 @@ def commands_from_joints(machine: Machine, q: Array, tcp: Mask, tool_length: Arr
     chosen = q if len(rows) == len(q) else q[rows]
     tip = machine.tip(chosen, _of_rows(tool_length, rows))
     if moves_as_one(machine):
-        others = np.setdiff1d(np.flatnonzero(~machine.rotary), columns)
-        maps, offset = machine.at_zero[1][None, columns].swapaxes(1, 2), _tip_by_linear_axes(machine, chosen, others)
+        others = ~machine.rotary
+        others[columns] = False
+        tip_of_others = _tip_by_linear_axes(machine, chosen, np.flatnonzero(others))
+        maps, offset = machine.at_zero[1][None, columns].swapaxes(1, 2), tip_of_others
     else:
         maps, offset = affine_tip(machine, _rotary_at_zero(machine, chosen))
     commands[rows[:, None], columns] = solve(regular(maps)[0], tip - offset)

@@ -256,7 +256,7 @@ def _of_axes(written: WrittenPieces, code: str, text: str, beyond: Array) -> Fin
 
 def _worst(moves: Index, values: Array) -> tuple[Index, Array]:
     """Each motion once, with its largest value."""
-    rows, place = np.unique(moves, return_inverse=True)
+    rows = distinct(moves)
     most = np.zeros(len(rows))
-    np.maximum.at(most, place, values)
+    np.maximum.at(most, np.searchsorted(rows, moves), values)
     return rows, most
