@@ -325,3 +325,12 @@ def test_check_tells_only_of_cuts() -> None:
 
     assert not found("G21 G90 G94\nG0 X1 Y2 Z3\nT1 M6\nG0 X100 Y50\nZ5\nG1 X7 F100\nM2\n")
     assert found("G21 G90 G94\nG0 X1 Y2 Z3\nT1 M6\nG0 X100 Y50\nG1 X7 F100\nM2\n")
+
+
+@pytest.mark.parametrize(("between", "said"), [("G43 H2\n", False), ("G43 H2\nG0 Z5\n", True), ("", True)])
+def test_behind_another_tool_length_z_is_not_where_the_program_has_brought_it(between: str, said: bool) -> None:
+    setup = Setup(assume_zero=True, work_offsets={"G54": {}}, tools={1: Tool(50.0), 2: Tool(80.0)})
+    text = f"G54\nG43 H1\nG0 X0 Y0 Z5 B0 C0\n{between}G1 X300 F100\nM2\n"
+    lines = fixed(text, setup=setup, tolerance_um=50.0).text.splitlines()
+    (cut,) = (line for line in lines if line.startswith(b"G1 X300."))
+    assert (b" Z" in cut) is said

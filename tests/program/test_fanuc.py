@@ -261,6 +261,7 @@ def test_the_point_of_each_word_is_kept(text: str, no_point: str, expected: str)
         ("G10L10P4R80.\nG43H4\nG0Z0.", [[0, 0, 80]]),
         ("G4X1.\nG0X2.", [[0, 0, 0], [2, 0, 0]]),
         ("T3T5M6\nG0X#4120\nT7\nX#4120", [[3, 0, 0], [7, 0, 0]]),
+        ("G0X#4008Y#4010Z#4014", [[49, 98, 54]]),  # what is in force at the start
         ("G0X5.\nG92X0.\nX1.", [[5, 0, 0], [6, 0, 0]]),
         ("G68X0Y0R90.\nG0X1.Y0.\nG69\nX2.Y1.", [[0, 1, 0], [2, 1, 0]]),
         ("G17G16\nG0X10.Y90.\nY180.\nX20.\nG15\nX1.", [[0, 10, 0], [-10, 0, 0], [-20, 0, 0], [1, 0, 0]]),

@@ -269,3 +269,13 @@ def test_g52_in_g91_may_be_added_to_the_shift_in_force(dialect: str) -> None:
 def test_g5_that_switches_names_no_axes(text: str, known: bool) -> None:
     found = reasons(follow(f"G21 G0 X1.\n{text}\nX2.", dialect="fanuc", no_point="calculator"))
     assert (found[-1] == "") is known
+
+
+def test_the_first_work_offset_is_in_force_at_the_start() -> None:
+    assert ends(follow("G0 X[#5220]")) == [[1.0, 0.0, 0.0]]
+
+
+def test_in_a_turned_frame_an_axis_without_a_word_stands_where_another_tool_length_has_left_it() -> None:
+    tools = {1: Tool(50.0), 2: Tool(80.0)}
+    found = follow("G10 L2 P1 R90\nG43 H1\nG0 X0 Y0 Z10\nG43 H2\nG1 X5 F100", tools=tools)
+    assert ends(found) == [[0.0, 0.0, 60.0], [0.0, 5.0, 60.0]]
