@@ -31,7 +31,7 @@ from ncfix.text.language import language_of
 from ncfix.text.reader import read
 from ncfix.writer.language import WrittenLanguage
 
-COUNT = int(os.environ.get("NCFIX_MUTATED", "80"))
+COUNT = int(os.environ.get("NCFIX_MUTATED", "40"))
 SEED = os.environ.get("NCFIX_SEED", "0")
 SIZE = 1000
 """Bytes of a part."""
@@ -103,7 +103,7 @@ def test_every_way_writes_the_same(root: Path) -> None:
         counted["in parts"] += found["in parts"] is not None
         assert not different, f"seed {SEED}, program {number}, {program.name}: {different}\n{text.decode('latin-1')}"
     assert counted["in parts"] > COUNT / 10, counted
-    assert all(counted[dialect] > COUNT / 100 for dialect in programs()), counted
+    assert sum(counted[dialect] for dialect in programs()) > COUNT / 4, counted
 
 
 def in_all_ways(text: bytes, dialect: str, machine: Machine, setup: Setup) -> dict[str, bytes | str | None]:
