@@ -83,3 +83,16 @@ def test_a_result_that_was_changed_by_hand_makes_a_page_all_the_same(ncfix: Any,
             assert result_sections({"schema": 1, "files": files}, "night.json")
             if all(map(is_of_fix, files)):
                 assert b"Batch" in batch_page(files)
+
+
+def test_a_calibration_has_expanded_uncertainties_and_units() -> None:
+    rows = [
+        {"name": "EXX u^1", "value": 0.006, "sigma": 0.0002, "held": False},
+        {"name": "EC0Y", "value": 25e-6, "sigma": None, "held": True},
+    ]
+    (section,) = result_sections({"parameters": rows, "covariance": [[1.0]], "freedom": 12}, "result.json")
+    table = section.parts[0]
+    assert list(table.rows) == [("EXX u^1", "6", "0.2", "0.4", "um"), ("EC0Y", "25", "held", "", "urad")]
+    assert "degrees of freedom" in str(section.parts)
+    (other,) = result_sections({"parameters": [{"name": "EXX", "value": "many"}]}, "result.json")
+    assert "many" in str(other.parts)

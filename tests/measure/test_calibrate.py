@@ -9,7 +9,8 @@ import pytest
 
 from measure.poses import machine, perfect, plan
 from ncfix.diagnostics import UsageError
-from ncfix.machine import dumps, loads
+from ncfix.machine import Effect, dumps, loads
+from ncfix.machine.basis import Polynomial
 from ncfix.measure.calibrate import calibrate, deviations, guesses, over_the_travels
 from ncfix.measure.estimate import Calibration
 from ncfix.measure.instruments import Faults, simulate
@@ -278,3 +279,16 @@ def test_held_effects_keep_their_covariance():
     again = calibrate([lasers], first, "EC0Y,EA0Z,ECY")
     kept = {effect.name: effect.covariance for effect in again.machine.effects}
     assert all(kept[effect.name] == effect.covariance is not None for effect in first.effects)
+
+
+def test_an_axis_measured_again_at_one_temperature_keeps_its_expansion():
+    """Of a scale and its growth only the sum is seen at one temperature: the growth is held, whatever comes first."""
+    scale = Effect("EXX", (20e-6,), Polynomial(degree=(1,)))
+    growth = replace(scale, coefficients=(-11e-6,), times="temp_x", times_center=20.0, times_scale=1.0)
+    position = np.linspace(-300.0, 300.0, 13)
+    columns = {"position": position, "value": 9e-6 * position, "temp_x": np.full(13, 22.0)}
+    laser = Measurement("axis", (), columns, labels={"axis": ("X",) * 13, "component": ("EXX",) * 13})
+    for effects in ((growth, scale), (scale, growth)):
+        found = calibrate([laser], machine("three_axis").replace(effects=effects)).machine.effects
+        values = {effect.times: effect.coefficients[0] for effect in found}
+        assert values == pytest.approx({"temp_x": -11e-6, None: 31e-6})

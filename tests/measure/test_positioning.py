@@ -32,6 +32,7 @@ def test_figures_of_two_runs_worked_out_by_hand():
     assert found.mean_reversal == pytest.approx(3)
     assert pytest.approx(4 * s + 3) == found.R
     assert pytest.approx(7 + 4 * s) == found.A
+    assert found.runs == 2
 
 
 def test_the_order_that_laspas_s_tables_keep():

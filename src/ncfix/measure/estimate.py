@@ -15,8 +15,10 @@ import numpy as np
 from scipy.special import chdtrc
 
 from ncfix.diagnostics import Message, Place, UsageError
-from ncfix.machine import Machine
+from ncfix.machine import Effect, Machine
+from ncfix.machine.error_model import signals_of
 from ncfix.machine.plausible import functions, much
+from ncfix.machine.state import inputs_of
 from ncfix.measure import least_squares
 from ncfix.measure.instruments import observe
 from ncfix.measure.least_squares import Solution, gauss_newton, solve
@@ -121,6 +123,12 @@ class Problem:
             parts.append(HOPELESS * much(self.machine, effect.name) / np.maximum(largest, TINY))
         return np.concatenate(parts)
 
+    @cached_property
+    def fleeting(self) -> Mask:
+        """Which coefficients are of effects that follow a temperature, a load, the time, ..., (p,)."""
+        follows = [bool(_followed(self.machine, effect)) for effect in self.selection.estimated]
+        return np.repeat(np.array(follows, dtype=np.bool_), [each.basis.size for each in self.selection.estimated])
+
     @property
     def start(self) -> Array:
         """The first guess of what is unknown about the set-ups, one after another, (k,), mm or rad."""
@@ -210,6 +218,10 @@ class Calibration:
         return deviation
 
 
+def _followed(machine: Machine, effect: Effect) -> frozenset[str]:
+    return inputs_of(each for each in signals_of(machine.axes, effect) if each is not None) - {"tool_length"}
+
+
 def fit(problem: Problem, loss: str = least_squares.AUTO) -> Estimate:
     """Iterate to convergence; with `auto` once more without the outliers that a robust look finds.
 
@@ -253,7 +265,8 @@ def _iterate(problem: Problem, weight: Array, loss: str, scale: float = 1.0) -> 
         coefficients, unknowns, weight = at
         target = problem.residual(coefficients, unknowns) / problem.sigma
         root = np.sqrt(weight)
-        solution = solve(design * root[:, None], nuisance * root[:, None], target * root, problem.limits / scale)
+        weighed = design * root[:, None], nuisance * root[:, None], target * root
+        solution = solve(*weighed, problem.limits / scale, problem.fleeting)
         rest = (target - design @ solution.change) * root
         moved = np.linalg.lstsq(nuisance * root[:, None], rest, rcond=1e-11)[0] if nuisance.shape[1] else unknowns
         change = design @ solution.change + nuisance @ moved

@@ -139,11 +139,13 @@ def without(basis: Array, columns: Array) -> Array:
     return twice
 
 
-def solve(design: Array, nuisance: Array, target: Array, limit: Array | None = None) -> Solution:
+def solve(
+    design: Array, nuisance: Array, target: Array, limit: Array | None = None, last: NDArray[np.bool_] | None = None
+) -> Solution:
     """Least squares of `design @ change + nuisance @ anything = target`.
 
     design (m, p), nuisance (m, k), target (m,), all divided by the noise; limit (p,): what would be known to no better
-    than this is not known, and held.
+    than this is not known, and held; last (p,): of columns that do the same, these are held before others.
     """
     basis = orthonormal(nuisance)
     left, wanted = without(basis, design), without(basis, target)
@@ -151,7 +153,8 @@ def solve(design: Array, nuisance: Array, target: Array, limit: Array | None = N
     seen = np.flatnonzero(after > VISIBLE * np.maximum(before, 1e-300))
     scaled = left[:, seen] / after[seen]
     most = np.full(len(seen), np.inf) if limit is None else limit[seen] * after[seen]
-    kept, orthogonal, triangle, combinations, weak = _independent(scaled, seen, after, most)
+    order = np.arange(len(seen)) if last is None else np.argsort(last[seen], kind="stable")
+    kept, orthogonal, triangle, combinations, weak = _independent(scaled, seen, after, most, order)
     change = np.zeros(design.shape[1])
     projected = orthogonal.T @ wanted
     inverse = solve_triangular(triangle, np.eye(len(kept))) / after[kept, None] if len(kept) else np.zeros((0, 0))
@@ -174,15 +177,16 @@ def solve(design: Array, nuisance: Array, target: Array, limit: Array | None = N
 
 
 def _independent(
-    scaled: Array, seen: Index, size: Array, most: Array
+    scaled: Array, seen: Index, size: Array, most: Array, order: Index
 ) -> tuple[Index, Array, Array, tuple[Combination, ...], tuple[int, ...]]:
     """A largest set of independent columns, their QR factors, what the others are made of, and which are just weak.
 
-    most (s,) is the standard deviation of the scaled columns' factors beyond which one is not known.
+    most (s,) is the standard deviation of the scaled columns' factors beyond which one is not known; order (s,): which
+    are kept first.
     """
     if not scaled.shape[1]:
         return np.zeros(0, dtype=np.int64), scaled, np.zeros((0, 0)), (), ()
-    chosen, orthogonal, upper = _known(scaled, _chosen(scaled), most)
+    chosen, orthogonal, upper = _known(scaled, _chosen(scaled, order), most)
     held = np.setdiff1d(np.arange(scaled.shape[1]), chosen)
     kept = seen[chosen]
     combinations, weak = [], []
@@ -219,11 +223,11 @@ def _known(scaled: Array, chosen: Index, most: Array) -> tuple[Index, Array, Arr
     return chosen[among], *np.linalg.qr(scaled[:, chosen[among]])
 
 
-def _chosen(scaled: Array) -> Index:
+def _chosen(scaled: Array, order: Index) -> Index:
     """Which columns are kept: the first that are well apart, so that noise does not decide, then what is left by QR."""
     first: list[int] = []
     basis: Array = np.zeros((len(scaled), 0))
-    for k in range(scaled.shape[1]):
+    for k in order.tolist():
         new = without(basis, scaled[:, k])
         size = float(np.linalg.norm(new))
         if size > STURDY:

@@ -44,6 +44,8 @@ FIX = {
     "max_correction_um": "largest, um",
 }
 """Columns of what `fix` did."""
+TERMS = {"freedom": "degrees of freedom", "chi_square": "reduced chi-square", "condition": "condition number"}
+"""Keys that people would not say so."""
 FIGURES = {"error_before_um": "before", "error_after_um": "after"}
 
 
@@ -127,6 +129,9 @@ def _parts(result: Result) -> Iterator[Part]:
     files: Any = rest.get("files")
     if _is_rows(files) and any("error_after_um" in each for each in files) and all(map(is_of_fix, files)):
         yield from _programs(rest.pop("files"))
+    if _is_of_calibration(rest):
+        yield from _calibration(rest.pop("parameters"))
+        rest.pop("covariance", None)
     plain = [
         (_words(key), _cell(value)) for key, value in rest.items() if not _is_rows(value) and value not in (None, [])
     ]
@@ -138,6 +143,34 @@ def _parts(result: Result) -> Iterator[Part]:
             header = list(dict.fromkeys(name for row in value for name in row))
             cells = [[_cell(row.get(name)) for name in header] for row in value]
             yield from _limited([_words(name) for name in header], cells)
+
+
+def _is_of_calibration(result: Result) -> bool:
+    """Whether each coefficient has a name, a value, and a standard deviation unless it was held."""
+    rows = result.get("parameters")
+    return _is_rows(rows) and all(
+        isinstance(row.get("name"), str)
+        and row.get("value") is not None
+        and _is_figure(row["value"])
+        and _is_figure(row.get("sigma"))
+        for row in rows or ()
+    )
+
+
+def _calibration(rows: Sequence[Result]) -> Iterator[Part]:
+    """The coefficients with their uncertainty, um and urad."""
+    cells = []
+    for row in rows:
+        factor, unit = (1e6, "urad") if row["name"][1:2] in ("A", "B", "C") else (1e3, "um")
+        sigma = row.get("sigma")
+        known = ("held", "") if sigma is None else (f"{factor * sigma:.3g}", f"{2 * factor * sigma:.3g}")
+        cells.append((row["name"], f"{factor * row['value']:.4g}", *known, unit))
+    yield from _limited(("coefficient", "value", "u (k = 1)", "U (k = 2)", "unit"), cells)
+    yield Paragraph(
+        "u is the standard uncertainty, U the expanded one. They come from the noise and the fit alone: what the "
+        "calibration of the instrument and its surroundings add is not in them. A coefficient that multiplies a "
+        "temperature, a load or a time is per K, kg or s."
+    )
 
 
 def is_of_fix(entry: Any) -> bool:
@@ -218,6 +251,8 @@ def _limited(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[P
 
 def _words(key: str) -> str:
     """A key as people would say it: `gap_um` is "gap, um"."""
+    if key in TERMS:
+        return TERMS[key]
     name, unit = (key[:-3], ", um") if key.endswith("_um") else (key, "")
     return name.replace("_", " ") + unit
 
