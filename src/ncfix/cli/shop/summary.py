@@ -69,7 +69,7 @@ def brief(entry: Mapping[str, Any]) -> str:
     found = entry.get("errors") or entry["refused"]
     line = f":{found[0]['line']}" if found[0].get("line") else ""
     rest = f" (and {len(more)} more)" if more else ""
-    stale = "; the output is of an earlier state of it" if entry.get("stale") else ""
+    stale = "; the output that is there is of an earlier state: do not run it" if entry.get("stale") else ""
     before = ", as before" if entry.get("resumed") else ""
     return f"{visible(entry['path'])}{line}: {code}: {text.splitlines()[0]}{rest}{stale}{before}"
 
