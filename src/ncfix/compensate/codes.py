@@ -130,7 +130,8 @@ CODES = {
         "not put right (splines, threads, turning cycles, positions that are known only at run time). The block is "
         "left as it was.",
         "Have the CAM system write lines and arcs there, or accept it with `--allow-refused`. `--flatten` writes out "
-        "what cycles with incremental words, patterns of holes and other repetitions make.",
+        "what cycles with incremental words, patterns of holes and other repetitions make. Parameters that the program "
+        "reads and does not set can stand in the setup file: `variables.R1 = 5`.",
     ),
     "NCF433": Code(
         "a block that cannot be written once for all",
