@@ -9,7 +9,6 @@ import pickle
 import re
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError, field
-from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
@@ -139,10 +138,3 @@ def test_they_are_pickled() -> None:
     one = Pickled(3, (1, 2))
     assert pickle.loads(pickle.dumps(one)) == one
     assert hash(one) == hash(copy.deepcopy(one)) == hash((3, (1, 2)))
-
-
-def test_all_modules_use_it(root: Path) -> None:
-    of_the_library = re.compile(r"^from dataclasses import .*\bdataclass\b", re.MULTILINE)
-    modules = [path for folder in ("src", "plugins") for path in (root / folder).rglob("*.py")]
-    found = [path.name for path in modules if of_the_library.search(path.read_text())]
-    assert not found

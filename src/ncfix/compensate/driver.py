@@ -9,8 +9,7 @@ A whole program is one part (`fix_program`). A long one is corrected while it is
 does not depend on its length (`Stream`): every part goes through the same plan, emitter, checks and proof, and what
 comes out is the same, byte for byte. A part begins with the last motion of the one before it, which is written already:
 all that one part has to know of the earlier ones is what that motion left (`PrecedingMotion`). What cannot be done that
-way raises `NotInPartsError`, and the caller takes the program as a whole. Several processes can work on a program (see
-`workers`): each corrects parts in turn, and follows what it has to of others.
+way raises `NotInPartsError`, and the caller takes the program as a whole. Several processes may share it: `workers`.
 """
 
 from __future__ import annotations
