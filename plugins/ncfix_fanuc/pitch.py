@@ -36,6 +36,8 @@ from ncfix_fanuc.pitch_files import (
 )
 
 FIRST_NUMBER = 1
+THOUSANDTHS = 360_000
+"""Of a degree in a turn."""
 
 
 class FanucPitch(Control):
@@ -207,12 +209,15 @@ def _with_cells(
     """The increments with about so many intervals, if they make the axis better: the value at zero cannot be said.
 
     Points are numbered so that the reference position has a number of zero or more, wherever it lies. The first and the
-    last point of a turn are one place, and have the same value (B-63980EN, p. 100).
+    last point of a turn are one place, and have the same value (B-63980EN, p. 100). A turn has a whole number of
+    intervals, which are whole thousandths of a degree: the control counts in them.
     """
     column = request.machine.axis_names.index(axis)
     described = request.machine.axes[column]
     low, high = (request.space[column] / described.unit).tolist()
     turn = 360.0 if described.endless else 0.0
+    while turn and cells < MOST_POINTS - 1 and THOUSANDTHS % cells:
+        cells += 1
     interval = 360.0 / cells if turn else math.ceil((high - low) / cells * 1000) / 1000
     first, last = (0, cells) if turn else _ends(low, high, interval)
     if last - first + 1 > MOST_POINTS:

@@ -231,6 +231,10 @@ class Assigned:
         if modulo and abs(values[0] - values[-1]) > WHOLE:
             text = f"{self.title} repeats, but ends on another value than it begins"
             self.remarks.doubt(self.values[last].line, text)
+        turns = (self.number("MAX") - self.number("MIN")) / 360
+        if modulo and (turns < 0.5 or abs(turns - round(turns)) > WHOLE):
+            text = f"{self.title} repeats every {360 * turns:g} degree, which are no whole turns"
+            self.remarks.doubt(self.fields["MAX"].line, text)
         return values
 
     def _last(self) -> int:

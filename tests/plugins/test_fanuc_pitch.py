@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from ncfix.diagnostics import ConfigError, RefusedError
 from ncfix.machine import Effect, load, loads
-from ncfix.machine.basis import Polynomial
+from ncfix.machine.basis import Fourier, Polynomial
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
@@ -99,6 +100,21 @@ def test_a_rotary_axis_closes_over_a_turn(root: Path) -> None:
 
     assert "behind its first point add up to" in lint(first + 3, 7)[0]
     assert "the same place, has" in lint(first, 0)[0]
+
+
+def test_the_intervals_of_a_turn_fill_it_exactly(root: Path) -> None:
+    """The parameter has four decimals: 28 intervals of 12.8571 degrees would be no turn."""
+    machine = load(root / "examples" / "machines" / "dmu50.toml").replace(
+        effects=(Effect("ECC", (0.0, 5e-5), Fourier((1,))),)
+    )
+    space = ranges_of(machine)
+    for turns in (1, 1.5, 2):
+        space[machine.axis_names.index("C")] = np.array([0, turns * 2 * np.pi])
+        made = export(CONTROL, Request(machine, space, 0.0, 0.001, SETTINGS), 50)
+        rows = made.native["parameters.txt"].decode().splitlines()
+        interval = next(re.findall(r"P([\d.]+)", row)[-1] for row in rows if row.startswith("N03624"))
+        _, increments = read_increments(Remarks.of("pitch_C.csv", made.native["pitch_C.csv"]))
+        assert float(interval) * (len(increments) - 1) == pytest.approx(360, abs=1e-9)
 
 
 def test_the_sample_is_read_and_its_numbers_written_again(shared: Callable[[str], Path]) -> None:

@@ -60,6 +60,7 @@ DOUBTFUL = {
     "an axis of another control unit": (GOOD.replace(b"M17", b"$AN_CEC_INPUT_NCU[0]=1\nM17"), "control units"),
     "no header": (GOOD.replace(b"%_N_NC_CEC_INI\n", b""), "does not name the file"),
     "assigned twice": (GOOD.replace(b"$AN_CEC_INPUT", b"$AN_CEC[0,1]=0.0\n$AN_CEC_INPUT"), "keeps the last"),
+    "a turn that is none": (GOOD.replace(b"MODULO[0]=0", b"MODULO[0]=1"), "are no whole turns"),
     "ends that differ": (GOOD.replace(b"MODULO[0]=0", b"MODULO[0]=1"), "ends on another value than it begins"),
     "micrometres": (GOOD.replace(b"0.003", b"3.0"), "which no machine needs"),
     "a slip of the digits": (GOOD.replace(b"0.003", b"0.9"), "changes by"),

@@ -13,7 +13,7 @@ from ncfix.machine import Effect, Machine, State, load
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.tables import scheme_tables
 from ncfix.tables.correction import Residual, orientation_error, random_poses, ranges_of, residual, rotary_correction
-from ncfix.tables.scheme import Limits, Scheme, SchemeTask, automatic
+from ncfix.tables.scheme import Limits, Scheme, SchemeTask, automatic, lines_of
 from ncfix.tables.scheme_tables import AxisPositions
 from ncfix.testing import single_error
 
@@ -97,6 +97,17 @@ def test_tables_of_an_endless_axis_repeat() -> None:
         assert grid.modulo == (True,)
         assert grid.values[0] == grid.values[-1]
         assert np.degrees(grid.nodes[0][-1] - grid.nodes[0][0]) == pytest.approx(360)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "repeats"), [(0, 360, True), (-180, 540, True), (-10, 370, False), (0, 90, False)]
+)
+def test_tables_of_a_turn_and_a_part_of_one_do_not_repeat(low: int, high: int, repeats: bool) -> None:
+    """The control would repeat them every 380 degrees."""
+    space = ranges_of(CRADLE)
+    space[CRADLE.axis_names.index("C")] = np.radians([low, high])
+    lines = lines_of(SchemeTask(CRADLE, space, 120.0, 1e-4, Limits(40, 1000)))
+    assert [line.modulo for line in lines if line.name == "C"] == [repeats]
 
 
 def test_rotary_axes_take_off_what_they_can_of_the_orientation() -> None:

@@ -263,13 +263,16 @@ def _remarks(control: Control, request: Request, tables: Tables, left: Residual,
     before, after = (float(np.sqrt(np.mean(each**2))) for each in (left.before, left.after))
     if after > WORTH * before and before > request.target:
         yield "These tables take off next to nothing: the format does not reach the errors of this machine."
-    machine = request.machine
+    machine, counted = request.machine, dict(_wrong_turn(request, tables))
     for axis, (low, high), travel in zip(machine.axes, request.space.tolist(), machine.ranges.tolist(), strict=True):
         if np.isfinite(travel).all() and (low > travel[0] + CLOSE or high < travel[1] - CLOSE):
             sizes = [f"{value / axis.unit:g}" for value in (low, high, *travel)]
             covered = f"{axis.name} from {sizes[0]} to {sizes[1]}, of a travel from {sizes[2]} to {sizes[3]}"
             yield f"They cover {covered}: beyond that {control.properties.extrapolation}, and more is left."
-    for name, covered in _wrong_turn(request, tables):
+        if axis.endless and high - low < TURN - CLOSE and axis.name not in counted:
+            covered = f"{axis.name} from {low / axis.unit:g} to {high / axis.unit:g} degree"
+            yield f"They cover {covered} of a turn: nothing is said of what is left beyond."
+    for name, covered in counted.items():
         text = f"{name} turns without end and these tables do not repeat: they hold while the control counts it from "
         text += f"{covered}; elsewhere {control.properties.extrapolation}"
         yield f"{text}. --range {name}=LOW,HIGH makes them for other counts."

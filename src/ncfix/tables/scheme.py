@@ -412,11 +412,15 @@ def coarse_nodes(space: Array, turns: Sequence[bool], most: int = NODES) -> list
 
 
 def lines_of(task: SchemeTask) -> tuple[AxisPositions, ...]:
-    """The positions that tables of each axis cover; those of an endless axis over a whole turn repeat."""
+    """The positions that tables of each axis cover; those of an endless axis over whole turns repeat.
+
+    Over a turn and a part of one they do not: the control would repeat them with a period that is no turn.
+    """
     found = []
     features = task.machine.feature_lengths().tolist()
     for axis, (low, high), feature in zip(task.machine.axes, task.space.tolist(), features, strict=True):
-        turn = axis.endless and high - low > 2 * np.pi - 1e-9
+        turns = (high - low) / (2 * np.pi)
+        turn = axis.endless and turns > 0.5 and abs(turns - round(turns)) < 1e-9
         ends = (low / axis.unit, high / axis.unit)
         found.append(AxisPositions.over(axis.name, *ends, axis.unit, feature / axis.unit, turn))
     return tuple(found)
