@@ -163,7 +163,8 @@ def _kind_of(text: MeasurementLines, pairs: list[tuple[Cell, Cell]]) -> str:
     found = {key.text: value for key, value in pairs}
     version = found.get("ncfix-measurement")
     if version is None:
-        text.note("NCF600", "there is no line `# ncfix-measurement: 1`", 1 if text.lines else 0)
+        hint = "an instrument's table needs it above its columns, with `# kind: ...`; see docs/formats.md"
+        text.note("NCF600", "there is no line `# ncfix-measurement: 1`", 1 if text.lines else 0, 0, hint)
     elif version.text != str(VERSION):
         text.mark(version, "NCF600", f"version {version.text!r}, this ncfix reads {VERSION}")
     kind = found.get("kind")
