@@ -146,14 +146,11 @@ def _slotted(kind: str, row: str, match: re.Match[str]) -> FileLine:
     return FileLine(kind, text + row[at:], numbers, plus, "" if as_written else row)
 
 
-def _ascending(kind: str) -> Check:
-    def check(document: TableFile, remarks: Remarks) -> None:
-        rows = [(n, line.numbers) for n, line in enumerate(document.lines, 1) if line.kind == kind and line.numbers]
-        for (_, before), (number, after) in pairwise(rows):
-            if after[0] <= before[0]:
-                remarks.refuse(number, "the positions must ascend")
-
-    return check
+def _ascending(document: TableFile, remarks: Remarks) -> None:
+    rows = [(n, line.numbers) for n, line in enumerate(document.lines, 1) if line.kind == "row" and line.numbers]
+    for (_, before), (number, after) in pairwise(rows):
+        if after[0] <= before[0]:
+            remarks.refuse(number, "the positions must ascend")
 
 
 def _elmo(document: TableFile, remarks: Remarks) -> None:
@@ -216,7 +213,7 @@ def _headed(document: TableFile, remarks: Remarks) -> None:
 
 
 FORMS = (
-    FileForm("comp", "LinuxCNC's .comp", {"row": rf"{BLANK}{N}{GAP}{N}{GAP}{N}{BLANK}"}, _ascending("row"), ("row",)),
+    FileForm("comp", "LinuxCNC's .comp", {"row": rf"{BLANK}{N}{GAP}{N}{GAP}{N}{BLANK}"}, _ascending, ("row",)),
     FileForm(
         "ini",
         "an ini file",

@@ -88,9 +88,9 @@ class BlockWords:
         """The words of an address that have one of these codes."""
         return tuple(word for word in self.words if word.address == address and self._code(word) in codes)
 
-    def first_coded(self, address: str, codes: frozenset[float]) -> Word | None:
-        """The first of them."""
-        return next(iter(self.coded(address, codes)), None)
+    def g_code(self, codes: frozenset[float]) -> Word | None:
+        """The first G word that has one of these codes."""
+        return next(iter(self.coded("G", codes)), None)
 
     @property
     def skip(self) -> Span | None:
@@ -128,8 +128,8 @@ def layout_of(program: Program, block: int) -> Layout:
         radius=words.by_address.get("R"),
         turns=words.by_address.get("P"),
         feed=words.by_address.get("F"),
-        motion=words.first_coded("G", MOTION_CODES),
-        feed_mode=words.first_coded("G", FEED_MODES),
+        motion=words.g_code(MOTION_CODES),
+        feed_mode=words.g_code(FEED_MODES),
         after=(*words.coded("M", CODES_AFTER_MOTION), *words.coded("G", EXACT_STOP)),
         words_at=words_at,
         code_at=code_at,
