@@ -141,7 +141,10 @@ class KinematicsComp(Control):
         files[UNITS] = f"{settings['sign']} {settings['angle_unit']}\n".encode()
         notes = _notes(components, [flag for _, flag in found], most)
         done = Compensation(self.read(files).own)
-        left = reversal_note(machine, request.space, request.tool_length, done)
+        left = list(reversal_note(machine, request.space, request.tool_length, done))
+        own = (each for each in machine.effects if each.basis.needs_direction and each.joint == each.name[1])
+        if left and not play and any(each.active for each in own):
+            left.append("The mean of both ways is written; --set backlash=on writes what the way back needs.")
         return Written(files, (*notes, *left))
 
     def read(self, files: Files) -> ErrorChain:

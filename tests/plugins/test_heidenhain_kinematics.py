@@ -96,6 +96,10 @@ def test_the_mean_of_both_ways_is_said() -> None:
     machine = loads(text + '[[effect]]\nname = "EYX"\nbasis = "backlash"\ncoefficients = [0.004]\n')
     written = CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS))
     assert any("(play) is left: up to 2.00 um" in note for note in written.notes)
+    assert not any("backlash=on" in note for note in written.notes)
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (0.004,), Backlash()),))
+    written = CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS))
+    assert any("backlash=on" in note for note in written.notes)
 
 
 @pytest.mark.parametrize("topology", ["w F X Y Z t", "w X F Y Z t"])

@@ -117,7 +117,7 @@ def _check_apt(of_plan: bool, of_program: bool) -> None:
         raise click.UsageError(f"--{named[0].replace('_', '-')} is for a measurement (--plan), not for a program")
     if of_plan and of_program:
         raise click.UsageError(
-            "--dialect and the options of the set-up are for a program; a plan has columns for states"
+            "--dialect and the options of the set-up are for a program; a plan has columns for states (temp_x, ...)"
         )
 
 
