@@ -265,9 +265,13 @@ def test_g52_in_g91_may_be_added_to_the_shift_in_force(dialect: str) -> None:
     assert "G52" in reasons(follow("G21 G52 X3.\nG91 G52 X5.\nG90 G0 X1.", **setup))[0]
 
 
-@pytest.mark.parametrize(("text", "known"), [("G5 P10000", True), ("G5 P3", True), ("G5 P10000 X0 Y0", False)])
-def test_g5_that_switches_names_no_axes(text: str, known: bool) -> None:
-    found = reasons(follow(f"G21 G0 X1.\n{text}\nX2.", dialect="fanuc", no_point="calculator"))
+@pytest.mark.parametrize("dialect", ["iso", "fanuc"])
+@pytest.mark.parametrize(
+    ("text", "known"),
+    [("G5 P10000", True), ("G5 P3", True), ("G5 P10000 X0 Y0", False), ("G25", True), ("G25 X0", False)],
+)
+def test_codes_that_some_controls_know_without_words_of_axes(dialect: str, text: str, known: bool) -> None:
+    found = reasons(follow(f"G21 G0 X1.\n{text}\nX2.", dialect=dialect, no_point="calculator"))
     assert (found[-1] == "") is known
 
 
@@ -279,3 +283,31 @@ def test_in_a_turned_frame_an_axis_without_a_word_stands_where_another_tool_leng
     tools = {1: Tool(50.0), 2: Tool(80.0)}
     found = follow("G10 L2 P1 R90\nG43 H1\nG0 X0 Y0 Z10\nG43 H2\nG1 X5 F100", tools=tools)
     assert ends(found) == [[0.0, 0.0, 60.0], [0.0, 5.0, 60.0]]
+
+
+@pytest.mark.parametrize("code", ["G28.1", "G30.1"])
+def test_a_place_that_is_kept_is_one_to_go_to_elsewhere(code: str) -> None:
+    assert set(reasons(follow(f"G0 X1\n{code}\nX2", dialect="iso"))) == {""}
+    assert code in reasons(follow(f"G0 X1\n{code} X2\nX3", dialect="iso"))[-1]
+    assert set(reasons(follow(f"G0 X1\n{code} X2\nX3"))) == {""}
+
+
+@pytest.mark.parametrize("dialect", ["iso", "fanuc"])
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("G0 X20. Y20.\nG92 X5. Y5.\nG92.1 X0\nX1. Y6.", [[20, 20, 0], [1, 21, 0]]),
+        ("G0 X20. Y20.\nG92 X5. Y5.\nG52 X3.\nG92.1 X0. Y0. Z0.\nX1. Y6.", [[20, 20, 0], [1, 6, 0]]),
+    ],
+)
+def test_a_preset_takes_the_shifts_away(dialect: str, text: str, expected: list[list[float]]) -> None:
+    found = follow(f"G21\n{text}", dialect=dialect, no_point="calculator")
+    assert ends(found) == expected
+    assert set(reasons(found)) == {""}
+
+
+@pytest.mark.parametrize("dialect", ["iso", "fanuc"])
+@pytest.mark.parametrize("text", ["G92.1 X5.", "G43 H2 Z5.\nG92.1 X0", "G41 D1 X5. Y5. F9.\nG92.1 X0"])
+def test_a_preset_that_is_not_followed(dialect: str, text: str) -> None:
+    found = follow(f"G21 G0 X1.\n{text}\nX2. Y2.", dialect=dialect, no_point="calculator", tools=NUMBERED)
+    assert "G92.1" in reasons(found)[-1]

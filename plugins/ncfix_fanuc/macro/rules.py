@@ -22,13 +22,13 @@ from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE, drill, place_hole, repeats
 from ncfix_iso.rs274.groups import ISO_G, Rules, grouped
-from ncfix_iso.rs274.systems import check_system
+from ncfix_iso.rs274.systems import check_system, preset_system
 
 MACRO = "macro call"
 
 FOREIGN = frozenset(
     {
-        *(171, 181, 191, 281, 301, 591, 592, 593, 901, 911, 921, 922, 923),
+        *(171, 181, 191, 281, 301, 591, 592, 593, 901, 911, 922, 923),
         *(*groups.TURNING_CYCLES, *groups.PROBES, *groups.SPLINES, 331, 760, 431, 432, 411, 421, 890),
     }
 )
@@ -139,10 +139,11 @@ FANUC = Rules(
         683: tilt.tilt,
         684: tilt.tilt,
         690: tilt.rotate,
+        921: preset_system,
         **dict.fromkeys(ALL_CYCLES, cycle),
     },
     cycles=ALL_CYCLES,
-    takes=frozenset({40, 100, 270, 290, 531, 536, 650, 660, 661, 670}),
+    takes=frozenset({40, 100, 270, 290, 531, 536, 650, 660, 661, 670, 921}),
     system=is_system,
     lasting=is_lasting,
     compiled=compiled,

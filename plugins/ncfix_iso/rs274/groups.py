@@ -204,7 +204,7 @@ class Rules:
 
 
 LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")
-ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40}), length_by_h_alone=True)
+ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40, 921}), length_by_h_alone=True)
 RULES = {"iso": ISO, "linuxcnc": LINUXCNC}
 """By `Dialect.semantics`."""
 

@@ -44,7 +44,10 @@ DWELL_WORDS = "P"
 NO_WORDS = frozenset("GMNO")
 """Addresses that do not come as values to the steps of a block."""
 
-LOOK_AHEAD, SMOOTHING = 50, 51
+WITHOUT_WORDS = frozenset({50, 250, 260, 281, 301})
+"""Codes that some controls know without words of axes, and others with: G5 P10000 and splines, G25 and G26 of spindles
+and of working areas, G28.1 and G30.1 that keep the place and that go to one."""
+SMOOTHING = 51
 """G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, say for which axes it is, and move nothing."""
 
 LANE_LETTERS = frozenset("FN") | INDEX.keys()
@@ -272,7 +275,11 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
             code = tenths(like)
         if word.address == "G":
             named |= code == SMOOTHING and "Q" in letters
-            if code in rules.harmless_g and not (code in groups.SPLINES and is_spline(code, letters)):
+            own = rules.strict or ("G", code) in rules.operations
+            if code in WITHOUT_WORDS and not own and not letters.isdisjoint(INDEX):
+                unknown.append(code)
+                continue
+            if code in rules.harmless_g and not (code in groups.SPLINES and is_spline(letters)):
                 continue
             if code not in rules.g_groups:
                 unknown.append(code)
@@ -320,12 +327,9 @@ def takes_axes(code: int, rules: Rules) -> bool:
     return code in rules.takes or (code in AXES_TAKEN and not own)
 
 
-def is_spline(code: int, letters: frozenset[str]) -> bool:
-    """Whether a block with G5 or G5.1 is a spline, as LinuxCNC and Marlin have them: with points besides its end.
-
-    G5 that switches look-ahead on (P10000) names no axes.
-    """
-    return not letters.isdisjoint(INDEX) and (code == LOOK_AHEAD or not letters.isdisjoint("IJ"))
+def is_spline(letters: frozenset[str]) -> bool:
+    """Whether a block with G5 or G5.1 is a spline, as LinuxCNC and Marlin have them: with points besides its end."""
+    return not letters.isdisjoint("IJ") and not letters.isdisjoint(INDEX)
 
 
 def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules) -> None:

@@ -41,6 +41,7 @@ REFERENCES = {"G28": 5161, "G30": 5181}
 """The parameters of X of the reference points."""
 
 BAD_G10 = "NCF222"
+NO_PRESET = "G92.1 that names no axis, another value than zero, or stands under a tool offset is not followed"
 ON_TOP = "whether a shift (G52) is added to the one in force in G91 differs from control to control"
 TURNED_WITH_SHIFT = "where {} stands after a rotation while G92 is active differs from control to control"
 TURNED = "turned"
@@ -279,6 +280,9 @@ def origin_for_position(control: RS274Control, block: Block, system: int, origin
 
 def shift_system(control: RS274Control, block: Block, code: int) -> None:
     """G52 and G92: shift all coordinate systems, by the words or so that the position gets their values."""
+    if code == 921 and block.axes and not control.rules.strict:
+        preset_system(control, block, code)
+        return
     if code in (520, 920) and not block.axes:
         if control.rules.strict:
             raise Fault("NCF221", f"G{code // 10} needs an axis word")
@@ -309,6 +313,28 @@ def shift_system(control: RS274Control, block: Block, code: int) -> None:
     else:
         after, doubtful = control.frames.additive.shift, doubtful | {*control.composed.unknown}
         control.places.shift(mask_of(i for i in control.machine if before[i] != after[i] or i in doubtful))
+
+
+def preset_system(control: RS274Control, block: Block, code: int) -> None:
+    """G92.1 X0 of ISO controls: along the axes named no shift (G52, G92) is in force any more."""
+    named, offset = words_of(block), any(control.tools.vector) or control.modal.compensated
+    if not named or offset or block.unknown or any(block.values[LETTERS[index]] for index in named):
+        control.refuse_rest(NO_PRESET)
+        return
+    moved_while_turned(control, "G92.1")
+    additive, local = control.frames.additive, control.frames.local
+    for index in named:
+        store(control, SHIFT, index, 0.0, unknown=False)
+    control.frames = replace(
+        control.frames,
+        additive=Affine(tuple(0.0 if index in named else step for index, step in enumerate(additive.shift))),
+        local=Affine(
+            tuple(0.0 if index in named else step for index, step in enumerate(local.shift)),
+            unknown={index: why for index, why in local.unknown.items() if index not in named},
+        ),
+    )
+    compose(control)
+    control.places.shift(mask_of(named))
 
 
 def is_on_top(control: RS274Control, block: Block) -> bool:

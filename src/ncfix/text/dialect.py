@@ -56,7 +56,7 @@ window by G98 and G99. With NUM G52 is a motion in machine coordinates.
 
 LATHE = "lathe code (X a diameter, U and W increments)"
 TURNING: tuple[tuple[str, bytes], ...] = (
-    (LATHE, rb"(?im)^[ \t/]*(?:N\d+[ \t]*)?(G[ \t]*50[ \t]*S[ \t]*\d)"),
+    (LATHE, rb"(?im)^[ \t/]*(?:N\d+[ \t]*)?(G[ \t]*50[ \t]*(?:S[ \t]*\d|[XZ][ \t]*[-+.\d]))"),
     (LATHE, rb"(?im)^[^(;\n]*(?<![A-Z])(G[ \t]*7(?:[0-2]|3(?=[^(;\n]{0,80}[UW]))[ \t]*P[ \t]*\d+[ \t]*Q[ \t]*\d)"),
     (
         LATHE,
@@ -68,9 +68,9 @@ TURNING: tuple[tuple[str, bytes], ...] = (
         rb"^[^(;\n]*(?<![A-Z])(T[ \t]*(?!0000)\d{4}(?![\d.]))(?=(?s:.*?)X[ \t]*[-+.\d#\[])",
     ),
 )
-"""What shows that a text of the Fanuc family is for a lathe: the spindle's limit (G50 S), turning cycles that name the
-blocks of a contour (P and Q), or, in a text that names no Y, constant surface speed (G96) or a tool with its offset
-(T0101) and no M6."""
+"""What shows that a text of the Fanuc family is for a lathe: the spindle's limit (G50 S) or a place (G50 X), turning
+cycles that name the blocks of a contour (P and Q), or, in a text that names no Y, constant surface speed (G96), or a
+tool with its offset (T0101) and no M6."""
 
 CODE = re.compile(r"[GM](0|[1-9]\d{0,3})(\.[1-9])?")
 """How a code of a dialect's own is written."""
