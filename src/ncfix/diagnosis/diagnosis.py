@@ -401,7 +401,7 @@ def diagnose(
         checks.sensible(measurements, machine)
         return _explained(measurements, machine, refused)
     undone = _explained(wrong.measurements, wrong.machine, refused)
-    if not wrong.sure:
+    if not wrong.sure or any(each.candidate.family == CONSTANT_FAMILY for each in undone.findings):
         try:
             checks.sensible(measurements, machine)
             given = _explained(measurements, machine, refused)
