@@ -128,3 +128,41 @@ def in_all_ways(text: bytes, dialect: str, machine: Machine, setup: Setup) -> di
     with mock.patch("ncfix.writer.emit.language_of", without_bulk):
         found["one by one"] = outcome(fixed)
     return found
+
+
+BESIDE_UNKNOWN = """BEGIN PGM U MM
+TOOL CALL 1 Z S1000
+L X+10 Y+5 Z+250 R0 FMAX
+L B+0 C+0 FMAX
+CYCL DEF 10.0 ROTATION
+CYCL DEF 10.1 ROT+8.895
+L X+17.883 Y-3.112 Z+60 R0 FMAX
+L X+17.883 Y-3.1Z12 RL F500
+L X+10.318
+L X-13.655 F700
+L Y-6.731 F700
+END PGM U MM
+"""
+"""A contour behind a block that is not understood: nobody knows where the rotary axes stand."""
+CENTRE_BEHIND_CT = """G17 G40 G90 G94 G710
+T1 D1 M6
+G54
+G0 X0 Y0 Z40 A0 C0 F1000
+G1 X4 Y5
+CT X10 Y7.27 Z2
+X17 Y-4.5
+G18 I1 J1
+G1 X1
+M30
+"""
+"""Centre words alone, where the arc before it was CT and is written as another."""
+
+
+@pytest.mark.parametrize(
+    ("text", "dialect", "machine"), [(BESIDE_UNKNOWN, "heidenhain", "head"), (CENTRE_BEHIND_CT, "siemens", "table")]
+)
+def test_what_was_a_fault_of_ncfix(text: str, dialect: str, machine: str, root: Path) -> None:
+    setup = replace(load_setup(str(root / "tests" / "goldens" / "setup.toml")), assume_zero=True)
+    found = fix_program(read(text.encode(), "p.nc", dialect), machine_of(machine, root), setup, OPTIONS)
+    assert found.changed
+    assert found.report.refused

@@ -52,7 +52,7 @@ from ncfix_siemens.sinumerik.vocabulary import (
 )
 
 GEOMETRY = (X, Y, Z)
-ROUND = frozenset({20, 30, MOTIONS["cip"]})
+ROUND = frozenset({20, 30, MOTIONS["cip"], MOTIONS["ct"]})
 RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
 
 RESET_OF_DIAMETER = "$MC_GCODE_RESET_VALUES[28]"

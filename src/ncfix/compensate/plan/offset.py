@@ -135,10 +135,7 @@ def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
     if moves.beside is None or moves.across is None:
         return None
     rows = np.flatnonzero(is_offset(moves) & (moves.kind != MotionKind.DWELL) & (moves.kind != MotionKind.CYCLE))
-    columns = intent.columns
-    known = np.isfinite(
-        np.hstack([table[rows][:, columns] for table in (moves.start, moves.end, real.start, real.end)])
-    )
+    known = np.isfinite(np.hstack([table[rows] for table in (moves.start, moves.end, real.start, real.end)]))
     rows = rows[known.all(axis=1)]
     if not rows.size:
         return None
