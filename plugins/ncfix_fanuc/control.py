@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -36,7 +36,6 @@ from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_even_nodes, least_of_functions
 from ncfix.tables.table_files import Remarks, check_all, messages_of
 from ncfix.tables.volume import AIM, Mesh, Volume, search
-from ncfix.values import dataclass
 from ncfix_fanuc.parameters import (
     BACKLASH_ASSUMPTION,
     BACKLASH_OPTIONS,

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,6 @@ from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Assumption, Files, Option, Request, SettingForm, number, one_of
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import DEGREE, Remarks
-from ncfix.values import dataclass
 from ncfix_fanuc import json_values
 
 SIGNS = ("correction", "error")

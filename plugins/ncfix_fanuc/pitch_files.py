@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,6 @@ from ncfix.tables.compensation import Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import TURNING, Remarks, as_number, unit_of
-from ncfix.values import dataclass
 from ncfix_fanuc.parameters import SIGNS, read_records, sense_of
 
 LARGEST_INCREMENT = 7

@@ -10,6 +10,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from string import Formatter
 from typing import Any
 
@@ -20,7 +21,6 @@ from ncfix.diagnostics import RefusedError
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid, full_grid
 from ncfix.tables.table_files import DEGREE, Remarks, unit_of
-from ncfix.values import dataclass
 from ncfix_fanuc import json_values
 from ncfix_fanuc.json_values import SMALLEST
 from ncfix_fanuc.parameters import LINEAR, SIGNS, Placing, placed, sense_of

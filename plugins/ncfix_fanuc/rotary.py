@@ -14,7 +14,7 @@ times the distance from where it is said to be about: six numbers for all positi
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import ClassVar
 
@@ -29,7 +29,6 @@ from ncfix.tables.correction import corners, exact_correction, linear_axes, resi
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import DEGREE, Remarks, check_all, in_order, messages_of
 from ncfix.tables.volume import AIM, Mesh, Volume, inputs_that_matter, search
-from ncfix.values import dataclass
 from ncfix_fanuc.control import LEVEL
 from ncfix_fanuc.parameters import (
     BACKLASH_ASSUMPTION,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -32,7 +33,6 @@ from ncfix.plugin import (
     Written,
     exact_correction,
 )
-from ncfix.values import dataclass
 
 MACHINE, HOW = "machine.toml", "fix.toml"
 

@@ -12,6 +12,7 @@ it has gained.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.correction import even_poses, poses_along
 from ncfix.tables.grid import Array, Grid, projector
 from ncfix.tables.table_files import DEGREE, TURNING, Remarks, unit_of
-from ncfix.values import dataclass
 from ncfix_heidenhain.table_files import TableColumn, TextTable, cell_number, read_table
 
 KEYS = ("Trans", "MachAxis", "MachBase")

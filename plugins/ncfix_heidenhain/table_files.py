@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array
 from ncfix.tables.table_files import ORDER, Remarks, as_number
-from ncfix.values import dataclass
 
 END = "[END]"
 NAME = re.compile(r"\S+")

@@ -10,7 +10,7 @@ each. Play, of which grids know nothing, goes into the leadscrew compensation of
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from ncfix.plugin import (
@@ -40,7 +40,6 @@ from ncfix.plugin import (
 from ncfix.tables.control import SettingForm
 from ncfix.tables.grid_sums import faces, searched
 from ncfix.tables.volume import AIM, Volume, inputs_that_matter, search
-from ncfix.values import dataclass
 from ncfix_isg.volcomp_files import (
     LETTERS,
     MOST_SCREW_POINTS,

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from ncfix.plugin import Array, Files, Grid, Remarks, Reversal, Term, as_number, full_grid, own_terms, unit_of
-from ncfix.values import dataclass
 
 LETTERS = tuple("XYZABC")
 HEAD = {"workpiece_axes": "0"}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -39,7 +40,6 @@ from ncfix.plugin import (
     wrong_setting,
 )
 from ncfix.tables.table_files import ALONE, DEGREE, NUMBER, ORDER, TURNING
-from ncfix.values import dataclass
 
 MOST = 256
 """EMCMOT_COMP_SIZE of LinuxCNC."""

@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ncfix.tables.grid import Array
 from ncfix.tables.table_files import Remarks
-from ncfix.values import dataclass
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][xX]?[-+]?[0-9]+)?")
 ASSIGNMENT = re.compile(

@@ -7,7 +7,7 @@ The files of a folder are taken as the control would: CEC and EEC tables, with w
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import Remarks, unit_of
-from ncfix.values import dataclass
 from ncfix_siemens.assignments import VALUE_FILES, parsed, settings
 from ncfix_siemens.settings import SIGNS, TERMS
 from ncfix_siemens.tables import BOTH, DIGITS, PLACES, CecTable, read_cec, read_eec

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from ncfix.machine import Machine
 from ncfix.tables.control import Assumption, Option, Properties, one_of, whole, wrong_setting
 from ncfix.tables.scheme import Limits
 from ncfix.tables.table_files import DEGREE, in_order
-from ncfix.values import dataclass
 from ncfix_siemens.tables import PLACES, CecStyle, CecTable, cec_text
 
 PROPERTIES = Properties(

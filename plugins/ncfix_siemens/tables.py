@@ -7,12 +7,12 @@ are errors.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import Remarks
-from ncfix.values import dataclass
 from ncfix_siemens.assignments import ArrayAssignment, Assigned, FileRow, assignments
 
 DIGITS = 7

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any
 
 from ncfix.diagnostics import UsageError
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import ClassVar, Self
-
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,10 @@ import os
 import re
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import reduce
 from importlib import import_module
 from typing import Any, Protocol
-
-from ncfix.values import dataclass
 
 INFO = (".dist-info", ".egg-info")
 """How the folder of a distribution ends."""

@@ -15,6 +15,7 @@ import os
 import stat
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import IO
@@ -23,7 +24,6 @@ from ncfix import inputs
 from ncfix.diagnostics import Place, SourceError, UsageError
 from ncfix.inputs import FileIdentity
 from ncfix.outputs import check_folder, check_output, check_own, check_target, exists_already, linked, way_to
-from ncfix.values import dataclass
 
 READING = {
     errno.EACCES: "get the right to read it",

@@ -18,7 +18,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache, lru_cache
 from importlib import import_module
 from types import TracebackType
@@ -28,7 +28,6 @@ import pluggy
 
 from ncfix.diagnostics import Message, NcfixError, PluginError
 from ncfix.entry_points import EntryPoint, entry_points
-from ncfix.values import dataclass
 
 hookspecs = import_module("ncfix.hookspecs")
 """The contract speaks of things of all floors, so it stands above them, and the ground takes it by its name."""

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from typing import Any
@@ -30,7 +30,6 @@ from ncfix.files import read_bytes
 from ncfix.inputs import MOST_SAID
 from ncfix.toml_text import decoded, key_lines, line_of, parsed, place_of
 from ncfix.toml_text import written as table_written
-from ncfix.values import dataclass
 
 NAME = "ncfix.toml"
 CODE = "NCF028"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
 
 from ncfix.control.coordinates import INDEX, Vector
 from ncfix.control.setup import POINTLESS, Run
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
 from ncfix.text.tree import Template
-from ncfix.values import dataclass
 from ncfix_fanuc.macro.variables import MacroVariables
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.groups import Rules

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z, mask_of
 from ncfix.control.expressions import Fault, Unknown, Value, nominal
@@ -12,7 +13,6 @@ from ncfix.control.interpreter import RUNTIME
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
-from ncfix.values import dataclass
 from ncfix_fanuc.macro import coordinates, system, tilt
 from ncfix_fanuc.macro.blocks import CORNER, G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl

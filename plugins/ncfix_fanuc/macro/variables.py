@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from ncfix.control.expressions import (
     ARITHMETIC,
@@ -28,7 +29,6 @@ from ncfix.control.expressions import (
     scaled,
 )
 from ncfix.text.tree import Expression
-from ncfix.values import dataclass
 from ncfix_iso.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, NumberedParameters, Store
 
 VACANT = math.nan

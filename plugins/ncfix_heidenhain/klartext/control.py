@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Hashable
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 from ncfix.control import control as base
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, X, Y, Z, mask_of
@@ -13,7 +13,6 @@ from ncfix.control.moves import AT_START, Motion, MotionEnd, MotionKind, Pass, P
 from ncfix.control.setup import WORK_OFFSET, Run, Setup, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
-from ncfix.values import dataclass
 from ncfix_heidenhain.klartext.free import ContourElement
 from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING, FormulaScope, QParameters
 

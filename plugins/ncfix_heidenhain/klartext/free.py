@@ -12,9 +12,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-
-from ncfix.values import dataclass
+from dataclasses import dataclass, replace
 
 FLAT = 1e-9
 

@@ -10,6 +10,7 @@ where a circle lies is worked out arc by arc, with what `arcs` uses.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,6 @@ from ncfix.control.expressions import Fault
 from ncfix.control.lanes.block_rows import LONGEST, filled, followed, words
 from ncfix.control.lanes.lane import SHORTEST, before_placing
 from ncfix.control.moves import Arc, FeedMode, MotionKind
-from ncfix.values import dataclass
 from ncfix_heidenhain.klartext.arcs import BAD_ARC, FLAT, direction_at_end
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.layout import CORNERS

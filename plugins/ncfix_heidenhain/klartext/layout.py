@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -26,7 +26,6 @@ from ncfix.text.tree import (
     Template,
     Word,
 )
-from ncfix.values import dataclass
 from ncfix_heidenhain.klartext.arc_text import in_lines
 from ncfix_heidenhain.klartext.plans import POLAR, VECTOR, opens_block, own_words
 

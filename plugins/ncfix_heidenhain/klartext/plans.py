@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 from ncfix.control.expressions import FUNCTIONS, SUMS, Evaluate, Expressions, Unknown, Value, nominal
 from ncfix.text.reach import UNREAD, Deletable, deletable
@@ -27,7 +27,6 @@ from ncfix.text.tree import (
     Template,
     Word,
 )
-from ncfix.values import dataclass
 
 PATH_FUNCTIONS = frozenset({"l", "lp", "ln", "c", "cp", "cr", "ct", "ctp", "cc", "rnd", "chf"})
 OPENING = ("tool ", "cycl ", "plane ", "trans ", "appr ", "dep ")

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 
 from ncfix.control.control import UNPLACED
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import AT_START, MotionEnd, UnknownAxes
-from ncfix.values import dataclass
 from ncfix_heidenhain.klartext.control import SPATIAL, KlartextControl
 from ncfix_heidenhain.klartext.plans import MOVING
 

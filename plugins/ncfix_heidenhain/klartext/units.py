@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,6 @@ from ncfix.control.interpreter import TextUnit
 from ncfix.control.lanes import lane_tables as shared
 from ncfix.control.lanes.lane_tables import Lane
 from ncfix.text.tree import Constant, Literal, Program, Template
-from ncfix.values import dataclass
 from ncfix_heidenhain.klartext.arcs import IN_PLANE
 from ncfix_heidenhain.klartext.plans import LETTERS, KlartextPlan, plan_of
 

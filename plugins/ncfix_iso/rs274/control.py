@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ncfix.control import control as shared
 from ncfix.control.coordinates import INCH, LETTERS
@@ -11,7 +11,6 @@ from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
 from ncfix.control.setup import Run
 from ncfix.control.state import Saved
 from ncfix.text.dialect import Dialect
-from ncfix.values import dataclass
 from ncfix_iso.rs274.groups import ARCS, RULES, Rules, with_own_codes
 from ncfix_iso.rs274.parameters import NumberedParameters, Store
 

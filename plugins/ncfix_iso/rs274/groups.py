@@ -7,14 +7,13 @@ and Okuma programming manuals. Codes are in tenths: G38.2 is 382.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Set
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from ncfix.control.expressions import Evaluate
 from ncfix.control.operations import Like
 from ncfix.text.dialect import CodeOperation, CycleTable, tenths
 from ncfix.text.tree import Expression
-from ncfix.values import dataclass
 from ncfix_iso.rs274.parameters import compiled
 
 if TYPE_CHECKING:

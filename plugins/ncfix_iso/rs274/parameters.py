@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.control.expressions import (
     ARITHMETIC,
@@ -29,7 +29,6 @@ from ncfix.control.expressions import (
     remainder,
 )
 from ncfix.text.tree import NamedParameter, NumberedParameter
-from ncfix.values import dataclass
 
 EQUAL = 1e-6
 """Two numbers are equal that differ by less."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from lark import Token, UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
@@ -51,7 +52,6 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
-from ncfix.values import dataclass
 from ncfix_siemens.sinumerik.vocabulary import SETTERS
 
 BRACKET = "("

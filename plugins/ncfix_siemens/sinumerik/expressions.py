@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import product
 
 from ncfix.control.expressions import (
@@ -28,7 +28,6 @@ from ncfix.control.expressions import (
     power,
 )
 from ncfix.text.tree import Binary, Constant, Expression, NumberedParameter
-from ncfix.values import dataclass
 from ncfix_siemens.sinumerik.blocks import BRACKET
 
 CONSTANTS: dict[str, Value] = {"true": 1.0, "false": 0.0, "$pi": math.pi}

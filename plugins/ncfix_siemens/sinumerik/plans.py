@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
 from ncfix.control.expressions import Evaluate, left_out
@@ -28,7 +28,6 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
-from ncfix.values import dataclass
 from ncfix_siemens.sinumerik.blocks import BRACKET, STATEMENT
 from ncfix_siemens.sinumerik.expressions import compiled
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, VECTOR

@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.control.coordinates import INDEX
 from ncfix.control.expressions import Evaluate, Fault, number
 from ncfix.control.frames import WORLD
 from ncfix.text.tree import Expression, FunctionCall, NamedParameter
-from ncfix.values import dataclass
 from ncfix_siemens.sinumerik import framing, motion
 from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import set_pole

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,6 @@ from ncfix.control.interpreter import TextUnit
 from ncfix.control.pointing import FloatArray, Pointing, Ways, to_each
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.text.tree import StringLiteral as Label
-from ncfix.values import dataclass
 from ncfix_siemens.sinumerik.plans import Branching, SinumerikPlan, plan_of
 
 HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*(?:;.*)?$", re.IGNORECASE)

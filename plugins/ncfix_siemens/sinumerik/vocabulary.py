@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ncfix.control.coordinates import INDEX, LETTERS
 from ncfix.control.frames import ZEROS
 from ncfix.control.moves import Arc, MotionEnd, MotionKind, Passing
-from ncfix.values import dataclass
 
 _SETTERS = """
     ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,6 @@ from ncfix.text.tree import (
     Tape,
     Word,
 )
-from ncfix.values import dataclass
 from ncfix.writer.block import BlockWriter
 from ncfix.writer.target import LINE, TANGENTIAL, Target
 from ncfix_siemens.sinumerik.circles import VIA, circle_through

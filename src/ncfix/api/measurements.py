@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ncfix.api.sources import (
@@ -16,7 +17,6 @@ from ncfix.api.sources import (
     write_output,
 )
 from ncfix.diagnostics import Message, RefusedError, UsageError
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.api.sources import Measured

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, overload
 
 from ncfix.api.sources import (
@@ -21,7 +21,6 @@ from ncfix.api.sources import (
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.files import read_bytes
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -18,13 +18,12 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import field, fields
+from dataclasses import dataclass, field, fields
 from time import monotonic, sleep
 from typing import Any
 
 from ncfix import files
 from ncfix.diagnostics import Place, UsageError
-from ncfix.values import dataclass
 
 JOURNAL = ".ncfix-journal.jsonl"
 SCHEMA = 2

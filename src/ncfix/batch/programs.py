@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from ncfix import files
 from ncfix.diagnostics import Place, UsageError
 from ncfix.plugins import registry
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from time import monotonic, sleep
 
 from ncfix.batch.programs import program_files
 from ncfix.diagnostics import UsageError
-from ncfix.values import dataclass
 
 LOOK_S = 1.0
 """How often a folder is looked at where the system says nothing."""

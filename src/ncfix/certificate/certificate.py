@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from ncfix.certificate.findings import BlockProof
@@ -13,7 +13,6 @@ from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
 from ncfix.diagnostics import Place, SourceError
 from ncfix.machine import Machine
-from ncfix.values import dataclass
 from ncfix.version import __version__
 
 SCHEMA = 1

@@ -6,11 +6,10 @@ Lines are counted from one, those of the corrected program and those of the orig
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ncfix.certificate.text import StampFound
-from ncfix.values import dataclass
 
 
 class BlockFault(NamedTuple):

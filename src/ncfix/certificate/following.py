@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind, ModesInForce, ProgramSteps, StraightRun
 from ncfix.certificate.text import Lines, StraightLines, Text
-from ncfix.values import dataclass
 
 INCH = 25.4
 PLANES = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}

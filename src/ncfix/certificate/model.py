@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.steps import Kind, ProgramSteps
 from ncfix.machine import Machine, State
-from ncfix.values import dataclass
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

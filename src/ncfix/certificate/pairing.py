@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,6 @@ import numpy as np
 from ncfix.certificate.findings import BlockFault
 from ncfix.certificate.reading import Family, TextLine
 from ncfix.certificate.text import Text
-from ncfix.values import dataclass
 
 AHEAD = 8
 """Lines that are looked at for where a line that should be here has gone."""

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
-
-from ncfix.values import dataclass
 
 AXES = frozenset("XYZABCUVW")
 

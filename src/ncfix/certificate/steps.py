@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 from ncfix.certificate.reading import TextLine, TextWord
 from ncfix.certificate.text import Lines, StraightLines
-from ncfix.values import dataclass
 
 NAN = math.nan
 Floats = NDArray[np.float64]

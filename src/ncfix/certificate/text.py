@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import NamedTuple, overload
 
@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.reading import AXES, DECIMAL, NUMBER, PATH_WORDS, READERS, Family, TextLine, TextWord
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 
 from ncfix.cli import console
 from ncfix.text.spelling import MINUS, ZERO, without_zeros
-from ncfix.values import dataclass
 
 DIGITS = 9
 """Decimals that are kept: what is below has no meaning on any machine."""

@@ -8,6 +8,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 
@@ -18,7 +19,6 @@ from ncfix.cli import console
 from ncfix.cli.options import json_option
 from ncfix.diagnostics import ExitCode, NcfixError, visible
 from ncfix.plugins import load_plugins
-from ncfix.values import dataclass
 from ncfix.version import __version__
 
 EXTRAS = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -17,7 +18,6 @@ from ncfix.cli.shop.projects import ProjectCommand, TableCommand, after_next_gro
 from ncfix.cli.streams import HeldOutput, Source, source_of
 from ncfix.cli.targets import Outputs, shown, targets
 from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.cli.columns import Columns

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,6 @@ import click
 from ncfix.cli.console import tell
 from ncfix.cli.options import PATH
 from ncfix.diagnostics import Message, Place
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup

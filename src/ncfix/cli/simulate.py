@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,6 @@ from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import TableCommand, project_options
 from ncfix.cli.streams import HeldOutput, Source, source_of
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, read, shown, targets
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.cli.columns import Columns

@@ -7,14 +7,13 @@ import os
 import stat
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING
 
 from ncfix import files, inputs
 from ncfix.cli import console
 from ncfix.cli.targets import STREAM, OutputTarget, shown, stdin
 from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.driver import Stamp

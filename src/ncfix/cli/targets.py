@@ -6,6 +6,7 @@ import errno
 import os
 import sys
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from typing import IO
 from weakref import WeakSet
 
@@ -15,7 +16,6 @@ from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
 from ncfix.inputs import identities, identity
 from ncfix.outputs import check_named, check_output, check_target, folded_name
-from ncfix.values import dataclass
 
 STREAM = "-"
 """Standard input or output as a file name."""

@@ -6,6 +6,7 @@ Long programs are compared while they are read, if they can be.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
@@ -19,7 +20,6 @@ from ncfix.cli.shop.projects import ProjectCommand, project_options
 from ncfix.cli.streams import Source, source_of
 from ncfix.cli.targets import STREAM, shown
 from ncfix.diagnostics import ExitCode, Message
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.figures.comparison import RunningComparison

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ncfix.arguments import BLOCK_NUMBERS, TOLERANCE_UM, check_choice
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

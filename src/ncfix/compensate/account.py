@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,6 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.control.moves import PASS_RULES, MotionKind, Moves, Pass, Rule
 from ncfix.diagnostics import Message, Place
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 
 REFUSED = "refused"
 LEFT = "an axis is left where it stands"

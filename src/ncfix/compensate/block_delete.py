@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import combinations, repeat
 
 import numpy as np
@@ -36,7 +36,6 @@ from ncfix.machine import Machine
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Skip
 from ncfix.text.writer import Edit, Splices
-from ncfix.values import dataclass
 from ncfix.writer.pieces import SecondReading
 
 DIFFERS = "NCF451"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,6 @@ from ncfix.compensate.plan.arrays import Array, Index, picked
 from ncfix.compensate.plan.kinematics import reached_joints, signs
 from ncfix.machine import Machine, State
 from ncfix.text.writer import Edit, Splices, spliced
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate import FixOptions

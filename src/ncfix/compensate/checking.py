@@ -7,7 +7,7 @@ it; nothing is written.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,7 +28,6 @@ from ncfix.diagnostics import Message
 from ncfix.machine import Machine
 from ncfix.text import stamp
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 
 SUSPECTED = "NCF438"
 """A program that seems to have been corrected: what nobody needs to guess of one that says so."""

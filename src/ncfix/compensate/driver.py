@@ -15,7 +15,7 @@ way raises `NotInPartsError`, and the caller takes the program as a whole. Sever
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Protocol
 
@@ -66,7 +66,6 @@ from ncfix.text import stamp
 from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices, spliced
-from ncfix.values import dataclass
 from ncfix.writer.emit import Emission
 from ncfix.writer.language import WrittenLanguage
 

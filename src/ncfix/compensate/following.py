@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -34,7 +34,6 @@ from ncfix.text import stamp
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 from ncfix.version import __version__
 
 Resolve = Callable[[str], bytes | None]

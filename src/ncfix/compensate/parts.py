@@ -6,7 +6,7 @@ Each part begins behind the last motion of the one before, which is written alre
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,7 +28,6 @@ from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices, left_alone
-from ncfix.values import dataclass
 
 FRAMES = "the program takes frames or values from where the machine stands"
 MOST_PENDING = 64

@@ -14,7 +14,7 @@ program with the motion before it and the one behind it.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,7 +43,6 @@ from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import MORE
 from ncfix.text.dialect import Dialect
-from ncfix.values import dataclass
 from ncfix.writer.emit import Emission
 from ncfix.writer.pieces import Pieces
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +32,6 @@ from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.control.flatten import Flat

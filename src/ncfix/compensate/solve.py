@@ -15,7 +15,7 @@ What was written is read again. The new text must say what the plan meant (`diff
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -36,7 +36,6 @@ from ncfix.machine import Machine, State
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import language_of
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 from ncfix.writer.emit import Emission, emit
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import BEYOND_TRAVEL, PINNED, SecondReading, closure_of_refusals

@@ -23,7 +23,7 @@ import pickle
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import combinations
 from queue import SimpleQueue
 from threading import Thread
@@ -33,7 +33,6 @@ from ncfix.compensate.solve import PrecedingMotion
 from ncfix.control.trace import Checkpoint
 from ncfix.host import tie
 from ncfix.plugins import blamed
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
 from ncfix.control.moves import Arc, CycleCall, Frame, MotionKind, Moves, Pass, Rule
 from ncfix.control.turns import Winding, extremes, half_turns
-from ncfix.values import dataclass
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

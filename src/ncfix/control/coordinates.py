@@ -13,9 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import field
-
-from ncfix.values import dataclass
+from dataclasses import dataclass, field
 
 LETTERS = "XYZABCUVW"
 """The axis letters of RS274NGC in the order of its parameters; every position here is a list in this order."""

@@ -8,6 +8,7 @@ them only. In the flat program each execution is a block of its own. It is writt
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,7 +22,6 @@ from ncfix.diagnostics import RefusedError, SourceError
 from ncfix.text.language import language_of
 from ncfix.text.reader import read
 from ncfix.text.tree import Assignment, Command, Item, Opaque, OWordLine, Program, Span, Word
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.control.interpreter import TextUnit

@@ -14,11 +14,10 @@ followed instead, up to a bound on all that is executed.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from ncfix.control.expressions import Fault
-from ncfix.values import dataclass
 
 ENDLESS = "NCF233"
 NEVER_ENDS = "the program never ends: it jumps back here again and again, and nothing changes in between"

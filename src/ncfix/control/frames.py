@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 from ncfix.control.coordinates import (
     IDENTITY,
@@ -26,7 +26,6 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.moves import UnknownAxes
 from ncfix.control.pointing import Triple, cross
-from ncfix.values import dataclass
 
 ZEROS = (0.0,) * N_LETTERS
 AROUND = {"X": PLANES[190], "Y": PLANES[180], "Z": PLANES[170]}

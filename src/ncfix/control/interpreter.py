@@ -16,6 +16,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, TypeVar
 
@@ -35,7 +36,6 @@ from ncfix.diagnostics import Message, Place, SourceError
 from ncfix.text.language import Language
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Span, Template, view
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -26,7 +27,6 @@ from numpy.typing import NDArray
 from ncfix.control.coordinates import LETTERS, Vector
 from ncfix.control.pointing import Pointing
 from ncfix.diagnostics import Message
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

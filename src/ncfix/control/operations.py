@@ -19,12 +19,12 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Set
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.moves import Motion, MotionEnd, MotionKind
 from ncfix.text.dialect import NO_WORDS, is_letters
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.control.control import ProgramControl

@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import TURN
-from ncfix.values import dataclass
 
 FloatArray = NDArray[np.float64]
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -20,7 +21,6 @@ import numpy as np
 from ncfix.control.coordinates import Rotation, Vector, X, Y, Z, angles_in_words, as_rotation
 from ncfix.control.moves import Kinematics, TcpState
 from ncfix.control.pointing import FloatArray, Pair, Pointing, Triple
-from ncfix.values import dataclass
 
 PROBE = 128.0
 """mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""

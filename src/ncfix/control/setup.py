@@ -5,12 +5,11 @@ from options; what a program asks for and is not there is collected, once each.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.diagnostics import Message, Place, UsageError
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.control.moves import Kinematics

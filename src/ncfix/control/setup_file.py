@@ -18,7 +18,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial
 from pathlib import PurePath
@@ -30,7 +30,6 @@ from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
 from ncfix.inputs import MOST_SAID
 from ncfix.toml_text import Path, decoded, key_lines, parsed, place_of
-from ncfix.values import dataclass
 
 NOT_TOML = "NCF381"
 UNKNOWN_KEY = "NCF382"

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Hashable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.control.coordinates import (
     DEGREE,
@@ -37,7 +37,6 @@ from ncfix.control.setup import Run, SetupLookup
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect
 from ncfix.text.reach import Deletable
-from ncfix.values import dataclass
 
 NO_MOTION = 800
 """G80: no motion code is in force; the state at the start of a program."""

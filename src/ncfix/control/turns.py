@@ -21,12 +21,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import FeedMode, MotionKind, Moves
-from ncfix.values import dataclass
 
 FloatArray = NDArray[np.float64]
 

@@ -13,6 +13,7 @@ those of ISO/TR 16907 as docs/controllers.md lists them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,7 +24,6 @@ from ncfix.machine.axes import SPINDLE
 from ncfix.machine.basis import Backlash
 from ncfix.machine.effects import runs_ahead
 from ncfix.machine.state import SUM
-from ncfix.values import dataclass
 
 BOUNDS: dict[str, tuple[float, float]] = {
     "curve": (100.0, 100.0),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.machine import Effect
 from ncfix.machine.basis import Polynomial
 from ncfix.measure.measurement import Array
-from ncfix.values import dataclass
 
 LIKE = 0.25
 """Share of their mean by which scales may differ and still be one temperature's."""

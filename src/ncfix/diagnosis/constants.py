@@ -13,7 +13,7 @@ mistakes are on one scale.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,6 @@ from ncfix.measure.least_squares import Combination, Solution, orthonormal, solv
 from ncfix.measure.measurement import Array, Index
 from ncfix.measure.observation import Mask
 from ncfix.measure.selection import Selection
-from ncfix.values import dataclass
 
 FIRST_UM, TIMES, STEPS = 1.5, 3.0, 10
 """Sizes of a change at the tool tip that are considered, um: from the first on, each so many times the one before."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,6 @@ from ncfix.machine.axes import component_title
 from ncfix.measure.least_squares import orthonormal
 from ncfix.measure.least_squares import without as without_base
 from ncfix.measure.measurement import Array, Measurement
-from ncfix.values import dataclass
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
 EXCESS_UM = 2.0

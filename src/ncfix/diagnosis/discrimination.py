@@ -6,6 +6,7 @@ Each name in turn taken for the true one, and every other refitted to old and ne
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import compress
 
@@ -20,7 +21,6 @@ from ncfix.diagnosis.selection import ALIKE
 from ncfix.measure.instruments import observe
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
-from ncfix.values import dataclass
 
 COUNT = 12
 """Poses that are chosen."""

@@ -32,7 +32,7 @@ what it shows. What such a change explains is no reason for another name, nor fo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -44,7 +44,6 @@ from ncfix.diagnosis.forms import EffectForm, shape_variations, side_by_side
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse
 from ncfix.measure.measurement import Array, Index
-from ncfix.values import dataclass
 
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
 """Size of everything else together, against the noise of one value."""

@@ -20,7 +20,7 @@ same, the effect is not in the catalogue.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import accumulate, combinations, pairwise, product
 from typing import Any
 
@@ -45,7 +45,6 @@ from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
 from ncfix.measure.observation import Observation, base_from_workpiece
-from ncfix.values import dataclass
 
 VISIBLE = 0.05
 """Share of an effect's squares that must be left beside what is free."""

@@ -8,7 +8,7 @@ What a name must show besides evidence: that it predicts, and that it matters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +23,6 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis, Fourier, Polynomial
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index
-from ncfix.values import dataclass
 
 Mask = NDArray[np.bool_]
 WIDE = 1e3

@@ -6,10 +6,11 @@ much likelier the data are with it, less what it pays; all rungs are on that sca
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.diagnosis.diagnosis import CONSTANT_FAMILY, Diagnosis
-from ncfix.values import dataclass
 
 GIVEN, MISTAKES, CONSTANTS, NAMED, UNNAMED, NOISE = (
     "file as given",

@@ -11,7 +11,7 @@ Poses on offer for a further measurement, where axes and tool have been or may g
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from ncfix.machine import Machine
 from ncfix.machine.state import SUM
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import STATES, Array, Measurement
-from ncfix.values import dataclass
 
 NEAR = 10.0
 """Log odds within which another name is near enough to ask for poses that tell them apart."""

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,6 @@ from ncfix.diagnosis.forms import (
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse, orthonormal
 from ncfix.measure.measurement import Array, groups
-from ncfix.values import dataclass
 
 DRIFT_TIME = 900.0
 """s: how long an instrument's wandering lasts."""

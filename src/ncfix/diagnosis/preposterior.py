@@ -10,6 +10,7 @@ the old rows happen to say is not counted a second time, and a prediction that i
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -21,7 +22,6 @@ from ncfix.diagnosis.noise import everything_at
 from ncfix.diagnosis.selection import ALIKE, ASSUMED, TOLD_APART, Selected, untold
 from ncfix.measure.measurement import Array
 from ncfix.measure.observation import Observation
-from ncfix.values import dataclass
 
 FORMS = 2
 """Forms of each name that are considered, as where names are weighed."""

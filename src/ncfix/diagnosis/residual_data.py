@@ -9,7 +9,7 @@ How well a machine file as it stands agrees with data: its constants nearly fixe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -24,7 +24,6 @@ from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import gauss_newton, solve
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.selection import Selection
-from ncfix.values import dataclass
 
 UM = 1e3
 STEPS = 6

@@ -7,6 +7,7 @@ that grows along an axis, time, a temperature, a tool. They only show; they do n
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
@@ -15,7 +16,6 @@ from ncfix.diagnosis.evidence import Background
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index
-from ncfix.values import dataclass
 
 SHOWN = 6
 UNLIKELY = 1e-3

@@ -19,14 +19,13 @@ a size of one, over the variance of noise and background, its log odds are 1/2 s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix.diagnosis.evidence import Comparison, Evidence, Member, Members, entry_price
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
-from ncfix.values import dataclass
 
 SAME = 0.8
 """Share of what either may show, its squares beside what is free, that the other must be able to show."""

@@ -7,7 +7,7 @@ change it by parts in ten thousand only, so each pass gains about as many digits
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from ncfix.machine.route import Route, SplitRoute, Turns, batch_of
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, behind_each_other, some
 from ncfix.machine.steps import SMALL, dot, has_arrived, volume
-from ncfix.values import dataclass
 
 Mask = NDArray[np.bool_]
 Tips = Callable[[Poses, Turns], tuple[Array, Array]]

@@ -11,14 +11,13 @@ these declarations, so a plugin's basis needs no code for that. Register one wit
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ncfix.machine.se3 import Array
-from ncfix.values import dataclass
 
 REQUIRED = object()
 

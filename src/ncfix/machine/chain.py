@@ -11,6 +11,7 @@ a direction, shape () or (m, 1). A pose is carried as four columns, three direct
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from ncfix.machine.error_model import ErrorModel, Slot, SmallMotionKind
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.steps import dot
-from ncfix.values import dataclass
 
 Weight = float | Array
 

@@ -9,7 +9,7 @@ section 2.5, rule 1).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 from math import nan
@@ -25,7 +25,6 @@ from ncfix.machine.piecewise import PIECEWISE
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import SUM, State, flatten
 from ncfix.plugins import called, handed, registry
-from ncfix.values import dataclass
 
 WARM = 20.0
 """Degree C at which thermal effects are zero."""

@@ -8,7 +8,7 @@ reference point.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property, reduce
 
@@ -19,7 +19,6 @@ from ncfix.machine.axes import BASE_AXES, SPINDLE, Axis, Effect, GaugeLine, Vect
 from ncfix.machine.basis import Basis
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal, inputs_of, middle_of_gap, signal_called
-from ncfix.values import dataclass
 
 
 class SmallMotionKind(Enum):

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, TypeGuard
 
 from ncfix.diagnostics import Message
 from ncfix.toml_text import Path, line_of, place_of
-from ncfix.values import dataclass
 
 LARGEST = 1e12
 """No quantity of a machine has a larger number, in whatever unit; beyond it arithmetic goes wrong."""

@@ -11,6 +11,7 @@ nearer to the foundation at zero; the joint's Jacobian wants it at its reference
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,7 +28,6 @@ from ncfix.machine.error_model import (
 )
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

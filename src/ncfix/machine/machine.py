@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -23,7 +23,6 @@ from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal, State, flatten, inputs_of, poses_first, with_lags
 from ncfix.machine.steps import SMALL
 from ncfix.toml_text import written
-from ncfix.values import dataclass
 
 DEFAULT_INCREMENT = (0.001, 0.001 * np.pi / 180)
 """What controls resolve, linear and rotary axes: 1 um, in mm, and 0.001 degree, in rad."""
@@ -55,7 +54,7 @@ class Machine:
     name: str
     topology: str
     axes: tuple[Axis, ...]
-    tool: GaugeLine = GaugeLine()
+    tool: GaugeLine = GaugeLine()  # noqa: RUF009
     effects: tuple[Effect, ...] = ()
     control: str | None = None
     least_increment: tuple[float, float] = DEFAULT_INCREMENT

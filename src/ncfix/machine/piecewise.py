@@ -9,7 +9,7 @@ Outside the first and last place of a table, spline or step the end values hold.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from ncfix.machine.basis import Basis, columns_like, distinct, key, powers
 from ncfix.machine.se3 import Array
-from ncfix.values import dataclass
 
 
 def splines(knots: Array, degree: int, coefficients: Array, u: Array) -> Array:

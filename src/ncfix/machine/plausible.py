@@ -10,7 +10,7 @@ machine of a metre.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from pathlib import Path
 
@@ -24,7 +24,6 @@ from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State
 from ncfix.toml_text import decoded, key_lines, line_of, parsed, place_of
-from ncfix.values import dataclass
 
 BEYOND = 10.0
 """Times what is much: no machine that runs is so wrong."""

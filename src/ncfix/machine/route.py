@@ -11,7 +11,7 @@ whatever they are, and are added up with the rest.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,6 @@ from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
 from ncfix.machine.steps import BACK, FORTH, GIVEN, PARTS, POWERS, SHIFT, TURN, WAVES, Functions, Number, Steps
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.core.chain import PoseBatch, RouteSteps

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,6 @@ from ncfix import core
 from ncfix.diagnostics import UsageError
 from ncfix.machine.axes import Axis
 from ncfix.machine.se3 import Array
-from ncfix.values import dataclass
 
 CHUNK = 8192
 """Poses handled at a time: few enough that the intermediate columns stay in the processor's cache."""

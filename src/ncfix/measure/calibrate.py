@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Mask
 from ncfix.measure.refine import pruned, with_time_constants
 from ncfix.measure.selection import Selection, select
-from ncfix.values import dataclass
 from ncfix.version import __version__
 
 ALIKE = 0.02

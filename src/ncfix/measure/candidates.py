@@ -7,7 +7,7 @@ distances: an error that repeats with a screw's pitch cannot hide (Soons, sectio
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.axes import Axis
 from ncfix.measure.measurement import Array, Measurement
-from ncfix.values import dataclass
 
 DECIMALS = 3
 CORNERS = 0.4

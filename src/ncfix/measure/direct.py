@@ -10,7 +10,7 @@ is how a straightness instrument's line is aligned: a constant, and a slope acro
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +21,6 @@ from ncfix.machine.error_model import dependence_of, unit_motion
 from ncfix.machine.state import flatten, with_lags
 from ncfix.measure.measurement import Array, Index, Measurement, component_of, groups
 from ncfix.measure.observation import DEFAULT_NOISE, LEVER, Mask, Observation, Unknowns, repeatability
-from ncfix.values import dataclass
 
 ANGLE = 1e-4
 """rad: how far an angle instrument's zero may be off, in simulations."""

@@ -9,6 +9,7 @@ and does not change where the iteration ends.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +26,6 @@ from ncfix.measure.least_squares import Solution, gauss_newton, solve
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.observation import Mask, Observation
 from ncfix.measure.selection import Selection
-from ncfix.values import dataclass
 
 STEPS = 25
 """Most steps of the iteration."""

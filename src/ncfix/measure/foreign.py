@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,7 +24,6 @@ from ncfix.machine import Axis, Machine
 from ncfix.measure import checks
 from ncfix.measure.measurement import Measurement
 from ncfix.plugins import called, registry
-from ncfix.values import dataclass
 
 LINEAR = "XYZ"
 SLANTED = 1e-6

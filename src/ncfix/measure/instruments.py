@@ -7,6 +7,8 @@ either; the set-up is drawn at random and nobody is told.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.arguments import FAULT, SEED
@@ -18,7 +20,6 @@ from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.tip_errors import Probing, TipErrors
 from ncfix.measure.tracker import Targets
-from ncfix.values import dataclass
 
 UNKNOWNS = 6
 """Of a set, at most: a shift and a turn."""

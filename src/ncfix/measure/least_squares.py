@@ -8,6 +8,7 @@ reweighted least-squares" (1977).
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -17,7 +18,6 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import chdtr, ndtri, stdtrit
 
 from ncfix.measure.measurement import Array, Index
-from ncfix.values import dataclass
 
 NUISANCE_RANK = 1e-10
 """Singular values of the scaled nuisance columns below this are zero."""

@@ -14,6 +14,7 @@ it are told apart, and compared.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +22,6 @@ import numpy as np
 from ncfix.machine import Effect, Machine
 from ncfix.measure.measurement import CENTRE, Array, Measurement
 from ncfix.measure.observation import Observation, Unknowns, linear_axes
-from ncfix.values import dataclass
 
 SHORT = 1e-9
 """mm: a length that has no direction."""

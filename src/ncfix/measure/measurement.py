@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
 from ncfix.machine.axes import COMPONENTS, NAME
-from ncfix.values import dataclass
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -8,7 +8,7 @@ wrongly is a tenth of a file of ten, and what all the others leave, or do not le
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations, permutations, product
 
 import numpy as np
@@ -20,7 +20,6 @@ from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Mask
-from ncfix.values import dataclass
 
 ODD = {"NCF614", "NCF615", "NCF616"}
 """Remarks on a file that are mistakes where the model does not describe the data: positions out of range or like

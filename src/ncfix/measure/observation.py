@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +22,6 @@ from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Effect, GaugeLine, Machine, se3
 from ncfix.machine.axes import SPINDLE
 from ncfix.measure.measurement import Array, Index, Measurement, groups
-from ncfix.values import dataclass
 
 Mask = NDArray[np.bool_]
 

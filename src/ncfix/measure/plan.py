@@ -10,6 +10,7 @@ tell is left out beforehand. To separate two effects, the variances of their coe
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -24,7 +25,6 @@ from ncfix.measure.least_squares import NUISANCE_RANK, solve
 from ncfix.measure.measurement import Array, Index, Measurement, number
 from ncfix.measure.observation import Observation
 from ncfix.measure.selection import Selection, form, select
-from ncfix.values import dataclass
 
 CANDIDATES = 800
 POOR = 10.0

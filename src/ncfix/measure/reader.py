@@ -10,7 +10,7 @@ import codecs
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from ncfix.machine import Machine
 from ncfix.machine.fields import LARGEST, did_you_mean
 from ncfix.measure import checks, foreign
 from ncfix.measure.measurement import CENTRE, CHOICES, COMMON, ENDS, KINDS, STATES, Array, Measurement, MeasurementKind
-from ncfix.values import dataclass
 
 SHOWN = 25
 """Faults that are named one by one; a file with more has a fault of another sort."""

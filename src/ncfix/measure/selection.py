@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -24,7 +24,6 @@ from ncfix.machine.basis import Backlash, Basis, ConstantBasis, Fourier, Polynom
 from ncfix.machine.effects import library
 from ncfix.machine.fields import did_you_mean
 from ncfix.machine.piecewise import Truncated
-from ncfix.values import dataclass
 
 ALL = "all"
 TERM = re.compile(r"([XYZABC][A-Z])(\d|b)(?:-(\d))?")

@@ -16,7 +16,7 @@ than 63 degrees from all of them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import permutations, product
 
@@ -37,7 +37,6 @@ from ncfix.measure.observation import (
     branch,
     vector_columns,
 )
-from ncfix.values import dataclass
 
 STEPS = 40
 """Gauss-Newton steps from one start; a good one takes some ten."""

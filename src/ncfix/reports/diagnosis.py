@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -32,7 +33,6 @@ from ncfix.machine.basis import Periodic
 from ncfix.machine.effects import with_unit
 from ncfix.measure.measurement import Array
 from ncfix.reports.document import ArrowMap, Bars, Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
-from ncfix.values import dataclass
 
 HOUR = 3600.0
 CURVES = 4

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from ncfix.machine.se3 import Array
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, field
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from html import escape
 
@@ -18,7 +18,6 @@ from ncfix.reports.content import machine_sections
 from ncfix.reports.document import Plot
 from ncfix.reports.pages import LIBRARY, asset, card, filled, library, packed, table, with_columns
 from ncfix.reports.rendering import html_plot
-from ncfix.values import dataclass
 from ncfix.version import __version__
 
 WHOLE = 300_000

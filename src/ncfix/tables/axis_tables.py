@@ -16,7 +16,7 @@ that do not know the way.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,6 @@ from ncfix.tables.correction import (
     random_ways,
 )
 from ncfix.tables.grid import Array, Grid, projector
-from ncfix.values import dataclass
 
 MEAN_POSES = 64
 """Poses of the other axes over which a node's value is averaged: half of them, and those opposite."""

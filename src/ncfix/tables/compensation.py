@@ -10,12 +10,12 @@ what a control could hold, but what was written. One table of X over itself is L
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from ncfix.tables.grid import Array, Grid
-from ncfix.values import dataclass
 
 LINEAR = ("X", "Y", "Z")
 

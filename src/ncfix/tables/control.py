@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from ncfix.arguments import TARGET_UM, TOOL_LENGTH
@@ -20,7 +20,6 @@ from ncfix.machine import Machine
 from ncfix.plugins import called, nearest, registry, useless
 from ncfix.tables.compensation import Compensation, Tables, class_of
 from ncfix.tables.grid import Array
-from ncfix.values import dataclass
 
 Files = Mapping[str, bytes]
 """File name (no folder) -> content."""

@@ -8,6 +8,7 @@ error of the tool tip over random poses, with the tables off and with them on.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,6 @@ from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.tables.compensation import Tables
 from ncfix.tables.grid import Array, full_grid
-from ncfix.values import dataclass
 
 ARRIVED = 1e-7
 """mm: nearer to the intended tip than any control can resolve."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from ncfix.tables.control import Control, Files, Least, Request, Written
 from ncfix.tables.correction import POSES, Residual, random_poses, ranges_of, residual
 from ncfix.tables.grid import Array
 from ncfix.tables.sheet import as_html, as_markdown
-from ncfix.values import dataclass
 from ncfix.version import __version__
 
 SIDE_FILE = "ncfix-tables.json"

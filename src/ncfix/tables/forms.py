@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import pairwise
 
@@ -19,7 +19,6 @@ from ncfix.plugins import called
 from ncfix.tables.control import Control, Files, controls, get_control
 from ncfix.tables.export import SHEET, SIDE_FILE, linted, read_manifest
 from ncfix.tables.table_files import AGAIN, BYTE_ORDER, NUMBER, Remarks
-from ncfix.values import dataclass
 
 N = f"({NUMBER})"
 GAP = r"[ \t]+"

@@ -16,13 +16,11 @@ turns.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-
-from ncfix.values import dataclass
 
 Array = NDArray[np.float64]
 WITHIN = 4

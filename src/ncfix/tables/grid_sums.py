@@ -11,7 +11,7 @@ middle of their range, the second what it lacks there, and so on: where the sum 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from ncfix.tables.correction import random_poses
 from ncfix.tables.grid import Array, Grid, on_full_grid
 from ncfix.tables.volume import CHECKS, Volume, search
-from ncfix.values import dataclass
 
 COARSE = 6
 """Positions of each axis at which the correction is taken apart."""

@@ -12,6 +12,7 @@ function of the kind leaves less at the worst than the weighted root mean square
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache, reduce
 from itertools import combinations, pairwise
 from math import comb
@@ -34,7 +35,6 @@ from ncfix.tables.correction import (
 )
 from ncfix.tables.grid import Array, hats, on_full_grid, spline_weights
 from ncfix.tables.volume import Volume, even_line
-from ncfix.values import dataclass
 
 ROUNDS = 40
 SWEEPS = 2

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -32,7 +32,6 @@ from ncfix.tables.separable import (
     taken_apart,
     taken_apart_along,
 )
-from ncfix.values import dataclass
 
 MANY_MORE = 12
 """Tables than there are: down to so many, parts are left out by their size alone."""

@@ -15,6 +15,7 @@ The coefficients are the least squares of the exact correction over the working 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,7 +27,6 @@ from ncfix.tables.grid import Array
 from ncfix.tables.scheme import LEVER, Scheme, SchemeTask, lines_of, moving, turning
 from ncfix.tables.scheme_tables import Corrections, StagedTables, checked
 from ncfix.tables.separable import Star, TableLayout
-from ncfix.values import dataclass
 
 POSES = 6000
 CHAIN = ("C", "A", "Y", "X", "Z")

@@ -11,7 +11,7 @@ among the positions that are known. A file can say them exactly: the first one, 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.correction import poses_along, random_poses, random_ways
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.separable import Star, TableLayout
-from ncfix.values import dataclass
 
 SCALE = 10**4
 """Positions and steps have four decimals, mm or degree."""

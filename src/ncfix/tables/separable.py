@@ -14,14 +14,13 @@ as a multiple of another, and hiding a sum in a factor, (a + f(q)) g(p) = a g(p)
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import combinations, product
 
 import numpy as np
 
 from ncfix.tables.grid import Array
-from ncfix.values import dataclass
 
 NOISE = 2e-6
 """mm: below what is solved for, and far below what any control resolves."""

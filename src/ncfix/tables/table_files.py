@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
-from ncfix.values import dataclass
 
 AGAIN = "export again"
 """What helps with a file that ncfix has written."""

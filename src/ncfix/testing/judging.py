@@ -7,7 +7,7 @@ before, in whatever frame it is written; a block that is passed or refused keeps
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from ncfix.machine import Machine, loads
 from ncfix.text.dialect import Dialect
 from ncfix.text.reader import read
 from ncfix.text.stamp import find
-from ncfix.values import dataclass
 
 SHIFT = {"X": -0.0124, "Y": 0.0213, "Z": 0.0085}
 """mm, added to commands: minus the errors of the machine."""

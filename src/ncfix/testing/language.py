@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import combinations, product
 
 from ncfix.compensate.driver import fix_program
@@ -21,7 +21,6 @@ from ncfix.machine import Machine
 from ncfix.testing.judging import OPTIONS, SETUP, Judged, judged, shifted_machine
 from ncfix.text.dialect import Dialect, get
 from ncfix.text.reader import read, shapes_of, texts_of
-from ncfix.values import dataclass
 
 NUMBERS: dict[str, float] = {
     "5.": 5.0,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from math import isfinite
 
 from lark import Token, Tree
@@ -34,7 +34,6 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
-from ncfix.values import dataclass
 
 NUMBERS = frozenset({"NUMBER", "UNSIGNED"})
 """The terminals whose text is a number of the block; every other digit belongs to its shape."""

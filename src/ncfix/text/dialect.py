@@ -6,13 +6,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import PurePath
 from typing import Any, ClassVar, Literal, Protocol
 
 from ncfix.diagnostics import Message, Place, SourceError, UsageError
 from ncfix.plugins import nearest, registry, working
-from ncfix.values import dataclass
 
 FAGOR = (
     rb"[ \t]*(?:RPT[ \t]+N\d+[ \t]*,[ \t]*N\d+|GOTO[ \t]+N\d+|P\d+[ \t]*=[^()\r\n]*P\d[^()\r\n]*"

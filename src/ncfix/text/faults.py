@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from lark import UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
 from ncfix.text.grammar import UnspacedBlock
-from ncfix.values import dataclass
 
 FLOW = re.compile(r"/?(n[\d.]*)?o(<[^<>]*>|\d+|\[.*?\](?=[a-z])|#\d+)(?P<keyword>[a-z]*)", re.IGNORECASE | re.DOTALL)
 """The start of a squeezed block of flow control."""

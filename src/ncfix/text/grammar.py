@@ -10,6 +10,7 @@ import os
 import re
 import sys
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -17,7 +18,6 @@ from typing import TYPE_CHECKING
 
 from ncfix.host import cache_folders
 from ncfix.plugins import describe, working
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree

@@ -8,13 +8,13 @@ what a block means and how a corrected motion is put into words is a family's ow
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from ncfix.plugins import called, handed, nearest, useless
 from ncfix.text.reach import runs_straight_on
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

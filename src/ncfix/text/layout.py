@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.tree import Anchor, Constant, Literal, Opaque, OWordLine, Program, Skip, Span, Tape, Word
-from ncfix.values import dataclass
 
 #: In the order in which programs write them.
 AXIS_LETTERS = "XYZABCUVW"

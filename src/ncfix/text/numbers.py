@@ -6,12 +6,11 @@ reader compares the two for every shape, and goes by the grammar where they diff
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from ncfix.values import dataclass
 
 EXACT_DIGITS = 15
 """Up to so many digits a number and its power of ten are exact in a double, and so is their rounded quotient."""

@@ -7,13 +7,12 @@ line is kept as opaque text of the kind `UNREAD`; whoever gets to it after all, 
 from __future__ import annotations
 
 import re
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.text.tree import Comment, Constant, OWordLine, Skip, Template, Word
-from ncfix.values import dataclass
 
 UNREAD = "unread"
 """The kind of an `Opaque` that could not be read where nobody may need it."""

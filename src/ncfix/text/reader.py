@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from operator import itemgetter
 from typing import Generic, NamedTuple, TypeVar
@@ -26,7 +26,6 @@ from ncfix.text.reach import UNREAD, Reach
 from ncfix.text.shapes import Scan, firsts
 from ncfix.text.tree import END, START, Anchor, Opaque, Program, Span, Template
 from ncfix.text.writer import line_end
-from ncfix.values import dataclass
 
 CAPACITY = 5_000
 """How many shapes and texts of a dialect are remembered; the one that was not used for longest goes first."""

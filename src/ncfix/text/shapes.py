@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import pairwise
 
@@ -34,7 +34,6 @@ from ncfix.text.numbers import (
     is_numeric,
     table,
 )
-from ncfix.values import dataclass
 
 NUMBER_MARK = 1
 COMMENT_MARK = 2

@@ -10,7 +10,7 @@ outputs that a product of doubles cannot tell which of them is nearer is marked,
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from ncfix import core
 from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.core.words import NumberRules

@@ -13,14 +13,13 @@ every block of the shape, however long its numbers are, and however long the com
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import Place
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect

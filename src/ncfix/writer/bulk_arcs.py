@@ -6,7 +6,7 @@ two together. An arc qualifies if it stays one, by G2 or G3, and has a plain R o
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.spelling import Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
-from ncfix.values import dataclass
 from ncfix.writer.bulk_layouts import NONE, Layouts, places_of
 from ncfix.writer.pieces import Pieces
 from ncfix.writer.target import FrameMap

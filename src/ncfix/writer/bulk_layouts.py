@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,6 @@ from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import START, Program
-from ncfix.values import dataclass
 from ncfix.writer.language import WrittenLanguage
 
 IntArray = NDArray[np.int64]

@@ -8,6 +8,7 @@ the same each time; where it does not, the block is reported as a conflict, and 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +20,6 @@ from ncfix.control.turns import UNTIMED, minutes, turn_alone, turns_alone
 from ncfix.text.language import BlockLayout, language_of
 from ncfix.text.tree import Program, view
 from ncfix.text.writer import Edit, Splices, overlong
-from ncfix.values import dataclass
 from ncfix.writer.block import STRAIGHT_AND_ARCS
 from ncfix.writer.bulk import Bulk, write_alone
 from ncfix.writer.language import WrittenLanguage

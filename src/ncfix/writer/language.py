@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ncfix.control.interpreter import FollowedLanguage
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

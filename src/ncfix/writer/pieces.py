@@ -9,11 +9,12 @@ an end or centre of its own no longer closes, so what is before it must end wher
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import Frame, MotionKind, Moves, Rule
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

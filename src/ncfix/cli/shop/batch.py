@@ -9,7 +9,7 @@ import gc
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,6 @@ from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
 from ncfix.host import limited
 from ncfix.plugins import load_plugins
-from ncfix.values import dataclass
 from ncfix.version import __version__
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
@@ -19,7 +19,6 @@ from ncfix.cli import console
 from ncfix.cli.options import FOLDER, PATH, PathName, force_option
 from ncfix.diagnostics import ConfigError, UsageError, visible
 from ncfix.outputs import exists_already
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.project import Project

@@ -10,13 +10,12 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
 from typing import Any
 
 from ncfix.cli import console
 from ncfix.diagnostics import Code, visible
-from ncfix.values import dataclass
 
 WIDEST = 60
 """Characters of an example's name in the table."""

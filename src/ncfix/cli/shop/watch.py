@@ -6,7 +6,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +24,6 @@ from ncfix.cli.targets import STREAM, Outputs, targets
 from ncfix.diagnostics import ExitCode, NcfixError, Place, UsageError, visible
 from ncfix.inputs import identities
 from ncfix.outputs import check_target
-from ncfix.values import dataclass
 
 if TYPE_CHECKING:
     from ncfix.cli.shop.batch import FixJob

@@ -10,6 +10,8 @@ such an axis turns round where its rounded numbers do; so close to a turn both s
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +22,6 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import REST, Signs, carried, signs
 from ncfix.compensate.plan.sampling import BISECTIONS
 from ncfix.machine import State
-from ncfix.values import dataclass
 
 LATERAL = 1e-5
 """mm or rad: an axis with less play is off across its way, if at all, where it turns round."""

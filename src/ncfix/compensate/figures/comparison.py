@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -39,7 +39,6 @@ from ncfix.control.trace import joined_moves, taken
 from ncfix.diagnostics import DifferenceError, Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 
 BESIDE = 64
 """Motions on both sides of one that are looked at to find out whether an axis turns round near it."""

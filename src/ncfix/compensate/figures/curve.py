@@ -6,7 +6,7 @@ Motions are divided into stretches so short that a parabola is near enough to th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -29,7 +29,6 @@ from ncfix.compensate.plan.sampling import (
     with_kinks,
 )
 from ncfix.control.moves import MotionKind
-from ncfix.values import dataclass
 
 ROUND, TWISTED = 1e-6, 2e-5
 """mm; so far a parabola may be from a circle on which the tip goes, and from a path on which it goes on besides."""

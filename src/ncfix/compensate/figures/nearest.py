@@ -16,7 +16,7 @@ Between the samples of a path more are taken in two cases:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, length
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places
 from ncfix.control.trace import NotInPartsError
-from ncfix.values import dataclass
 
 ALONG = 0.02
 """A point that is so much shorter or longer along the path counts as this share of that farther away."""

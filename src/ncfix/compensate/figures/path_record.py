@@ -9,7 +9,7 @@ path is measured, and stands in the result. Figures, histogram and lists are of 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from ncfix.compensate.solve import WrittenPlan
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 
 CUT, RAPID, REFUSED, PASSED = range(4)
 """What leads to a place: a corrected cut, a rapid, a refused motion, one passed by rule."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -27,7 +27,6 @@ from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 
 
 class SampledErrors(Protocol):

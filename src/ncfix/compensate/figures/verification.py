@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ncfix.arguments import TOLERANCE_UM
@@ -16,7 +16,6 @@ from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

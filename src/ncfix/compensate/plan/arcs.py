@@ -7,14 +7,13 @@ centre moved by the mean correction.
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask, picked, slices, vector_product
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import ArcColumns, Segments, sweep_between
-from ncfix.values import dataclass
 
 LOOKS = np.arange(1, 13) / 13
 """Fractions of each arc at which the corrected path is looked at to find the centre."""

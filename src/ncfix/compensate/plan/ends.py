@@ -18,7 +18,7 @@ axes and spindles", R2, MD30455; Fanuc 30i parameter manual, No. 1008.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,7 +31,6 @@ from ncfix.compensate.plan.kinematics import Correction, commands_from_joints, r
 from ncfix.compensate.plan.strategies import PoseSequence, Strategy
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
-from ncfix.values import dataclass
 from ncfix.writer.target import FrameMap
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

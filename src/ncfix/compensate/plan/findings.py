@@ -6,7 +6,7 @@ Findings of the parts of a program are put together in `Notes`: the first few ar
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place, RefusedError
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 
 MOST = 20
 """So many messages are written out; the rest is counted."""

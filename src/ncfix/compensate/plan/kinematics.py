@@ -14,6 +14,8 @@ taken to keep the side of its play that it last had.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -23,7 +25,6 @@ from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import FLAT
 from ncfix.machine.steps import dot, volume
-from ncfix.values import dataclass
 
 Signs = NDArray[np.int8]
 

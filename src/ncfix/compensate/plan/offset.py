@@ -12,6 +12,8 @@ rays of the other one.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, owners, picked
@@ -19,7 +21,6 @@ from ncfix.compensate.plan.intent import Intent, correctable
 from ncfix.compensate.plan.sampling import interior
 from ncfix.compensate.plan.segments import Segments
 from ncfix.control.moves import MotionKind, Moves
-from ncfix.values import dataclass
 
 NO_WAY = 1e-9
 """mm in the plane; a motion that goes no farther makes no corner."""

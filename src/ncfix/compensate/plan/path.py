@@ -10,7 +10,7 @@ are split only if asked. Canned cycles are corrected at their end. Nothing is sp
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,7 +48,6 @@ from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.plan.written import Known
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
-from ncfix.values import dataclass
 from ncfix.writer.pieces import Pieces
 
 LEAST_SHARE = 1e-6

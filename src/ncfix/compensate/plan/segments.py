@@ -10,6 +10,8 @@ of it from its chord. A straight way in the workpiece is nowhere farther from a 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask, every, lengths, owners, picked, spread, vector_product
@@ -18,7 +20,6 @@ from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
 from ncfix.machine.chain import turn
 from ncfix.machine.steps import dot
-from ncfix.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

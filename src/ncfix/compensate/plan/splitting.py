@@ -20,7 +20,7 @@ that bend the other way than the arc turns: a control would go the long way roun
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -35,7 +35,6 @@ from ncfix.compensate.plan.kinematics import regular
 from ncfix.compensate.plan.sampling import MOST, bends, crossed, merged, reversals
 from ncfix.compensate.plan.segments import Segments, sweep_between
 from ncfix.compensate.plan.strategies import Strategy
-from ncfix.values import dataclass
 from ncfix.writer.target import TANGENTIAL
 
 STRETCH = 1024

@@ -14,7 +14,7 @@ arm has changed.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -27,7 +27,6 @@ from ncfix.compensate.plan.segments import Segments, sweep_between
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
 from ncfix.text.spelling import decimals_for
-from ncfix.values import dataclass
 from ncfix.writer.emit import Emission
 from ncfix.writer.pieces import Pieces
 

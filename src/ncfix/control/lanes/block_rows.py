@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -14,7 +14,6 @@ from ncfix.control.coordinates import N_LETTERS
 from ncfix.control.lanes.lane_tables import LaneTables
 from ncfix.control.moves import FeedMode
 from ncfix.text.tree import Program
-from ncfix.values import dataclass
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -10,7 +10,7 @@ Shapes: bases with priors on their coefficients. A curve is smooth, harmonics de
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -20,7 +20,6 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
 from ncfix.machine.piecewise import Spline
 from ncfix.measure.measurement import Array
-from ncfix.values import dataclass
 
 LETTERS = "XYZ"
 TURNS = "ABC"

@@ -10,6 +10,7 @@ likely theirs, and in how slow they are.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,6 @@ from ncfix.machine.axes import SPINDLE
 from ncfix.machine.basis import Polynomial
 from ncfix.machine.piecewise import PiecewiseConstant
 from ncfix.measure.measurement import Array
-from ncfix.values import dataclass
 
 LAGS = (None, 600.0, 1800.0, 5400.0)
 """s: at once, a spindle, a slide, a frame; what lies between is a mixture."""

@@ -10,7 +10,7 @@ of it holds, keeping them costs the squares of two unrelated curves where one wo
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -23,7 +23,6 @@ from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.selection import Selection
-from ncfix.values import dataclass
 
 SMOOTH = 0.3
 """How far the values of a table know of each other, of its length."""

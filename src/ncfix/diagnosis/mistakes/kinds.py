@@ -7,7 +7,7 @@ are undone is seen to first order. Of positions and axes it is not.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -21,7 +21,6 @@ from ncfix.machine.plausible import much, times_a_machining_centre
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index, Measurement
-from ncfix.values import dataclass
 
 LARGE_RAD = 2e-4
 """An angle above this may have been typed in degrees."""

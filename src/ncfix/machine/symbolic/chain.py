@@ -12,7 +12,7 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from itertools import combinations_with_replacement
 from math import prod
@@ -21,7 +21,6 @@ from typing import Self, TypeAlias
 import sympy as sp
 
 from ncfix.diagnostics import ConfigError
-from ncfix.values import dataclass
 
 TAKEN = (
     "np", "shape", "map", "v", "locals", "float", "pi", "sin", "cos", "tan", "sqrt", "branch", *"xyzijk",

@@ -12,6 +12,7 @@ second-order terms out.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import product
 
@@ -37,7 +38,6 @@ from ncfix.machine.symbolic.chain import (
     skew,
 )
 from ncfix.machine.symbolic.from_machine import DEFAULT, from_machine
-from ncfix.values import dataclass
 
 Series = dict[Monomial, DomainMatrix]
 

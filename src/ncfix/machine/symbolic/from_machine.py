@@ -10,7 +10,7 @@ What is not recognised, or what the reader wants to see as a letter, becomes a L
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from math import atan2, pi
@@ -43,7 +43,6 @@ from ncfix.machine.symbolic.chain import (
     rodrigues,
     scaled,
 )
-from ncfix.values import dataclass
 
 CLOSE = 1e-14
 """How near an exact constant a number must be: well below what the fast engine resolves."""

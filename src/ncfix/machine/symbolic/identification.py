@@ -12,6 +12,7 @@ of the tool tip, nominal part included.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import combinations, product
 
@@ -21,7 +22,6 @@ from numpy.typing import NDArray
 
 from ncfix.machine.symbolic.algebra import Algebra, Poly
 from ncfix.machine.symbolic.derivation import POSITION, Derivation
-from ncfix.values import dataclass
 
 Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-9

@@ -8,13 +8,13 @@ linear axes then follow from a linear system. Every axis is turned or shifted by
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import sympy as sp
 
 from ncfix.machine.symbolic.algebra import Algebra, Poly
 from ncfix.machine.symbolic.chain import Chain, Expr, Rotation, linear_part, rodrigues
 from ncfix.machine.symbolic.derivation import DIRECTION, POSITION, Derivation
-from ncfix.values import dataclass
 
 BRANCH = sp.Symbol("branch", real=True)
 """Which of two solutions: +1 or -1."""
