@@ -28,6 +28,7 @@ from ncfix.compensate.solve import (
     differences,
     plan_and_write,
 )
+from ncfix.control.interpreter import NEVER
 from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.state import BLOCK_DELETE, named_switches
@@ -159,7 +160,10 @@ def messages_of(positions: Sequence[SwitchSetting]) -> tuple[Message, ...]:
     if len(positions) == 1:
         return tuple(told)
     places = [each.place for each in told if each.code == BLOCK_DELETE]
-    rest = dict.fromkeys(each for each in told if each.code != BLOCK_DELETE)
+    always = set.intersection(*({each.text for each in position.trace.messages} for position in positions))
+    rest = dict.fromkeys(
+        each for each in told if each.code != BLOCK_DELETE and (each.code != NEVER or each.text in always)
+    )
     first = min(filter(None, places), key=lambda place: place.line, default=None)
     (switches, *_), many = (each.trace.switches for each in positions), len(positions)
     words = "/" if len(switches) == 1 else named_switches(switches), "both" if many == 2 else f"all {many}"

@@ -279,11 +279,13 @@ CODES: dict[str, Code] = {
         "Check the numbers of the block, and the increments, shifts and scales before it.",
     ),
     "NCF249": Code(
-        "Blocks behind the end of the program",
-        "Behind the end of the program (M30, M2, %, END PGM) the file has blocks that name axes, and the program never "
-        "goes through them. They are another program in the same file, a subprogram that nothing calls, or what an "
-        "editor has left there. What is corrected is the first program and what it calls.",
-        "Correct each program in a file of its own; delete what is left over.",
+        "Blocks that the program never goes through",
+        "The file has blocks that name axes, and the program never goes through them: it ends before (M30, M2, %, END "
+        "PGM), or jumps over them. They are another program in the same file, a subprogram that nothing calls, a "
+        "branch that is not taken with these values, or what an editor has left there. What is corrected is the first "
+        "program, where it goes, and what it calls.",
+        "Correct each program in a file of its own; delete what is left over. Where a value in the program chooses a "
+        "branch, correct the original anew after the value has been changed.",
     ),
     "NCF381": Code(
         "The setup file is no TOML",

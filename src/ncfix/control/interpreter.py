@@ -136,7 +136,7 @@ class TextUnit(ABC, Generic[P]):
 
 
 NO_END = "NCF234"
-BEHIND = "NCF249"
+NEVER = "NCF249"
 NAMES_AN_AXIS = re.compile(
     rb"(?i)(?!\d*[ \t]*(?:\*|(?:BEGIN|END|CALL)[ \t]+PGM\b))"
     rb"(?:\([^)\r\n]*\)|\"[^\"\r\n]*\"|[^(;%\"\r\n])*?"
@@ -160,7 +160,8 @@ class Interpreter(ABC, Generic[U]):
     in_parts  the text comes part by part; `first` and `last`: this is the first, the last of them
     ended     the program has ended
     behind    the block of the main text behind which the program has ended; None: where it ends is not known
-    in_calls  the blocks of the main text that subprograms have executed
+    executed  the blocks of the main text that were executed one by one; in parts only those of subprograms
+    jumped    (first, stop) blocks of the main text over which the program has jumped
     """
 
     main: U
@@ -177,7 +178,8 @@ class Interpreter(ABC, Generic[U]):
         self.first = self.last = True
         self.ended = False
         self.behind: int | None = None
-        self.in_calls: set[int] = set()
+        self.executed: set[int] = set()
+        self.jumped = set[tuple[int, int]]()
         self._recurrence = Recurrence()
         control.budget.left = run.budget(program)
         control.locate = self.place
@@ -226,24 +228,35 @@ class Interpreter(ABC, Generic[U]):
         moves: Moves = self.control.moves()
         return moves
 
-    def note_behind(self, program: Program, moves: Moves) -> None:
-        """Say where blocks behind the end of the program begin that name axes though it never goes through them.
+    def note_uncorrected(self, program: Program, moves: Moves) -> None:
+        """Say where blocks begin that name axes though the program never goes through them.
 
-        They are those of other programs in the file, and of subprograms that nothing calls. `program` and `moves`: what
-        was followed last, with the end of the program.
+        They are those of other programs in the file, of subprograms that nothing calls, and of branches that are not
+        taken. `program` and `moves`: what was followed last, with the end of the program.
         """
-        if self.behind is None or self.behind >= len(program):
+        if self.behind is None:
             return
-        executed = self.in_calls.union(moves.block[moves.block >= self.behind].tolist())
-        source, spans = program.source, program.blocks[self.behind :].tolist()
-        for block, (start, stop) in enumerate(spans, self.behind):
-            if block not in executed and NAMES_AN_AXIS.match(source, start, stop):
-                text = (
-                    "behind the end of the program there are blocks that name axes; the program never goes through them"
-                )
-                hint = "they stay as they are: correct another program in a file of its own"
-                self.control.messages[text] = Message(BEHIND, text, program.place(block), hint)
-                return
+        jumped = sorted((first, min(stop, self.behind)) for first, stop in self.jumped)
+        behind = [(self.behind, len(program))] if self.behind < len(program) else []
+        if not (behind or jumped):
+            return
+        executed = self.executed.union(moves.block.tolist())
+        text = "behind the end of the program there are blocks that name axes; the program never goes through them"
+        hint = "they stay as they are: correct another program in a file of its own"
+        self._note_first(program, executed, behind, text, hint)
+        text = "the program jumps over blocks that name axes, and never goes through them"
+        hint = "they stay as they are: when it is to go through them, correct the original anew"
+        self._note_first(program, executed, jumped, text, hint)
+
+    def _note_first(
+        self, program: Program, executed: set[int], spans: Iterable[tuple[int, int]], text: str, hint: str
+    ) -> None:
+        """Remark on the first block of some spans that names an axis and was not executed."""
+        for first, stop in spans:
+            for block in range(first, stop):
+                if block not in executed and NAMES_AN_AXIS.match(program.source, *program.blocks[block].tolist()):
+                    self.control.messages[text] = Message(NEVER, text, program.place(block), hint)
+                    return
 
     # -- what a language says of parts --------------------------------------------------------------------------------
 
@@ -304,8 +317,12 @@ class Interpreter(ABC, Generic[U]):
     def walk(self) -> bool:
         """Block after block; whether the program ends before its text does."""
         control, flow = self.control, self.flow
+        after, depth = flow.block, 0
         while True:
-            if not flow.arrive():
+            here = flow.arrive()
+            if flow.unit is self.main and flow.block > after and len(flow.calls) == depth:
+                self.jumped.add((after, flow.block))
+            if not here:
                 if (self.last or flow.calls) and self.end_of_text():
                     continue
                 self.behind = flow.block
@@ -313,7 +330,9 @@ class Interpreter(ABC, Generic[U]):
             unit, block = flow.unit, flow.block
             plan = unit.plan(block)
             control.external = unit.external
+            after, depth = len(self.main.program) if unit.external else block + 1, len(flow.calls)
             if self.take_stretch(plan):
+                after = flow.block
                 continue
             flow.block = block + 1
             self.span = None
@@ -321,8 +340,8 @@ class Interpreter(ABC, Generic[U]):
             control.numbers, control.first = unit.numbers, unit.first[block]
             if not unit.external:
                 control.row_block = block
-                if flow.calls:
-                    self.in_calls.add(block)
+                if flow.calls or not self.in_parts:
+                    self.executed.add(block)
             if plan.skip is not None and control.is_deleted(plan.skip):
                 continue
             ended = self.execute(plan, unit, block)

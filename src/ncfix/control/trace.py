@@ -259,7 +259,7 @@ class Follower:
         moves = control.moves()
         check_reach(program, moves)
         control.note_rolling(program)
-        interpreter.note_behind(program, moves)
+        interpreter.note_uncorrected(program, moves)
         interpreter.check_motions(program, moves)
         self.unchanged = begun is not None and begun == control.lasting()
         return moves
@@ -383,7 +383,7 @@ def trace(
     interpreter = interpreter_of(program, Run(setup, axes, rotary, resolve, kinematics))
     interpreter.run()
     moves = interpreter.moves()
-    interpreter.note_behind(program, moves)
+    interpreter.note_uncorrected(program, moves)
     return finished(interpreter.control, program, moves)
 
 
