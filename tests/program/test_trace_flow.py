@@ -156,6 +156,8 @@ def test_the_end_is_m2_m30_m99_or_tape() -> None:
         ("fanuc", "O1\n#1=0\nN5 G92 X0.\nG0 X1.\nIF [#1 EQ 1] GOTO 6\n#1=1\nGOTO 5\nN6 M30\n", 0),
         ("fanuc", "O1\nGOTO 6\nN5 G0 X2.\nGOTO 7\nN6 X1.\nGOTO 5\nN7 M30\n", 0),
         ("fanuc", "O1\nGOTO 6\nN5 (X2.)\n#1=3\nN6 G0 X1.\nM30\n", 0),
+        ("fanuc", "O1\n#1=0\nN5 G0 X1.\nIF [#1 EQ 1] GOTO 7\n#1=1\nGOTO 6\nX2.\nN6 X3.\nGOTO 5\nN7 M30\n", 1),
+        ("fanuc", "O1\n#1=0\nN5 G0 X1.\nIF [#1 EQ 1] GOTO 7\n#1=1\nGOTO 6\nN6 X3.\nGOTO 5\nN7 M30\n", 0),
         ("linuxcnc", "o1 if [0]\nG0 X1\no1 else\nG0 X2\no1 endif\nM2\n", 1),
         ("linuxcnc", "o1 while [0]\nG0 X1\no1 endwhile\nM2\n", 1),
         ("linuxcnc", "o1 sub\nG0 X1\no1 endsub\no1 call\nM2\n", 0),

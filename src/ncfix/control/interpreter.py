@@ -251,8 +251,10 @@ class Interpreter(ABC, Generic[U]):
     def _note_first(
         self, program: Program, executed: set[int], spans: Iterable[tuple[int, int]], text: str, hint: str
     ) -> None:
-        """Remark on the first block of some spans that names an axis and was not executed."""
+        """Remark on the first block of some spans, in order, that names an axis and was not executed."""
+        seen = 0
         for first, stop in spans:
+            first, seen = max(first, seen), max(stop, seen)
             for block in range(first, stop):
                 if block not in executed and NAMES_AN_AXIS.match(program.source, *program.blocks[block].tolist()):
                     self.control.messages[text] = Message(NEVER, text, program.place(block), hint)
