@@ -303,8 +303,7 @@ class BacklashAmounts:
     def shift(self, unit: float) -> Array:
         """What grids must hold besides the mean of both ways, X, Y and Z, mm."""
         signs = [-1.0 if axis in self.home_minus else 1.0 for axis in LINEAR]
-        found: Array = np.array(self.amounts) * signs * unit / 2
-        return found
+        return np.array(self.amounts) * signs * unit / 2
 
     def tables(self, unit: float) -> Compensation:
         """What the control does: the amount, in the direction of motion, against that of the return."""

@@ -121,8 +121,7 @@ class ErrorChain:
         if not isinstance(row.error, tuple):
             return value + unit * row.error
         grid = self.components[row.error]
-        found: Array = value + unit * grid.at(q[:, [names.index(grid.inputs[0])]])[:, 0]
-        return found
+        return value + unit * grid.at(q[:, [names.index(grid.inputs[0])]])[:, 0]
 
 
 def _acted(points: Array, axis: str, value: Array) -> Array:
@@ -297,8 +296,7 @@ def _in_frame(axis: Axis, positions: Array, twist: Array) -> Array:
     carried = motion[:, :3, :3] @ point + motion[:, :3, 3]
     velocity = velocity + np.cross(turned, point - carried)
     frame = tilt(axis)
-    found: Array = np.concatenate([velocity @ frame, turned @ frame], axis=1)
-    return found
+    return np.concatenate([velocity @ frame, turned @ frame], axis=1)
 
 
 def chain_rows(machine: Machine, components: Sequence[AxisErrors], angle: float, sense: float) -> tuple[ChainRow, ...]:

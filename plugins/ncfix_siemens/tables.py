@@ -68,8 +68,7 @@ class CecTable:
     @property
     def positions(self) -> Array:
         """All positions, (k + 1,)."""
-        found: Array = self.low + self.step * np.arange(len(self.values), dtype=np.float64)
-        return found
+        return self.low + self.step * np.arange(len(self.values), dtype=np.float64)
 
     def grid(self, input_name: str, output_name: str, factor: float, input_unit: float) -> Grid:
         """The table with its values times a factor, over positions in mm or rad."""

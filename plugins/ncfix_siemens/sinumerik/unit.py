@@ -263,8 +263,7 @@ def vectors_of(unit: SinumerikUnit, start: int, stop: int) -> FloatArray:
     program = unit.program
     slots = unit.vectors[program.template[start:stop]]
     values = program.numbers[program.first_number[start:stop, None] + np.maximum(slots, 0)]
-    found: FloatArray = np.where(slots >= 0, values, 0.0)
-    return found
+    return np.where(slots >= 0, values, 0.0)
 
 
 def ways_of(pointing: Pointing, vectors: FloatArray) -> list[Ways]:

@@ -41,8 +41,7 @@ class Moved(NamedTuple):
     @property
     def owner(self) -> Indices:
         """Which motion each piece belongs to."""
-        found: Indices = np.repeat(np.arange(len(self.row)), self.stop - self.begin)
-        return found
+        return np.repeat(np.arange(len(self.row)), self.stop - self.begin)
 
     @property
     def pieces(self) -> Indices:
@@ -79,8 +78,7 @@ class Deviations(Expected):
         for unit in set(units.tolist()):
             digits[units == unit] = np.linalg.norm(self.control_halves(unit)[~self.machine.rotary])
         digits[self.ours.kind[at] == Kind.ARC] *= 3
-        found: Array = WIDER * self.tolerance + digits + SLACK
-        return found
+        return WIDER * self.tolerance + digits + SLACK
 
     def shares(
         self,

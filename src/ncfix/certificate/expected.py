@@ -219,16 +219,12 @@ class Expected:
         """Digits behind the point that the control resolves, in blocks with units of so many mm (n,); (n, n_axes)."""
         linear, angle = self.machine.least_increment
         least = np.where(self.machine.rotary, angle * 180 / math.pi, linear / units[:, None])
-        found: NDArray[np.intp] = np.maximum(0, np.ceil(-np.log10(least) - 1e-9)).astype(np.intp)
-        return found
+        return np.maximum(0, np.ceil(-np.log10(least) - 1e-9)).astype(np.intp)
 
     def halves(self, units: Array, written: NDArray[np.intp]) -> Array:
         """The same for blocks with so many digits behind the point (n, n_axes), in units of so many mm (n,)."""
         digits = np.maximum(self.control_digits(units), written)
-        found: Array = (
-            0.5 * 10.0 ** -digits.astype(float) * np.where(self.machine.rotary, math.pi / 180, units[:, None])
-        )
-        return found
+        return 0.5 * 10.0 ** -digits.astype(float) * np.where(self.machine.rotary, math.pi / 180, units[:, None])
 
     def sure_of_side(self, step: AxisStep) -> bool:
         """Whether the direction of every axis is known on which an error depends."""

@@ -51,8 +51,7 @@ class TipModel:
 
     def _at_zero(self, command: Array) -> Array:
         offset, ways = self.machine.at_zero
-        tip: Array = offset + command @ ways
-        return tip
+        return offset + command @ ways
 
     def joints(self, command: Array, tcp: Mask, length: Array) -> Array:
         """Axis positions for commands (n, n_axes), those under tool-centre-point control included."""
@@ -135,8 +134,7 @@ class Ways:
     def is_short(self, rotary: Mask) -> Mask:
         """Which motions are straight and lead no axis far, (n,)."""
         far = np.abs(self.end - self.start) > np.where(rotary, SHORT_RAD, SHORT_MM)
-        short: Mask = ~(far.any(axis=1) | self.arc)
-        return short
+        return ~(far.any(axis=1) | self.arc)
 
     def at(self, row: NDArray[np.intp], share: Array) -> Array:
         """The commands at shares (k,) of motions (k,), shape (k, n_axes)."""

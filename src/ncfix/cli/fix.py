@@ -62,8 +62,7 @@ class Jobs(click.IntRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Make it the number, or AUTO."""
-        number: int = AUTO if value == "auto" else super().convert(value, param, ctx)
-        return number
+        return AUTO if value == "auto" else super().convert(value, param, ctx)
 
 
 def workers_for(jobs: int, programs: Sequence[OutputTarget], executor: str) -> int:

@@ -54,8 +54,7 @@ def at_feed(moves: Moves) -> Mask:
 
 def at_measured_places(moves: Moves) -> Mask:
     """(n,) motions of which a word is computed from what the machine has measured, with its error in it."""
-    found: Mask = np.zeros(len(moves), dtype=bool) if moves.measured is None else np.any(moves.measured, axis=1)
-    return found
+    return np.zeros(len(moves), dtype=bool) if moves.measured is None else np.any(moves.measured, axis=1)
 
 
 def without_figure(moves: Moves, kept: Mask, left: Mask | None, own: Mask | None = None) -> Counter[str]:

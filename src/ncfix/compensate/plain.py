@@ -485,5 +485,4 @@ def pieces_of(real: Segments, over: Index, parts: Split | None, others: MorePiec
 
 def _pieces_at(first: Index, rows: Index, counts: Index) -> Index:
     """The pieces of motions `rows` (k,), of which there are so many."""
-    at: Index = np.repeat(first[:-1][rows], counts) + places(counts)
-    return at
+    return np.repeat(first[:-1][rows], counts) + places(counts)

@@ -141,15 +141,13 @@ class WrittenPlan:
         Not those to a place that the machine measures itself: what it finds has its error in it.
         """
         wanted = self.moves.cutting | (self.moves.kind == MotionKind.RAPID) if rapids else self.moves.cutting
-        shown: Mask = wanted & ~self.kept & ~at_measured_places(self.moves)
-        return shown
+        return wanted & ~self.kept & ~at_measured_places(self.moves)
 
     @property
     def shift(self) -> Array:
         """(n, n_axes) by how much the command at the end of each motion is changed, as written, mm and rad."""
         last = np.searchsorted(self.plan.pieces.move, np.arange(len(self.moves)), side="right") - 1
-        change: Array = picked(self.emission.end, last) - self.moves.end
-        return change
+        return picked(self.emission.end, last) - self.moves.end
 
     def lacking(self, steps: Array, own: Mask | None = None) -> Lacking | None:
         """The axes that were left, of motions `own` (n,) if given; `steps` (n_axes,) what the control resolves.

@@ -208,8 +208,7 @@ class WorkShare:
             return None
         while ("checkpoint", number) not in received and ("silent", owner) not in received:
             self.mailbox.receive()
-        found: PartCheckpoint | None = received.get(("checkpoint", number))
-        return found
+        return received.get(("checkpoint", number))
 
     def before(self, number: int) -> PrecedingMotion | None:
         """What the part before that one has left, as soon as it is known; None for the first part.

@@ -264,8 +264,7 @@ class Moves:
         """(n,) arcs whose centre is where a word says, wherever they start."""
         if self.fixed_centre is None:
             return self.arc_absolute
-        fixed: NDArray[np.bool_] = self.arc_absolute | self.fixed_centre
-        return fixed
+        return self.arc_absolute | self.fixed_centre
 
     def call_of(self, row: int) -> CycleCall | None:
         """The call with which the cycle of a motion is called, if that has a block of its own."""

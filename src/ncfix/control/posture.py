@@ -130,8 +130,7 @@ class MachinePosture:
         def directions(first: float, second: float) -> FloatArray:
             position = [0.0] * len(self.rotary)
             position[turning[0]], position[turning[1]] = first, second
-            found: FloatArray = (self._tip(position, 0.0) - self._tip(position, PROBE)) / PROBE
-            return found
+            return (self._tip(position, 0.0) - self._tip(position, PROBE)) / PROBE
 
         return Pointing.of((self.machine.index(turning[0]), self.machine.index(turning[1])), directions)
 

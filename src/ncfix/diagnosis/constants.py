@@ -133,8 +133,7 @@ class FileLikelihood:
         """(m,) values minus what the file's own constants and the fitted set-up say, um."""
         data = self.data
         back = data.problem.selection.start - data.coefficients
-        found: Array = data.y - self.constants @ back
-        return found
+        return data.y - self.constants @ back
 
     @property
     def constants(self) -> Array:
@@ -193,8 +192,7 @@ class FileLikelihood:
 
     @property
     def _steps(self) -> Array:
-        sizes: Array = FIRST_UM * np.power(TIMES, np.arange(STEPS, dtype=np.float64))
-        return sizes
+        return FIRST_UM * np.power(TIMES, np.arange(STEPS, dtype=np.float64))
 
     def _at(self, moved: Sequence[int], size: float) -> float:
         inner, seen, total = self._products
@@ -266,8 +264,7 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     basis = orthonormal(asked.setup / data.relative[:, None])
 
     def beside(shown: Array) -> Array:
-        found: Array = without(basis, (shown / data.relative)[:, None])[:, 0] * data.relative
-        return found
+        return without(basis, (shown / data.relative)[:, None])[:, 0] * data.relative
 
     sigma: Array = np.sqrt(np.diag(spread) * scale)
     start, labels = data.problem.selection.start, names_of(data.problem.selection)

@@ -117,8 +117,7 @@ class Case:
     @property
     def kept(self) -> NDArray[np.bool_]:
         """(m,) values of rows that were not put aside."""
-        kept: NDArray[np.bool_] = ~self.outlying[np.maximum(self.data.row, 0)] & (self.data.row >= 0)
-        return kept
+        return ~self.outlying[np.maximum(self.data.row, 0)] & (self.data.row >= 0)
 
 
 @dataclass(frozen=True, repr=False)

@@ -234,5 +234,4 @@ def _contest(evidence: Evidence, new: Observation, true: Hypothesis, other: Hypo
 def _shown(new: Observation, group: EffectForm) -> Array:
     """What the numbers of a form show in the poses on offer, um."""
     used = group.loading.any(axis=1)
-    shown: Array = 1e3 * new.design(group.owner.effects)[:, used] @ group.loading[used]
-    return shown
+    return 1e3 * new.design(group.owner.effects)[:, used] @ group.loading[used]

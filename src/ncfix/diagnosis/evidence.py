@@ -119,8 +119,7 @@ class Background:
 
 def in_noise(covariance: Array, relative: Array) -> Array:
     """A covariance (m, m) in units of each value's noise; `relative` (m,)."""
-    scaled: Array = covariance / relative[:, None] / relative
-    return scaled
+    return covariance / relative[:, None] / relative
 
 
 def marginal(squares: float, log_determinant: float, count: int, freedom: float) -> float:

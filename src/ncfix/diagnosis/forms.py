@@ -185,8 +185,7 @@ def without_lacking_constants(data: ResidualData, columns: Array, named: Sequenc
     constants = [group.columns for group in named if group.owner.constant]
     if not constants:
         return columns
-    rest: Array = columns - np.concatenate(constants, axis=1) @ data.shares(columns, constants)
-    return rest
+    return columns - np.concatenate(constants, axis=1) @ data.shares(columns, constants)
 
 
 def _form(data: ResidualData, candidate: Candidate, loading: Array, design: Array) -> EffectForm | None:
@@ -213,8 +212,7 @@ def principal_rotation(columns: Array) -> Array:
     if columns.shape[1] == 1:
         return np.ones((1, 1))
     squares, turned = np.linalg.eigh(columns.T @ columns)
-    kept: Array = turned[:, np.cumsum(squares) > NEGLIGIBLE * squares.sum()]
-    return kept
+    return turned[:, np.cumsum(squares) > NEGLIGIBLE * squares.sum()]
 
 
 def side_by_side(parts: Iterable[Array]) -> Array:

@@ -88,14 +88,12 @@ class Contrasts:
     def columns(self) -> Array:
         """The basis itself, (m, n)."""
         m, k = self.vectors.shape
-        last: Array = np.eye(m, m - k, -k) - self.vectors @ (self.joined @ self.vectors[k:].T)
-        return last
+        return np.eye(m, m - k, -k) - self.vectors @ (self.joined @ self.vectors[k:].T)
 
     def seen(self, values: Array) -> Array:
         """Columns of values (m, p) as contrasts, (n, p); far quicker by a few reflections."""
         k = self.vectors.shape[1]
-        last: Array = values[k:] - self.vectors[k:] @ (self.joined.T @ (self.vectors.T @ values))
-        return last
+        return values[k:] - self.vectors[k:] @ (self.joined.T @ (self.vectors.T @ values))
 
     def of(self, covariance: Array) -> Array:
         """The covariance (m, m) of values as one of contrasts, (n, n)."""
@@ -124,8 +122,7 @@ def everything_covariance(data: ResidualData, named: Sequence[EffectForm]) -> Ar
     columns = without_lacking_constants(
         data, _everything(named, [group.columns for group in named], len(data.y)), named
     )
-    covariance: Array = columns @ columns.T
-    return covariance
+    return columns @ columns.T
 
 
 def everything_at(data: ResidualData, named: Sequence[EffectForm], ahead: Sequence[Array]) -> tuple[Array, Array]:
@@ -318,8 +315,7 @@ def leave_one_out(data: ResidualData, there: Array) -> Array:
     precision = _precision(data, np.eye(len(there)) + there)
     z = precision @ (data.y / data.relative) / np.sqrt(np.maximum(np.diag(precision), 1e-12))
     spread = float(np.median(np.abs(z))) / 0.6745
-    scaled: Array = z / (spread or 1.0)
-    return scaled
+    return z / (spread or 1.0)
 
 
 def _precision(data: ResidualData, covariance: Array) -> Array:

@@ -54,8 +54,7 @@ class PredictedValues:
 
     def drawn(self, random: np.random.Generator, count: int) -> Array:
         """Values (v, count)."""
-        found: Array = self.mean[:, None] + self.factor @ random.standard_normal((len(self.mean), count))
-        return found
+        return self.mean[:, None] + self.factor @ random.standard_normal((len(self.mean), count))
 
 
 def shown_at(new: Observation, groups: Sequence[EffectForm]) -> list[Array]:

@@ -144,8 +144,7 @@ class ResidualData:
         size = np.linalg.norm(free, axis=0)
         size = np.where(size > 0, size, 1.0)
         shares = np.linalg.lstsq(free / size, columns / self.relative[:, None], rcond=UNTELLABLE)[0] / size[:, None]
-        found: Array = shares[self.base.shape[1] :]
-        return found
+        return shares[self.base.shape[1] :]
 
     @cached_property
     def q(self) -> Array:
@@ -205,8 +204,7 @@ class ResidualData:
     @cached_property
     def _inside(self) -> NDArray[np.bool_]:
         """(m,) whether a value is of a row."""
-        inside: NDArray[np.bool_] = self.row >= 0
-        return inside
+        return self.row >= 0
 
     @cached_property
     def _seen(self) -> int:
@@ -287,8 +285,7 @@ def relative_noise(problem: Problem) -> Array:
         each.sigma if each.noise_known else each.sigma * usual / np.median(each.sigma) for each in problem.observations
     ]
     sigma = np.concatenate(own)
-    relative: Array = sigma / np.median(sigma)
-    return relative
+    return sigma / np.median(sigma)
 
 
 def damped(columns: Array, y: Array) -> Array:

@@ -85,8 +85,7 @@ def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: 
 
 def _white(evidence: Evidence, group: int, share: float) -> Array:
     """The columns of a form in units of noise and background, (n, p)."""
-    white: Array = evidence.columns[:, evidence.part(group)] / np.sqrt(evidence.background.variance(share))[:, None]
-    return white
+    return evidence.columns[:, evidence.part(group)] / np.sqrt(evidence.background.variance(share))[:, None]
 
 
 def act_alike(first: Array, shown: Array, second: Array, largest_um: float) -> bool:

@@ -110,8 +110,7 @@ class Basis(ABC):
 
     def combine(self, gains: Array, u: Array, direction: Array) -> Array:
         """Several sums at once, gains (m, k) and u (n,) -> (m, n)."""
-        result: Array = gains @ self.rows(u, direction)
-        return result
+        return gains @ self.rows(u, direction)
 
 
 def check_shapes(basis: Basis) -> None:

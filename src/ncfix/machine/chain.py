@@ -61,8 +61,7 @@ def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> 
     arm = moved - np.asarray(axis.point)[:, None, None] * weight
     once = cross_with(axis.direction, arm)
     sine, versine = turn(position)
-    result: Array = moved + sine * once + versine * cross_with(axis.direction, once)
-    return result
+    return moved + sine * once + versine * cross_with(axis.direction, once)
 
 
 def _is_many(moved: Array) -> bool:
@@ -160,8 +159,7 @@ def rotated_by(vector: Array, arm: Array) -> Array:
     """By how much a rotation vector (3, ...) moves the end of an arm (3, ...): (R - 1) arm, to all digits if small."""
     first, second = se3.rotation_factors((vector * vector).sum(0))
     once = cross(vector, arm)
-    result: Array = first * once + second * cross(vector, once)
-    return result
+    return first * once + second * cross(vector, once)
 
 
 def composed(motions: Sequence[tuple[Array, Array]], rotates: bool) -> SmallMotion:
@@ -190,8 +188,7 @@ def _integrated(vector: Array, velocity: Array) -> Array:
     squared = (vector * vector).sum(0)
     second, third = se3.rotation_factors(squared)[1], se3.screw_factor(squared)
     once = cross(vector, velocity)
-    result: Array = velocity + second * once + third * cross(vector, once)
-    return result
+    return velocity + second * once + third * cross(vector, once)
 
 
 FRAME_AXES = columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -317,8 +314,7 @@ def carry(joints: tuple[JointPose, ...], moved: Array, weight: Weight = 1.0) -> 
 def carried_tips(joints: tuple[JointPose, ...], tool: GaugeLine, lengths: Array, offset: Vector) -> Array:
     """The tip of a tool of `lengths` (n,) or (1,), (3, 1, n) mm, in the frame at `offset` on the workpiece branch."""
     start = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
-    tip: Array = carry(joints, start) - columns(offset)
-    return tip
+    return carry(joints, start) - columns(offset)
 
 
 def carried_frames(joints: tuple[JointPose, ...], tool: GaugeLine, lengths: Array, offset: Vector) -> Array:

@@ -263,8 +263,7 @@ def _axes_of(machine: Machine, effect: Effect) -> list[int | None]:
 
 
 def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array:
-    found: Array = np.asarray(effect.coefficients) @ functions_at(machine, effect, q, State(direction=direction))
-    return found
+    return np.asarray(effect.coefficients) @ functions_at(machine, effect, q, State(direction=direction))
 
 
 def functions_at(machine: Machine, effect: Effect, q: Array, state: State, inputs: Iterable[str] = ()) -> Array:

@@ -183,8 +183,7 @@ def unit_twist(axes: tuple[Axis, ...], tool: GaugeLine, effect: Effect, poses: P
         velocity, turned = _at(reference, _joint_twist(axis, position, slot, motion))
         if axis.moving_frame:
             velocity, turned = (advance(axis, -position, part, weight=0.0) for part in (velocity, turned))
-    found: Array = np.concatenate([np.asarray(triad) @ part[:, 0] for part in (velocity, turned)])
-    return found
+    return np.concatenate([np.asarray(triad) @ part[:, 0] for part in (velocity, turned)])
 
 
 def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Array:

@@ -208,8 +208,7 @@ class PiecewiseConstant(Basis):
 
     def combine(self, gains: Array, u: Array, direction: Array) -> Array:
         index = np.searchsorted(np.asarray(self.positions), u, side="right")
-        result: Array = gains[:, index] * self._share(direction)
-        return result
+        return gains[:, index] * self._share(direction)
 
     def _share(self, direction: Array) -> Array:
         if self.direction == BOTH:
@@ -230,8 +229,7 @@ def ascending(name: str, values: tuple[float, ...], strictly: bool = True) -> li
 
 def _at(index: Any, values: Array, size: int) -> Array:
     """Rows that are zero but for `values` in row `index`."""
-    rows: Array = np.where(columns_like(range(size), index) == index, values, 0.0)
-    return rows
+    return np.where(columns_like(range(size), index) == index, values, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,8 +301,7 @@ class Truncated(Basis):
 
     def _above(self, u: Array) -> Array:
         """How far u is above each knot, (k, ...); zero below it."""
-        above: Array = np.maximum(u - columns_like(self.knots, u), 0.0)
-        return above
+        return np.maximum(u - columns_like(self.knots, u), 0.0)
 
     def _trend(self) -> Array:
         """Mean and slope of each function between the ends, as [a1, a2] of a1 + a2 u, (k, 2)."""

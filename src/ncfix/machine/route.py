@@ -475,5 +475,4 @@ def _error_motion(index: int, joint: JointModel) -> list[Link] | None:
 def _rigid(small: SmallMotion) -> Array:
     """A small motion of one pose as a matrix."""
     way, turn = (np.zeros(3) if part is None else part.ravel() for part in (small.translation, small.rotation))
-    motion: Array = se3.shift(way) @ se3.turn(turn, small.center.ravel())
-    return motion
+    return se3.shift(way) @ se3.turn(turn, small.center.ravel())

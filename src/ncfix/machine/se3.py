@@ -48,8 +48,7 @@ def rotation(vector: ArrayLike) -> Array:
     vector = np.asarray(vector, dtype=np.float64)
     first, second = rotation_factors((vector * vector).sum(-1))
     cross = skew(vector)
-    result: Array = np.eye(3) + first[..., None, None] * cross + second[..., None, None] * (cross @ cross)
-    return result
+    return np.eye(3) + first[..., None, None] * cross + second[..., None, None] * (cross @ cross)
 
 
 def rigid(rotation: ArrayLike, translation: ArrayLike) -> Array:

@@ -138,8 +138,7 @@ def some(values: Array, part: slice | NDArray[np.intp]) -> Array:
 
 def poses_first(values: Array, shape: tuple[int, ...]) -> Array:
     """From (..., n) to (*shape, ...), contiguous."""
-    first: Array = np.ascontiguousarray(np.moveaxis(values, -1, 0)).reshape((*shape, *values.shape[:-1]))
-    return first
+    return np.ascontiguousarray(np.moveaxis(values, -1, 0)).reshape((*shape, *values.shape[:-1]))
 
 
 TIME = "time_s"

@@ -142,8 +142,7 @@ class Problem:
     @cached_property
     def columns(self) -> Array:
         """What coefficients and set-ups do to the values, in units of the noise, at the first guess: (m, p + k)."""
-        columns: Array = np.concatenate([self.design, self.nuisance(self.start)], axis=1) / self.sigma[:, None]
-        return columns
+        return np.concatenate([self.design, self.nuisance(self.start)], axis=1) / self.sigma[:, None]
 
     def residual(self, coefficients: Array, unknowns: Array) -> Array:
         """Values minus exact predictions, (m,), mm or rad, for coefficients (p,) and unknowns (k,)."""
@@ -203,8 +202,7 @@ class Calibration:
     @property
     def sigma(self) -> Array:
         """The standard deviations of all coefficients, (p,); NaN where they were held."""
-        deviations: Array = np.sqrt(np.diag(self.covariance))
-        return deviations
+        return np.sqrt(np.diag(self.covariance))
 
     def uncertainty(self, design: Array) -> Array:
         """Standard deviation of a prediction with this design over the coefficients, (..., p) -> (...).

@@ -144,5 +144,4 @@ def _drift(plan: Measurement, model: Observation, faults: Faults, random: np.ran
     time = plan.columns.get("time_s", np.arange(len(plan), dtype=np.float64))
     share = (time - time.min()) / (float(np.ptp(time)) or 1.0)
     ways = random.uniform(-1.0, 1.0, len(model.components)) * faults.drift_um * 1e-3
-    drift: Array = np.outer(share, ways).ravel()
-    return drift
+    return np.outer(share, ways).ravel()

@@ -115,8 +115,7 @@ def orthonormal(columns: Array) -> Array:
     if not scaled.shape[1]:
         return np.zeros((len(columns), 0))
     left, values, _ = np.linalg.svd(scaled, full_matrices=False)
-    basis: Array = left[:, values > NUISANCE_RANK * values[0]]
-    return basis
+    return left[:, values > NUISANCE_RANK * values[0]]
 
 
 def inverse(matrix: Array) -> Array:
@@ -135,8 +134,7 @@ def inverse(matrix: Array) -> Array:
 def without(basis: Array, columns: Array) -> Array:
     """The part of columns (m, ...) orthogonal to an orthonormal basis (m, k); done twice, for the last digits."""
     once = columns - basis @ (basis.T @ columns)
-    twice: Array = once - basis @ (basis.T @ once)
-    return twice
+    return once - basis @ (basis.T @ once)
 
 
 def solve(

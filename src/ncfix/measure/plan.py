@@ -217,8 +217,7 @@ def _targets(
         return np.eye(len(kept))[chosen]
     places = candidates(machine, "tcp", PLACES, room, seed + 1)
     tip = machine.design(places.positions(machine), places.state(machine), selection.estimated)[:, :3]
-    scaled: Array = 1e3 * tip[:, :, kept].reshape(-1, len(kept))
-    return scaled
+    return 1e3 * tip[:, :, kept].reshape(-1, len(kept))
 
 
 def _columns(machine: Machine, selection: Selection, name: str) -> list[int]:
@@ -399,8 +398,7 @@ def information(pool: Pool, rows: Sequence[int]) -> Array:
     """The information matrix (p, p) of some blocks, with next to nothing added so that it has an inverse."""
     p = pool.blocks.shape[2]
     stacked = pool.blocks[list(rows)].reshape(-1, p)
-    total: Array = stacked.T @ stacked + RIDGE * np.eye(p) * pool.power
-    return total
+    return stacked.T @ stacked + RIDGE * np.eye(p) * pool.power
 
 
 def variances(pool: Pool, rows: Sequence[int]) -> Array:

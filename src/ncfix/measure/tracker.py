@@ -356,8 +356,7 @@ def _linear_turn(sights: Sights, readings: Array) -> Array | None:
 
 def _by(columns: Array, wanted: Array) -> Array:
     """What of some columns (m, k) others explain."""
-    explained: Array = columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
-    return explained
+    return columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
 
 
 def _starts(sights: Sights, readings: Array, places: Array) -> Iterator[Array]:

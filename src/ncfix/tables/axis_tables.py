@@ -174,8 +174,7 @@ class Region:
         """Half of what the own correction of an axis differs by between both ways, at its fine positions, (FINE,)."""
         ways = [np.eye(len(self.space))[axis] * way for way in (1.0, -1.0)]
         ahead, back = (self.means(axis, way)[0][:, axis] for way in ways)
-        half: Array = (ahead - back) / 2
-        return half
+        return (ahead - back) / 2
 
     def outputs(self, axis: int, curve: Array, target: float) -> NDArray[np.intp]:
         """The axes that tables over this one correct: itself, and those that need more than a tenth of the target."""

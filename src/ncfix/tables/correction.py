@@ -101,8 +101,7 @@ def orientation_error(machine: Machine, q: Array, correction: Array, state: Stat
 def _turn(actual: Array, meant: Array) -> Array:
     """The small rotation from frames (n, 4, 4) that are meant to the actual ones, (3, n) rad."""
     turn = actual[..., :3, :3] @ np.swapaxes(meant[..., :3, :3], -1, -2)
-    half: Array = (turn[:, [2, 0, 1], [1, 2, 0]] - turn[:, [1, 2, 0], [2, 0, 1]]).T / 2
-    return half
+    return (turn[:, [2, 0, 1], [1, 2, 0]] - turn[:, [1, 2, 0], [2, 0, 1]]).T / 2
 
 
 def ranges_of(machine: Machine, given: Ranges | None = None) -> Array:
@@ -154,8 +153,7 @@ def even_poses(space: Array, count: int) -> Array:
         ratio = (1 + ratio) ** (1 / (dimensions + 1))
     steps = ratio ** -np.arange(1.0, dimensions + 1)
     share = np.mod(0.5 + np.arange(1, count + 1)[:, None] * steps, 1.0)
-    poses: Array = space[:, 0] + share * (space[:, 1] - space[:, 0])
-    return poses
+    return space[:, 0] + share * (space[:, 1] - space[:, 0])
 
 
 def corners(space: Array) -> Array:

@@ -120,8 +120,7 @@ def on_full_grid(function: Callable[[Array], Array], lines: Sequence[Array]) -> 
 
 def hats(places: Array, nodes: Array) -> Array:
     """The weight of every node (m) at every place (n), linear between nodes and held beyond the ends: (n, m)."""
-    found: Array = np.stack([np.interp(places, nodes, row) for row in np.eye(len(nodes))], axis=1)
-    return found
+    return np.stack([np.interp(places, nodes, row) for row in np.eye(len(nodes))], axis=1)
 
 
 def spline_weights(nodes: Array, places: Array, turn: float | None = None) -> Array:
@@ -165,16 +164,14 @@ def spline_weights(nodes: Array, places: Array, turn: float | None = None) -> Ar
 
 def projector(places: Array, nodes: Array) -> Array:
     """What turns values at places (n) into the values at nodes (m) that come nearest to them in all: (m, n)."""
-    found: Array = np.asarray(np.linalg.pinv(hats(places, nodes)), dtype=np.float64)
-    return found
+    return np.asarray(np.linalg.pinv(hats(places, nodes)), dtype=np.float64)
 
 
 def between(nodes: Array, within: int = WITHIN) -> Array:
     """Nodes (n,) and evenly spaced places in the cells between them, ascending: (within (n - 1) + 1,)."""
     share = np.arange(within) / within
     inner = nodes[:-1, None] + share * np.diff(nodes)[:, None]
-    found: Array = np.append(inner.reshape(-1), nodes[-1])
-    return found
+    return np.append(inner.reshape(-1), nodes[-1])
 
 
 def fitted(values: Array, places: Sequence[Array], nodes: Sequence[Array]) -> Array:
@@ -222,8 +219,7 @@ class Bending:
         """The corrections at positions (n,), (n_lines, n, n_outputs)."""
         cell = np.clip(np.searchsorted(self.places, positions, side="right") - 1, 0, len(self.places) - 2)
         part = ((positions - self.places[cell]) / np.diff(self.places)[cell])[:, None]
-        found: Array = self.values[:, cell] * (1 - part) + self.values[:, cell + 1] * part
-        return found
+        return self.values[:, cell] * (1 - part) + self.values[:, cell + 1] * part
 
     def missed(self, nodes: Array) -> float:
         """The largest correction that evenly spaced nodes (n,) miss, mm; the outermost may lie beyond the ends."""

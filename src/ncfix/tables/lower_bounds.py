@@ -84,8 +84,7 @@ class Remainder:
         values = np.moveaxis(self.values, axis, 0)
         weights = spline_weights(self.nodes[axis], positions, 2 * np.pi if self.turns[axis] else None)
         curve = (weights @ values.reshape(len(values), -1)).reshape(len(positions), *values.shape[1:])
-        found: Array = curve[(slice(None), *np.delete(places, axis, axis=1).T)]
-        return found
+        return curve[(slice(None), *np.delete(places, axis, axis=1).T)]
 
 
 def least_worst(
@@ -290,8 +289,7 @@ def _mixed(space: Array, chosen: Array) -> Array:
     """Positions of the axes that are chosen, each with many of the others, ends first: (PLACES * OTHERS, n_axes)."""
     standing = np.concatenate([corners(space), even_poses(space, PLACES)])[:PLACES]
     varied = np.concatenate([corners(space), even_poses(space, OTHERS)])[:OTHERS]
-    q: Array = np.where(chosen, standing[:, None], varied[None]).reshape(-1, len(space))
-    return q
+    return np.where(chosen, standing[:, None], varied[None]).reshape(-1, len(space))
 
 
 def _nearest(places: Array, curve: Array, nodes: Array) -> float:

@@ -143,8 +143,7 @@ class Volume:
                 q[:, columns] = positions
                 one = exact_correction(machine, q, State(tool_length))[:, linear]
                 low, high = np.minimum(low, one), np.maximum(high, one)
-            middle: Array = (low + high) / 2 - meant
-            return middle
+            return (low + high) / 2 - meant
 
         seen = random_poses(found.ranges, SEEN, seed=19)
         meant = added(seen)
@@ -200,8 +199,7 @@ class Volume:
         else:
             low, high = (self.covered[index] / self.units[index]).tolist()
             line = even_line(low, high, count, self.anchor(index))
-        nodes: Array = np.round(line, DIGITS) * self.units[index]
-        return nodes
+        return np.round(line, DIGITS) * self.units[index]
 
     def anchor(self, index: int) -> float | None:
         """The position at which one input must have a node, in its unit of the file."""
@@ -266,8 +264,7 @@ class Volume:
 def even_line(low: float, high: float, count: int, anchor: float | None) -> Array:
     """Evenly spaced nodes from one end to the other, or as near to that as they can be with one at the anchor."""
     if anchor is None:
-        line: Array = np.linspace(low, high, count)
-        return line
+        return np.linspace(low, high, count)
     before = np.arange(count)
     with np.errstate(divide="ignore", invalid="ignore"):
         sides = [

@@ -242,8 +242,7 @@ def is_plain(values: FloatArray, decimals: IntArray) -> Mask:
 def rounded(values: FloatArray, decimals: IntArray | int) -> FloatArray:
     """What a reader makes of values (n,) written with so many decimals (for those that are `is_plain`)."""
     scale = POWERS.take(decimals)
-    result: FloatArray = np.rint(values * scale) / scale + 0.0
-    return result
+    return np.rint(values * scale) / scale + 0.0
 
 
 def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> NumberColumns:
@@ -277,8 +276,7 @@ def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8], *, s
 
 def _steps(values: FloatArray, decimals: IntArray) -> NDArray[np.uint32]:
     """How many output steps values are, the sign left out; all less than `LARGEST`."""
-    steps: NDArray[np.uint32] = np.rint(np.abs(values) * POWERS.take(decimals)).astype(np.uint32)
-    return steps
+    return np.rint(np.abs(values) * POWERS.take(decimals)).astype(np.uint32)
 
 
 def laid_out(numbers: NumberColumns) -> Texts:

@@ -172,8 +172,7 @@ class Bulk:
         alone = self.layouts.alone
         if not alone.any():
             return []
-        found: list[int] = (row + np.flatnonzero(alone[self.program.template[self.moves.block[row:stop]]])).tolist()
-        return found
+        return (row + np.flatnonzero(alone[self.program.template[self.moves.block[row:stop]]])).tolist()
 
     def take_out(self, rows: list[int]) -> None:
         """Nothing stays written of some motions of the stretch that was taken last."""
@@ -247,8 +246,7 @@ def _silenced(moves: Moves) -> Mask:
 
 def _halves(decimals: IntArray) -> FloatArray:
     """Half output steps."""
-    halves: FloatArray = 0.5 * 10.0 ** -decimals.astype(float)
-    return halves
+    return 0.5 * 10.0 ** -decimals.astype(float)
 
 
 def _is_plain(frame: Frame) -> bool:

@@ -107,8 +107,7 @@ class BacklashBodies:
         """(n_axes,) the way in which each axis came to the begin of a motion."""
         assert self.intent.arrival is not None
         first = np.broadcast_to(np.asarray(self.intent.state.direction, np.int8), self.intent.arrival.shape[1:])
-        found: Signs = self.intent.arrival[row - 1] if row else first
-        return found
+        return self.intent.arrival[row - 1] if row else first
 
     def _runs(self, axis: int) -> Runs:
         places = self.q[:, :, axis].T.ravel()  # begin and end of each leg in turn: between two, it may have moved, too
@@ -141,8 +140,7 @@ class BacklashBodies:
         along = self.intent.machine.axis_jacobian(q, self.intent.lengths(rows))[:, :3, axis]
         square = np.einsum("ki,ki->k", along, along)
         ahead = np.einsum("ki,ki->k", along, there - here) * way / np.where(square > 0, square, np.inf)
-        lost: Array = np.where(ahead > LATERAL, ahead, 0.0)
-        return lost
+        return np.where(ahead > LATERAL, ahead, 0.0)
 
     # -- what follows from it -----------------------------------------------------------------------------------------
 
@@ -202,8 +200,7 @@ class BacklashBodies:
         states = self.intent.states(rows, fraction)
         ways = np.array(states.direction)
         ways[:, axis] = side
-        tip: Array = self.intent.machine.actual_tip(q, State(states.tool_length, ways, states.inputs))
-        return tip
+        return self.intent.machine.actual_tip(q, State(states.tool_length, ways, states.inputs))
 
     def before(self, row: int) -> Array:
         """Where the bodies are as a motion begins, (n_axes,)."""

@@ -132,8 +132,7 @@ def _round_axes(intent: Intent, rows: Index) -> Array:
     count = np.maximum(
         np.cbrt(CUBIC * besides * squared / TWISTED), np.sqrt(squared * np.sqrt(QUARTIC * radius / ROUND))
     )
-    found: Array = np.ceil(count)
-    return found
+    return np.ceil(count)
 
 
 def _opening(intent: Intent, rows: Index, start: Array) -> Mask:
@@ -213,8 +212,7 @@ class Curve:
     @cached_property
     def lengths(self) -> Array:
         """The way to the begin of each, straight over what lies between cuts, (k,) mm."""
-        lengths: Array = self.first + np.cumsum(self.ways + self.gaps) - self.ways
-        return lengths
+        return self.first + np.cumsum(self.ways + self.gaps) - self.ways
 
     @property
     def total(self) -> float:
@@ -262,14 +260,12 @@ class Curve:
 
     def way(self, piece: Index, share: Array) -> Array:
         """The way along the path to shares (n,) of parabolas (n,), mm."""
-        way: Array = self.lengths[piece] + share * self.ways[piece]
-        return way
+        return self.lengths[piece] + share * self.ways[piece]
 
     def point(self, piece: Index, share: Array) -> Array:
         """The points at shares (n,) of parabolas (n,), (n, 3) mm."""
         at = share[:, None]
-        found: Array = self.begin[piece] + at * (self.slope[piece] + at * self.bend[piece])
-        return found
+        return self.begin[piece] + at * (self.slope[piece] + at * self.bend[piece])
 
     def and_then(self, other: Curve) -> Curve:
         """This path, and then another one."""
@@ -329,8 +325,7 @@ class CurvePoints:
 def arc_lengths(begin: Array, middle: Array, end: Array) -> Array:
     """Of parabolas through points (k, 3), (k,) mm: by Simpson's rule, as it were, from one chord and from two."""
     halves = distance(begin, middle) + distance(middle, end)
-    lengths: Array = (4 * halves - distance(begin, end)) / 3
-    return lengths
+    return (4 * halves - distance(begin, end)) / 3
 
 
 def distance(one: Array, other: Array) -> Array:
@@ -347,5 +342,4 @@ def length(vectors: Array) -> Array:
 def _unit(vectors: Array) -> Array:
     """Vectors (n, 3) of length 1; those without length stay."""
     size = length(vectors)
-    unit: Array = vectors / np.where(size > 0, size, 1.0)[:, None]
-    return unit
+    return vectors / np.where(size > 0, size, 1.0)[:, None]

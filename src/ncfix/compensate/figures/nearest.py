@@ -149,8 +149,7 @@ class Search:
         sure = np.flatnonzero((found.gap <= self.near) & (np.abs(ahead - self.ahead) <= SUDDEN))
         if not sure.size:
             return expected
-        better: Array = lengths + np.interp(np.arange(len(lengths)), sure, ahead[sure])
-        return better
+        return lengths + np.interp(np.arange(len(lengths)), sure, ahead[sure])
 
     def _downhill(self, points: Array, expected: Array) -> Nearest:
         down = self._down_compiled if core.engaged() else self._down
@@ -229,8 +228,7 @@ class Search:
     def _cost(self, expected: Array, found: Nearest, which: Index) -> Array:
         """The measure in which a point is nearest, mm: its distance, and how far it is from where it was expected."""
         off = self.curve.way(found.piece[which], found.share[which]) - expected[which]
-        cost: Array = np.hypot(found.gap[which], ALONG * off)
-        return cost
+        return np.hypot(found.gap[which], ALONG * off)
 
     def _lacks(self, low: Array, high: Array) -> bool:
         """Whether some of these ways along the curve are not at hand."""

@@ -233,8 +233,7 @@ def _samples(intent: Intent, rows: Index, counts: Index) -> tuple[Index, Array]:
 
 def actual_tip(intent: Intent, rows: Index, fraction: Array) -> Array:
     """Where the tip of the real machine is at fractions of motions done as programmed, (k, 3) mm."""
-    tip: Array = intent.machine.actual_tip(intent.joints_at(rows, fraction), intent.states(rows, fraction))
-    return tip
+    return intent.machine.actual_tip(intent.joints_at(rows, fraction), intent.states(rows, fraction))
 
 
 Correct = Callable[[Array, Array, float], Array]
@@ -252,8 +251,7 @@ def tip_with(correct: Correct) -> Tip:
         for length in np.unique(lengths):
             some = lengths == length
             corrected[some] += correct(q[some], ways[some], float(length))
-        actual: Array = intent.machine.actual_tip(corrected, states)
-        return actual
+        return intent.machine.actual_tip(corrected, states)
 
     return tip
 

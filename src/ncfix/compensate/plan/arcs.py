@@ -190,5 +190,4 @@ def _sound(
 
 def turns_begun(sweep: Array) -> Array:
     """How many turns, full ones and the last, a control is told of: a little more than one is next to nothing to it."""
-    begun: Array = np.ceil(np.abs(sweep) / (2 * np.pi) - TURNED)
-    return begun
+    return np.ceil(np.abs(sweep) / (2 * np.pi) - TURNED)

@@ -76,8 +76,7 @@ def farthest(table: Array) -> Array:
 
 def lengths(vectors: Array) -> Array:
     """The lengths (n,) of vectors (n, k)."""
-    size: Array = np.sqrt(squares(vectors))
-    return size
+    return np.sqrt(squares(vectors))
 
 
 def squares(vectors: Array) -> Array:

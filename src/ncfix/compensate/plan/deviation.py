@@ -153,8 +153,7 @@ def straight_bounds(
     least, angle = bow.of(np.abs(end - start), most_far, float(np.abs(tool_lengths).max()), ~linear)
     sizes = [lengths(each) for each in (*shifts, shifts[1] - shifts[0])]
     turned = (np.maximum(sizes[0], sizes[1]) * angle + 2 * sizes[2]) * angle
-    most: Array = least + CORNER * turned / 8 + CLOSE
-    return most
+    return least + CORNER * turned / 8 + CLOSE
 
 
 def deviations_seen(

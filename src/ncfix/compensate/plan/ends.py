@@ -375,8 +375,7 @@ def commands_of_positions(
     nominal, corrected = positions
     here, there = (commands_from_joints(machine, q, tcp, lengths) for q in positions)
     still = every(nominal == corrected)[:, None]
-    result: Array = programmed + np.where(still, 0.0, there - here)
-    return result
+    return programmed + np.where(still, 0.0, there - here)
 
 
 def along(intent: Intent, rows: Index, fraction: Array) -> PoseSequence:

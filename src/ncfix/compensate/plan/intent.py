@@ -267,8 +267,7 @@ def crooked(intent: Intent) -> Mask:
     if intent.mute is None or not arcs.any():
         return np.zeros(len(arcs), dtype=bool)
     in_plane = np.abs(intent.moves.normal) < SQUARE
-    result: Mask = arcs & (in_plane & intent.mute).any(axis=1)
-    return result
+    return arcs & (in_plane & intent.mute).any(axis=1)
 
 
 def lacking(intent: Intent, rows: Index) -> Index:

@@ -171,8 +171,7 @@ def programmed_tip(machine: Machine, commands: Array) -> Array:
     if moves_as_one(machine):
         return _tip_by_linear_axes(machine, commands, np.flatnonzero(~machine.rotary))
     maps, offset = affine_tip(machine, _rotary_at_zero(machine, commands))
-    tip: Array = (maps @ commands[:, linear_columns(machine), None])[..., 0] + offset
-    return tip
+    return (maps @ commands[:, linear_columns(machine), None])[..., 0] + offset
 
 
 def _tip_by_linear_axes(machine: Machine, q: Array, axes: Index) -> Array:

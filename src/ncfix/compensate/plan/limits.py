@@ -168,8 +168,7 @@ def excess(machine: Machine, joints: Joints, motion: Index, curved: Mask, ends: 
 
     def beyond(which: Index, fraction: Array) -> Array:
         q = joints(motion[rows[near[which]]], fraction)
-        found: Array = _beyond(machine, q)[np.arange(len(which)), axis[which]]
-        return found
+        return _beyond(machine, q)[np.arange(len(which)), axis[which]]
 
     found = _highest(beyond, low, high)
     best[near, axis] = np.maximum(best[near, axis], found)

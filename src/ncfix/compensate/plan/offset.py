@@ -294,8 +294,7 @@ def _from_wedge(gap: Array, come: Array, go: Array) -> Array:
         size: Array = np.sqrt(np.maximum(square - np.maximum(*rays) ** 2, 0.0))
         return size
 
-    result: Array = np.maximum(to_rays(1.0), to_rays(-1.0))
-    return result
+    return np.maximum(to_rays(1.0), to_rays(-1.0))
 
 
 def _dot(vectors: Array, others: Array) -> Array:
@@ -305,10 +304,8 @@ def _dot(vectors: Array, others: Array) -> Array:
 
 def _flat(vectors: Array, up: Array) -> Array:
     """The parts of vectors (k, 3) in planes."""
-    result: Array = vectors - _dot(vectors, up)[:, None] * up
-    return result
+    return vectors - _dot(vectors, up)[:, None] * up
 
 
 def _unit(vectors: Array) -> Array:
-    result: Array = vectors / np.maximum(lengths(vectors), 1e-300)[:, None]
-    return result
+    return vectors / np.maximum(lengths(vectors), 1e-300)[:, None]

@@ -125,8 +125,7 @@ def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
     way = lengths(pieces.end - start)
     whole = np.repeat(sums(way, counts), counts)
     share = np.where(jumps, np.maximum(way / np.maximum(whole, 1e-300), LEAST_SHARE), span)
-    result: Array = share / np.repeat(sums(share, counts), counts)
-    return result
+    return share / np.repeat(sums(share, counts), counts)
 
 
 SAMPLED = 0.02
@@ -350,8 +349,7 @@ def in_pieces(
 
 def _bows(deviation: Array, tolerance: float) -> Array:
     """About how many pieces motions will need that deviate so much: one per bow."""
-    bows: Array = np.sqrt(np.where(np.isfinite(deviation), deviation, 0.0) / tolerance) + 1
-    return bows
+    return np.sqrt(np.where(np.isfinite(deviation), deviation, 0.0) / tolerance) + 1
 
 
 def _pieces(intent: Intent, real: Segments, rows: Index, deviation: Array, tolerance: float) -> Array:

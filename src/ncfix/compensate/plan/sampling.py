@@ -82,8 +82,7 @@ def bends_closely(intent: Intent, rows: Index) -> Array:
 
 def too_long(intent: Intent, rows: Index) -> Mask:
     """Motions (k,) on which the error may bend so often that they are not looked at closely enough."""
-    found: Mask = DENSITY * bends(intent, rows) >= MOST
-    return found
+    return DENSITY * bends(intent, rows) >= MOST
 
 
 def reach(intent: Intent, rows: Index) -> Array:
@@ -100,8 +99,7 @@ def _arc_ways(intent: Intent, rows: Index) -> Array:
     """What X Y Z move along arcs, (k, 3) mm, from above."""
     moves = intent.moves
     in_plane = np.sqrt(np.maximum(1 - moves.normal[rows] ** 2, 0.0))
-    ways: Array = (arc_radii(intent, rows) * np.abs(moves.sweep[rows]))[:, None] * in_plane
-    return ways
+    return (arc_radii(intent, rows) * np.abs(moves.sweep[rows]))[:, None] * in_plane
 
 
 def arc_radii(intent: Intent, rows: Index) -> Array:

@@ -149,8 +149,7 @@ def _next_trial(at: Index, near: Index, far: Index, stop: Index, step: Index) ->
     """The next end to be tried, where `near` is good and `far` is not, or has not been tried if it is behind `stop`."""
     half = (near + far) // 2
     back = np.where(near > at + 1, half, np.maximum(far - step, half))
-    trial: Index = np.where(far > stop, np.minimum(near + step, stop), back)
-    return trial
+    return np.where(far > stop, np.minimum(near + step, stop), back)
 
 
 WIDEST = 0.95 * np.pi
@@ -230,8 +229,7 @@ class RoundGrid:
         return arcs.arc, arcs.centre
 
     def _turn(self, first: Index, last: Index) -> Array:
-        turn: Array = self.sweep[first] * (self.grid.fraction[last] - self.grid.fraction[first])
-        return turn
+        return self.sweep[first] * (self.grid.fraction[last] - self.grid.fraction[first])
 
     def _between(self, first: Index, last: Index) -> tuple[Segments, Array]:
         """The pieces, and the shares (flat) of each at which its inner nodes are."""

@@ -286,8 +286,7 @@ def _within_travel(machine: Machine, q: Array, turn: Array) -> Array:
 
 def apply(matrices: Array, vectors: Array) -> Array:
     """Matrices (n, i, j) times vectors (n, j)."""
-    result: Array = (matrices @ vectors[..., None])[..., 0]
-    return result
+    return (matrices @ vectors[..., None])[..., 0]
 
 
 def damped(tilts: Array, error: Array, most: float) -> tuple[Array, Mask]:
@@ -317,8 +316,7 @@ def _across(nominal: Array, machine: Machine) -> Array:
     first = np.cross(tool, np.eye(3)[np.argmin(np.abs(tool))])
     first /= np.linalg.norm(first)
     pair = np.stack([first, np.cross(tool, first)])
-    result: Array = pair @ np.swapaxes(nominal[:, :3, :3], 1, 2)
-    return result
+    return pair @ np.swapaxes(nominal[:, :3, :3], 1, 2)
 
 
 def small_turn(actual: Array, nominal: Array) -> Array:
@@ -422,8 +420,7 @@ def rotary_shift(errors: list[Array], point: Array, as_printed: bool = True) -> 
         actual = _about(actual, 2, b if as_printed else c)
         actual = _about(actual, 1, -b if as_printed else b)
         actual = _about(actual, 0, a)
-    result: Array = actual - point
-    return result
+    return actual - point
 
 
 def _about(points: Array, axis: int, angle: Array) -> Array:

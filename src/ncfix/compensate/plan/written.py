@@ -59,8 +59,7 @@ class WrittenPieces:
     @cached_property
     def span(self) -> Array:
         """The part of the motion that each piece covers, (m,)."""
-        span: Array = self.pieces.fraction - self.before
-        return span
+        return self.pieces.fraction - self.before
 
     @cached_property
     def segments(self) -> Segments:
@@ -97,8 +96,7 @@ class WrittenPieces:
     @cached_property
     def correction(self) -> Array:
         """What is added to the axis positions of the program at the end of each piece, (m, n_axes) mm and rad."""
-        added: Array = self.done - self.programmed
-        return added
+        return self.done - self.programmed
 
 
 TURNED = 1e-12
@@ -163,15 +161,13 @@ def on_digits(intent: Intent, pieces: Pieces, among: Index | None = None) -> Pie
 def _newly_written(moves: Moves, pieces: Pieces, among: Index) -> Index:
     """Straight pieces with a rotary position that the program does not have as a number of its own."""
     turned = some((picked(pieces.end, among) != picked(moves.end, pieces.move[among]))[:, moves.rotary])
-    rows: Index = among[turned & ~pieces.kept[among] & ~pieces.arc[among]]
-    return rows
+    return among[turned & ~pieces.kept[among] & ~pieces.arc[among]]
 
 
 def _rounded(angle: Array, machine: Machine) -> Array:
     """Angles (rad) rounded to the decimals (of degrees) that the least increment needs."""
     decimals = decimals_for(float(np.degrees(machine.least_increment[1])))
-    result: Array = np.radians(np.round(np.degrees(angle), decimals))
-    return result
+    return np.radians(np.round(np.degrees(angle), decimals))
 
 
 def without_idle(moves: Moves, pieces: Pieces, emission: Emission, first: int = 0) -> Pieces:
@@ -226,8 +222,7 @@ def _shares(pieces: Pieces, left: Index) -> Array | None:
     if pieces.share is None:
         return None
     begins = np.append(0, left[:-1] + 1)
-    result: Array = np.add.reduceat(pieces.share, begins)
-    return result
+    return np.add.reduceat(pieces.share, begins)
 
 
 CENTRE = 2.0

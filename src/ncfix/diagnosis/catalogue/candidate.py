@@ -218,8 +218,7 @@ def _straight(length: float, powers: int) -> Array:
     """Mean, and slope if `powers` is 2, of what `smooth` loads."""
     places = _spline_places(-1.0, 1.0, PIECES)
     straight = np.linalg.qr(places[:, None] ** np.arange(powers))[0]
-    found: Array = straight @ (straight.T @ smooth_loading(length))
-    return found
+    return straight @ (straight.T @ smooth_loading(length))
 
 
 def harmonic_variances(count: int) -> tuple[float, ...]:

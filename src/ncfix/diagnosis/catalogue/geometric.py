@@ -106,8 +106,7 @@ def _of_pitch(index: int, count: int) -> Array:
     variances[0, index] = harmonic_variances(3)
     variances[1, index] = 0.3 * np.asarray(harmonic_variances(3))
     whole = weighed(variances.ravel())
-    kept: Array = whole[:, whole.any(axis=0)]
-    return kept
+    return whole[:, whole.any(axis=0)]
 
 
 def _lost(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:

@@ -250,14 +250,12 @@ class FirstOrder:
             ])
             for each, seen in pairs
         ])  # fmt: skip
-        changed: Array = self.y + UM * (values - problem.values)
-        return changed
+        return self.y + UM * (values - problem.values)
 
     def of_places(self, measurements: Sequence[Measurement]) -> Array:
         """(m,) values minus what the file says at other positions, or with other tools, um."""
         seen = Problem.of(measurements, self.now.problem.machine, self.now.problem.selection)
-        changed: Array = UM * seen.residual(seen.selection.start, seen.start)
-        return changed
+        return UM * seen.residual(seen.selection.start, seen.start)
 
     @property
     def rows(self) -> Index:

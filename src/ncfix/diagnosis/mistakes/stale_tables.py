@@ -49,8 +49,7 @@ def _shown(seen: ResidualData, basis: Array, curves: Sequence[Effect], ways: Arr
     values = np.concatenate([np.asarray(e.coefficients) for e in curves])
     designs = np.split(seen.design(moved), len(ways), axis=1)
     columns = np.stack([design @ values for design in designs], axis=1)
-    left: Array = without(basis, columns / seen.relative[:, None]).T
-    return left
+    return without(basis, columns / seen.relative[:, None]).T
 
 
 def _bent(effect: Effect) -> bool:
