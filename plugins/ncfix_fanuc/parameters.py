@@ -38,7 +38,7 @@ UNITS: Mapping[str, Option] = {
 RECORD = re.compile(r"N(\d{1,6})(?:Q\d)?((?:[ASL]\d{1,3}[PM][-+]?\d{1,12}\.?\d*)+);?")
 PLAIN = re.compile(r"N(\d{1,6})(?:Q\d)?P([-+]?\d{1,12}\.?\d*);?")
 ENTRY = re.compile(r"([ASL])(\d+)[PM]([-+]?\d+\.?\d*)")
-PLACE = re.compile(r"([XYZABC])=?([+-]?(?:\d+\.?\d*|\.\d+))")
+PLACE = re.compile(r"([XYZABCUVW])=?([+-]?(?:\d+\.?\d*|\.\d+))")
 REFERENCE, POINTS, FIRST = "reference", "reference_points", "first"
 CLOSE = 1e-6
 """mm or degree: positions nearer to each other are one."""
@@ -97,10 +97,13 @@ def is_records(content: bytes) -> bool:
     return len(rows) > 1 and rows[0] == "%" and bool(RECORD.fullmatch(rows[1]) or PLAIN.fullmatch(rows[1]))
 
 
-def parameter_text(values: Mapping[int, Sequence[float]]) -> bytes:
-    """Records of axis parameters: number -> one value for each axis in turn."""
+def parameter_text(values: Mapping[int, Mapping[int, float]]) -> bytes:
+    """Records of axis parameters: number -> number of the axis -> value.
+
+    Axes that are not named keep what the control has: a zero would wipe out the compensation of the machine's maker.
+    """
     rows = [
-        f"N{number:05d}{''.join(f'A{n}P{_short(value)}' for n, value in enumerate(row, 1))};"
+        f"N{number:05d}{''.join(f'A{n}P{_short(value)}' for n, value in sorted(row.items()))};"
         for number, row in sorted(values.items())
     ]
     return "".join(f"{row}\n" for row in ["%", *rows, "%"]).encode()
@@ -143,14 +146,14 @@ def read_records(remarks: Remarks) -> tuple[PunchedParameter, ...]:
     return tuple(found)
 
 
-def _entries(text: str) -> list[tuple[str, float]] | None:
+def entries_of(text: str) -> list[tuple[str, float]] | None:
     """Letters and positions; None for text that says anything else, or something twice."""
     found = [PLACE.fullmatch(part) for part in re.split(r"[ ,]+", text.strip().upper()) if part]
     pairs = [(match[1], float(match[2])) for match in found if match is not None]
     return pairs if len(pairs) == len(found) == len({letter for letter, _ in pairs}) else None
 
 
-REFERENCE_FORM = SettingForm("axes with their positions, like X0,Y0,Z-10.5", lambda text: _entries(text) is not None)
+REFERENCE_FORM = SettingForm("axes with their positions, like X0,Y0,Z-10.5", lambda text: entries_of(text) is not None)
 
 
 def placing_assumption(name: str) -> Assumption:
@@ -177,17 +180,25 @@ PLACING_OPTIONS: Mapping[str, Option] = {
 }
 
 
+def references(request: Request, settings: Mapping[str, str]) -> dict[str, float]:
+    """The reference positions that the setting names, mm or degree.
+
+    Raises `UsageError` NCF485 for an axis that the machine lacks.
+    """
+    given = dict(entries_of(settings[REFERENCE]) or ())
+    names = request.machine.axis_names
+    if strange := sorted(set(given) - set(names)):
+        text = f"{REFERENCE} names {', '.join(strange)}, and the machine has {' '.join(names)}"
+        raise UsageError.of("NCF485", text, hint=REFERENCE_FORM.hint)
+    return given
+
+
 def anchors(request: Request, settings: Mapping[str, str], inputs: Sequence[str]) -> tuple[float, ...]:
     """The reference position along each axis of a grid, mm or degree.
 
     Raises `UsageError` NCF485 where it is not in the range of the grid, or said of an axis that the machine lacks.
     """
-    machine = request.machine
-    given = dict(_entries(settings[REFERENCE]) or ())
-    strange = sorted(set(given) - set(machine.axis_names))
-    if strange:
-        text = f"{REFERENCE} names {', '.join(strange)}, and the machine has {' '.join(machine.axis_names)}"
-        raise UsageError.of("NCF485", text, hint=REFERENCE_FORM.hint)
+    machine, given = request.machine, references(request, settings)
     for name in inputs:
         index = machine.axis_names.index(name)
         low, high = (float(value) / machine.axes[index].unit for value in request.space[index])
@@ -295,8 +306,8 @@ class BacklashAmounts:
     def files(self) -> dict[str, bytes]:
         """The parameter as it is punched; no file if there is no play."""
         return (
-            {BACKLASH_FILE: parameter_text({BACKLASH_PARAMETER: [float(each) for each in self.amounts]})}
-            if any(self.amounts)
+            {BACKLASH_FILE: parameter_text({BACKLASH_PARAMETER: found})}
+            if (found := {n: float(each) for n, each in enumerate(self.amounts, 1) if each})
             else {}
         )
 

@@ -16,11 +16,21 @@ from numpy.typing import NDArray
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.axis_tables import positioning
 from ncfix.tables.compensation import Compensation
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, whole
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_own_axis
-from ncfix.tables.table_files import DEGREE, TURNING, Remarks, check_all, in_order, messages_of
-from ncfix_fanuc.parameters import UNITS, is_records, parameter_text, read_records, sense_of, sign_option, units_of
+from ncfix.tables.table_files import DEGREE, TURNING, Remarks, check_all, in_order, messages_of, unit_of
+from ncfix_fanuc.parameters import (
+    PLACING_OPTIONS,
+    UNITS,
+    is_records,
+    parameter_text,
+    read_records,
+    references,
+    sense_of,
+    sign_option,
+    units_of,
+)
 from ncfix_fanuc.pitch_files import (
     LARGEST_INCREMENT,
     MOST_PITCH_MAGNIFICATION,
@@ -35,7 +45,8 @@ from ncfix_fanuc.pitch_files import (
     read_pitches,
 )
 
-FIRST_NUMBER = 1
+MOST_NUMBER = 9999
+"""Of a point: beyond any control's."""
 THOUSANDTHS = 360_000
 """Of a degree in a turn."""
 
@@ -49,7 +60,7 @@ class FanucPitch(Control):
     properties = Properties(
         value_sign="as --set sign says",
         input_signal="setpoint",
-        position_frame="reference position: machine zero",
+        position_frame="the reference position (PITCH-4)",
         unit="detection unit times magnification, increments",
         quantum=(1e-4, 1e-4 * DEGREE),
         extrapolation="the sum up to the first or last point is held",
@@ -75,17 +86,33 @@ class FanucPitch(Control):
         ),
         Assumption(
             "PITCH-3",
-            "Parameters 3620 to 3625 and the punched form N..A1P..A2P.. are those of this control.",
+            "Parameters 3620 to 3625, punched as N..A1P..A2P.., are those of this control; its axes are counted in "
+            "the order X Y Z A B C U V W of those that the machine has.",
             "B-63330EN (15i), B-63980EN",
             "so",
-            "Punch the parameters of the control and compare the form.",
+            "Punch the parameters of the control and compare the form; parameter 1020 has the names of the axes.",
+        ),
+        Assumption(
+            "PITCH-4",
+            "The reference position of every axis is machine zero, unless --set reference says otherwise.",
+            "points count from the reference position (3620)",
+            "so",
+            "Parameter 1240 is the machine coordinate of the reference position.",
         ),
     )
-    options: ClassVar[Mapping[str, Option]] = {"sign": sign_option("PITCH-1"), **UNITS}
+    options: ClassVar[Mapping[str, Option]] = {
+        "sign": sign_option("PITCH-1"),
+        **UNITS,
+        **PLACING_OPTIONS,
+        "first_number": Option("1", "number of the first point that is free on the control", whole(0, MOST_NUMBER)),
+    }
     steps = (
         "Settle PITCH-1 on the machine.",
         "Save parameters and pitch data; set parameter 3605#0 to 0 (one table for both ways).",
-        "Set the parameters of parameters.txt, switch power off and on (alarm PW1102 tells of wrong point numbers).",
+        "See that no axis which is not written here uses the point numbers below (its 3621 to 3622): "
+        "--set first_number=... begins behind them.",
+        "Set the parameters of parameters.txt, switch power off and on (alarm PW1102 tells of wrong point numbers). "
+        "Axes that are not in it keep theirs.",
         "Type in the increments of the pitch_*.csv files at the numbers given.",
         "Home all axes and measure one again: the error must have become smaller, not twice as large.",
     )
@@ -98,17 +125,21 @@ class FanucPitch(Control):
         axes, turning = in_order(request.machine), {axis.name for axis in request.machine.axes if axis.rotary}
         tables, notes = curves(request), []
         found: list[Pitch] = []
+        places = references(request, settings)
         for axis in axes:
-            number = found[-1].last + 1 if found else FIRST_NUMBER
-            made = pitch_of(request, axis, tables.get(axis, ()), sense * units[int(axis in turning)], number)
+            number = found[-1].last + 1 if found else int(settings["first_number"])
+            step, at = sense * units[int(axis in turning)], places.get(axis, 0.0)
+            made = pitch_of(request, axis, tables.get(axis, ()), step, number, at)
             if made is not None:
                 found.append(made)
                 notes.append(_said(made, units))
             elif axis in tables:
-                notes.append(_unsaid(axis, at_zero(tables[axis])))
+                notes.append(_unsaid(axis, at_reference(tables[axis], at)))
         files = {f"pitch_{each.axis}.csv": pitch_text(each) for each in found}
-        files[PARAMETERS] = parameter_text(_parameters(found, axes))
-        words = (settings["sign"], settings["detection_unit_um"], settings["detection_unit_deg"], "".join(axes))
+        if found:
+            files[PARAMETERS] = parameter_text(_parameters(found, axes))
+        words = [settings["sign"], settings["detection_unit_um"], settings["detection_unit_deg"], "".join(axes)]
+        words += [f"{axis}{at!r}" for axis, at in places.items()]
         files[SETTINGS] = (" ".join(words) + "\n").encode()
         notes.append("The way back needs a table of its own (3605#0); what is written is the mean of both ways.")
         notes.append(f"{SETTINGS} is for ncfix emulate only; the control does not read it.")
@@ -155,21 +186,18 @@ def _unsaid(axis: str, correction: float) -> str:
     rotary = axis in TURNING
     size = f"{correction / DEGREE:.4g} degree" if rotary else f"{1000 * correction:.1f} um"
     return (
-        f"{axis}: no points. Increments count from machine zero, where the correction is {size}, and without that they "
-        f"take nothing off. A reference position that is shifted by it, and an axis that is measured again, help."
+        f"{axis}: no points. Increments count from the reference position, where the correction is {size}, and without "
+        f"that they take nothing off. A reference position that is shifted by it, and the axis measured again, help."
     )
 
 
-def _parameters(pitches: list[Pitch], axes: tuple[str, ...]) -> dict[int, list[float]]:
-    by_axis = {each.axis: each for each in pitches}
-    rows: dict[int, list[float]] = {number: [] for number in NUMBERS.values()}
-    for axis in axes:
-        each = by_axis.get(axis)
-        values = (
-            (each.reference, each.first, each.last, each.magnification, each.interval, each.turn) if each else [0] * 6
-        )
+def _parameters(pitches: list[Pitch], axes: tuple[str, ...]) -> dict[int, dict[int, float]]:
+    """By number, and number of the axis; only of axes that have points."""
+    rows: dict[int, dict[int, float]] = {number: {} for number in NUMBERS.values()}
+    for each in pitches:
+        values = (each.reference, each.first, each.last, each.magnification, each.interval, each.turn)
         for number, value in zip(NUMBERS.values(), values, strict=True):
-            rows[number].append(float(value))
+            rows[number][axes.index(each.axis) + 1] = float(value)
     return rows
 
 
@@ -182,35 +210,40 @@ def curves(request: Request) -> dict[str, tuple[Grid, ...]]:
     return found
 
 
-def at_zero(tables: tuple[Grid, ...]) -> float:
-    """The correction at the reference position, mm or rad: what increments cannot say."""
-    return float(np.mean([table.at(np.zeros((1, 1)))[0, 0] for table in tables]))
+def at_reference(tables: tuple[Grid, ...], at: float) -> float:
+    """The correction at the reference position (mm or degree), mm or rad: what increments cannot say."""
+    place = np.array([[at * unit_of(tables[0].inputs[0])]])
+    return float(np.mean([table.at(place)[0, 0] for table in tables]))
 
 
-def pitch_of(request: Request, axis: str, tables: tuple[Grid, ...], step: float, number: int) -> Pitch | None:
+def pitch_of(
+    request: Request, axis: str, tables: tuple[Grid, ...], step: float, number: int, at: float
+) -> Pitch | None:
     """The increments of an axis; twice as many points as the curve needs, and twice again, while that rounds less.
 
     step    what a detection unit adds to a correction, mm or rad: below zero where increments are errors
     number  the first point that is free
+    at      the reference position, mm or degree
     """
     if not tables:
         return None
     cells = len(tables[0].nodes[0]) - 1
-    best = _with_cells(request, axis, tables, step, number, cells)
+    best = _with_cells(request, axis, tables, step, number, cells, at)
     while best is not None and best.magnification > 1 and 2 * cells < MOST_POINTS - 1:
         cells *= 2
-        best = _with_cells(request, axis, tables, step, number, cells)
+        best = _with_cells(request, axis, tables, step, number, cells, at)
     return best
 
 
 def _with_cells(
-    request: Request, axis: str, tables: tuple[Grid, ...], step: float, number: int, cells: int
+    request: Request, axis: str, tables: tuple[Grid, ...], step: float, number: int, cells: int, at: float
 ) -> Pitch | None:
-    """The increments with about so many intervals, if they make the axis better: the value at zero cannot be said.
+    """The increments with about so many intervals, if they make the axis better: that at the reference is not said.
 
     Points are numbered so that the reference position has a number of zero or more, wherever it lies. The first and the
     last point of a turn are one place, and have the same value (B-63980EN, p. 100). A turn has a whole number of
-    intervals, which are whole thousandths of a degree: the control counts in them.
+    intervals, which are whole thousandths of a degree: the control counts in them. An outermost point beyond the travel
+    has the value that makes the end of the travel right.
     """
     column = request.machine.axis_names.index(axis)
     described = request.machine.axes[column]
@@ -219,16 +252,19 @@ def _with_cells(
     while turn and cells < MOST_POINTS - 1 and THOUSANDTHS % cells:
         cells += 1
     interval = 360.0 / cells if turn else math.ceil((high - low) / cells * 1000) / 1000
-    first, last = (0, cells) if turn else _ends(low, high, interval)
+    first, last = (0, cells) if turn else _ends(low - at, high - at, interval)
     if last - first + 1 > MOST_POINTS:
         raise RefusedError.of(
             "NCF484", f"{axis} needs {last - first + 1} points, and the control has {MOST_POINTS} for an axis"
         )
-    places = np.arange(first, last + 1) * interval * described.unit
+    places = (at + np.arange(first, last + 1) * interval) * described.unit
     lowest, highest = request.space[column]
     inside = lowest + np.mod(places - lowest, 2 * np.pi) if turn else np.clip(places, lowest, highest)
     mean = np.mean([table.at(inside[:, None])[:, 0] for table in tables], axis=0)
-    curve: Array = mean - at_zero(tables)
+    for end, next_ in () if turn else ((0, 1), (-1, -2)):
+        slope = (mean[end] - mean[next_]) / (inside[end] - inside[next_])
+        mean[end] += slope * (places[end] - inside[end])
+    curve: Array = mean - at_reference(tables, at)
     if turn:
         curve[-1] = curve[0]
     increments, magnification = diffused(curve / step)
@@ -237,11 +273,11 @@ def _with_cells(
     if turn:
         increments[0] = increments[-1]
     number = max(number, first)
-    return Pitch(axis, number, increments, number - first, magnification, interval, turn)
+    return Pitch(axis, number, increments, number - first, magnification, interval, turn, at)
 
 
 def _ends(low: float, high: float, interval: float) -> tuple[int, int]:
-    """The first and last whole number of intervals from zero that hold a range."""
+    """The first and last whole number of intervals from the reference position that hold a range."""
     first = math.floor(low / interval + 1e-9)
     return first, max(math.ceil(high / interval - 1e-9), first + 1)
 

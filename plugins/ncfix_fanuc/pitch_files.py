@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from ncfix.tables.compensation import Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import TURNING, Remarks, as_number, unit_of
-from ncfix_fanuc.parameters import SIGNS, read_records, sense_of
+from ncfix_fanuc.parameters import SIGNS, entries_of, read_records, sense_of
 
 LARGEST_INCREMENT = 7
 MOST_POINTS = 128
@@ -39,10 +39,11 @@ class Pitch:
     first          number of the first point
     increments     (n,) times magnification times detection unit: what is added on the way from the point before; of a
                    turn the first is the last one again
-    reference      number of the point at machine zero
+    reference      number of the point at the reference position
     magnification  factor
     interval       mm or degree
     turn           travel of a turn, degree; 0 for an axis that does not turn round
+    at             machine coordinate of the reference position, mm or degree
     """
 
     axis: str
@@ -52,6 +53,7 @@ class Pitch:
     magnification: int
     interval: float
     turn: float = 0.0
+    at: float = 0.0
 
     @property
     def last(self) -> int:
@@ -102,21 +104,24 @@ def read_pitches(files: Files) -> tuple[tuple[Term, ...], list[Remarks]]:
     head = Remarks.of(SETTINGS, files.get(SETTINGS, b""))
     words = " ".join(head.rows).split()
     units = [as_number(word) or 0.0 for word in words[1:3]]
-    if len(words) != 4 or words[0] not in SIGNS or not all(1e-6 <= unit <= 10 for unit in units):
-        head.refuse(0, "should hold the sign, two detection units and the axes", "PITCH-1")
+    places = entries_of(" ".join(words[4:]))
+    if len(words) < 4 or words[0] not in SIGNS or not all(1e-6 <= unit <= 10 for unit in units) or places is None:
+        head.refuse(0, "should hold the sign, two detection units, the axes, and reference positions if any", "PITCH-1")
         return (), [head]
+    tables = [name for name in sorted(files) if name.startswith("pitch_") and name.endswith(".csv")]
     parameters = Remarks.of(PARAMETERS, files.get(PARAMETERS, b""))
-    values = {record.number: dict(record.values) for record in read_records(parameters)}
+    punched = read_records(parameters) if tables or PARAMETERS in files else ()
+    values = {record.number: dict(record.values) for record in punched if record.kind == "A"}
     remarks, terms = [head, parameters], []
-    for name in sorted(files):
-        if name.startswith("pitch_") and name.endswith(".csv"):
-            axis = name[len("pitch_") : -len(".csv")]
-            found = Remarks.of(name, files[name])
-            remarks.append(found)
-            pitch = _pitch(found, axis, words[3], values)
-            if pitch is not None and not found.wrong:
-                unit = unit_of(axis) * (units[1] if axis in TURNING else units[0] / 1000)
-                terms.append(Term((_grid(pitch, sense_of(words[0]) * unit),)))
+    for name in tables:
+        axis = name[len("pitch_") : -len(".csv")]
+        found = Remarks.of(name, files[name])
+        remarks.append(found)
+        pitch = _pitch(found, axis, words[3], values)
+        if pitch is not None and not found.wrong:
+            unit = unit_of(axis) * (units[1] if axis in TURNING else units[0] / 1000)
+            pitch = replace(pitch, at=dict(places).get(axis, 0.0))
+            terms.append(Term((_grid(pitch, sense_of(words[0]) * unit),)))
     return tuple(terms), remarks
 
 
@@ -172,6 +177,6 @@ def _grid(pitch: Pitch, unit: float) -> Grid:
     sums = np.cumsum(pitch.increments)
     at_zero = int(np.clip(pitch.reference - pitch.first, 0, len(sums) - 1))
     counts = np.arange(pitch.first - pitch.reference, pitch.last - pitch.reference + 1, dtype=np.float64)
-    nodes: Array = pitch.interval * unit_of(pitch.axis) * counts
+    nodes: Array = unit_of(pitch.axis) * (pitch.at + pitch.interval * counts)
     values = (sums - sums[at_zero]) * pitch.magnification * unit
     return Grid((pitch.axis,), (nodes,), (pitch.axis,), values[:, None].astype(np.float64), (bool(pitch.turn),))

@@ -73,6 +73,18 @@ def test_the_result_reads_back_with_its_covariance():
     assert any(effect.covariance for effect in again.effects)
 
 
+def test_no_source_is_forgotten():
+    """Each calibration may find other errors: the machine says where those that it leaves alone came from."""
+    known = loads(
+        dumps(machine("three_axis").replace(provenance={}).known_from({"date": "2025-03-01", "source": "laser.csv"}))
+    )
+    assert "earlier" not in known.provenance
+    for source in ("bar.csv", "bar.csv", "plate.csv"):
+        known = loads(dumps(known.known_from({"date": "2026-01-01", "source": source})))
+    assert known.provenance["source"] == "plate.csv"
+    assert known.provenance["earlier"] == ["2025-03-01 laser.csv", "2026-01-01 bar.csv"]
+
+
 def test_squarenesses_of_two_axes_are_one_angle():
     known = machine("three_axis").replace(effects=())
     data = simulate(plan(known, "tcp", 60), known, Faults(noise_um=1.0), seed=3)

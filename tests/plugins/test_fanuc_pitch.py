@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ncfix.diagnostics import ConfigError, RefusedError
+from ncfix.diagnostics import ConfigError, RefusedError, UsageError
 from ncfix.machine import Effect, load, loads
 from ncfix.machine.basis import Fourier, Polynomial
 from ncfix.tables.control import Request, get_control
@@ -60,7 +60,7 @@ def test_sums_are_never_off_by_more_than_half_a_step(values: list[float]) -> Non
 def test_golden_bytes() -> None:
     """20 um at -200 to -30 um at 300, in units of 1 um: intervals of 62.5 mm, 6.25 units each.
 
-    They count from zero, so the first and the last reach beyond the travel, and have 1.25 and 5 units.
+    They count from zero, so the first and the last reach beyond the travel, with values that are right at its ends.
     """
     found = long_screw()
     assert set(found) == {"pitch_X.csv", "parameters.txt", "settings.txt"}
@@ -71,16 +71,16 @@ def test_golden_bytes() -> None:
         b"1,0",
     ]
     values = [int(line.split(b",")[1]) for line in lines[3:]]
-    assert sum(values) == -50
-    assert set(values) == {-7, -6, -5, -1}
+    assert sum(values) == -56
+    assert set(values) == {-7, -6}
     assert found["parameters.txt"].splitlines() == [
         b"%",
-        b"N03620A1P5A2P0A3P0;",
-        b"N03621A1P1A2P0A3P0;",
-        b"N03622A1P10A2P0A3P0;",
-        b"N03623A1P1A2P0A3P0;",
-        b"N03624A1P62.5000A2P0A3P0;",
-        b"N03625A1P0A2P0A3P0;",
+        b"N03620A1P5;",
+        b"N03621A1P1;",
+        b"N03622A1P10;",
+        b"N03623A1P1;",
+        b"N03624A1P62.5000;",
+        b"N03625A1P0;",
         b"%",
     ]
 
@@ -143,6 +143,28 @@ def test_nothing_of_the_parameter_sample_is_lost(shared: Callable[[str], Path]) 
     assert "\n".join(["%", *map(punched, records), "%", ""]).encode() == content
 
 
+def test_axes_without_a_table_keep_what_the_control_has() -> None:
+    """No zero for them: it would wipe out the compensation of the machine's maker. Points begin where they are free."""
+    machine = single_error("EYY").replace(effects=(Effect("EYY", (1e-4,), Polynomial((1,))),))
+    settings = {**SETTINGS, "first_number": "200"}
+    made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, settings), 100).native
+    rows = made["parameters.txt"].decode().splitlines()[1:-1]
+    assert all(re.fullmatch(r"N0362[0-5]A2P[\d.]+;", row) for row in rows)
+    assert "N03621A2P200;" in rows
+
+
+@pytest.mark.parametrize("at", [-120.0, 90.0])
+def test_increments_count_from_the_reference_position(at: float) -> None:
+    """0.1 um per mm: what is at the reference position cannot be said. That is left, and half of a magnified unit."""
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (1e-4,), Polynomial((1,))),))
+    settings = {**SETTINGS, "reference": f"X{at}"}
+    made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, settings), 500)
+    half = 0.5e-4 * int(re.findall(rb"N03623A1P(\d+)", made.native["parameters.txt"])[0])
+    assert made.left.after == pytest.approx(np.full(500, abs(at) * 1e-4), abs=half + 1e-5)
+    with pytest.raises(UsageError, match="reference names B"):
+        export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, {**SETTINGS, "reference": "B1"}), 50)
+
+
 def test_a_magnification_beyond_the_control_is_refused() -> None:
     with pytest.raises(RefusedError) as caught:
         diffused(np.array([0.0, 900.0]))
@@ -166,10 +188,11 @@ BROKEN = {
     "no head": (("pitch_X.csv", b"no,value\n", b""), "should begin with no,value"),
     "other numbers": (("parameters.txt", b"N03622A1P10", b"N03622A1P11"), "the parameters say 1 to 11"),
     "no interval": (("parameters.txt", b"N03624A1P62.5000", b"N03624A1P0"), "an interval of zero"),
-    "a parameter gone": (("parameters.txt", b"N03623A1P1A2P0A3P0;\n", b""), "not all parameters of axis 1"),
+    "a parameter gone": (("parameters.txt", b"N03623A1P1;\n", b""), "not all parameters of axis 1"),
     "no tape marks": (("parameters.txt", b"%\n", b""), "begin and end with a line %"),
     "no record": (("parameters.txt", b"N03625A1P0", b"N03625A1=0"), "is no record"),
-    "two kinds": (("parameters.txt", b"N03625A1P0", b"N03625S1P0"), "several kinds"),
+    "two kinds": (("parameters.txt", b"N03625A1P0", b"N03625A1P0S2P0"), "several kinds"),
+    "of a spindle": (("parameters.txt", b"N03625A1P0", b"N03625S1P0"), "not all parameters of axis 1"),
     "no sign": (("settings.txt", b"correction", b"plus"), "the sign"),
 }
 

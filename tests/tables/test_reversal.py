@@ -92,7 +92,7 @@ def test_it_can_be_left(control: str) -> None:
 def test_the_grid_of_fanuc_makes_up_for_the_way_home(home: str) -> None:
     """Nothing is added on the way home: half of the play is in the grid, with the sign of that way."""
     made = exported("fanuc", with_play(0.004), home_minus=home)
-    assert made.native["backlash.txt"] == b"%\nN01851A1P-40A2P0A3P0;\n%\n"
+    assert made.native["backlash.txt"] == b"%\nN01851A1P-40;\n%\n"
     ways = np.array([[1.0, 0, 0], [-1.0, 0, 0]])
     found = made.tables.at(("X", "Y", "Z"), np.zeros((2, 3)), ways)
     assert found[:, 0] == pytest.approx([-0.002, 0.002], abs=1e-9)
@@ -112,7 +112,7 @@ FANUC_BROKEN = {
     "another parameter": (b"N01851", b"N01850", "parameter 1850 is not for here"),
     "a fraction": (b"P-40", b"P-40.5", "whole numbers"),
     "too large": (b"P-40", b"P-40000", "whole numbers from -9999"),
-    "a fourth axis": (b"A3P0", b"A4P7", "axes 1 to 3"),
+    "a fourth axis": (b";\n%", b"A4P7;\n%", "axes 1 to 3"),
     "cut off": (b";\n%\n", b";\n", "begin and end with a line %"),
 }
 

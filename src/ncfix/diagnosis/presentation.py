@@ -367,4 +367,4 @@ def with_provenance(diagnosis: Diagnosis) -> Machine:
         "gap_after_um": round(diagnosis.gap.after, 3),
         "noise_um": round(diagnosis.gap.floor, 3),
     }
-    return diagnosis.machine.replace(provenance={**diagnosis.machine.provenance, **notes})
+    return diagnosis.machine.known_from(notes)

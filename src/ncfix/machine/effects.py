@@ -334,7 +334,8 @@ def facts(machine: Machine) -> dict[str, str]:
     sizes = {"least increment": machine.least_increment, "largest correction": machine.max_correction}
     rows = {"topology": machine.topology, "control": machine.control or ""}
     rows |= {name: f"{linear:g} mm, {np.degrees(rotary):g} deg" for name, (linear, rotary) in sizes.items()}
-    rows |= {str(name): str(value) for name, value in machine.provenance.items()}
+    for name, value in machine.provenance.items():
+        rows[str(name)] = "; ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
     return {name: value for name, value in rows.items() if value}
 
 

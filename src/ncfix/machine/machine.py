@@ -128,6 +128,16 @@ class Machine:
         bare = self.replace(name="", control=None, provenance={}, effects=effects, axes=axes)
         return hashlib.sha256(dumps(bare).encode()).hexdigest()[:12]
 
+    def known_from(self, notes: Mapping[str, Any]) -> Machine:
+        """With further provenance. Where its errors came from before stays under `earlier`, the newest last."""
+        kept = dict(self.provenance)
+        earlier = kept.pop("earlier", [])
+        earlier = list(earlier) if isinstance(earlier, (list, tuple)) else [earlier]
+        if "source" in kept and kept["source"] != notes.get("source"):
+            earlier.append(" ".join(str(kept[key]) for key in ("date", "source") if key in kept))
+        history = {"earlier": earlier} if earlier else {}
+        return self.replace(provenance={**kept, **notes, **history})
+
     @cached_property
     def depends_on_tool_length(self) -> bool:
         """Whether the error of the tip depends on the length of the tool."""

@@ -114,7 +114,7 @@ def _machine(problem: Problem, estimate: Estimate, scale: float, figures: dict[s
     notes["calibrated_by"] = f"ncfix {__version__}"
     told = {key: value for key, value in figures.items() if value == value}
     rounded = {key: round(value, 3) if isinstance(value, float) else value for key, value in told.items()}
-    return machine.replace(effects=tuple(effects), provenance={**problem.machine.provenance, **notes, **rounded})
+    return machine.replace(effects=tuple(effects)).known_from({**notes, **rounded})
 
 
 def _known(effect: Effect, covariance: Array) -> Effect:
