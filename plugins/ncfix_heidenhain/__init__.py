@@ -20,7 +20,13 @@ HEIDENHAIN = Dialect(
     grammar="klartext.lark",
     suffixes=(".h",),
     signature=(BEGIN_PGM,),
-    foreign=(("a text without BEGIN PGM", rb"(?is)\A(?!.*\bBEGIN[ \t]+PGM\b)"),),
+    foreign=(
+        ("a text without BEGIN PGM", rb"(?is)\A(?!.*\bBEGIN[ \t]+PGM\b)"),
+        (
+            "Klartext with an N before each block number, which has to be taken out",
+            rb"(?im)^[ \t]*/?[ \t]*(N\d+[ \t]+(?:L|CC|TOOL|CYCL|BEGIN|BLK)\b)",
+        ),
+    ),
     comment="; {}",
     closure_mm=0.016,
     closure_relative=0.0,

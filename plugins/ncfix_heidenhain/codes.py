@@ -53,4 +53,11 @@ KLARTEXT_CODES: dict[str, Code] = {
         "corrected; by how much the errors differ across what is milled stays, and is not in the figures.",
         "Mill what has to be exact all round by blocks of its own.",
     ),
+    "NCF281": Code(
+        "The program measures the tool",
+        "TCH PROBE 31, 33, 481, 483 and their like write the length that they find into the tool table. Where the axes "
+        "stand follows from that length, and ncfix goes by the one that it is given. A tenth of a millimetre between "
+        "the two changes a correction by some nanometres.",
+        "Give the length that the tool has when it cuts, not that before it is measured.",
+    ),
 }

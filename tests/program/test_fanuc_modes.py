@@ -35,6 +35,8 @@ def motions(text: str) -> list[list[float]]:
         ("G43H2G0Z0.\nH3Z0.\nH0Z0.\nG49Z0.", [[0, 0, 20], [0, 0, 30], [0, 0, 0], [0, 0, 0]]),
         ("G43H3G0Z0.\nG49Z0.\nG43Z0.", [[0, 0, 30], [0, 0, 0], [0, 0, 30]]),
         ("G43H2G0Z0\nG10L10P2R7.\nG43H2Z0", [[0, 0, 20], [0, 0, 7]]),
+        ("G43H2G0Z0.\nG10L3\nP1L10\nT3H3\nG11\nG0Z1.", [[0, 0, 20], [0, 0, 21]]),
+        ("G43H2G0Z0.\nG10L3\nP1L10\nG0Z1.\nH3Z0", [[0, 0, 20], [0, 0, 21], [0, 0, 30]]),
         ("H4\nG43G0Z0.\nG49.1Z0.", [[0, 0, 40], [0, 0, 0]]),
         ("G27Z5.\nG0X1.", [[0, 0, 5], [1, 0, 5]]),
         ("G30P2Z0.\nG0X1.", [[0, 0, 0], [0, 0, 290], [1, 0, 290]]),
@@ -73,6 +75,11 @@ def test_after_skipping_the_code_before_it_is_in_force_again() -> None:
         ("G68X0Y0\nG0X1.Y1.", "the angle of the rotation"),
         ("G43H2G0Z0\nG10L10P2R7.\nZ1.", "changed while it is in force"),
         ("G43H2G0Z0\n#11002=7.\nZ1.", "changed while it is in force"),
+        ("G0X5.\nG16Y90.", "only one of radius and angle"),
+        ("G0X5.\nG91G16Y90.", "only one of radius and angle"),
+        ("G0X5.\nG91G92X1.\nG90X2.", "what G92 counts from in G91"),
+        ("M98P7L0\nG0X1.\nM30\nO7\nM99", "a call with L0"),
+        ("G65P7L0\nG0X1.\nM30\nO7\nM99", "a call with L0"),
         ("G91G68X1.Y0R30.\nG90G0X1.Y1.", "count from in G91"),
         ("G68R30.\nG91G68R30.\nG90G0X1.Y1.", "count from in G91"),
         ("G0X1.Y1.\nG68X0Y0R30.\nX2.", "until both axes are named"),
@@ -133,11 +140,19 @@ def test_calls_that_are_not_certain_are_errors(text: str) -> None:
         ("G43G0Z0.", "NCF217"),
         ("G0A90.\nG43.4H1", "NCF218"),
         ("G43.4H1\nG0A90.\nH2", ""),
+        ("G18G81X1.Z2.Y-5.R3.F50.", "NCF245"),
+        ("G19G43H1Z5.", "NCF245"),
+        ("G43H1Z5.\nG18G2X1.R3.F50.", ""),
     ],
 )
 def test_what_cannot_be_seen_in_the_program_is_said(text: str, code: str) -> None:
     codes = {message.code for message in follow(text, "XYZA", setup=SETUP, dialect="fanuc").messages}
-    assert codes & {"NCF217", "NCF218"} == ({code} if code else set())
+    assert codes & {"NCF217", "NCF218", "NCF245"} == ({code} if code else set())
+
+
+def test_a_feature_coordinate_system_of_haas_is_refused_until_it_ends() -> None:
+    found = follow("G0X1.\nG268X1.Y0Z0I10.\nG253\nG0X2.Y1.Z3.\nG269\nG0X1.Y2.Z3.", setup=SETUP, dialect="haas")
+    assert ["G253" in why or "G268" in why for why in reasons(found)] == [False, True, True, False]
 
 
 @pytest.mark.parametrize(("dialect", "refused"), [("haas", True), ("fanuc", False)])

@@ -56,8 +56,8 @@ WORKED: dict[str, tuple[str, list[list[float]]]] = {
     ),
     "bits": ("G0X[12AND10]Y[12OR10]Z[12XOR10]", [[8, 14, 6]]),
     "precedence: functions, then * / AND, then + - OR, then relations": (
-        "G0X[2+3*4]Y[[2+3]*4]Z[10/4-1]",
-        [[14, 20, 1.5]],
+        "G0X[2+3*4]Y[[2+3]*4]Z[10/4-1]\nX[2+3AND1]Y[1OR2+3]Z[2*3AND5]\nIF[1+1EQ2]GOTO9\nX0\nN9Z[7XOR2-1]",
+        [[14, 20, 1.5], [3, 6, 4], [3, 6, 4]],
     ),
     "common variables of large memories": (
         "#400=1.\n#900000=2.\n#907399=#900000+#400\n#98499=4.\nG0X#400Y#907399Z#98499",
@@ -100,6 +100,7 @@ WORKED: dict[str, tuple[str, list[list[float]]]] = {
     "computed codes": ("#1=1\nG#1X5.F100.\nG[#1-1]X6.", [[5, 0, 0], [6, 0, 0]]),
     "a vacant code is no code": ("G1X5.F100.\nG#9X6.", [[5, 0, 0], [6, 0, 0]]),
     "system alarms are no motion": ("IF[#1EQ#0]GOTO5\n#3000=1(NO TOOL)\nN5#3006=1(LOOK)\nG0X1.", [[1, 0, 0]]),
+    "a jump behind THEN": ("#1=1\nIF[#1EQ1]THEN GOTO5\nG0X9.\nN5G0X1.", [[1, 0, 0]]),
 }
 
 
@@ -112,6 +113,9 @@ def test_worked_by_hand(name: str) -> None:
 
 
 STOPS = {
+    "IF[1EQ1AND2EQ2]GOTO5\nN5": "NCF110",
+    "IF[1EQ1]GOTO5G0X1.\nN5": "NCF110",
+    "GOTO5G0X1.\nN5": "NCF110",
     "G0X[1/0]": "NCF210",
     "G0X[SQRT[-1.]]": "NCF210",
     "#0=5": "NCF212",
@@ -135,8 +139,8 @@ def test_where_the_control_stops(text: str) -> None:
     from ncfix.text.reader import read
     from program.tracing import KNOWN
 
-    program = read(f"{text}\nM30\n".encode(), "part", "fanuc")
     with pytest.raises(SourceError) as caught:
+        program = read(f"{text}\nM30\n".encode(), "part", "fanuc")
         tracing.trace(program, replace(KNOWN, most_blocks=2000), ("X", "Y", "Z"), frozenset())
     assert caught.value.messages[0].code == STOPS[text]
 
@@ -145,6 +149,7 @@ def test_where_the_control_stops(text: str) -> None:
     ("text", "reason"),
     [
         ("G0X1.\n#1=#5041\nG0X[#1+1.]", "known only at run time"),
+        ("IF[1EQ2]THEN\nG0X1.\nENDIF\nG0X2.", "blocks between THEN and ENDIF are not followed"),
         ("IF[#1000EQ1]GOTO5\nG0X1.\nN5G0X2.", "which blocks are executed here is decided at run time"),
         ("#1=#3012\nG0X#1", "known only at run time"),
         ("#5201=1.\nG0X1.", "the program sets #5201"),

@@ -35,7 +35,8 @@ class Scaling:
 class MacroControl(RS274Control):
     """`RS274Control` with the decimal-point rule, polar coordinates and the variables of Macro B.
 
-    polar   radius and angle last commanded while G16 is in force, program units and degrees; None otherwise
+    polar   radius and angle last commanded while G16 is in force, program units and degrees, NaN before the program has
+            named them; None otherwise
     scaling        what G51 does to words; None without it
     mirrored       letter index -> where the axis is mirrored (G51.1), mm in the program's frame
     length_code    the code of the tool length offset in force (G43, G43.4, G44), 0 without
@@ -44,6 +45,7 @@ class MacroControl(RS274Control):
     defining, definition  P of the tilted plane that is being defined, and its blocks so far by their Q
     dynamic        the work offset turns with the tables (G254 of Haas)
     vectors        the direction of the tool is given by I J K (G43.5)
+    entering       the blocks that follow are data of tools (G10 L3)
     outside        number of the program that the block has called, if that is in the control and not at hand
     """
 
@@ -60,6 +62,7 @@ class MacroControl(RS274Control):
         self.definition: dict[int, Block] = {}
         self.dynamic = False
         self.vectors = False
+        self.entering = False
         self.outside = ""
 
     def lasting(self) -> None:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, X, Y, Z, zeros
 from ncfix.control.frames import WORLD, handed, mirrored, turned_about
 from ncfix_fanuc.macro.control import MacroControl, Scaling
+from ncfix_iso.rs274.cycles import AXES_SAID
 from ncfix_iso.rs274.groups import CONTROL, CUTTER, DISTANCE, FEED_MODE, MOTION, PLANE, RETRACT, SPINDLE_MODE
 from ncfix_iso.rs274.systems import is_turned, turned_back, unfollowed, words_of
 
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 ON, OFF = 510, 500
 REASON = "scaling (G51) is in force; --flatten writes out what its words mean"
 TOGETHER = "what {} does while scaling (G51) is in force is not certain"
-AXES_SAID = "NCF245"
 ALIKE = "scaling (G51) is taken to act on X, Y and Z alike"
 AT_PEACE = frozenset((MOTION, PLANE, DISTANCE, FEED_MODE, CUTTER, CONTROL, RETRACT, SPINDLE_MODE))
 """Groups of codes that scaling has nothing to do with."""
@@ -132,6 +132,9 @@ def put_up(control: MacroControl) -> None:
 
 
 POLAR_REASON = "polar coordinates (G16) are in force; --flatten writes them in X and Y"
+ONE_ALONE = (
+    "the program has named only one of radius and angle since G16, and from where the other counts is not certain"
+)
 POLAR_ON = 160
 
 
@@ -139,17 +142,10 @@ def switch_polar(control: MacroControl, block: Block, code: int) -> None:
     """G16 and G15."""
     if code == POLAR_ON and control.polar is None:
         control.suspend("polar", POLAR_REASON)
-        control.polar = polar_position(control)
+        control.polar = math.nan, math.nan
     elif code != POLAR_ON:
         control.resume("polar")
         control.polar = None
-
-
-def polar_position(control: MacroControl) -> tuple[float, float]:
-    """Where the control stands, as radius and angle in program units and degrees."""
-    position, plane = control.program_position(), control.modal.plane
-    first, second = position[plane.first] / control.modal.unit, position[plane.second] / control.modal.unit
-    return math.hypot(first, second), math.degrees(math.atan2(second, first))
 
 
 def cartesian(control: MacroControl, block: Block) -> Block:
@@ -159,14 +155,19 @@ def cartesian(control: MacroControl, block: Block) -> Block:
     given = [letter for letter in letters if letter in block.values]
     if control.polar is None or not given:
         return block
-    if control.modal.incremental and given == [letters[1]] and block.turn is None:
+    lone = any(math.isnan(known) and letter not in given for letter, known in zip(letters, control.polar, strict=True))
+    if control.modal.incremental and given == [letters[1]] and block.turn is None and not lone:
         return further_round(control, block, letters)
     radius, angle = (block.get(letter, known) for letter, known in zip(letters, control.polar, strict=True))
     control.polar = radius, angle
+    control.suspend("polar", ONE_ALONE if lone else POLAR_REASON)
+    if lone:
+        control.unwritten = control.unwritten or ONE_ALONE
+        radius, angle = block.get(letters[0]), block.get(letters[1])
     turn = math.radians(angle)
     block.values[letters[0]], block.values[letters[1]] = radius * math.cos(turn), radius * math.sin(turn)
     block.axes |= plane.axes
-    if control.modal.incremental or block.unknown & set(letters):
+    if lone or control.modal.incremental or block.unknown & set(letters):
         block.unknown |= set(letters)
     return block
 

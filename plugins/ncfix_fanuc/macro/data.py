@@ -5,6 +5,8 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable data input
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of
 from ncfix.control.expressions import Unknown, Value, nominal
 from ncfix.control.moves import Motion, MotionEnd, MotionKind
@@ -22,6 +24,10 @@ from ncfix_iso.rs274.systems import (
     words_of,
 )
 
+if TYPE_CHECKING:
+    from ncfix_fanuc.macro.control import MacroControl
+    from ncfix_iso.rs274.plans import RS274Plan
+
 WORK_OFFSETS = 6
 FIRST_EXTENDED, ALL_EXTENDED = 1100, 1540
 AFTER_MADE = "where the axis {} stands after motions that the control makes up is not followed"
@@ -38,8 +44,10 @@ MADE = {
     350: "holes along a line (G35)",
     360: "holes on an arc (G36)",
     371: "a grid of holes (G37.1)",
+    2530: "the turn of the tool square to a feature coordinate system (G253)",
 }
 """Motions that the control makes up."""
+SQUARE = 2530
 
 SETTING_ERRORS = {
     542: "the dynamic offset of the rotary table (G54.2), whose data are in the control, is in force",
@@ -53,8 +61,11 @@ UNFOLLOWED = {
     52: "parameters of the control (G10 L52)",
 }
 CHANGED = "the length of the tool is changed while it is in force (G10 L10, #11001), which acts sooner or later"
-HARMLESS = frozenset({3, 12, 13})
+TOOL_LIFE = 3
+HARMLESS = frozenset({TOOL_LIFE, 12, 13})
 """Tool life, and tool radii, which only the control's cutter compensation uses."""
+DATA_WORDS = frozenset("PLTHDQ")
+"""Words of the blocks between G10 L3 and G11, which select no tool and no length."""
 
 
 def extended(control: RS274Control, block: Block, code: int) -> None:
@@ -73,14 +84,16 @@ def setting_error(control: RS274Control, block: Block, code: int) -> None:
 
 def made(control: RS274Control, block: Block, code: int) -> None:
     """A text or a pocket that the control mills by itself, and the way back from a reference point."""
-    gone = {index for index in control.machine if block.axes >> index & 1 or index in (X, Y, Z)}
+    led = (X, Y, Z, *control.turning) if code == SQUARE else (X, Y, Z)
+    gone = {index for index in control.machine if block.axes >> index & 1 or index in led}
     unknown = control.unknown | dict.fromkeys(sorted(gone), AFTER_MADE)
     control.make(Motion(MotionKind.FEED, block.axes, MotionEnd(control.position[:], unknown), 0, refusal=MADE[code]))
 
 
-def set_data(control: RS274Control, block: Block, code: int) -> None:
+def set_data(control: MacroControl, block: Block, code: int) -> None:
     """G10; a block without L takes tool lengths on old controls."""
     kind = whole(block.get("L", 10.0 if "P" in block.values else -1.0), "L of G10")
+    control.entering = kind == TOOL_LIFE
     if kind == 2:
         set_offset(control, block)
     elif kind == 20:
@@ -90,6 +103,15 @@ def set_data(control: RS274Control, block: Block, code: int) -> None:
     elif kind not in HARMLESS:
         what = UNFOLLOWED.get(kind, f"data of the control (G10 L{kind})")
         control.refuse_rest(f"the program sets {what}, which ncfix does not follow")
+
+
+def is_data(plan: RS274Plan) -> bool:
+    """Whether a block is one of those behind G10 L3: words of a tool, and no code."""
+    return (
+        plan.codes is not None
+        and not (plan.codes.g or plan.codes.m or plan.codes.unknown)
+        and plan.letters <= DATA_WORDS
+    )
 
 
 def set_offset(control: RS274Control, block: Block) -> None:

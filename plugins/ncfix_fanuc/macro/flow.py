@@ -25,6 +25,7 @@ from ncfix.text.tree import Comment, Literal, Opaque, Span, Template
 from ncfix.text.tree import OWordLine as FlowItem
 from ncfix_fanuc.macro.control import MacroControl
 from ncfix_fanuc.macro.variables import number
+from ncfix_iso.rs274.flow import NO_REPEATS
 from ncfix_iso.rs274.parameters import Store
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit, has_words
 
@@ -53,6 +54,7 @@ def ran(control: MacroControl, label: str) -> None:
 
 
 BAD_JUMP = "NCF242"
+OVER_BLOCKS = "blocks between THEN and ENDIF are not followed"
 
 ONCE = dict(
     zip(
@@ -213,6 +215,8 @@ class MacroFlow(ProgramFlow[RS274Unit]):
                 return (Jump(lambda: self.target(line)),)
             case "if goto":
                 return (Jump(lambda: self.target(line), lambda: self.holds(line)),)
+            case "if then" if not has_words(unit.plan(block)):
+                return (Let(lambda: self.control.refuse_rest(OVER_BLOCKS)),)
             case "if then":
                 return (Jump(block + 1, lambda: not self.holds(line)),)
             case "do" if partner < 0:
@@ -259,6 +263,7 @@ class MacroFlow(ProgramFlow[RS274Unit]):
     def called(self, label: str, times: int, arguments: Store | None) -> OpenCall[RS274Unit] | None:
         """The call of a program; None where it is not executed, or is one of the builder's that is not at hand."""
         if times < 1:
+            self.control.refuse_rest(NO_REPEATS)
             return None
         self.check_depth(label)
         try:
@@ -303,9 +308,11 @@ class MacroFlow(ProgramFlow[RS274Unit]):
     def enter_local(self, target: int, times: int) -> None:
         """M97 of Haas: a subprogram that begins at a block N of this program."""
         found = self.outline_of(self.unit).numbered(target, self.block - 1)
-        if times > 0:
-            self.budget.foresee(times - 1)
-            self.enter(OpenCall(f"N{target}", (self.unit, found), times - 1))
+        if times < 1:
+            self.control.refuse_rest(NO_REPEATS)
+            return
+        self.budget.foresee(times - 1)
+        self.enter(OpenCall(f"N{target}", (self.unit, found), times - 1))
 
     def come_back(self, target: int | None) -> None:
         """M99: return, to a block N if one is named, or run again if the call asked for several times.

@@ -16,6 +16,7 @@ from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import coordinates, system, tilt
 from ncfix_fanuc.macro.blocks import CORNER, G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl
+from ncfix_fanuc.macro.data import is_data
 from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
 from ncfix_fanuc.macro.lengths import LENGTH_IN_STEPS, lone_number
 from ncfix_fanuc.macro.rules import MACRO
@@ -102,7 +103,7 @@ class MacroInterpreter(RS274Interpreter):
     def lane_is_open(self, plan: RS274Plan) -> bool:
         """Not while a macro is called after every motion, words are polar or directions, or a corner is put in."""
         control = self.control
-        special = control.polar is not None or control.scaling is not None or control.vectors
+        special = control.polar is not None or control.scaling is not None or control.vectors or control.entering
         return super().lane_is_open(plan) and not (special or self.modal_calls or self.cornered)
 
     def position_read(self, number: int) -> None:
@@ -126,6 +127,11 @@ class MacroInterpreter(RS274Interpreter):
     def execute_words(self, plan: RS274Plan, index: int) -> bool:
         """Execute a block of words and assignments."""
         self.moved = False
+        if self.control.entering and is_data(plan):
+            if self.watcher:
+                self.watcher.whole(self.flow.unit, index)
+            return False
+        self.control.entering = False
         self.note_command(plan)
         plan = self.without_vacant(plan)
         codes = plan.codes

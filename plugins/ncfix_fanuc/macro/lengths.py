@@ -12,6 +12,7 @@ from ncfix.text.tree import Comment, Tape, Word
 from ncfix_fanuc.macro.data import CHANGED
 from ncfix_fanuc.macro.tilt import INCLINED
 from ncfix_iso.rs274 import settings
+from ncfix_iso.rs274.cycles import AXES_SAID
 from ncfix_iso.rs274.groups import LENGTH
 from ncfix_iso.rs274.parameters import whole
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from ncfix_iso.rs274.control import Block
     from ncfix_iso.rs274.plans import Codes
 
+ALONG_Z = "a tool length in G18 or G19 is taken to act along Z"
 LENGTH_ALONE = "NCF214"
 ALONE = "a tool length without a Z word (G43, G49) is taken not to move the axis: up to the next Z word that matters"
 LENGTH_IN_STEPS = "where the axis {} stands after a tool length together with an increment (G91) is not certain"
@@ -57,6 +59,8 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
     else:
         control.length_code = code
         take_number(control, block)
+        if control.modal.plane.across != Z:
+            control.warn(AXES_SAID, ALONG_Z, "check along which axis it acts (Fanuc: parameter 5001 TLB)")
         if code in TIP_CONTROL:
             note_turned(control)
     settings.tool_offset(control, block, SAME.get(code, code))

@@ -22,7 +22,7 @@ from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE, drill, place_hole, repeats
 from ncfix_iso.rs274.groups import ISO_G, Rules, grouped
-from ncfix_iso.rs274.systems import check_system, preset_system
+from ncfix_iso.rs274.systems import check_system, preset_system, unfollowed
 
 MACRO = "macro call"
 
@@ -152,8 +152,10 @@ FANUC = Rules(
 HAAS_OFFSETS = (1540, *range(1100, 1300, 10))
 """G154 P, and its first twenty by their own names G110 to G129."""
 
-HAAS_MADE = (120, 130, 470, 700, 710, 720, 1500)
-"""Circular pockets, engraving, rows of holes, pockets: G12, G13, G47, G70 to G72, G150."""
+HAAS_MADE = (120, 130, 470, 700, 710, 720, 1500, data.SQUARE)
+"""Circular pockets, engraving, rows of holes, pockets, the turn to a feature: G12, G13, G47, G70 to G72, G150, G253."""
+HAAS_FEATURE = (2680, 2690)
+"""A feature coordinate system: G268 to G269."""
 
 HAAS_JUMP, BY_INPUT = 960, "which blocks are executed after M96 is for an input of the machine"
 HAAS = replace(
@@ -161,16 +163,18 @@ HAAS = replace(
     g_groups=FANUC_G
     | dict.fromkeys(HAAS_MADE, groups.NON_MODAL)
     | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM)
+    | dict.fromkeys(HAAS_FEATURE, groups.UNFOLLOWED)
     | {lengths.HAAS_TIP: groups.LENGTH, tilt.DYNAMIC_ON: groups.ROTATION, tilt.DYNAMIC_OFF: groups.ROTATION},
     steps={
         **FANUC.steps,
         **dict.fromkeys(HAAS_MADE, data.made),
         **dict.fromkeys(HAAS_OFFSETS, data.extended),
+        **dict.fromkeys(HAAS_FEATURE, unfollowed),
         **dict.fromkeys((tilt.DYNAMIC_ON, tilt.DYNAMIC_OFF), tilt.dynamic_offset),
         lengths.HAAS_TIP: lengths.tool_offset,
         280: references.cancelling,
     },
-    takes=FANUC.takes | set(HAAS_MADE),
+    takes=FANUC.takes | {*HAAS_MADE, *HAAS_FEATURE},
     repeats="L",
     adds_rotations=True,
 )

@@ -340,6 +340,8 @@ class Maker:
                 return self.statement(token, "program" if name == "HEAD" else "statement")
             case "TEXT":
                 return Opaque("name", span)
+            case "AXIS_NAME":
+                return Command(f"axis {normal(token)}", (), False, span)
             case "CORNER" if following and kind(following[0]) in VALUES:
                 value = following.pop(0)
                 whole = self.builder.between(edges(token)[0], edges(value)[1])

@@ -55,7 +55,8 @@ DEPTH_WORDS = frozenset({"DEPTH", "TIEFE"})
 ADJUSTING = frozenset({291, 800, 801, 880, *range(1000, 1100)})
 ADJUSTED = "cycle {} may change coordinates, for turning or grinding, in a way that is not followed"
 BUILDERS = range(300, 400)
-MEASURING = 238
+LEADING = frozenset({224, 238})
+"""A pattern in the form of a code, and a run that measures the state of the machine."""
 TILT = 19
 OF_BUILDER = "cycle {} is the machine builder's; what it does where it is defined is not known"
 BY_ITSELF = "cycle {} moves the axes by itself where it is defined"
@@ -92,7 +93,7 @@ def define(control: KlartextControl, name: str, words: MotionWords, text: str) -
         control.refuse_rest(ADJUSTED.format(cycle))
     if cycle in BUILDERS:
         control.refuse_here(OF_BUILDER.format(cycle))
-    if cycle == MEASURING:
+    if cycle in LEADING:
         control.refuse_here(BY_ITSELF.format(cycle))
     if cycle in (ON_CIRCLE, ON_LINES):
         pattern(control, pattern_of_cycle(cycle, control.scope.parameters), f"cycle {cycle}")

@@ -55,7 +55,7 @@ class KlartextPlan:
     name         what the block begins with: `l`, `cycl def 200`, `plane spatial`; empty for words alone
     words        address -> its value, of the words of the motion
     codes        M codes, each with the words that are its own
-    flags        words without values: `fmax`, `r0`, `dr+`, `stay`
+    flags        words without values: `fmax`, `r0`, `dr+`, `stay`; `axis c` of M94 and M138
     assignments  Q parameter -> its value
     flow         label, call or condition; `test` is the condition's value
     tool         the name of a tool, or the value of its number

@@ -95,6 +95,9 @@ COUNTED = "from where the axis {} counts after M126 depends on a parameter of th
 BESIDE_RETRACTION = (
     "M140 retracts the tool at the start of its block: where the words of axes beside it lead is not sure"
 )
+NAMED_AXES = frozenset({"axis a", "axis b", "axis c"})
+"""Words of M94 and M138."""
+
 COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}
 
 
@@ -142,16 +145,16 @@ def end_of_short_ways(control: KlartextControl) -> None:
 def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
     """M138: the rotary axes that tilted planes and control of the tip take into account, those of the machine again."""
     control.resume("M138")
-    turning = {LETTERS[index].lower() for index in control.turning}
-    if flags & set("abc") not in (set(), turning):
+    turning = {f"axis {LETTERS[index].lower()}" for index in control.turning}
+    if flags & NAMED_AXES not in (set(), turning):
         control.suspend("M138", CHOSEN)
 
 
 def reduce_turns(control: KlartextControl, flags: frozenset[str]) -> None:
     """M94: rotary axes, those that are named if any is, are said by an angle below a turn from here on."""
-    named = flags & set("abc")
+    named = flags & NAMED_AXES
     for index in control.turning:
-        if not named or LETTERS[index].lower() in named:
+        if not named or f"axis {LETTERS[index].lower()}" in named:
             control.position[index] %= TURN
 
 
@@ -280,8 +283,14 @@ def length_of(control: KlartextControl, number: int) -> float:
 
 PROBING = Passing(Pass.PROBING, "probing")
 MEASURED = "TCH PROBE {} makes what it measures the datum, a rotation or the kinematics: that is known only at run time"
-SETTING = frozenset({*range(400, 406), *range(408, 420), 451, 452, 453, *range(1400, 1430)})
-"""Probing cycles that do not only measure."""
+SETTING = frozenset({*range(400, 406), *range(408, 420), *range(450, 454), *range(1400, 1500)})
+"""Probing cycles that do not only measure. Those from 500 on are of builders and of probes' makers."""
+
+OF_THE_TOOL = frozenset({31, 33, 481, 483, *range(580, 590)})
+"""Cycles that measure the length of the tool in the spindle."""
+
+TOOL_MEASURED = "NCF281"
+LENGTH_MEASURED = "TCH PROBE {} measures the tool, and its length in the setup is taken to be what the control finds"
 
 SPATIAL_ANGLES = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
 OTHER_POINT = "FUNCTION TCPM with a reference point other than the tip"
@@ -352,7 +361,9 @@ def free_contour(control: KlartextControl, flow: KlartextFlow, match: re.Match[s
 def probe(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """TCH PROBE: the control moves on its own, and leaves results in Q parameters, or sets a datum by them."""
     number = int(match["number"])
-    if number in SETTING:
+    if number in OF_THE_TOOL:
+        control.warn(TOOL_MEASURED, LENGTH_MEASURED.format(number), "give the length that the tool has when it cuts")
+    elif number in SETTING or 500 <= number < 1400:
         control.suspend(PRESET, MEASURED.format(number))
     control.pass_here(PROBING, AFTER_PROBING, "XYZ")
     for each in PROBED:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, mask_of
+from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, Z, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import FeedMode, Motion, MotionEnd, MotionKind, UnknownAxes
 from ncfix_iso.rs274.control import Block, RS274Control
@@ -17,6 +17,10 @@ from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.systems import check_system, words_of
 
 BAD_CYCLE = "NCF226"
+AXES_SAID = "NCF245"
+"""A parameter of the control says on which axes a code acts."""
+ACROSS = "drilling cycles in G18 and G19 are taken to go along the axis across the plane"
+WHICH_AXIS = "check which axis the control drills along (Fanuc: parameter 5101 FXY)"
 AFTER_NONE = "where the axis {} stands after a cycle without a hole (K0, L0) differs from control to control"
 NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
 """Words without which LinuxCNC refuses to begin a cycle."""
@@ -131,6 +135,8 @@ def drill(
 ) -> None:
     """One hole: a motion by way of R to its bottom, after which the control stands at `clear` above it."""
     across = control.modal.plane.across
+    if across != Z and not control.rules.strict:
+        control.warn(AXES_SAID, ACROSS, WHICH_AXIS)
     moved = block.axes | 1 << across
     unknown = hole_unknown(control, block)
     refusal = "a word of the cycle is known only at run time" if control.modal.cycle.unknown else ""

@@ -136,10 +136,12 @@ class RS274Flattener(Flattener):
 
     def check(self) -> None:
         """Raise `Fault` where the values of a block depend on the machine at run time."""
-        block = self.values
-        if block.unknown or self.control.refusal == RUNTIME_BRANCH:
+        block, why = self.values, self.control.unwritten
+        if not why and (block.unknown or self.control.refusal == RUNTIME_BRANCH):
             what = f"the word {min(block.unknown)}" if block.unknown else "which blocks are executed"
-            raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
+            why = f"{what} is known only at run time"
+        if why:
+            raise Fault(RUNTIME, f"{why}, so the program cannot be written out flat")
 
     # -- items --------------------------------------------------------------------------------------------------------
 

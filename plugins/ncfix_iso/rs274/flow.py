@@ -26,6 +26,7 @@ MAX_CALLS = 9
 
 GLOBAL = frozenset({"sub", "endsub", "call", "return", "program"})
 ENDS_OF_LOOPS = {"endwhile": "while", "endrepeat": "repeat"}
+NO_REPEATS = "whether a call with L0 is executed differs from control to control"
 BY_CODE = "M98"
 """The kind of calls that share #1 to #30 with the caller."""
 
@@ -222,6 +223,8 @@ class OWords(ProgramFlow[RS274Unit]):
         self.budget.foresee(times)
         if times > 0:
             self.begin(label, times - 1, BY_CODE, lambda: None)
+        elif not self.control.rules.strict:
+            self.control.refuse_rest(NO_REPEATS)
 
     def begin(self, label: str, left: int, kind: str, restored: Callable[[], None]) -> None:
         """Enter a subprogram: known already, in a file of its own, or further down."""

@@ -181,14 +181,14 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         codes = plan.codes or self.computed_codes(plan)
         if codes.unknown:
             self.unknown_codes(plan, codes)
-        motion = self.motion_of(plan, codes)
+        motion, dwells = self.motion_of(plan, codes), codes.g.get(NON_MODAL) == DWELL
         if codes.takes or (motion is None and codes.g.get(LENGTH) in DYNAMIC_OFFSETS):
-            dwells, by_p = codes.g.get(NON_MODAL) == DWELL, "P" in plan.letters
-            control.claim_words(None if not dwells else "P" if by_p else DWELL_TIME)
+            control.claim_words(None if not dwells else "P" if "P" in plan.letters else DWELL_TIME)
         check_words(plan, codes, motion, control.rules)
         if plan.command is not None:
             self.command(plan.command)
-        self.note_foreign(plan)
+        if not dwells:
+            self.note_foreign(plan)
         self.settings(codes, block)
         if motion is not None:
             self.move(block, codes, motion)

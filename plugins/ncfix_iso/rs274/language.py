@@ -114,8 +114,6 @@ def unroll(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int
     flattener = RS274Flattener(interpreter.control, steps, limit)
     interpreter.watcher, interpreter.control.ends = flattener, []
     interpreter.run()
-    if why := interpreter.control.unwritten:
-        raise SourceError.of(RUNTIME, f"{why}, so the program cannot be written out flat", interpreter.place())
     lines = flattener.lines
     begins, ends = (lines[at].text.lstrip()[:1] == "%" if lines else False for at in (0, -1))
     if begins and (not ends or len(lines) == 1):

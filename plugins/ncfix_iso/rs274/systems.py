@@ -42,6 +42,7 @@ REFERENCES = {"G28": 5161, "G30": 5181}
 
 BAD_G10 = "NCF222"
 NO_PRESET = "G92.1 that names no axis, another value than zero, or stands under a tool offset is not followed"
+COUNTED_ON = "what G92 counts from in G91 differs from control to control"
 ON_TOP = "whether a shift (G52) is added to the one in force in G91 differs from control to control"
 TURNED_WITH_SHIFT = "where {} stands after a rotation while G92 is active differs from control to control"
 TURNED = "turned"
@@ -58,10 +59,19 @@ UNFOLLOWED = {
     682: ("tilt", "a tilted plane (G68.2)"),
     683: ("tilt", "a tilted plane (G68.3)"),
     684: ("tilt", "a tilted plane (G68.4)"),
+    2680: ("feature", "a feature coordinate system (G268)"),
 }
 """Codes of ISO controls that change coordinates in a way that is not followed: what they switch on, in words."""
 
-ENDS = {150: "polar", 500: "scaling", 501: "mirror", 131: "polar plane", 1130: "polar plane", 690: "tilt"}
+ENDS = {
+    150: "polar",
+    500: "scaling",
+    501: "mirror",
+    131: "polar plane",
+    1130: "polar plane",
+    690: "tilt",
+    2690: "feature",
+}
 """The codes that end them."""
 
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
@@ -290,6 +300,8 @@ def shift_system(control: RS274Control, block: Block, code: int) -> None:
     moved_while_turned(control, f"G{code // 10}")
     if code == 520 and not control.rules.strict and is_on_top(control, block):
         control.refuse_rest(ON_TOP)
+    if code == 920 and not control.rules.strict and control.modal.incremental:
+        control.refuse_rest(COUNTED_ON)
     if not control.rules.strict and code in (520, 920):
         set_local(control, block, cancelled=code == 920)
     if code == 520 and not control.rules.strict:

@@ -252,10 +252,11 @@ CODES: dict[str, Code] = {
         'Give the value in the setup file (`variables."#500" = 5.0`), or correct the program that calls the macro.',
     ),
     "NCF245": Code(
-        "Scaling is taken to act on X, Y and Z alike",
-        "G51 with one factor magnifies the axes that a parameter of the control names, usually X, Y and Z. The program "
-        "does not show it.",
-        "Check the parameter (Fanuc: 5401 SCL).",
+        "A parameter of the control says on which axes a code acts",
+        "G51 with one factor magnifies the axes that a parameter names, usually X, Y and Z. In G18 and G19 a parameter "
+        "says whether drilling cycles go along Z or across the plane, and another one along which axis a tool length "
+        "acts. The program does not show it.",
+        "Check the parameter (Fanuc: 5401 SCL, 5101 FXY, 5001 TLB).",
     ),
     "NCF246": Code(
         "Program of the control that is not at hand",

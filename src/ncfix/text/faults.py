@@ -24,7 +24,9 @@ KEYWORDS = (
     *("sub", "endsub", "call", "return", "if", "elseif", "else", "endif", "while", "endwhile", "do", "repeat"),
     *("endrepeat", "break", "continue"),
 )
+COMPARISONS = frozenset({"EQ", "NE", "GT", "GE", "LT", "LE"})
 OPERATORS = "compare with EQ, NE, GT, GE, LT or LE"
+JOINED = "[[#1 EQ 1] AND [#2 EQ 2]] joins two comparisons"
 
 HINTS = {
     "/": "block skip stands at the start of the block",
@@ -165,6 +167,8 @@ def in_expression_word(stop: Stop) -> BlockError:
     """A letter inside brackets that starts nothing the language knows there."""
     name = re.match(r"[A-Za-z]*", stop.rest)
     shown = repr(name[0]) if name and name[0] else repr(stop.at)
+    if name and name[0].upper() in COMPARISONS:
+        return stop.fault("NCF110", f"{shown} is a second comparison without brackets", JOINED)
     if stop.before in {*NUMERIC, "]", ">"} and unmatched(stop.squeezed.code) == []:
         return stop.fault("NCF110", f"{shown} is no operator", OPERATORS)
     if unmatched(stop.squeezed.code):
@@ -218,7 +222,7 @@ def in_flow(stop: Stop) -> BlockError | None:
 
 def in_word(stop: Stop) -> BlockError | None:
     """An address, a parameter or an `=` without what belongs to it; text that is no word at all."""
-    if macro := MACRO_B.match(stop.text):
+    if (macro := MACRO_B.match(stop.text)) and stop.place() < macro.end("keyword"):
         text = "this is flow control of another dialect (Macro B)"
         return BlockError("NCF110", text, macro.start("keyword"), "name it with --dialect")
     if stop.before == "=":

@@ -73,6 +73,11 @@ def test_what_has_no_beginning_is_no_klartext(shared: Callable[[str], Path]) -> 
         read(path.read_bytes(), path.name, "heidenhain")
 
 
+def test_an_n_before_block_numbers_is_refused_once() -> None:
+    with pytest.raises(SourceError, match="NCF103: this is Klartext with an N"):
+        read(b"N0 BEGIN PGM T MM\nN10 L X+1 FMAX\nN20 END PGM T MM\n", "t.h", "heidenhain")
+
+
 @pytest.mark.parametrize("name", ["iso", "linuxcnc"])
 def test_klartext_read_as_something_else_is_an_error(name: str) -> None:
     with pytest.raises(SourceError, match="NCF103"):

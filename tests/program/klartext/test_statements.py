@@ -42,6 +42,8 @@ def test_m94_and_m138_name_axes_without_numbers() -> None:
         (Rule.CORRECT, ""),
     ]
     assert [rule for rule, _ in fates("L X+1 Y+1 Z+1 M138 B C FMAX", "XYZBC")] == [Rule.CORRECT]
+    assert ends("L C+370 FMAX\nM94 C\nL C+20 F100", "XYZC")[-1] == [0, 0, 0, 20]
+    assert fates("M138 B C\nL X+1 Y+1 Z+1 FMAX", "XYZBC") == [(Rule.CORRECT, "")]
 
 
 @pytest.mark.parametrize("element", ["FLT", "FCT DR- R15 CCX+5 CCY+7", "FL X+5 Y+5", "FC DR- R18 CLSD+ CCX+2 CCY+3"])
@@ -61,11 +63,27 @@ def test_a_rapid_from_where_the_control_has_led_the_tool_is_passed(before: str) 
     assert found[-1] == (Rule.CORRECT, "")
 
 
+@pytest.mark.parametrize(
+    ("number", "said"), [(31, True), (481, True), (483, True), (583, True), (482, False), (421, False)]
+)
+def test_that_a_tool_is_measured_is_said(number: int, said: bool) -> None:
+    found = follow(f"L X+1 Y+1 Z+5 FMAX\nTCH PROBE {number}\nL X+1 Y+1 Z+1 FMAX")
+    assert [message.code for message in found.messages] == (["NCF281"] if said else [])
+    assert found.moves.rule.tolist()[-1] == Rule.CORRECT
+
+
+def test_a_pattern_of_a_code_is_no_block_that_does_nothing() -> None:
+    hole = "CYCL DEF 200 ~\n Q200=2 ~\n Q201=-5 ~\n Q203=+0 ~\n Q204=50"
+    found = fates(f"L X+1 Y+1 Z+5 FMAX\n{hole}\nCYCL DEF 224 ~\n Q216=+50\nL X+1 Y+1 Z+1 FMAX")
+    assert found[1] == (Rule.REFUSE, "cycle 224 moves the axes by itself where it is defined")
+
+
 def test_probing_cycles_that_set_a_datum() -> None:
     start = "L X+1 Y+1 Z+5 F100\n"
     (rule, reason) = fates(start + "TCH PROBE 413 DATUM OUTSIDE CIRCLE ~\n Q321=+5\nL X+1 Y+1 Z+1 FMAX")[-1]
     assert rule == Rule.REFUSE
     assert "TCH PROBE 413 makes what it measures the datum" in reason
+    assert fates(start + "TCH PROBE 510\nL X+1 Y+1 Z+1 FMAX")[-1][0] == Rule.REFUSE
     assert fates(start + "TCH PROBE 421 MEASURE HOLE ~\n Q321=+5\nL X+1 Y+1 Z+1 FMAX")[-1] == (Rule.CORRECT, "")
     again = "TCH PROBE 413 DATUM ~\n Q321=+5\nCYCL DEF 247 PRESET Q339=+1\nL X+1 Y+1 Z+1 FMAX"
     assert fates(start + again)[-1] == (Rule.CORRECT, "")
