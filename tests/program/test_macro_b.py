@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from ncfix.diagnostics import SourceError
@@ -135,13 +133,8 @@ STOPS = {
 
 @pytest.mark.parametrize("text", STOPS)
 def test_where_the_control_stops(text: str) -> None:
-    from ncfix.control import trace as tracing
-    from ncfix.text.reader import read
-    from program.tracing import KNOWN
-
     with pytest.raises(SourceError) as caught:
-        program = read(f"{text}\nM30\n".encode(), "part", "fanuc")
-        tracing.trace(program, replace(KNOWN, most_blocks=2000), ("X", "Y", "Z"), frozenset())
+        follow(f"{text}\nM30", dialect="fanuc", most_blocks=2000)
     assert caught.value.messages[0].code == STOPS[text]
 
 
