@@ -36,6 +36,7 @@ FANUC = Dialect(
     closure_mm=0.01,
     language="ncfix_fanuc.macro.language:FANUC",
     semantics="fanuc",
+    returns=rb"(?i)M[ \t]*0*99(?!\d)",
     understands=(
         "G0 G1 G2 G3 with centre or radius, helices, full circles, G17 G18 G19",
         "G90 G91, G20 G21, modal words; numbers without a decimal point by --no-point (never dropped, never added)",

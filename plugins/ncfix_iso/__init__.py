@@ -22,6 +22,7 @@ ISO = Dialect(
     passes=("G53, G28, G30, G31, dwell, G5.1, G8, G61, tool change and other M codes",),
     language="ncfix_iso.rs274.language:RS274",
     semantics="iso",
+    returns=rb"(?i)M[ \t]*0*99(?!\d)",
     refuses=(
         "G16, G51, G51.1, G12.1, G68.2 while in force, threads, incremental canned cycles without --flatten",
         "everything after a G code that is not known, or a G10 that sets other things on other controls (L10, L20)",

@@ -24,6 +24,7 @@ LINUXCNC = Dialect(
     foreign=FOREIGN,
     language="ncfix_iso.rs274.language:RS274",
     semantics="linuxcnc",
+    returns=rb"(?i)M[ \t]*0*99(?!\d)|o[ \t]*(?:<[^>]*>|\d+)[ \t]*(?:endsub|return)\b",
     understands=(
         "G0 G1 G2 G3 with centre or radius, helices, full circles, G17 G18 G19",
         "G90 G91, G20 G21, modal words and codes",

@@ -28,6 +28,7 @@ SIEMENS = Dialect(
     comment="; {}",
     closure_mm=0.01,
     closure_relative=0.0,
+    returns=rb"(?i)(?<![A-Z_])M0*17(?!\d)|(?<!\w)RET(?!\w)",
     understands=(
         "packed words, X=, AC IC DC ACP ACN, R parameters, DEF, arrays, arithmetic, functions of texts",
         "G0 G1 G2 G3 with I J K, CR=, AR=, TURN=; CIP, CT; G90 G91, G70 G71 G700 G710, DIAMON DIAM90",

@@ -106,7 +106,8 @@ def test_verify_sees_that_the_original_is_wrong(shop: Any, ncfix: Any) -> None:
     result = ncfix("verify", shop.program, shop.program, "-m", shop.machine, "--assume-zero")
     assert result.code == ExitCode.FINDINGS
     before, after, *_, verdict = result.out.decode().splitlines()
-    assert before.removeprefix("tip error before: ") == after.removeprefix("tip error after:  ")
+    figures = after.removeprefix("tip error after:  ")
+    assert before == f"tip error before: {figures} of the original"
     assert verdict.startswith("NOT within 1 um and 0.87 um of the control's digits: lines ")
     loose = ncfix("verify", shop.program, shop.program, "-m", shop.machine, "--assume-zero", "--tolerance-um", "22")
     assert loose.code == ExitCode.DONE

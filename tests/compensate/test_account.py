@@ -27,6 +27,7 @@ from ncfix.compensate.account import (
     merged,
     not_looked_at,
     rule_of,
+    said_of,
     without_figure,
 )
 from ncfix.control.moves import PASS_RULES, MotionKind, Moves, Pass, Rule
@@ -185,6 +186,13 @@ def test_what_is_left_is_said_with_lines_and_size() -> None:
     assert "9 motions (between lines 1 and 9), 2 of which cut" in more.text
     four = left("X", 9, 2, [(row, row) for row in (1, 3, 5, 7)]).message("part.nc")
     assert "(lines 1, 3, 5, 7)" in four.text
+
+
+def test_axes_left_in_the_same_motions_are_one_message() -> None:
+    same = [left(axis, 2, 1, ((4, 4), (9, 9)), most) for axis, most in zip("XYZ", (0.001, 0.003, 0.002), strict=True)]
+    said = [each.text for each in said_of([*same, left("B", 2, 1, ((4, 4), (9, 9))), left("Y")], "part.nc")]
+    assert [text.partition(" left")[0] for text in said] == ["X, Y and Z are", "B is", "Y is"]
+    assert "left where they stand in 2 motions (lines 4, 9), 1 of which cut, up to 3.00 um beside where they" in said[0]
 
 
 def test_what_is_left_as_plain_data() -> None:

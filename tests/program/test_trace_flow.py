@@ -138,7 +138,7 @@ def codes_of(source: bytes, dialect: str = "linuxcnc") -> list[str]:
 
 
 def test_the_end_is_m2_m30_m99_or_tape() -> None:
-    for end in (b"M2", b"M30", b"M99", b"G0 X2 M30"):
+    for end in (b"M2", b"M30", b"G0 X2 M30"):
         assert codes_of(b"G0 X1\n" + end + b"\nS900\n") == []
     assert codes_of(b"%\nG0 X1\n%\nnot looked at\n") == []
 

@@ -20,7 +20,7 @@ from ncfix.api.sources import (
     subprograms_of,
     write_output,
 )
-from ncfix.diagnostics import Place, RefusedError, UsageError
+from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.files import read_folder, write_folder
 from ncfix.inputs import identities
 from ncfix.outputs import check_folder
@@ -171,7 +171,7 @@ def with_program(
     import numpy as np
 
     from ncfix.compensate import FixOptions
-    from ncfix.compensate.figures.simulation import SimulatedErrors, seems_corrected, tip_errors_of, tip_with
+    from ncfix.compensate.figures.simulation import SimulatedErrors, refuse_corrected, tip_errors_of, tip_with
     from ncfix.compensate.following import follow
     from ncfix.tables.export import SIDE_FILE, ProgramWithTables, read_manifest
     from ncfix.text import stamp
@@ -191,9 +191,7 @@ def with_program(
         after = found.report.error_after_um or before
         return replace(made, files=files, program=ProgramWithTables(program.path, before, after))
     moves, names = followed.trace.moves, machine.axis_names
-    if seems_corrected(followed.machine, moves):
-        text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
-        raise RefusedError.of("NCF438", text, Place(program.path), INSTEAD)
+    refuse_corrected(followed.machine, moves, program.path, INSTEAD)
     tip = tip_with(lambda q, way, length: made.tables.for_tool(length).at(names, q, way))
     after = SimulatedErrors.of(tip_errors_of(program, followed, made=tip)).figures()
     remarks: tuple[str, ...] = ()

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from ncfix import files
-from ncfix.diagnostics import Place, UsageError
+from ncfix.diagnostics import Message, Place, UsageError
 from ncfix.plugins import registry
+from ncfix.text.dialect import goes_back
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup
 
 SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".mpf")
 """Under what a subprogram's file may go besides its name, beside the suffix of the program that calls it."""
+
+TAIL_BYTES = 1 << 12
+"""The last block of a text stands in so much of its end."""
+CODE = re.compile(rb"[ \t]*(?:\([^)]*\)[ \t]*)*[^%;(\s\0-\x1f]")
+"""A line with more than a comment and the mark of the tape."""
+PROGRAM_END = re.compile(rb"(?i)(?:[^(;]|\([^)]*\))*?(?<![A-Z])M[ \t]*0*(?:2|30)(?![\d.])")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +33,20 @@ class ProgramFile:
 
     path  as the user wrote it, or below the folder that the user named
     name  the file's own name, or its way down from that folder
+    below  it is in a folder that was named, and was not named itself
     """
 
     path: str
     name: str
+    below: bool = False
+
+    @property
+    def left_out(self) -> Message | None:
+        """Why a program that was not named itself is left out: other programs call it. None if it is not."""
+        if not (self.below and is_subprogram(self.path)):
+            return None
+        text = "is a subprogram, and is corrected in the programs that call it, with --flatten"
+        return Message("NCF258", text, Place(self.path), "name the file itself to correct it as a program of its own")
 
 
 def program_files(given: Iterable[str], apart: str | None = None) -> list[ProgramFile]:
@@ -57,7 +75,7 @@ def _below(folder: str, apart: str | None) -> list[ProgramFile]:
     for path in _files(folder, apart):
         suffix = os.path.splitext(path)[1].lower()
         if suffix in known and not os.path.islink(path) and os.path.isfile(path):
-            found.append(ProgramFile(path, path[len(folder) :].lstrip(os.sep)))
+            found.append(ProgramFile(path, path[len(folder) :].lstrip(os.sep), below=True))
     if not found:
         hint = f"programs in folders have one of these suffixes: {' '.join(sorted(known))}; or name the files"
         raise UsageError.of("NCF014", "there is no program in this folder", Place(folder), hint)
@@ -75,6 +93,20 @@ def _files(folder: str, apart: str | None) -> Iterator[str]:
         if apart is not None and os.path.isdir(apart):
             folders[:] = [name for name in folders if not os.path.samefile(os.path.join(here, name), apart)]
         yield from (os.path.join(here, name) for name in sorted(names) if not name.startswith("."))
+
+
+def is_subprogram(path: str) -> bool:
+    """Whether the last block of a text goes back to what has called it, in any dialect, and no block ends a program."""
+    try:
+        with open(path, "rb") as handle:
+            handle.seek(max(0, os.fstat(handle.fileno()).st_size - TAIL_BYTES))
+            blocks = [line for line in handle.read().splitlines() if CODE.match(line)]
+            if not blocks or not any(goes_back(blocks[-1], each) for each in registry("dialects").values()):
+                return False
+            handle.seek(0)
+            return not any(PROGRAM_END.match(line) for line in handle)
+    except OSError:
+        return False  # whoever reads it says why
 
 
 @dataclass(frozen=True, slots=True)

@@ -278,8 +278,8 @@ def _changes(
     from ncfix.cli.shop.changes import show_changes
 
     only, before = group_of(context).programs, context.meta.setdefault(BATCHES, [])
-    paths = [each.path for each in program_files(programs, apart) if only is None or each.path in only]
-    before += [show_changes(job, path, motions, as_json) for path in paths]
+    wanted = [each for each in program_files(programs, apart) if only is None or each.path in only]
+    before += [show_changes(job, each, motions, as_json) for each in wanted]
     if (code := after_next_groups(context)) is not None:
         return code
     if as_json:

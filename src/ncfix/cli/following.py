@@ -63,13 +63,13 @@ class FollowingSetup:
             return traced(program, self.machine, self.setup, subprograms(self.setup, path))
         return trace(program, self.setup, *self._axes(program), subprograms(self.setup, path))
 
-    def checked(self, program: Program, path: str) -> Checked:
-        """What is found in a program."""
+    def checked(self, program: Program, path: str, flatten: bool = False) -> Checked:
+        """What is found in a program; `flatten`: it may be written out flat."""
         from ncfix.compensate.checking import check_alone, check_on
 
         if self.machine is None:
             return check_alone(program, self.setup, *self._axes(program), subprograms(self.setup, path))
-        return check_on(program, self.machine, self.setup, subprograms(self.setup, path))
+        return check_on(program, self.machine, self.setup, subprograms(self.setup, path), flatten)
 
     def _axes(self, program: Program) -> tuple[tuple[str, ...], frozenset[str]]:
         """The axes of the machine, or without one those that the program names; and which of them turn."""

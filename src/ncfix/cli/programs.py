@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from ncfix.batch.programs import program_files
+from ncfix.batch.programs import ProgramFile, program_files
 from ncfix.cli import console
 from ncfix.cli.following import FollowingSetup, dialect_in, parts_of, task_of, through
 from ncfix.cli.options import PATH, dialect_option, force_option, json_option, optional_machine_option, table_option
@@ -17,7 +18,7 @@ from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import ProjectCommand, TableCommand, after_next_groups, group_of, project_options
 from ncfix.cli.streams import HeldOutput, Source, source_of
 from ncfix.cli.targets import Outputs, shown, targets
-from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
+from ncfix.diagnostics import ExitCode, Message, NcfixError, UsageError, visible
 
 if TYPE_CHECKING:
     from ncfix.cli.columns import Columns
@@ -43,9 +44,9 @@ def _in_parts(following: FollowingSetup, source: Source) -> Found:
     return survey_on(task_of(following, source, dialect), source.read), dialect.name
 
 
-def _whole(following: FollowingSetup, source: Source) -> Found:
+def _whole(following: FollowingSetup, source: Source, flatten: bool) -> Found:
     program = following.read(source.path, source.everything())
-    return following.checked(program, source.path), program.dialect.name
+    return following.checked(program, source.path, flatten), program.dialect.name
 
 
 @click.command(cls=ProjectCommand)
@@ -53,10 +54,16 @@ def _whole(following: FollowingSetup, source: Source) -> Found:
 @optional_machine_option
 @dialect_option
 @setup_options
+@click.option("--flatten", is_flag=True, help="With a machine file: find what is refused though it is written flat.")
 @project_options
 @json_option
 def check(
-    programs: tuple[str, ...], machine_path: str | None, dialect: str | None, given: SetupOptions, as_json: bool
+    programs: tuple[str, ...],
+    machine_path: str | None,
+    dialect: str | None,
+    given: SetupOptions,
+    flatten: bool,
+    as_json: bool,
 ) -> int:
     """Read each PROGRAM, of a folder all below it, and follow it as the control would. Writes nothing.
 
@@ -64,10 +71,12 @@ def check(
     findings.
     """
     following = FollowingSetup.of(machine_path, dialect, given)
+    if flatten and following.machine is None:
+        raise UsageError.of("NCF001", "--flatten is for what a correction would refuse", hint="-m FILE")
     context = click.get_current_context()
     only, outcomes = group_of(context).programs, context.meta.setdefault(OUTCOMES, [])
-    paths = (program.path for program in program_files(programs))
-    outcomes += [_outcome(following, path) for path in paths if only is None or path in only]
+    wanted = (each for each in program_files(programs) if only is None or each.path in only)
+    outcomes += [_outcome(following, each, flatten) for each in wanted]
     if (code := after_next_groups(context)) is not None:
         return code
     if as_json:
@@ -75,13 +84,17 @@ def check(
     return max(int(code) for code, _ in outcomes)
 
 
-def _outcome(following: FollowingSetup, path: str) -> tuple[int, dict[str, Any]]:
+def _outcome(following: FollowingSetup, file: ProgramFile, flatten: bool) -> tuple[int, dict[str, Any]]:
     """What is found in one program: the exit code, and the entry in the JSON object."""
+    path = file.path
     entry: dict[str, Any] = {"path": shown(path)}
+    if why := file.left_out:
+        console.tell(why)
+        return ExitCode.DONE, {**entry, "left_out": True, "findings": []}
     try:
         with console.busy(f"checking {shown(path)}"), source_of(path) as source:
-            in_parts, whole = (lambda: _in_parts(following, source)), (lambda: _whole(following, source))
-            checked, dialect = through([source], in_parts, whole)
+            whole = partial(_whole, following, source, flatten)
+            checked, dialect = through([source], whole if flatten else partial(_in_parts, following, source), whole)
     except NcfixError as error:
         console.tell(*error.messages)
         return error.exit_code, {**entry, "errors": [message.as_dict() for message in error.messages]}

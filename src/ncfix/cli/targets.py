@@ -6,7 +6,7 @@ import errno
 import os
 import sys
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import IO
 from weakref import WeakSet
 
@@ -68,6 +68,7 @@ class OutputTarget:
     made      digests of what ncfix itself has written there: with `resume`, that may be replaced
     name      the output's way down from the output folder; empty if there is none
     root      the output folder, as the user named it; None if there is none
+    program   the input as it was found in a folder; None: it was not
     """
 
     source: str
@@ -78,6 +79,7 @@ class OutputTarget:
     name: str = ""
     root: str | None = None
     made: frozenset[str] = frozenset()
+    program: ProgramFile | None = None
 
     @property
     def is_own(self) -> bool:
@@ -169,9 +171,9 @@ def targets(
     if outputs.base is not None:
         from ncfix.project import way_below
 
-        programs = [ProgramFile(each.path, way_below(outputs.base, each.path) or each.name) for each in programs]
+        programs = [replace(each, name=way_below(outputs.base, each.path) or each.name) for each in programs]
     if outputs.in_place:
-        found = [OutputTarget(program.path, program.path, in_place=True) for program in programs]
+        found = [OutputTarget(program.path, program.path, in_place=True, program=program) for program in programs]
     else:
         found = [_target(program, outputs, folder) for program in programs]
     _check_clash(found)
@@ -203,7 +205,8 @@ def _target(program: ProgramFile, outputs: Outputs, folder: str | None) -> Outpu
             hint = f"-o {os.path.join(folder, 'NAME')}"
             raise UsageError.of("NCF003", "standard input has no name to be written under", Place(folder), hint)
         path = os.path.join(folder, program.name)
-        return OutputTarget(program.path, path, False, outputs.force, outputs.resume, program.name, folder)
+        how = (False, outputs.force, outputs.resume, program.name, folder)
+        return OutputTarget(program.path, path, *how, program=program)
     if outputs.output is None and program.path != STREAM:
         raise UsageError.of("NCF003", "no output given", hint="-o FILE, -o DIR, -o - or --in-place")
     return OutputTarget(program.path, outputs.output or STREAM, force=outputs.force)

@@ -159,7 +159,8 @@ def verify(
 
 def verdict(found: Compared, tolerance_um: float) -> Iterator[str]:
     """What was found, for people."""
-    yield f"tip error before: {console.error_figures(found.before)}"
+    at = " of the original" if found.before.get("where") else ""
+    yield f"tip error before: {console.error_figures(found.before)}{at}"
     yield f"tip error after:  {console.error_figures(found.after)}"
     if (found.left_out["max"] or 0.0) > max(tolerance_um + found.rounding_um, found.after["max"] or 0.0):
         yield f"intended path not reached: {console.error_figures(found.left_out)} of the original"

@@ -9,7 +9,7 @@ because an axis must get no word: by axis, with its lines.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -126,16 +126,21 @@ class LeftAxis:
         stretches, most = merged(self.stretches, other.stretches), max(self.most, other.most)
         return LeftAxis(self.axis, self.rotary, motions, cuts, stretches, most)
 
-    def message(self, path: str) -> Message:
-        """In words."""
+    def message(self, path: str, *others: LeftAxis) -> Message:
+        """In words; `others`: axes that were left in the same motions."""
         if self.motions == 1:
             many = f"this motion, which {'cuts' if self.cuts else 'cuts nothing'}"
         else:
-            many = f"{self.motions} motions ({self._where()}), {self.cuts or 'none'} of which cut"
-        far = f"{np.degrees(self.most):.4g} degrees" if self.rotary else f"{self.most * 1e3:.2f} um"
+            cutting = {0: "none", self.motions: "all"}.get(self.cuts, self.cuts)
+            many = f"{self.motions} motions ({self._where()}), {cutting} of which cut"
+        most = max(each.most for each in (self, *others))
+        far = f"{np.degrees(most):.4g} degrees" if self.rotary else f"{most * 1e3:.2f} um"
+        they, are, stand = ("they", "are", "stand") if others else ("it", "is", "stands")
+        axes = ", ".join(each.axis for each in (self, *others[:-1]))
+        axes += f" and {others[-1].axis}" if others else ""
         text = (
-            f"{self.axis} is left where it stands in {many}, up to {far} beside where it should be: "
-            "the program has not said where it is, or the control offsets or rounds the contour there"
+            f"{axes} {are} left where {they} {stand} in {many}, up to {far} beside where {they} should be: "
+            f"the program has not said where {they} {are}, or the control offsets or rounds the contour there"
         )
         return Message("NCF439", text, Place(path, self.first), HINT if self.cuts else "")
 
@@ -213,6 +218,14 @@ def either(found: Sequence[Mapping[str, LeftAxis]]) -> dict[str, LeftAxis]:
                 most=max(own.most, left.most),
             )
     return in_order(together)
+
+
+def said_of(left: Iterable[LeftAxis], path: str) -> list[Message]:
+    """What there is to say of axes that were left; of those left in the same motions once."""
+    alike: dict[object, list[LeftAxis]] = {}
+    for each in left:
+        alike.setdefault((each.rotary, each.motions, each.cuts, each.stretches), []).append(each)
+    return [first.message(path, *others) for first, *others in alike.values()]
 
 
 def in_order(found: Mapping[str, LeftAxis]) -> dict[str, LeftAxis]:

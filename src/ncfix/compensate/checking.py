@@ -12,14 +12,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix.compensate import FixOptions
+from ncfix.compensate.account import said_of
 from ncfix.compensate.block_delete import SwitchSetting, messages_of, positions_of
-from ncfix.compensate.driver import PartCorrector, fix_program
+from ncfix.compensate.driver import PartCorrector, fix_flat, fix_program
 from ncfix.compensate.following import Resolve, Task, follow, placed, suspected
 from ncfix.compensate.parts import MachineParts, Part, Parts
 from ncfix.compensate.plan.findings import Notes
 from ncfix.compensate.plan.limits import findings
 from ncfix.compensate.plan.path import untouched
-from ncfix.compensate.report import FixReport, Tally
+from ncfix.compensate.report import WRITTEN_FLAT, FixReport, Tally
 from ncfix.compensate.workers import Read, WorkShare
 from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
@@ -54,13 +55,18 @@ def check_alone(
     return _checked(program, positions_of(setup, lambda own: trace(program, own, axes, rotary, resolve)), Survey())
 
 
-def check_on(program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None) -> Checked:
+def check_on(
+    program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None, flatten: bool = False
+) -> Checked:
     """Check a program on a machine: besides, does it stay within the travel, and what would its correction refuse.
 
-    Raises what `fix_program` raises, but for a stamp, which is a finding here.
+    flatten  it may be written out flat
+
+    Raises what `fix_program` and `fix_flat` raise, but for a stamp, which is a finding here.
     """
     positions = positions_of(setup, lambda own: follow(program, machine, own, resolve).trace)
-    report = None if machine.is_perfect else fix_program(program, machine, setup, OPTIONS, resolve).report
+    fix = fix_flat if flatten else fix_program
+    report = None if machine.is_perfect else fix(program, machine, setup, OPTIONS, resolve).report
     return _checked(program, positions, Survey(placed(machine, setup)), report)
 
 
@@ -155,6 +161,9 @@ def _surveyed(parts: Parts, survey: Survey, report: FixReport | None = None) -> 
 
 
 def _remarks_of(report: FixReport) -> tuple[Message, ...]:
-    """What a correction would say and refuse, but for axes that stay where they stand and do not cut."""
-    harmless = {left.message(report.path) for left in report.left if not left.cuts}
-    return (*(each for each in report.warnings if each not in harmless), *report.refusals)
+    """What a correction would say and refuse, but for axes that stay where they stand and do not cut, and that the
+    program is written out flat, which was asked for.
+    """
+    harmless = said_of((left for left in report.left if not left.cuts), report.path)
+    said = (each for each in report.warnings if each.code != WRITTEN_FLAT and each not in harmless)
+    return (*said, *report.refusals)

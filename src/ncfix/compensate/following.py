@@ -37,6 +37,7 @@ from ncfix.text.tree import Program
 from ncfix.version import __version__
 
 Resolve = Callable[[str], bytes | None]
+FORCE = "fix the original program, or say --force if this is it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,12 +243,12 @@ def numbers_together(one: Numbers, other: Numbers, step: float) -> Numbers:
     return {axis: _different(values, change, step) for axis, (values, change) in both.items()}
 
 
-def suspected(numbers: Numbers, step: float, path: str, force: bool) -> tuple[Message, ...]:
+def suspected(numbers: Numbers, step: float, path: str, force: bool, hint: str = FORCE) -> tuple[Message, ...]:
     """Raise RefusedError NCF438 for a program that seems to have been corrected before; with `force`, only say so."""
     if not looks_corrected(numbers, step):
         return ()
     text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
-    message = Message("NCF438", text, Place(path), "fix the original program, or say --force if this is it")
+    message = Message("NCF438", text, Place(path), hint)
     if not force:
         raise RefusedError((message,))
     return (message,)

@@ -17,6 +17,7 @@ from ncfix.compensate.account import (
     either,
     joined,
     left_where_they_stand,
+    said_of,
     without_figure,
 )
 from ncfix.compensate.block_delete import JointPlan, worst_findings
@@ -28,6 +29,7 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import rounding_along
 from ncfix.compensate.solve import WrittenPlan, increments
+from ncfix.control.interpreter import NEVER
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
@@ -40,6 +42,7 @@ SEEN_UM = 0.001
 """By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""
 
 
+WRITTEN_FLAT = "NCF445"
 NOTHING_SEEN: Mapping[str, None] = {"max": None, "rms": None}
 """The figures where nothing was looked at."""
 
@@ -274,6 +277,7 @@ class Tally:
         """The report; `messages` are those of following the program."""
         figures = options.verify
         after = self.after.as_dict(self.way, self.samples) | {"where": self.after.line}
+        still = [] if self.moves else [each for each in messages if each.code == NEVER]
         report = FixReport(
             path=path,
             blocks=self.blocks,
@@ -285,11 +289,11 @@ class Tally:
             max_correction_um=self.largest * 1e3 if self.compensated else None,
             error_before_um=self.before.as_dict(self.way, self.samples) if figures else {},
             error_after_um=after if figures else {},
-            refused=tuple(self.refused),
+            refused=(*self.refused, *map(_refused_whole, still)),
             warnings=(
-                *messages,
+                *(each for each in messages if each not in still),
                 *self.notes.values(),
-                *(left.message(path) for left in self.left.values()),
+                *said_of(self.left.values(), path),
                 *self.found.messages(),
             ),
             strategy=options.strategy,
@@ -300,6 +304,11 @@ class Tally:
             no_figure=self.unseen,
         )
         return report.with_what_is_left(options.tolerance_um)
+
+
+def _refused_whole(said: Message) -> Refusal:
+    """Blocks that a program never goes through, if nothing in it moves: what was meant stays uncorrected."""
+    return Refusal(said.place.line if said.place else 0, said.code, f"{said.text}; nothing else in it moves")
 
 
 def refusals(program: Program, account: Account) -> list[Refusal]:
@@ -331,7 +340,7 @@ def in_lines(report: FixReport, flat: Flat, program: Program) -> FixReport:
 
     refused = tuple(replace(each, line=flat.lines[each.line - 1]) for each in report.refused)
     text = f"the program is written out flat: {len(program)} lines become {len(flat.lines)}"
-    note = Message("NCF445", text, Place(program.path), "blocks executed several times are corrected one by one")
+    note = Message(WRITTEN_FLAT, text, Place(program.path), "blocks executed several times are corrected one by one")
     after = dict(report.error_after_um)
     if after.get("where"):
         after["where"] = flat.lines[int(after["where"] or 1) - 1]

@@ -284,9 +284,18 @@ CODES: dict[str, Code] = {
         "The file has blocks that name axes, and the program never goes through them: it ends before (M30, M2, %, END "
         "PGM), or jumps over them. They are another program in the same file, a subprogram that nothing calls, a "
         "branch that is not taken with these values, or what an editor has left there. What is corrected is the first "
-        "program, where it goes, and what it calls.",
+        "program, where it goes, and what it calls. If that moves nothing, as where a text before the first % is taken "
+        "for the program, it is refused.",
         "Correct each program in a file of its own; delete what is left over. Where a value in the program chooses a "
         "branch, correct the original anew after the value has been changed.",
+    ),
+    "NCF258": Code(
+        "A subprogram",
+        "The text ends with M99, M17, RET or endsub and has no M2 or M30: other programs call it. Offsets, tool and "
+        "positions are theirs when they do, and no one text is right for several calls. In a folder it is left out. "
+        "Named by itself it is corrected as a program that begins in the state of the setup.",
+        "Correct the programs that call it with `--flatten`: it is written out in them. If it is a program of its own, "
+        "which only begins anew at its end, name the file itself.",
     ),
     "NCF381": Code(
         "The setup file is no TOML",

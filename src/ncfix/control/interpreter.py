@@ -33,6 +33,7 @@ from ncfix.control.lanes.lane_tables import LaneTables
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Run
 from ncfix.diagnostics import Message, Place, SourceError
+from ncfix.text.dialect import goes_back
 from ncfix.text.language import Language
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Span, Template, view
@@ -137,6 +138,9 @@ class TextUnit(ABC, Generic[P]):
 
 NO_END = "NCF234"
 NEVER = "NCF249"
+SUBPROGRAM = "NCF258"
+AS_PROGRAM = "the program ends as a subprogram: it is taken as one of its own, which begins in the state of the setup"
+BY_ITSELF = "correct the program that calls it with --flatten, if the caller sets offsets, tools or positions"
 NAMES_AN_AXIS = re.compile(
     rb"(?i)(?!\d*[ \t]*(?:\*|(?:BEGIN|END|CALL)[ \t]+PGM\b))"
     rb"(?:\([^)\r\n]*\)|\"[^\"\r\n]*\"|[^(;%\"\r\n])*?"
@@ -236,6 +240,10 @@ class Interpreter(ABC, Generic[U]):
         """
         if self.behind is None:
             return
+        if 0 < self.behind <= len(program) and self._goes_back(program, self.behind - 1):
+            self.control.messages[AS_PROGRAM] = Message(
+                SUBPROGRAM, AS_PROGRAM, program.place(self.behind - 1), BY_ITSELF
+            )
         jumped = sorted((first, min(stop, self.behind)) for first, stop in self.jumped)
         behind = [(self.behind, len(program))] if self.behind < len(program) else []
         if not (behind or jumped):
@@ -247,6 +255,10 @@ class Interpreter(ABC, Generic[U]):
         text = "the program jumps over blocks that name axes, and never goes through them"
         hint = "they stay as they are: when it is to go through them, correct the original anew"
         self._note_first(program, executed, jumped, text, hint)
+
+    def _goes_back(self, program: Program, block: int) -> bool:
+        start, stop = program.blocks[block].tolist()
+        return goes_back(program.source[start:stop], self.dialect)
 
     def _note_first(
         self, program: Program, executed: set[int], spans: Iterable[tuple[int, int]], text: str, hint: str

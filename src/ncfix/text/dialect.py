@@ -185,6 +185,7 @@ class Dialect:
     passes              what is left as it is, by rule
     refuses             what cannot be corrected, and is named with its line
     language            where its `Language` is: the functions that read, follow and write it, as "module:NAME"
+    returns             a regular expression (bytes) in a block that ends a subprogram, its comments left out
     semantics           which of its language's rule sets holds, where there are several. A name that the language does
                         not know is an error (NCF508) when the language is needed
     codes, cycles       what it adds to the codes of its language, see `derive`
@@ -213,6 +214,7 @@ class Dialect:
     passes: tuple[str, ...] = ()
     refuses: tuple[str, ...] = ()
     semantics: str = ""
+    returns: bytes = b""
     codes: tuple[tuple[str, tuple[CodeOperation, ...]], ...] = ()
     cycles: tuple[tuple[str, CycleTable], ...] = ()
     keywords: tuple[tuple[str, str], ...] = ()
@@ -283,6 +285,8 @@ class Dialect:
             kind = bytes if name == "signature" else str
             if not isinstance(told := getattr(self, name), tuple) or not all(isinstance(each, kind) for each in told):
                 return f"{name} is a tuple of {kind.__name__}, not {told!r}"
+        if not isinstance(self.returns, bytes):
+            return f"{self.returns!r} cannot be returns: a regular expression (bytes)"
         for suffix in self.suffixes:
             if not suffix.startswith(".") or suffix != suffix.lower() or len(suffix) < 2:
                 return f"{suffix!r} cannot be a suffix: lower case, with the point"
@@ -368,6 +372,11 @@ def signature_rank(dialect: Dialect, head: bytes) -> int | None:
     with working("dialects", dialect.name):
         found = (rank for rank, pattern in enumerate(dialect.signature) if re.search(pattern, head))
         return next(found, None)
+
+
+def goes_back(block: bytes, dialect: Dialect) -> bool:
+    """Whether a block ends a subprogram, so that what has called it goes on."""
+    return bool(dialect.returns and re.search(dialect.returns, COMMENT_TEXT.sub(b"", block)))
 
 
 UTF8_MARK = b"\xef\xbb\xbf"

@@ -73,6 +73,19 @@ class FixOutcome:
         entry = {"path": shown(target.source), "output": None}
         return cls(error.exit_code, {**entry, "errors": [message.as_dict() for message in error.messages]})
 
+    @classmethod
+    def left_out(cls, target: OutputTarget, why: Message) -> FixOutcome:
+        """A subprogram in a folder, which is corrected in the programs that call it."""
+        reason = {"line": 0, "code": why.code, "reason": why.text}
+        entry: dict[str, Any] = {
+            "path": shown(target.source),
+            "output": None,
+            "left_out": True,
+            "changed": False,
+            "warnings": [],
+        }
+        return cls(ExitCode.DONE, {**entry, "refused": [reason]})
+
 
 @dataclass(frozen=True, slots=True)
 class ProgramLimits:
@@ -128,12 +141,7 @@ class FixJob:
         find = RecordingFinder(subprograms(self.setup, target.source))
         key = self.key(target) if self.journal else ""
         try:
-            with (
-                limited(self.limits.seconds, self.limits.megabytes),
-                console.busy(f"fixing {shown(target.source)}"),
-                self.fixed(target, find, jobs) as fixed,
-            ):
-                done = self._written(fixed, target)
+            done = self._done(target, find, jobs)
         except console.ReaderGoneError:
             raise
         except Exception as error:
@@ -144,6 +152,17 @@ class FixJob:
             done.entry["stale"] = True
             console.tell(Message("NCF027", STALE, Place(target.path)))
         return replace(done, called=find.called, key=key if key and key == self.key(target) else "")
+
+    def _done(self, target: OutputTarget, find: Find, jobs: int) -> FixOutcome:
+        if target.program and (why := target.program.left_out):
+            console.tell(why)
+            return FixOutcome.left_out(target, why)
+        with (
+            limited(self.limits.seconds, self.limits.megabytes),
+            console.busy(f"fixing {shown(target.source)}"),
+            self.fixed(target, find, jobs) as fixed,
+        ):
+            return self._written(fixed, target)
 
     @contextmanager
     def fixed(self, target: OutputTarget, find: Find, jobs: int) -> Iterator[FixedText]:
@@ -311,11 +330,8 @@ def _summary(entry: dict[str, Any], refused: bool, errors: bool) -> list[str]:
         if entry["compensated"]:
             lines.append("  tip error           no figure: nothing that cuts was corrected")
     elif entry["error_before_um"]:
-        without = "; without what is refused" if entry["refused"] else ""
-        if any(left["cuts"] for left in entry["left_where_it_stands"]):
-            without += "; without what is left where it stands (NCF439)"
-        lines.append(f"  tip error before    {console.error_figures(entry['error_before_um'])}{without}")
-        lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}{without}")
+        lines.append(f"  tip error before    {console.error_figures(entry['error_before_um'])}")
+        lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}")
     if entry["compensated"]:
         lines.append(f"  rounding            up to {entry['rounding_um']:.2f} um of that are the control's digits")
     if entry["no_figure"]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ncfix.batch.programs import subprograms
+from ncfix.batch.programs import ProgramFile, subprograms
 from ncfix.cli import console
 from ncfix.cli.console import owned
 from ncfix.cli.options import dialect_of
@@ -18,19 +18,23 @@ if TYPE_CHECKING:
 COLUMNS = ("line", "axis", "from", "to", "change", "why")
 
 
-def show_changes(job: FixJob, path: str, motions: bool, as_json: bool) -> tuple[int, dict[str, Any]]:
+def show_changes(job: FixJob, program: ProgramFile, motions: bool, as_json: bool) -> tuple[int, dict[str, Any]]:
     """Print what would change in a program; the exit code, and the entry in the JSON object."""
     from ncfix.compensate.changes import Changes, as_plain
     from ncfix.text.reader import read as read_source
 
+    path = program.path
     name = shown(path)
     entry: dict[str, Any] = {"path": name}
+    if why := program.left_out:
+        console.tell(why)
+        return ExitCode.DONE, {**entry, "left_out": True, "changed": False, "motions": [], "refused": []}
     try:
         with console.busy(f"fixing {name}"):
             text = read(path)
-            program = read_source(text, name, dialect_of(text, name, job.dialect, job.machine))
+            source = read_source(text, name, dialect_of(text, name, job.dialect, job.machine))
             find = subprograms(job.setup, path)
-            changes = Changes.of(program, job.machine, job.setup, job.options, find)
+            changes = Changes.of(source, job.machine, job.setup, job.options, find)
             found = list(changes.motions())
     except Exception as error:
         own = owned(error)

@@ -40,6 +40,7 @@ class OutcomeKind(StrEnum):
     WRITTEN = "written"
     UNCHANGED = "unchanged"
     DONE = "done before"
+    LEFT_OUT = "left out"
     REFUSED = "refused"
     FAILED = "failed"
 
@@ -49,7 +50,7 @@ class OutcomeKind(StrEnum):
         if "errors" in entry:
             return cls.FAILED
         if entry["output"] is None:
-            return cls.REFUSED
+            return cls.LEFT_OUT if entry.get("left_out") else cls.REFUSED
         if entry.get("resumed"):
             return cls.DONE
         return cls.WRITTEN if entry["changed"] else cls.UNCHANGED

@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from ncfix.compensate import FixOptions
-from ncfix.compensate.following import Followed, Task, looks_corrected, numbers_of
+from ncfix.compensate.following import Followed, Task, numbers_of, suspected
 from ncfix.compensate.parts import MachineParts
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, distinct, owners, slices
 from ncfix.compensate.plan.intent import Intent
@@ -256,8 +256,8 @@ def tip_with(correct: Correct) -> Tip:
     return tip
 
 
-def seems_corrected(machine: Machine, moves: Moves) -> bool:
-    """Whether the numbers of a program look as if it had been corrected for this machine already (see `following`)."""
+def refuse_corrected(machine: Machine, moves: Moves, path: str, hint: str) -> None:
+    """Raise RefusedError NCF438 for a program that seems to have been corrected for this machine (see `suspected`)."""
     kept: Mask = (moves.rule != Rule.CORRECT) | ~np.isfinite(moves.end).all(axis=1)
     shift = np.zeros_like(moves.end)
     intent = Intent(machine, moves, State())
@@ -271,4 +271,4 @@ def seems_corrected(machine: Machine, moves: Moves) -> bool:
         commands = commands_from_joints(machine, corrected, moves.tcp[some], moves.length_under_tcp[some])
         shift[some] = commands - moves.end[some]
     step = machine.least_increment[0]
-    return looks_corrected(numbers_of(moves, shift, ~kept, step), step)
+    suspected(numbers_of(moves, shift, ~kept, step), step, path, False, hint)
