@@ -36,7 +36,7 @@ def streamed(
     files: Mapping[str, bytes] | None = None,
 ) -> Found:
     """Text and report of a program that is corrected in parts of so many bytes; raises `NotInPartsError`."""
-    task = Task(machine, setup, OPTIONS, (files or {}).get, "p.nc", get(dialect), size)
+    task = Task(machine, setup, OPTIONS, (files or {}).get, "p.nc", get(dialect), size, source[: 1 << 16])
     text, done = run(task, source, jobs)
     stamp = done.stamp
     assert text[stamp.at : stamp.at + len(stamp.written)] == stamp.written

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,12 @@ import pytest
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
+from ncfix.compensate.following import resolving
+from ncfix.control.coordinates import INCH
 from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.basis import ConstantBasis, Polynomial
+from ncfix.text.dialect import get
 from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, tools={1: Tool(80.0, 3.0)})
@@ -131,3 +135,25 @@ def test_a_program_in_which_nothing_is_corrected_has_no_rounding(three_axis: Mac
     text = "G21 G90 G17 G94\nG53 G0 Z0\nM2\n"
     report = fix_program(read(text.encode(), "part.ngc", "linuxcnc"), three_axis, SETUP, FixOptions()).report
     assert report.as_dict()["rounding_um"] == 0.0
+
+
+@pytest.mark.parametrize(("dialect", "step", "decimals"), [("fanuc", 0.001, 4), ("haas", 0.0001, 5), ("iso", 0.001, 5)])
+def test_increment_systems_have_a_decimal_fraction_of_an_inch(
+    dialect: str, step: float, decimals: int, three_axis: Machine
+) -> None:
+    """IS-B is 0.001 mm and 0.0001 inch, 2.54 um: no word has more digits, and the figures say what that rounds."""
+    text = "G20 G90 G17 G94 F10.\nG0 X0. Y0. Z0.\nG1 X3. Y2.\nG2 X5. Y4. I1. J1.\nG91 X.5 Y.5 I.25 J.25\nM30\n"
+    machine = with_steps(three_axis, step)
+    fixed = fix_program(read(text.encode(), "part.nc", dialect), machine, SETUP, FixOptions(tolerance_um=0.1))
+    found = re.findall(r"[XYZIJ]-?\d*\.(\d*)", fixed.text.decode())
+    assert max(map(len, found)) == decimals
+    assert fixed.report.error_after_um["max"] <= 0.1 + fixed.report.rounding_um + NOISE
+    whole = 10.0**-decimals * INCH * 1e3 / 2
+    assert whole <= fixed.report.rounding_um + NOISE
+
+
+def test_comments_do_not_say_that_a_program_is_in_inches(three_axis: Machine) -> None:
+    text = "G21 (NOT G20) G90 G17 G94 F10.\nG0 X0. Y0. Z0.\nG1 X70. Y50.\nM30\n"
+    assert resolving(three_axis, get("fanuc"), text.encode()) is three_axis
+    assert resolving(three_axis, get("fanuc"), b"G020G90") is not three_axis
+    assert resolving(three_axis, get("fanuc"), b"G200") is three_axis

@@ -24,7 +24,7 @@ HEAD = "G0 X10 Y0 Z0 A0\n"
 
 def traced(text: str, dialect: str) -> tuple[Program, Moves]:
     program = read((HEAD + text + "M2\n").encode(), "test.ngc", dialect)
-    return program, trace(program, Setup(assume_zero=True), AXES, frozenset("A")).moves
+    return program, trace(program, Setup(assume_zero=True, no_point="calculator"), AXES, frozenset("A")).moves
 
 
 def corrected(text: str, dialect: str, pieces: int = 1, shift: float = 0.02) -> tuple[str, dict[int, str]]:
@@ -92,6 +92,15 @@ def test_a_turn_that_needs_no_linear_motion_stays_as_it_is() -> None:
 def test_a_turn_of_unknown_time_is_not_written(text: str) -> None:
     _, conflicts = corrected(text, "linuxcnc")
     assert list(conflicts.values()) == [UNTIMED]
+
+
+def test_an_f_that_the_control_does_not_take_is_not_written() -> None:
+    """Half a degree at 50000 degrees per minute takes a hundred-thousandth of a minute."""
+    _, conflicts = corrected("G1 A0.5 F50000.\n", "fanuc", shift=4.0)
+    assert ["larger than 9999.999" in why for why in conflicts.values()] == [True]
+    _, conflicts = corrected("G93 G1 A90. F5000.\n", "fanuc", pieces=3)
+    assert ["larger than 9999.999" in why for why in conflicts.values()] == [True]
+    assert corrected("G93 G1 A90. F5000.\n", "fanuc") == ("G93 G1 A90. Y0.020 F5000.\nM2\n", {})
 
 
 def test_a_turn_in_inverse_time_keeps_its_time_by_itself() -> None:

@@ -213,6 +213,13 @@ CODES = {
         "contour is left as it is.",
         "Let the CAM system compensate the cutter radius, or ask for a larger tolerance.",
     ),
+    "NCF456": Code(
+        "turns of rotary axes get inverse time",
+        "F of a block that turns rotary axes alone is degrees per minute. Where its correction moves a linear axis, "
+        "many controls take F as the speed of that axis, and would turn in no time. So such a block gets the time that "
+        "it had, in inverse time (G93); G94 and the F that was in force follow it.",
+        "Check that the control has G93. A post that writes rotary axes with tool-centre-point control needs none.",
+    ),
     "NCF455": Code(
         "the radius of the tool is not known",
         "Cutter radius compensation is on. The contour is corrected, and the figures are those of the contour; where "

@@ -39,6 +39,7 @@ from ncfix.compensate.following import (
     kinematics_of,
     placed,
     refuse_stamped,
+    resolving,
     rotary_names,
     stamp_of,
     suspected,
@@ -281,7 +282,8 @@ def fix_program(
     positions = positions_of(setup, lambda own: with_tool_lengths(program, follow(program, own), machine, own))
     moves, words = [each.trace.moves for each in positions], (stamped(positions), assumed_of(positions))
     proof = WholeProof(program, [partial(follow, own=each.setup) for each in positions])
-    corrector = Corrector(task, placed(machine, setup), proof, lambda: words)
+    there = placed(resolving(machine, program.dialect, program.source), setup)
+    corrector = Corrector(task, there, proof, lambda: words)
     done = corrector.correct(ContinuedPart.whole(program, moves[0], corrector.machine), moves)
     seen(program, corrector)
     tally, text = done.tally, done.text
@@ -317,12 +319,11 @@ def fix_flat(
         text = "not written out flat: its numbers would be those of one position of block delete"
         note = Message("NCF447", text, Place(program.path), "--block-skip on or off says which one")
         return replace(fixed, report=replace(fixed.report, warnings=(note, *fixed.report.warnings)))
-    steps = np.where(machine.rotary, np.degrees(machine.least_increment[1]), machine.least_increment[0]).tolist()
-    names = machine.axis_names
-    by_name = dict(zip(names, steps, strict=True))
+    steps = increments(resolving(machine, program.dialect, program.source))
+    by_name = dict(zip(machine.axis_names, np.where(machine.rotary, np.degrees(steps), steps).tolist(), strict=True))
     from ncfix.control.flatten import flatten
 
-    flat = flatten(program, setup, names, rotary_names(machine), by_name, resolve, kinematics_of(machine))
+    flat = flatten(program, setup, machine.axis_names, rotary_names(machine), by_name, resolve, kinematics_of(machine))
     again = fix_program(flat.program, machine, setup, options, resolve, seen)
     if {each.line for each in fixed.report.refused} <= {flat.lines[each.line - 1] for each in again.report.refused}:
         return fixed

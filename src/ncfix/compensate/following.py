@@ -13,6 +13,7 @@ become round as cease to be, by chance; nothing is said of them.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,6 +25,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.plan.arrays import Array, Mask
 from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
 from ncfix.compensate.plan.strategies import get_strategy
+from ncfix.control.coordinates import INCH
 from ncfix.control.interpreter import FollowedLanguage
 from ncfix.control.moves import Kinematics, Moves, Rule, TcpState, Trace
 from ncfix.control.setup import PROBED, Run, Setup
@@ -31,7 +33,7 @@ from ncfix.control.trace import Follower, NotInPartsError, trace
 from ncfix.diagnostics import Message, Place, RefusedError, UsageError
 from ncfix.machine import Machine
 from ncfix.text import stamp
-from ncfix.text.dialect import Dialect
+from ncfix.text.dialect import Dialect, beginning_without_comments
 from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
 from ncfix.version import __version__
@@ -97,6 +99,20 @@ def placed(machine: Machine, setup: Setup) -> Machine:
     """The machine with the workpiece where the setup has it, under the conditions that the setup gives."""
     x, y, z = (a + b for a, b in zip(machine.workpiece_offset, setup.workpiece_offset, strict=True))
     return machine.replace(workpiece_offset=(x, y, z), conditions=dict(setup.inputs))
+
+
+INCHES = re.compile(rb"(?i)(?<![A-Z])G0*20(?![\d.])")
+
+
+def resolving(machine: Machine, dialect: Dialect, source: bytes) -> Machine:
+    """The machine with what its control resolves in a program in inches, where that is a decimal fraction of an inch.
+
+    source  the text of the program, or its beginning
+    """
+    if not dialect.decimal_inches or INCHES.search(beginning_without_comments(source)) is None:
+        return machine
+    linear, rotary = machine.least_increment
+    return machine.replace(least_increment=(linear * INCH / 10, rotary))
 
 
 def rotary_names(machine: Machine) -> frozenset[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from ncfix import core
 from ncfix.compensate import FixOptions
 from ncfix.compensate.block_delete import JointPlan, Readings
-from ncfix.compensate.following import Task, placed, refuse_stamped, with_tool_lengths
+from ncfix.compensate.following import Task, placed, refuse_stamped, resolving, with_tool_lengths
 from ncfix.compensate.plan.arrays import Index, Mask
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.intent import Intent
@@ -271,7 +271,7 @@ class MachineParts(Parts):
             task.size,
             matters(task.machine),
             machine=task.machine,
-            placed=placed(task.machine, task.setup),
+            placed=resolving(placed(task.machine, task.setup), task.dialect, task.head),
             setup=task.setup,
         )
 

@@ -24,7 +24,7 @@ from ncfix.compensate.block_delete import JointPlan, worst_findings
 from ncfix.compensate.following import LOOKED, Numbers, numbers_of, numbers_together
 from ncfix.compensate.plan.arrays import Mask, lengths
 from ncfix.compensate.plan.figure_tally import PathError
-from ncfix.compensate.plan.findings import Notes
+from ncfix.compensate.plan.findings import Finding, Notes
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import rounding_along
@@ -38,6 +38,8 @@ from ncfix.text.tree import Program
 if TYPE_CHECKING:
     from ncfix.control.flatten import Flat
 
+TIMED = "this turn of rotary axes alone, and others whose correction moves linear axes, get inverse time (G93)"
+HAS_G93 = "check that the control has G93"
 SEEN_UM = 0.001
 """By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""
 
@@ -164,6 +166,12 @@ SUMS = ("blocks", "moves", "compensated", "passed", "unseen", "samples", "insert
 """What of a tally is added up."""
 
 
+def in_inverse_time(solution: WrittenPlan) -> tuple[Finding, ...]:
+    """The turns that get inverse time."""
+    rows = np.array(solution.emission.timed, dtype=np.intp)
+    return (Finding("NCF456", rows, np.zeros(len(rows)), TIMED, hint=HAS_G93),) if len(rows) else ()
+
+
 @dataclass(slots=True)
 class Tally:
     """What has been done to the parts so far.
@@ -208,7 +216,7 @@ class Tally:
             self.rounding = max(self.rounding, rounding_along(intent, plan.pieces, plan.corners, own))
             self.largest = max(self.largest, largest_correction(moves, solution, own))
             unseen |= without_figure(moves, solution.kept, lack.axes if lack else None, own)
-            for finding in found:
+            for finding in (*found, *in_inverse_time(solution)):
                 self.found.add(finding, program, moves, own, k)
         self.unseen += unseen
         theirs = set() if own is None else set(every[0].moves.block[~own].tolist())

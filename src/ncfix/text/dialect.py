@@ -179,6 +179,8 @@ class Dialect:
                         "none", or "renumber": all blocks anew
     closure_mm          an arc whose start and end radii differ by more is refused by the control
     closure_relative    the same relative to the radius (both must be exceeded)
+    decimal_inches      an increment of 0.001 mm is one of 0.0001 inch in programs in inches, as in IS-B
+    most_inverse_time   the largest F in inverse time (G93), per minute; 0: not known, or any
     feed_of             whose speed F is where linear and rotary axes move together: "linear" (rotary axes keep pace),
                         "all" (of all axes together), or "" where that differs from control to control
     understands         what is followed and corrected, a short sentence each; for `ncfix dialects NAME`
@@ -209,6 +211,8 @@ class Dialect:
     block_numbers: str = "same"
     closure_mm: float = 0.0283
     closure_relative: float = 0.001
+    decimal_inches: bool = False
+    most_inverse_time: float = 0.0
     feed_of: str = ""
     understands: tuple[str, ...] = ()
     passes: tuple[str, ...] = ()

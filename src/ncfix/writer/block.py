@@ -39,6 +39,7 @@ NEAR = 3.0
 INVERSE_TIME, PER_MINUTE = "93", "94"
 
 FROM_NOWHERE = "an increment in turned coordinates, while where one of their axes stands is not known"
+TOO_SHORT = "the motion takes so little time that its F in inverse time (G93) would be larger than {:.10g}"
 NO_TIME = "the block would become several, and in G93 no number behind its own F says how long it takes"
 
 
@@ -453,7 +454,13 @@ class BlockWriter(BlockText):
 
     def _feed_share(self, piece: int) -> float:
         assert self.layout.feed is not None
-        return self._value(self.layout.feed, np.nan) / float(self.target.shares[piece])
+        return self._inverse_time(self._value(self.layout.feed, np.nan) / float(self.target.shares[piece]))
+
+    def _inverse_time(self, rate: float) -> float:
+        """The F of a piece in G93, if the control takes such a number."""
+        if 0 < (most := self.program.dialect.most_inverse_time) < rate:
+            self.out.conflict = TOO_SHORT.format(most)
+        return rate
 
     def _time_of_turn(self, begin: FloatArray, end: FloatArray) -> None:
         """State the time of a turn of rotary axes alone in its own block; it is taken back behind it."""
@@ -478,7 +485,7 @@ class BlockWriter(BlockText):
         """The number after F with which a piece of a turn takes its share of the time."""
         minutes = self.target.turn_minutes * float(self.target.shares[piece])
         reach = feed_way(self.target.letters, begin, end, self.target.diameter) if self.target.turn_by_feed else 1.0
-        return feed_number(reach / minutes) if reach > 0 else self._feed_in_force()
+        return feed_number(self._inverse_time(reach / minutes)) if reach > 0 else self._feed_in_force()
 
     def _feed_in_force(self) -> str:
         feed = self.layout.feed

@@ -45,6 +45,7 @@ class Emission:
     start      (n, n_axes) the command at the start of each motion likewise
     conflicts  block -> why it cannot be written; the text is not to be used while there are any
     added_blocks  lines added
+    timed      motions that turn rotary axes alone and have got inverse time (G93), ascending
     """
 
     splices: Splices
@@ -53,6 +54,7 @@ class Emission:
     start: FloatArray
     conflicts: dict[int, str]
     added_blocks: int
+    timed: tuple[int, ...] = ()
 
     @property
     def edits(self) -> tuple[Edit, ...]:
@@ -132,7 +134,7 @@ class _Emitter:
         self.cycle_end: FloatArray | None = None
         self.levels = RetractLevels(moves, pieces)
         self.written: dict[int, Rendered] = {}
-        self.latest, self.added = list[int](), 0
+        self.latest, self.timed, self.added = list[int](), list[int](), 0
         self.in_stretch = np.zeros(len(moves), dtype=bool)
         self.conflicts, self.replaced_by = dict[int, str](), -1
         self.end, self.centre, self.start = pieces.end.copy(), pieces.centre.copy(), moves.start.copy()
@@ -163,7 +165,8 @@ class _Emitter:
         limit = self.program.dialect.line_limit
         for block, length in overlong(self.program.source, self.program.blocks, splices, limit).items():
             self.conflicts.setdefault(block, TOO_LONG.format(length, limit))
-        return Emission(splices, self.end, self.centre, self.start, self.conflicts, self.added + self.bulk.added)
+        added = self.added + self.bulk.added
+        return Emission(splices, self.end, self.centre, self.start, self.conflicts, added, tuple(self.timed))
 
     @cached_property
     def moved(self) -> NDArray[np.bool_]:
@@ -291,8 +294,10 @@ class _Emitter:
         target = self._target(row, rows)
         if target.turn_by_feed and target.inverse_time and turn_alone(self.moves, row) > 0:
             target = target.at_their_pace()
-        if math.isinf(target.turn_minutes) and target.is_dragged:
+        if target.is_dragged and math.isinf(target.turn_minutes):
             self.conflicts.setdefault(block, UNTIMED)
+        elif target.is_dragged and not target.turn_by_feed:
+            self.timed.append(row)
         rendered = self.language.writer(self.program, block, layout, target, self.spelling).write()
         if rendered.conflict:
             self.conflicts.setdefault(block, rendered.conflict)

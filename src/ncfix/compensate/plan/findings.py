@@ -87,10 +87,10 @@ def pose_error(code: str, text: str, rows: Mask, hint: str = "") -> PoseError:
 
 ORDER = (
     *("NCF408", "NCF405", "NCF404", "NCF406", "NCF407"),
-    *("NCF414", "NCF402", "NCF403", "NCF415", "NCF454", "NCF413", "NCF455", "NCF409", "NCF410"),
+    *("NCF414", "NCF402", "NCF403", "NCF415", "NCF454", "NCF413", "NCF455", "NCF456", "NCF409", "NCF410"),
 )
 """Findings in the order in which they are reported: those of limits, then those of a plan."""
-ONCE = frozenset({"NCF409"})
+ONCE = frozenset({"NCF409", "NCF456"})
 """Findings that hold for the whole program, and are told of its first motion only."""
 
 
@@ -115,6 +115,7 @@ class Notes:
     def add(self, finding: Finding, program: Program, moves: Moves, own: Mask | None = None, position: int = 0) -> None:
         """Take in a finding of a part, in a position of block delete; of motions `own` (n,) if given."""
         rows = np.arange(len(finding)) if own is None else np.flatnonzero(own[finding.moves])
+        rows = rows[:1] if finding.code in ONCE else rows
         shown = []
         for k in rows[:MOST].tolist():
             place = program.place(int(moves.block[finding.moves[k]]))
