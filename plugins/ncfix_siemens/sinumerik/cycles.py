@@ -82,7 +82,7 @@ def points_of(control: Sinumerik, step: Calling) -> Points:
 def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float, float]) -> bool:
     """Whether the axes stand nearer to the last place than to the first."""
     plane = control.modal.plane
-    if any(control.lost.get(index, AFTER_PATTERN) != AFTER_PATTERN for index in (plane.first, plane.second)):
+    if any(control.lost_in_frame().get(index, AFTER_PATTERN) != AFTER_PATTERN for index in (plane.first, plane.second)):
         return False
     here = [control.program_position()[index] / control.stretch for index in (plane.first, plane.second)]
     return math.dist(here, last) < math.dist(here, first)
@@ -92,7 +92,7 @@ def lead_to(
     control: Sinumerik, block: int, point: tuple[float, float], name: str
 ) -> tuple[BlockWordValues, MotionEnd, str]:
     """The words that lead to a place, where that is, and why its hole is not corrected."""
-    plane, program, lost = control.modal.plane, control.program_position(), dict(control.lost)
+    plane, program, lost = control.modal.plane, control.program_position(), dict(control.lost_in_frame())
     axes = plane.axes
     for index, value in zip((plane.first, plane.second), point, strict=True):
         program[index] = control.stretch * value
@@ -185,7 +185,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
     take_up(control)
     mind_carried(control)
     control.use_all_start_positions()
-    here = MotionEnd(control.position[:], dict(control.unknown), dict(control.lost))
+    here = MotionEnd(control.position[:], dict(control.unknown), dict(control.lost_in_frame()))
     drill(control, BlockWordValues(block, {}, {}, 0), here, drilling, refusal=WITH_WORDS if words.axes else "")
 
 
@@ -197,15 +197,15 @@ def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
     for point in points:
         words, over, refusal = lead_to(control, block, point, name)
         drill(control, words, over, drilling, refusal=refusal, modal=True)
-    control.lost = dict(control.lost) | dict.fromkeys((plane.first, plane.second), AFTER_PATTERN)
-    control.stand(control.position, control.axes_of(control.lost))
+    lost = control.lost_in_frame() | dict.fromkeys((plane.first, plane.second), AFTER_PATTERN)
+    control.stand(control.position, control.axes_of(lost), lost)
 
 
 def hole_after(control: Sinumerik, words: BlockWordValues) -> None:
     """The modal cycle behind a motion that is none to a hole: a hole where that has led."""
     drilling = control.modes.modal_cycle
     assert drilling is not None
-    here = MotionEnd(control.position[:], dict(control.unknown), dict(control.lost))
+    here = MotionEnd(control.position[:], dict(control.unknown), dict(control.lost_in_frame()))
     drill(control, BlockWordValues(words.block, {}, {}, 0), here, drilling, refusal=TO_A_HOLE, modal=True)
 
 
@@ -236,12 +236,13 @@ def drill(
     )
     control.heading = None
     if clear is None or depth is None:
-        up = MotionEnd(control.position, control.unknown, dict(control.lost) | {across: AFTER_CYCLE})
+        up = MotionEnd(control.position, control.unknown, dict(control.lost_in_frame()) | {across: AFTER_CYCLE})
         up = MotionEnd(up.target, control.axes_of(up.lost), up.lost)
     else:
-        up = at_height(control, MotionEnd(control.position, dict(control.unknown), dict(control.lost)), clear)
+        here = MotionEnd(control.position, dict(control.unknown), dict(control.lost_in_frame()))
+        up = at_height(control, here, clear)
         control.count_from_here(1 << across)
-    control.position, control.unknown, control.lost = up.target, up.unknown, up.lost
+    control.stand(up.target, up.unknown, up.lost)
 
 
 def at_height(control: Sinumerik, over: MotionEnd, height: float) -> MotionEnd:
@@ -262,7 +263,7 @@ def at_height(control: Sinumerik, over: MotionEnd, height: float) -> MotionEnd:
 def refuse(control: Sinumerik, block: int, why: str) -> None:
     """Motions that are not followed: where the axes stand after them is not known."""
     gone = [index for index in GEOMETRY if index in control.machine]
-    lost = dict(control.lost) | dict.fromkeys(gone, AFTER_CYCLE)
+    lost = dict(control.lost_in_frame()) | dict.fromkeys(gone, AFTER_CYCLE)
     words = BlockWordValues(block, {}, {}, mask_of(gone))
     end = MotionEnd(control.position[:], control.axes_of(lost), lost)
     control.go(ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, refusal=why))

@@ -32,7 +32,7 @@ INCREMENT_IN_PLANE = (
 def destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd:
     """The command at which a motion of this block ends; refused where a word of X that is added would be a radius."""
     program = control.program_position()
-    lost = dict(control.lost)
+    lost = dict(control.lost_in_frame())
     moved = 0
     if control.modal.incremental and control.modes.diameter == "DIAM90":
         words.refusal = words.refusal or RADIUS
@@ -69,9 +69,9 @@ def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vect
     elif form in TURNING:
         if not control.rotary[index]:
             raise Fault(IMPOSSIBLE, f"{form.upper()} is for rotary axes, and {letter} is none")
-        program[index] = turned(form, program[index], step, known=index not in control.lost)
+        program[index] = turned(form, program[index], step, known=index not in control.lost_in_frame())
         control.over += (index,)
-        if index in control.lost:
+        if index in control.lost_in_frame():
             lost.pop(index, None)
     else:
         assert form in ("", ABSOLUTE)
@@ -130,7 +130,7 @@ def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector
 def stands_there(control: Sinumerik, here: Vector, angle: float | None, distance: float | None) -> bool:
     """Whether the axes stand at this angle and distance about the pole, as far as they are given."""
     plane, pole = control.modal.plane, control.modes.pole
-    if pole is None or control.lost.keys() & {plane.first, plane.second}:
+    if pole is None or control.lost_in_frame().keys() & {plane.first, plane.second}:
         return False
     x, y = here[plane.first] - pole[0], here[plane.second] - pole[1]
     near = distance is None or abs(math.hypot(x, y) - distance) < NEAR_POLE
@@ -189,7 +189,7 @@ def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
     here, plane = control.program_position(), control.modal.plane
     control.use_all_start_positions()
     axes = plane.first, plane.second
-    if control.lost.keys() & {*axes} or control.places.unplaced & mask_of(axes):
+    if control.lost_in_frame().keys() & {*axes} or control.places.unplaced & mask_of(axes):
         return None
     return None if any(control.unsteady(index) for index in axes) else (here[plane.first], here[plane.second])
 

@@ -181,7 +181,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         busy = control.at_start or modes.carried or modes.modal_cycle or modes.rounds or self.flow.sections
         by_block = control.acting or modes.by_block
         return not (
-            busy or by_block or control.lost or control.over or modes.diameter == "DIAM90" or leads_along(control)
+            busy or by_block or control.unknown or control.over or modes.diameter == "DIAM90" or leads_along(control)
         )
 
     def note_stretch(self, unit: SinumerikUnit, block: int, done: int) -> None:
@@ -304,7 +304,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
     why = ASYNCHRONOUS.get(step.name, "a positioning axis (POS)")
     if step.name in GO_SOMEWHERE:
         still = BlockWordValues(turn.words.block, {}, {}, mask_of(gone))
-        lost = control.lost | control.along_frame(dict.fromkeys(gone, AFTER_POSITIONING))
+        lost = control.lost_in_frame() | control.along_frame(dict.fromkeys(gone, AFTER_POSITIONING))
         control.go(
             ProgrammedMotion(
                 MotionKind.RAPID, still, MotionEnd(control.position[:], control.axes_of(lost), lost), 0, refusal=why

@@ -138,7 +138,7 @@ def as_coded(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     why = "" if code in UNFOLLOWED_MOTIONS else misled(control, words, name, taken)
     if why:
         refused(control, words, code, why)
-        control.lose_axes(GEOMETRY, AFTER_THAT.format(why))
+        control.lose(GEOMETRY, AFTER_THAT.format(why))
     elif code in (20, 30):
         arc(control, words, code)
     elif code == CIP:
@@ -190,7 +190,7 @@ def measure(control: Sinumerik, words: BlockWordValues) -> None:
 def soft_approach(control: Sinumerik, words: BlockWordValues) -> None:
     """G147, G148 and their like: the control adds motions of its own."""
     refused(control, words, control.modal.motion, "a soft approach or retraction (G147, G148, ...)")
-    control.lose_axes(GEOMETRY, AFTER_APPROACH)
+    control.lose(GEOMETRY, AFTER_APPROACH)
 
 
 def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
@@ -199,7 +199,7 @@ def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     gone = tuple(index for index in dict.fromkeys(named) if index in control.machine)
     reasons = dict.fromkeys((*gone, *(GEOMETRY if gone and control.tcp else ())), AFTER_REFERENCE)
     reasons = {index: why for index, why in reasons.items() if index in control.machine}
-    lost = control.lost | control.along_frame(reasons)
+    lost = control.lost_in_frame() | control.along_frame(reasons)
     words = BlockWordValues(words.block, {}, {}, mask_of(gone))
     end = MotionEnd(control.position[:], dict(control.unknown) | reasons, lost)
     control.go(
@@ -210,5 +210,5 @@ def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 def dwell(control: Sinumerik, words: BlockWordValues) -> None:
     """G4: F is seconds, S turns of the spindle."""
     still = BlockWordValues(words.block, {}, {}, 0)
-    end = MotionEnd(control.position, control.unknown, control.lost)
+    end = MotionEnd(control.position, control.unknown, control.lost_in_frame())
     control.go(ProgrammedMotion(MotionKind.DWELL, still, end, control.modal.motion, passing=DWELL))

@@ -265,7 +265,7 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
         return
     if len(step.written) > 1 and plain_text(step.written[1]) == DESELECTED:
         untilted(control)
-        control.lose_axes(GEOMETRY, AFTER_SWIVEL)
+        control.lose(GEOMETRY, AFTER_SWIVEL)
         return
     values = [number(value(control)) for value in step.arguments]
     written = zip(values, step.written, strict=True)
@@ -351,7 +351,7 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
         target[index] = angle
         unknown.pop(index, None)
     gone = [index for index in control.machine if (control.rotary[index] and index not in axes) or index in (X, Y, Z)]
-    lost = dict(control.lost) | dict.fromkeys(gone, AFTER_SWIVEL)
+    lost = dict(control.lost_in_frame()) | dict.fromkeys(gone, AFTER_SWIVEL)
     lost = {index: why for index, why in lost.items() if index not in axes}
     mask = mask_of(control.turning)
     end = MotionEnd(target, control.axes_of(lost), lost)
@@ -372,7 +372,7 @@ def level(control: Sinumerik, plane: SwivelPlane) -> None:
         return
     take_plane(control, whole)
     if plane.retracts:
-        control.lose_axes(GEOMETRY, AFTER_SWIVEL)
+        control.lose(GEOMETRY, AFTER_SWIVEL)
 
 
 def take_plane(control: Sinumerik, frame: Affine) -> None:

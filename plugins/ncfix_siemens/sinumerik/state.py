@@ -33,7 +33,7 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.expressions import Unknown, Value
 from ncfix.control.frames import WORLD, Affine, FrameStack, shifted
-from ncfix.control.moves import AT_START, Arc, Motion, MotionKind, Pass, Rule, UnknownAxes
+from ncfix.control.moves import Arc, Motion, MotionKind, Pass, Rule
 from ncfix.control.setup import Run, Tool
 from ncfix.control.state import Modal
 from ncfix.control.tcp import switch
@@ -80,7 +80,6 @@ NO_SYSTEM = "G500"
 class Sinumerik(ProgramControl):
     """Everything that the steps of a block read and change.
 
-    lost        letter index -> why that coordinate of the program's frame is not known
     over        rotary axes that the last motion took past a full turn
     edge        cutting edge in force (D), 0 for none
     allowance   what contours are offset by besides the radius of the tool (OFFN), mm; NaN where that is not known
@@ -105,7 +104,6 @@ class Sinumerik(ProgramControl):
         super().__init__(run, dialect)
         self.frames = replace(self.frames, name=NO_SYSTEM)
         self.modes = Modes()
-        self.lost: UnknownAxes = {}
         self.over: tuple[int, ...] = ()
         self.edge = 0
         self.allowance = 0.0
@@ -119,7 +117,6 @@ class Sinumerik(ProgramControl):
         self.variables = SinumerikVariables.given(run.setup.variables)
         self.named = NamedTools()
         self.refresh()
-        self.lost = dict(self.unknown)
         self.counted: list[Footing] = list(self.footing)
         self.watch_rolling()
         self.builder.winding = Winding(np.zeros(len(run.axes), dtype=np.bool_))
@@ -137,12 +134,9 @@ class Sinumerik(ProgramControl):
     # -- frames -------------------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """As of every control; coordinates that are not known are kept along the axes of the program's frame."""
-        before = self.rotation
+        """As of every control, with what the numbers of the program count from."""
         super().refresh()
         self.footing = self._footings(self.composed)
-        if self.rotation != before:
-            self.hide_in_turned_frame()
 
     def anchors(self) -> list[Hashable]:
         """As for all controls, but shifts of the programmable frame (TRANS) are stated by the program."""
@@ -157,12 +151,6 @@ class Sinumerik(ProgramControl):
         if index not in GEOMETRY:
             return None
         return self.tcp, (self.tools.offset, self.edge) if self.tcp or index == Z else None
-
-    def hide_in_turned_frame(self) -> None:
-        """Coordinates of a frame that has just been turned are known if all axes are that have a part in them."""
-        mine = {index: why for index, why in self.lost.items() if index not in GEOMETRY}
-        hidden = {index: why for index, why in self.unknown.items() if index in GEOMETRY}
-        self.lost = mine | self.along_frame(hidden)
 
     def select(self, name: str) -> None:
         """A settable frame comes into force."""
@@ -211,9 +199,7 @@ class Sinumerik(ProgramControl):
         on = self.setup.tcp or self.modes.transformed or self.modes.swivelled
         new = self.tools.vector if tool is None else tool
         if on or self.tcp:
-            known = dict(self.unknown)
             switch(self, new, on, self.tools.offset)
-            self.lost |= {index: why for index, why in self.unknown.items() if index not in known}
         self.tcp = on
         self.tools.vector = new
         self.refresh()
@@ -226,12 +212,7 @@ class Sinumerik(ProgramControl):
         Nor is the motion code known to be what it was.
         """
         self.stated = False
-        self.lose_axes(self.machine, reason)
-
-    def lose_axes(self, indices: tuple[int, ...], reason: str) -> None:
-        """These axes stand somewhere that is not known from here on."""
-        self.lose(indices, reason)
-        self.lost |= self.along_frame({index: reason for index in indices if index in self.machine})
+        self.lose(self.machine, reason)
 
     def path_word(self, words: Collection[str]) -> str:
         """See `PATH_WORDS`; I J K are words of arcs, and lead nowhere beside a straight motion."""
@@ -248,11 +229,6 @@ class Sinumerik(ProgramControl):
     def use_all_start_positions(self) -> None:
         """All start positions matter: they are given, or lacking and taken as zero."""
         self.use_start_positions(tuple(self.unknown))
-        self.forget_unknown()
-
-    def forget_unknown(self) -> None:
-        """Coordinates whose start position has been asked for are known."""
-        self.lost = {index: why for index, why in self.lost.items() if why is not AT_START or index in self.unknown}
 
     # -- increments ---------------------------------------------------------------------------------------------------
 
@@ -296,7 +272,7 @@ class Sinumerik(ProgramControl):
         axes, placed = self._axes_of(words), motion.placed
         if placed is None:
             placed = 0 if motion.passing else axes & ~mask_of(self.counted_words(words))
-        self.lost, self.fresh_tool = end.lost, False
+        self.fresh_tool = False
         refusal, self.whole = motion.refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
         sure = (letter for letter, form in words.forms.items() if form in TURNING and letter in INDEX)
         self.builder.says_the_way(mask_of(INDEX[letter] for letter in sure))
@@ -304,11 +280,9 @@ class Sinumerik(ProgramControl):
         if follows:
             self.ask_for_length()
         self._head(motion, follows=follows)
-        own = end._replace(in_frame=None)  # kept in `lost`
-        self.make(Motion(motion.kind, axes, own, motion.code, refusal, motion.passing, motion.arc, placed))
+        self.make(Motion(motion.kind, axes, end, motion.code, refusal, motion.passing, motion.arc, placed))
         self.whole = False
         self.count_from_here(axes, by_machine=motion.by_machine)
-        self.forget_unknown()
 
     def _head(self, motion: ProgrammedMotion, *, follows: bool) -> None:
         """Keep the direction in which a motion is about to end; None where it is not known, or not followed."""
@@ -342,10 +316,6 @@ class Sinumerik(ProgramControl):
         """The axes that a block names, as bits: polar coordinates name both axes of the plane."""
         plane = self.modal.plane
         return words.axes | (plane.axes if words.values.keys() & {"AP", "RP"} else 0)
-
-    def _lost_at_end(self, motion: Motion) -> UnknownAxes:
-        """As for all controls; the book of turned coordinates is `lost`."""
-        return self.lost if self.is_rotated else motion.end.unknown
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """As for all controls; whether it is a rapid, the program has to have said."""

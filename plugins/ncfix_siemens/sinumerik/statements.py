@@ -366,7 +366,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
     if control.path_word(words.values):
         motion.moved(control, words, frozenset(turn.special))
     elif "soft" in turn.special:
-        control.lose_axes(GEOMETRY, motion.AFTER_APPROACH)  # the next block says where the approach leads
+        control.lose(GEOMETRY, motion.AFTER_APPROACH)  # the next block says where the approach leads
 
 
 def additive_offset(control: Sinumerik, turn: Turn) -> None:

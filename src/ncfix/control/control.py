@@ -276,7 +276,7 @@ class ProgramControl(ControlState):
             self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
         lost = self._lost_at_end(motion)
         if motion.kind != MotionKind.DWELL:
-            self.frame_unknown = motion.end.in_frame
+            self.frame_unknown = None if motion.end.in_frame is None else lost
         self.places.place(placed)
         self.places.lose(mask_of(lost))
         self.places.begun = True
@@ -284,7 +284,7 @@ class ProgramControl(ControlState):
     def _lost_at_end(self, motion: Motion) -> UnknownAxes:
         """What is not known at the end of a motion, along the axes of the program's frame."""
         if motion.end.in_frame is not None:
-            return motion.end.in_frame
+            return self.without_start(motion.end.in_frame)
         return self.lost_in_frame() if motion.kind == MotionKind.DWELL else self.along_frame(motion.end.unknown)
 
     def ends_in_hole(self, motion: Motion) -> bool:

@@ -305,6 +305,12 @@ class ControlState(ABC):
             if self.unknown.get(index) is AT_START:
                 self.knowledge.start_position(LETTERS[index])
                 del self.unknown[index]
+        if self.frame_unknown is not None:
+            self.frame_unknown = self.without_start(self.frame_unknown)
+
+    def without_start(self, in_frame: UnknownAxes) -> UnknownAxes:
+        """What is not known along the axes of the frame, without start positions that have been asked for."""
+        return {i: why for i, why in in_frame.items() if why is not AT_START or i in self.unknown}
 
     def stand(self, position: Vector, unknown: UnknownAxes, in_frame: UnknownAxes | None = None) -> None:
         """The control stands there by itself: behind a hole, or where it comes back to.
@@ -315,10 +321,10 @@ class ControlState(ABC):
 
     def lose(self, indices: Sequence[int], reason: str) -> None:
         """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
-        self.frame_unknown = None
-        for index in indices:
-            if index in self.machine:
-                self.unknown[index] = reason
+        gone = {index: reason for index in indices if index in self.machine}
+        if self.frame_unknown is not None:
+            self.frame_unknown = self.frame_unknown | self.along_frame(gone)
+        self.unknown.update(gone)
 
     def lose_in_machine(self, indices: Sequence[int], reason: str) -> int:
         """These axes of the machine stand somewhere that is not known: under TCP so does the tip, in X, Y and Z.
