@@ -40,6 +40,13 @@ SINUMERIK_CODES: dict[str, Code] = {
         "depends on its machine data (MD10602: 0 takes it out, as G500 would); here it stays.",
         "Program the work offset anew after TRAORI and TRAFOOF.",
     ),
+    "NCF258": Code(
+        "Work offset after measuring",
+        "A measuring cycle (CYCLE977, CYCLE978, ...) may have set the work offset. Motions behind it are refused until "
+        "the program calls a work offset; that is taken to be what the setup gives.",
+        "Give the offset that the probe is about to find. A tenth of a millimetre beside it matters little: errors of "
+        "machines change slowly with the position.",
+    ),
     "NCF257": Code(
         "Another transformation",
         "TRAORI(2) and further ones are what the machine's data say: another head, or other rotary axes. The tool is "

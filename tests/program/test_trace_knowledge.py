@@ -295,6 +295,17 @@ def test_what_g10_sets_that_controls_take_otherwise_is_refused_in_iso(setting: s
     assert "differs from control to control" in reasons(found)[-1]
 
 
+def test_g10_l11_asks_for_the_fixture_offset_that_it_measures_from() -> None:
+    with pytest.raises(UsageError) as caught:
+        follow("G0 X1 Y1 Z1\nG10 L11 P1 Z5", work_offsets={"G54": ZERO})
+    assert caught.value.messages[0].text == "work offset G59.3 is used and not given"
+
+
+def test_a_length_from_an_offset_that_was_probed_is_known_at_run_time_only() -> None:
+    text = "T1 M6\nG0 X0 Y0 Z5\nF10 G38.2 Z-10\nG10 L20 P1 Z0\nG53 G0 Z0\nG10 L10 P1 Z5\nG43 H1\nG55 G0 X1 Y1 Z1"
+    assert reasons(follow(text))[-1] == "the length of tool 1 is measured at run time"
+
+
 def test_a_code_of_the_builder_that_the_setup_declares_changes_nothing() -> None:
     text = "G0 X1 Y1 Z1\nG131 R2\nX2\nG131 X5\nX3"
     declared = follow(text, dialect="iso", passed_codes=frozenset({1310}))

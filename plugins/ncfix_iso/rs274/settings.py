@@ -16,7 +16,16 @@ from ncfix.control.tcp import switch
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.groups import DYNAMIC_OFFSETS
 from ncfix_iso.rs274.parameters import whole
-from ncfix_iso.rs274.systems import BAD_G10, SYSTEM_NAMES, activate, first_parameter, set_system, stored, words_of
+from ncfix_iso.rs274.systems import (
+    BAD_G10,
+    SYSTEM_NAMES,
+    activate,
+    before_persistent,
+    first_parameter,
+    set_system,
+    stored,
+    words_of,
+)
 
 BAD_SETTING = "NCF221"
 
@@ -275,12 +284,16 @@ def set_tool(control: RS274Control, block: Block, kind: int) -> None:
         raise Fault(BAD_G10, "P of G10 L1, L10 and L11 is a tool number")
     if "Z" not in block.values:
         return
-    length = control.modal.unit * block.values["Z"]
+    length, unsure = control.modal.unit * block.values["Z"], "Z" in block.unknown
     if kind != 1:
         control.use_start_positions((Z,))
         system = control.modal.system if kind == 10 else len(SYSTEM_NAMES)
+        first = first_parameter(system)
+        before_persistent(control, first + Z)
         shift = control.frames.additive.shift[Z] + control.frames.local.shift[Z] if kind == 10 else 0.0
-        length = control.position[Z] - stored(control, first_parameter(system))[Z] - shift - length
+        length = control.position[Z] - stored(control, first)[Z] - shift - length
+        unsure |= Z in control.unknown or control.parameters.is_unknown(first + Z)
+        unsure |= kind == 10 and Z in control.composed.unknown
     control.tools.lengths[number] = length
-    if "Z" in block.unknown or (kind != 1 and Z in control.unknown):
+    if unsure:
         control.tools.measured.add(number)

@@ -11,19 +11,20 @@ Holes in a row (HOLES1) and on a circle (HOLES2): where the control takes the mo
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 
 from ncfix.control.coordinates import LETTERS, mask_of, rotated
 from ncfix.control.expressions import Unknown, number
-from ncfix.control.moves import CycleCall, MotionEnd, MotionKind
+from ncfix.control.moves import CycleCall, MotionEnd, MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import (
+    CALIBRATING,
     DP,
     DRILLING,
     FIRST_DEPTH,
+    MEASURING,
     BlockWordValues,
     Drilling,
     ProgrammedMotion,
@@ -112,8 +113,7 @@ ELSEWHERE = "this hole needs a depth of its own, and its cycle is called in anot
 ALONE = "this hole needs a line of its own, which REPEAT would leave out"
 UNDER_ANOTHER = "this hole needs a line of its own, after which the modal cycle in force would drill"
 UNSTATED = "this hole needs a line of its own, and the motion code in force is not known"
-MEASURING = re.compile(r"cycle9[789]\d")
-
+MEASURES = "{} measures, and may set a work offset at run time, until the program calls one anew (G54, ...)"
 AFTER_CYCLE = "where the axis {} stands after a cycle is not followed"
 
 CENTRING, GEOMETRY_MODE = "cycle81", 6
@@ -167,16 +167,14 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
     """A cycle of the control: kept for later (MCALL), or executed here."""
     name, block = step.name.upper(), words.block
     if step.name not in DRILLING:
-        if modal:
-            control.suspend("cycle", f"the modal cycle {name} is in force, which ncfix does not follow")
-            return
         if points := points_of(control, step):
             pattern(control, block, name, points)
             return
-        holes = step.name.startswith(("holes", "cycle80"))
-        refuse(control, block, (MADE_HOLES if holes else MADE).format(name))
         if MEASURING.fullmatch(step.name):
-            control.refuse_rest(f"{name} measures, and may set offsets at run time")
+            measure(control, block, step)
+            return
+        holes = step.name.startswith(("holes", "cycle80"))
+        made(control, block, refusal=(MADE_HOLES if holes else MADE).format(name))
         return
     drilling = drilling_of(control, step)
     if modal:
@@ -260,10 +258,19 @@ def at_height(control: Sinumerik, over: MotionEnd, height: float) -> MotionEnd:
     return MotionEnd(target, control.axes_of(lost), lost)
 
 
-def refuse(control: Sinumerik, block: int, why: str) -> None:
-    """Motions that are not followed: where the axes stand after them is not known."""
+def measure(control: Sinumerik, block: int, step: Calling) -> None:
+    """A cycle that measures: it may set the work offset, unless its second argument (S_KNUM) is zero."""
+    name = step.name.upper()
+    made(control, block, passing=Passing(Pass.PROBING, f"measuring ({name})"))
+    sets = number(step.arguments[1](control) if len(step.arguments) > 1 else control.variables.value("_knum"))
+    if sets != 0.0 and step.name not in CALIBRATING:
+        control.suspend("measured", MEASURES.format(name))
+
+
+def made(control: Sinumerik, block: int, *, refusal: str = "", passing: Passing | None = None) -> None:
+    """Motions that the control makes up: where the axes stand after them is not known."""
     gone = [index for index in GEOMETRY if index in control.machine]
     lost = dict(control.lost_in_frame()) | dict.fromkeys(gone, AFTER_CYCLE)
     words = BlockWordValues(block, {}, {}, mask_of(gone))
     end = MotionEnd(control.position[:], control.axes_of(lost), lost)
-    control.go(ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, refusal=why))
+    control.go(ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, refusal, passing))

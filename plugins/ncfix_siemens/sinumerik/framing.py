@@ -29,6 +29,8 @@ MIXED_SHIFTS = "G{} after a shift (ATRANS) in a turned or scaled frame is in for
 FINE_STAYS = "{} after G59: whether what G59 has set stays is not certain"
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
 CARRIED = "NCF255"
+MEASURED = "NCF258"
+LIKE_IT = "give about what the probe finds: tenths of a millimetre matter little"
 LENGTH_ACROSS = "$sc_tool_length_const"
 PLANE_LENGTH = (
     "in this plane the control adds the tool length along another axis, unless $SC_TOOL_LENGTH_CONST is 17: "
@@ -101,9 +103,15 @@ def mirroring(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
     return Affine(rotation=mirrored(letters)), ""
 
 
+def by_solid_angles(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
+    """ROTS: not followed."""
+    return WORLD, "a frame by solid angles (ROTS) is in force, which ncfix does not follow"
+
+
 FRAMES: dict[str, Callable[[Sinumerik, BlockWordValues], tuple[Affine, str]]] = {
     "trans": translation,
     "rot": rotation,
+    "rots": by_solid_angles,
     "scale": scaling,
     "mirror": mirroring,
 }
@@ -159,8 +167,11 @@ def units(control: Sinumerik, code: int) -> None:
 
 def settable(control: Sinumerik, code: int) -> None:
     """G54 to G57, G505 to G599; G500 switches them off."""
+    name = f"G{code // 10}"
     control.modes.carried = ""
-    control.select(f"G{code // 10}")
+    if control.resume("measured"):
+        control.warn(MEASURED, f"{name} after measuring is taken to be what the setup gives", LIKE_IT)
+    control.select(name)
 
 
 def mind_carried(control: Sinumerik) -> None:

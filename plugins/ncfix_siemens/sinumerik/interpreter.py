@@ -32,7 +32,7 @@ from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
 from ncfix_siemens.sinumerik.plans import AssignedVariable, Branching, Calling, SinumerikPlan, is_statement
 from ncfix_siemens.sinumerik.scanning import all_or_none
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.statements import Turn, act, call_word, finish_block, ran_elsewhere, say
+from ncfix_siemens.sinumerik.statements import Turn, act, call_word, finish_block, function, ran_elsewhere, say
 from ncfix_siemens.sinumerik.unit import HEAD, PROCEDURE, SinumerikUnit, units_of
 from ncfix_siemens.sinumerik.vocabulary import (
     ASYNCHRONOUS,
@@ -40,6 +40,7 @@ from ncfix_siemens.sinumerik.vocabulary import (
     MOTIONS,
     OF_THE_CONTROL,
     PROBING,
+    RESULTS,
     UNFOLLOWED_MOTIONS,
     UNSEEN,
     BlockWordValues,
@@ -219,6 +220,8 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
                     act(control, turn, step, self.find)
                 case Branching():
                     continue
+        for called in plan.functions:
+            function(control, called)
         self.span = None
         if turn.subprogram is None:
             call_word(control, turn, self.find)
@@ -257,7 +260,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
     def opaque(self, plan: SinumerikPlan, text: str) -> None:
         """Text that is no motion, or that nobody understands."""
         control = self.control
-        if is_statement(plan):
+        if is_statement(plan) or "macro" in plan.opaque:
             why = f"the block {say(text)} is not understood, and may move axes or change coordinates"
             control.refuse_rest(why)
             control.warn(NOT_UNDERSTOOD, control.refusal, "all motions after it are refused")
@@ -438,7 +441,7 @@ def bypassed(control: Sinumerik, flow: SinumerikFlow, step: Branching, steps: It
 
 def is_quiet(plan: SinumerikPlan) -> bool:
     """Whether a block moves nothing, changes no coordinates, and leads nowhere else."""
-    if plan.opaque or plan.g or not LOUD_M.isdisjoint(plan.m):
+    if plan.opaque or plan.g or plan.functions or not LOUD_M.isdisjoint(plan.m):
         return False
     if any(setting.address not in QUIET_WORDS for setting in plan.settings):
         return False
@@ -452,7 +455,7 @@ def is_quiet_step(step: object) -> bool:
             quiet = not name.startswith("$") and not OF_THE_CONTROL.match(name)
             return quiet and name not in BY_THEMSELVES | UNSEEN.keys() | PROBING
         case Calling(name):
-            return name in HARMLESS
+            return name in HARMLESS - RESULTS.keys()
         case Branching(keyword):
             return keyword in INNER or keyword == "label"
     return False

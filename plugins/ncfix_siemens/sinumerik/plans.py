@@ -29,12 +29,13 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix_siemens.sinumerik.blocks import BRACKET, STATEMENT
-from ncfix_siemens.sinumerik.expressions import compiled
+from ncfix_siemens.sinumerik.expressions import FUNCTIONS_OF_NUMBERS, TEXT_FUNCTIONS, compiled
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, VECTOR
 
 DWELL_WORDS = "FS"
 """With G4: how long."""
 LISTS = frozenset({BRACKET, "set", "rep"})
+OWN_FUNCTIONS = LISTS | FORMS | FUNCTIONS_OF_NUMBERS.keys() | TEXT_FUNCTIONS.keys() | {"<<"}
 """What gives several elements their values."""
 
 ANY_PARAMETER = "r[]"
@@ -109,6 +110,7 @@ class SinumerikPlan:
     skip       the switches of block delete that it begins with (`/` is `/0`)
     opaque     kinds of text that is passed over or not understood
     lane       set if the block may go through the fast lane
+    functions  what stands in its expressions and only the control can evaluate
     vector     the slots of A3 B3 C3, -1 for none, if a block for the fast lane has any of them
     """
 
@@ -122,6 +124,7 @@ class SinumerikPlan:
     opaque: frozenset[str] = frozenset()
     lane: Lane | None = None
     vector: tuple[int, ...] | None = None
+    functions: tuple[Calling, ...] = ()
     names: frozenset[str] = field(default=frozenset())
 
 
@@ -137,6 +140,7 @@ def plan_of(template: Template) -> SinumerikPlan:
     plan.skip = deletable(template, DWELL_WORDS)
     plan.opaque = frozenset(item.kind for item in items if isinstance(item, Opaque))
     plan.names = frozenset(step.name for step in plan.steps if isinstance(step, Calling))
+    plan.functions = tuple(functions_of(template))
     plan.lane = lane_of(plan)
     if plan.lane is not None and not template.slots.keys().isdisjoint(VECTOR):
         plan.vector = tuple(template.slots.get(address, -1) for address in VECTOR)
@@ -180,20 +184,41 @@ def is_parameter(name: str) -> bool:
 
 def names_in(expression: Expression) -> Iterator[str]:
     """The variables that an expression names; an R parameter with a computed number may be any."""
+    for part in parts_in(expression):
+        match part:
+            case NumberedParameter(Constant(number)):
+                yield f"r{number:g}"
+            case NumberedParameter():
+                yield ANY_PARAMETER
+            case NamedParameter(name) | FunctionCall(name):
+                yield name
+
+
+def parts_in(expression: Expression) -> Iterator[Expression]:
+    """An expression and all that stand in it."""
+    yield expression
     match expression:
-        case NumberedParameter(Constant(number)):
-            yield f"r{number:g}"
-        case NumberedParameter(index):
-            yield from (ANY_PARAMETER, *names_in(index))
-        case NamedParameter(name):
-            yield name
-        case Unary(_, operand):
-            yield from names_in(operand)
+        case NumberedParameter(inner) | Unary(_, inner):
+            yield from parts_in(inner)
         case Binary(_, left, right):
-            yield from (*names_in(left), *names_in(right))
-        case FunctionCall(name, arguments):
-            yield name
-            yield from (each for part in arguments if part is not None for each in names_in(part))
+            yield from (*parts_in(left), *parts_in(right))
+        case FunctionCall(_, arguments):
+            yield from (each for part in arguments if part is not None for each in parts_in(part))
+
+
+def functions_of(template: Template) -> Iterator[Calling]:
+    """The functions in the expressions of a block that only the control can evaluate."""
+    for item in template.items:
+        match item:
+            case Word(_, value) | Assignment(_, value):
+                written: tuple[Expression | None, ...] = (value,)
+            case Command(_, arguments) | OWordLine(_, _, arguments):
+                written = arguments
+            case _:
+                continue
+        for part in (each for value in written if value is not None for each in parts_in(value)):
+            if isinstance(part, FunctionCall) and not part.indexed and part.name not in OWN_FUNCTIONS:
+                yield Calling(part.name, evaluates(part.arguments), part.arguments, True, item.span)
 
 
 def letting(item: Assignment) -> AssignedVariable:

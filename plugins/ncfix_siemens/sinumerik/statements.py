@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from ncfix.control.coordinates import INDEX
-from ncfix.control.expressions import Evaluate, Fault, number
+from ncfix.control.expressions import Evaluate, Fault, Unknown, nominal, number
 from ncfix.control.frames import WORLD
-from ncfix.text.tree import Expression, FunctionCall, NamedParameter
+from ncfix.text.tree import Expression, FunctionCall, NamedParameter, NumberedParameter
 from ncfix_siemens.sinumerik import framing, motion
 from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import set_pole
+from ncfix_siemens.sinumerik.expressions import compiled
 from ncfix_siemens.sinumerik.framing import into_spindle, set_length
 from ncfix_siemens.sinumerik.orientation import swivel
 from ncfix_siemens.sinumerik.plans import LISTS, AssignedVariable, Calling, SinumerikPlan, evaluates, plain_text
@@ -32,6 +33,7 @@ from ncfix_siemens.sinumerik.vocabulary import (
     POLAR,
     POLES,
     PUNCHING,
+    RESULTS,
     STROKES,
     TURNS_OF_THE_TOOL,
     UNFOLLOWED,
@@ -65,7 +67,28 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
     if step.name.startswith(TRANSFORMING):
         control.suspend(step.name, f"the transformation {step.name.upper()} is in force, which ncfix does not follow")
         return
+    if MADE_BY_THE_CONTROL.fullmatch(step.name):
+        cycle(control, turn.words, step, modal=False)
+        return
+    lose_arguments(control, step.written)
     ran_elsewhere(control, step.name.upper(), changes_tool=control.fresh_tool)
+
+
+def lose_arguments(control: Sinumerik, written: Iterable[Expression | None]) -> None:
+    """Variables that are arguments of what is not at hand may have other values behind it (VAR)."""
+    for part in written:
+        match part:
+            case NumberedParameter(index):
+                control.variables.assign(("r", (nominal(compiled(index)(control)),)), Unknown())
+            case NamedParameter(name) | FunctionCall(name, indexed=True):
+                control.variables.forget(name)
+
+
+def function(control: Sinumerik, step: Calling) -> None:
+    """A function that only the control can evaluate stands in the block."""
+    if step.name in UNFOLLOWED:
+        control.suspend(step.name, f"{UNFOLLOWED[step.name]} is in force, which ncfix does not follow")
+    lose_arguments(control, step.written)
 
 
 def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
@@ -123,6 +146,7 @@ SWITCHED_ON = (
 )
 ADDITIVE = "an additive tool offset (DL) is in force, whose value is in the control"
 AFTER_ADDITIVE = "where the axis {} stands after an additive tool offset (DL) is not known"
+RETURNS_ELSEWHERE = "a subprogram leads back to another block than that behind its call (RET), which is not followed"
 AFTER_RESET = "where the axis {} stands after ORIRESET is for machine data"
 _PASSED = """
     G9 G60 G62 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
@@ -217,10 +241,10 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     elif name in PUNCHING:
         control.modes.by_block = control.modes.by_block - {STROKES} | PUNCHING[name]
     elif name in HARMLESS:
-        return
+        lose_arguments(control, step.written[RESULTS.get(name, len(step.written)) :])
     elif name == "cycle800":
         swivel(control, turn.words.block, step)
-    elif name in DRILLING or name in MADE_BY_THE_CONTROL:
+    elif name in DRILLING:
         cycle(control, turn.words, step, modal=turn.modal)
     else:
         subprogram(control, turn, step, find)
@@ -313,8 +337,10 @@ def sizes_of(control: Sinumerik, variable: NamedParameter | FunctionCall) -> tup
 
 
 def come_back(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """RET."""
+    """RET, perhaps with a place in the program that has called."""
     turn.ends = True
+    if any(part is not None for part in step.written):
+        control.refuse_rest(RETURNS_ELSEWHERE)
 
 
 def measure(control: Sinumerik, turn: Turn, step: Calling) -> None:
@@ -380,10 +406,10 @@ def additive_offset(control: Sinumerik, turn: Turn) -> None:
 
 def codes(control: Sinumerik, turn: Turn) -> None:
     """The G codes of a block."""
-    chosen = [code for code in turn.plan.g if code in STRAIGHT_AND_ARCS]
+    chosen = [f"G{code // 10}" for code in turn.plan.g if code in STRAIGHT_AND_ARCS or code in UNFOLLOWED_MOTIONS]
+    chosen += sorted(name.upper() for name in MOTIONS.keys() & turn.plan.names)
     if len(set(chosen)) > 1:
-        first, second = chosen[0] // 10, chosen[1] // 10
-        raise Fault(CONFLICT, f"G{first} and G{second} exclude one another (both set the motion)")
+        raise Fault(CONFLICT, f"{chosen[0]} and {chosen[1]} exclude one another (both set the motion)")
     for code in turn.plan.g:
         if code in STRAIGHT_AND_ARCS or code in UNFOLLOWED_MOTIONS:
             control.modal.motion, control.stated = code, True

@@ -47,7 +47,7 @@ FORMS = TURNING | {ABSOLUTE, INCREMENTAL}
 FORM = re.compile(r"\s*(?P<form>[A-Z]+)\s*\(\s*(?P<value>.*?)\s*\)\s*\Z", re.IGNORECASE | re.DOTALL)
 
 MOTIONS = {"cip": 1000, "ct": 1010, "poly": 1020, "aspline": 1030, "bspline": 1040, "cspline": 1050}
-MOTIONS |= dict.fromkeys(("invcw", "invccw"), 1060)
+MOTIONS |= dict.fromkeys(("invcw", "invccw"), 1060) | dict.fromkeys(("oemipo1", "oemipo2"), 1070)
 """Names that belong to the group of G0 to G3; the numbers are ours, for the column `modal`."""
 
 CT_LEFT, CT_RIGHT = MOTIONS["ct"], MOTIONS["ct"] + 1
@@ -59,6 +59,7 @@ UNFOLLOWED_MOTIONS = {
     1040: "splines (BSPLINE)",
     1050: "splines (CSPLINE)",
     1060: "involutes (INVCW, INVCCW)",
+    1070: "motions of the machine's builder (OEMIPO1, OEMIPO2)",
     330: "threading (G33)",
     331: "rigid tapping (G331)",
     332: "rigid tapping (G332)",
@@ -79,15 +80,18 @@ _HARMLESS = """
     compof compcurv compcad compon compsurf upath spath stamac rmi rmb rme rmn cfc cftcp cfin fgroup fgref
     cut2d cut2df cut3dc cut3df cut3dff cut3dfs kontc kontt normal gwpson gwpsof tmon tmof fpr fpraon fpraof newconf
     cancel group_begin group_end group_addend punchacc sof soff pdelayon pdelayof spif1 spif2
-    coupdef coupdel coupon coupof couponc coupofs waitc ctabend ctabdel resetmon tang adisposa
-    protd protz proa cutconon cutconof rtlion rtliof delt getselt settcor delobj
+    coupdef coupdel coupon coupof couponc coupofs waitc ctabdel resetmon tang adisposa
+    protd protz proa cutconon cutconof rtlion rtliof delt getselt delobj
     oric orid orirota orirotr orirott orirotc orison orisof oriaxpos
     drfof delayfston delayfstof fendnorm icycof icycon eauto enat etan bauto bnat btan prepro
     workpiece setpiece norm kont sons cprecon cprecof diamcycof spath lftxt lfwp lfpos clearm init start isvar
-    tangof tangdel tlift cut3dcc cut3dccd cut2dd cut2dfd cut3dcd cut3dfd rmbbl rmibl rmebl rmnbl
+    tangdel tlift cut3dcc cut3dccd cut2dd cut2dfd cut3dcd cut3dfd rmbbl rmibl rmebl rmnbl
     osof osc oss osse osd ost
     towstd towmcs towwcs towbcs towtcs towkcs walcs4 walcs5 walcs6 walcs7 walcs8 walcs9 walcs10
-    iptrlock iptrunlock actblocno extopen extclose protdef cprot cprotdef nprot nprotdef
+    iptrlock iptrunlock actblocno extopen extclose protdef cprot cprotdef nprot nprotdef prots collpair
+    afison afisof auxfudel auxfudelg auxfumseq auxfusync axtochan blsync callpath chandata coupofs coupres ctablock
+    ctabunlock deldl delmt deltc esrr esrs fctdef finea coarsea ipobrka lock unlock polfa polfmask polfmlin qeclrnon
+    qeclrnof rdisable sirelin sirelout splinepath stopreof comppath dyn3d cycle62 waitenc
 """
 HARMLESS = frozenset(_HARMLESS.split())
 """Names that move no geometry axis and change no coordinates: passed over."""
@@ -112,9 +116,14 @@ UNFOLLOWED = {
     "tcofry": "a tool carrier (TCOFRY)",
     "tcofrz": "a tool carrier (TCOFRZ)",
     "parot": "a frame along the table (PAROT)",
-    "rots": "a frame by solid angles (ROTS)",
-    "arots": "a frame by solid angles (AROTS)",
-    "crots": "a frame by solid angles (CROTS)",
+    "settcor": "a tool offset that the program sets (SETTCOR)",
+    "addframe": "a frame that the program adds (ADDFRAME)",
+    "e_head": "a program of ShopMill (E_HEAD)",
+    "f_head": "a program of ShopTurn (F_HEAD)",
+    "corrtrafo": "a corrected transformation (CORRTRAFO)",
+    "tca": "a tool that is called by TCA",
+    "axctswe": "exchanged axes (AXCTSWE)",
+    "axctswed": "exchanged axes (AXCTSWED)",
     "geoax": "exchanged geometry axes (GEOAX)",
     "preseton": "a preset position (PRESETON)",
     "presetons": "a preset position (PRESETONS)",
@@ -124,6 +133,7 @@ UNFOLLOWED = {
     "leadon": "coupled axes (LEADON)",
     "egon": "an electronic gear (EGON)",
     "egonsyn": "an electronic gear (EGONSYN)",
+    "egonsyne": "an electronic gear (EGONSYNE)",
     "tangon": "tangential control (TANGON)",
     "ctabdef": "a curve table, whose motions are not made (CTABDEF)",
     "contpron": "a table of a contour, whose motions are not made (CONTPRON)",
@@ -145,6 +155,14 @@ ENDED_BY = {
     "torotof": frozenset({"torot", "torotx", "toroty", "torotz", "toframe", "toframex", "toframey", "toframez"}),
     "parotof": frozenset({"parot"}),
     "cp": frozenset({"ptp", "ptpg0", "ptpwoc"}),
+    "execute": frozenset({"contpron", "contdcon"}),
+    "ctabend": frozenset({"ctabdef"}),
+    "toffof": frozenset({"toffon"}),
+    "ftocof": frozenset({"ftocon"}),
+    "trailof": frozenset({"trailon"}),
+    "leadof": frozenset({"leadon"}),
+    "tangof": frozenset({"tangon"}),
+    "egofs": frozenset({"egon", "egonsyn", "egonsyne"}),
 }
 """Names that end some of them; the others stay to the end of the program."""
 
@@ -165,7 +183,7 @@ UNSEEN = {
 """Names that with an index change what motions after them do, in a way that is not followed."""
 
 OF_THE_CONTROL = re.compile(
-    r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans|sn_cec_)|toff|tcarr$|cutmod$"
+    r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans|sn_cec_)|toff|tcarr$|cutmodk?$"
     r"|\$sc_(?:mirror_tool|wear_|tool_length_(?:type|const_t$)|tool_temp|tocarr|toframe)"
 )
 """Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""
@@ -184,14 +202,17 @@ PROBING = frozenset({"measa", "meawa", "meac"})
 DRILLING = frozenset({*(f"cycle{number}" for number in range(81, 90)), "cycle840"})
 """Cycles whose first arguments are RTP, RFP, SDIS, DP, DPR and that drill where the axes stand."""
 
-_CYCLES = """
-    holes1 holes2 cycle801 cycle802 pocket1 pocket2 pocket3 pocket4 slot1 slot2 longhole cycle60 cycle61 cycle62
-    cycle63 cycle64 cycle70 cycle71 cycle72 cycle73 cycle74 cycle75 cycle76 cycle77 cycle78 cycle79 cycle90 cycle899
-    cycle92 cycle93 cycle94 cycle95 cycle96 cycle97 cycle98 cycle99 cycle930 cycle940 cycle951 cycle952
-    cycle971 cycle973 cycle976 cycle977 cycle978 cycle979 cycle982 cycle994 cycle995 cycle996 cycle997 cycle998
-"""
-MADE_BY_THE_CONTROL = frozenset(_CYCLES.split())
-"""Cycles whose motions the control makes up."""
+MADE_BY_THE_CONTROL = re.compile(r"(?:cycle|holes|pocket|slot)\d+|longhole")
+"""Cycles whose motions the control makes up, unless a subprogram of that name is at hand."""
+
+MEASURING = re.compile(r"cycle(?:961|97[1346789]|982|99[4-8]|9960)")
+"""Of them, those that measure."""
+
+CALIBRATING = frozenset({"cycle971", "cycle973", "cycle976", "cycle982"})
+"""Of these, those that measure the probe or a tool: they set no frame."""
+
+RESULTS = {"read": 4, "getselt": 0}
+"""Names that change nothing but variables: those that are arguments, from that place on. Errors do not occur."""
 
 DEEP, FIRST_DEPTH = "cycle83", (5, 6)
 """The cycle that drills in steps, and where the depth of the first one stands: a height (FDEP), a way down (FDPR)."""

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ncfix.compensate.following import kinematics_of
 from ncfix.control.moves import Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import SourceError, UsageError
+from ncfix.machine.file import load
 from program.siemens.following import KNOWN, ZERO, follow
 from program.tracing import ends, last, reasons
 
@@ -372,3 +375,62 @@ def test_a_number_that_is_not_at_hand_may_be_what_changes_the_tool(call: str) ->
 def test_a_number_that_is_not_at_hand_is_called_after_its_block() -> None:
     followed = follow("T1 D1\nG0 X0 Y0 Z50\nX5 Y5 Z5 L900\nG1 X6 F100")
     assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]
+
+
+# -- what is not at hand ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        "MYPROBE(R1)",
+        "MYPROBE(1,LIST)",
+        "MYPROBE(,,GAP)",
+        "OK=CALCDAT(LIST,3,GAP)",
+        "IF MEASURE(R1)==5\nENDIF",
+        "IF $A_IN[1]\nR2=MEASURE(GAP)\nENDIF",
+        'READ(ERR,"/_N_X",1,1,GAP)',
+        "GETSELT(R1)",
+        "R2=INTERSEC(LIST,1,GAP)",
+    ],
+)
+def test_variables_that_something_else_may_set_are_not_known_behind_it(block: str) -> None:
+    text = f"DEF REAL LIST[3]\nDEF REAL GAP\nR1=5\n{block}\nG0 X1 Y1 Z1\nG1 F100 X=R1 Y=GAP Z=LIST[0]"
+    found = follow(text).moves
+    assert found.rule[-1] == Rule.REFUSE
+
+
+def test_variables_that_are_handed_over_by_value_stay_known() -> None:
+    found = follow('R1=5 R2=6\nMSG("AT "<<R1)\nWRITE(R3,"F",R1)\nSETAL(R1)\nMYPROBE(R1+1,2*R2)\nG0 X=R1 Y=R2 Z1')
+    assert ends(found) == [[5, 6, 1]]
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        "SETTCOR(LIST,3,0,0,1)",
+        'R1=ADDFRAME(TURN,"$P_PFRAME")',
+        'CUTMODK="HEAD"',
+        'TCA("DRILL",1)',
+        "E_HEAD(54,1)",
+        "AXCTSWE(CT1)",
+        "DEFINE MILL AS G1 X5",
+    ],
+)
+def test_statements_that_change_coordinates_or_tools_in_ways_that_are_not_followed(block: str) -> None:
+    found = follow(f"{block}\nG54 G0 X1 Y1 Z1\nG1 X5 F100").moves
+    assert set(found.rule.tolist()) == {Rule.REFUSE}
+
+
+@pytest.mark.parametrize("names", ["G1 CSPLINE", "G0 POLY", "G33 G1", "CT G2", "BSPLINE CIP"])
+def test_two_motions_in_one_block_exclude_one_another(names: str) -> None:
+    with pytest.raises(SourceError, match="exclude one another"):
+        follow(f"G0 X0 Y0 Z0\n{names} X5 F100")
+
+
+def test_rapids_with_another_length_in_a_swivelled_plane_may_name_its_axes_one_after_another(root: Path) -> None:
+    machine = load(root / "examples" / "machines" / "wCAYFXZSt.toml")
+    text = 'T1 M6 D1\nSUPA G0 Z0 D0\nCYCLE800(1,"TABLE",200000,57,0,0,0,-30,0,0,0,0,0,-1)\nG0 X0 Y0 D1\nZ20\nG1 X5 F100'
+    setup = replace(KNOWN, tools={1: Tool(50.0)})
+    moves = follow(text, "".join(machine.axis_names), setup, kinematics=kinematics_of(machine)).moves
+    assert moves.rule.tolist()[2:] == [Rule.PASS, Rule.CORRECT, Rule.CORRECT]
