@@ -93,9 +93,7 @@ class SinumerikVariables:
         if scope is None:
             self.shared[key] = value
         else:
-            plain = number(value)
-            whole = plain is not None and scope.kinds[name] in WHOLE
-            scope.values[key] = float(math.floor(plain + 0.5)) if whole and plain is not None else value
+            scope.values[key] = of_kind(scope.kinds[name], value)
         self.changes += self.value(key) != before
 
     def scope_of(self, name: str) -> Local | None:
@@ -135,6 +133,13 @@ class SinumerikVariables:
             return
         scope.kinds[name] = ""
         scope.values = {key: value for key, value in scope.values.items() if name_of(key) != name}
+
+
+def renamed(values: Mapping[Key, Value], name: str, other: str) -> dict[Key, Value]:
+    """The elements of an array as those of another."""
+    return {
+        (other, key[1]): value for key, value in values.items() if name_of(key) == name and not isinstance(key, str)
+    }
 
 
 def name_of(key: Key) -> str:
@@ -201,6 +206,22 @@ def as_number(text: str) -> float | None:
         return float(text.upper().replace("EX", "E"))
     except ValueError:
         return None
+
+
+def of_kind(kind: str, value: Value) -> Value:
+    """A value as a variable of a type keeps it."""
+    plain = number(value)
+    if plain is None or kind not in {"bool", *WHOLE}:
+        return value
+    return float(bool(plain)) if kind == "bool" else float(math.floor(plain + 0.5))
+
+
+def constant(text: str) -> Value:
+    """What a number, a text in quotes, TRUE or FALSE stands for; other things only the control knows."""
+    if len(text) > 1 and text[0] == text[-1] == '"':
+        return text[1:-1]
+    value = as_number(text)
+    return CONSTANTS.get(text.lower(), Unknown()) if value is None else value
 
 
 TEXT_FUNCTIONS: dict[str, tuple[Callable[..., Value | None], tuple[type, ...], int]] = {

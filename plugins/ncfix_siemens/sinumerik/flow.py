@@ -9,7 +9,7 @@ from functools import partial
 from ncfix.control.expressions import Evaluate, Fault, Unknown, Value, number
 from ncfix.control.flow import NO_LABEL, Jump, Let, OpenCall, Operation, ProgramFlow, Repeat
 from ncfix.text.tree import Expression, NamedParameter, NumberedParameter
-from ncfix_siemens.sinumerik.expressions import Key, Local, compiled
+from ncfix_siemens.sinumerik.expressions import Key, Local, compiled, name_of, of_kind, renamed
 from ncfix_siemens.sinumerik.plans import AssignedVariable, Branching
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import BROKEN, SinumerikUnit
@@ -220,25 +220,37 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         self.budget.foresee(times)
         control = self.control
         values: list[Value] = [argument(control) for argument in arguments]
-        local = Local()
+        variables, local = control.variables, Local()
         results: dict[str, Key] = {}
         for place, parameter in enumerate(unit.parameters):
             given = place < len(values) and written[place] is not None
             local.kinds[parameter.name] = parameter.kind
-            local.values[parameter.name] = values[place] if given else Unknown() if parameter.kind == "axis" else 0.0
+            local.values[parameter.name] = of_kind(parameter.kind, values[place] if given else parameter.left_out)
             key = self.key_of(written[place]) if given else None
+            if parameter.is_array:
+                name = key if isinstance(key, str) else ""
+                source = variables.scope_of(name)
+                local.kinds[parameter.name] = source.kinds[name] if source else ""
+                local.sizes[parameter.name] = source.sizes.get(name, ()) if source else ()
+                local.values |= renamed(source.values if source else {}, name, parameter.name)
             if parameter.by_reference and key is not None:
                 results[parameter.name] = key
         saved = (copy.copy(control.modal), copy.copy(control.modes), control.frames) if unit.saves else None
 
         def leave() -> None:
-            control.variables.scopes.pop()
+            variables.scopes.pop()
             for name, theirs in results.items():
-                control.variables.assign(theirs, local.values.get(name, Unknown()))
+                if name not in local.sizes:
+                    variables.assign(theirs, local.values.get(name, Unknown()))
+                elif not local.kinds[name]:
+                    variables.forget(name_of(theirs))
+                else:
+                    for key, value in renamed(local.values, name, name_of(theirs)).items():
+                        variables.assign(key, value)
             if saved is not None:
                 control.restore(*saved)
 
-        control.variables.scopes.append(local)
+        variables.scopes.append(local)
         return OpenCall(unit.name, (unit, unit.begin), times - 1, leave=leave)
 
     def finish(self, kind: str = "", *, again: bool = True) -> None:

@@ -18,18 +18,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.expressions import Fault
+from ncfix.control.expressions import Fault, Unknown, Value
 from ncfix.control.interpreter import TextUnit
 from ncfix.control.pointing import FloatArray, Pointing, Ways, to_each
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.text.tree import StringLiteral as Label
+from ncfix_siemens.sinumerik.expressions import INITIAL, constant
 from ncfix_siemens.sinumerik.plans import Branching, SinumerikPlan, plan_of
 
 HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*(?:;.*)?$", re.IGNORECASE)
 PROCEDURE = re.compile(r"PROC[ \t]+(?P<name>\w+)[ \t]*(?:\((?P<parameters>.*)\))?(?P<rest>[^()]*)$", re.IGNORECASE)
 PARAMETER = re.compile(
     r"[ \t]*(?P<var>VAR[ \t]+)?(?P<type>INT|REAL|BOOL|CHAR|STRING|AXIS|FRAME)[ \t]*(?:\[[^\]]*\])?[ \t]*"
-    r"(?P<name>\$?[A-Z_]\w*)[ \t]*(?:\[[^\]]*\])?[ \t]*(?:=(?P<default>.*))?",
+    r"(?P<name>\$?[A-Z_]\w*)[ \t]*(?P<array>\[[^\]]*\]?)?[ \t]*(?:=[ \t]*(?P<default>.*?)[ \t]*)?$",
     re.IGNORECASE,
 )
 
@@ -43,11 +44,17 @@ NO_LENGTH = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class ProcParameter:
-    """A parameter of a `PROC`: its type and name; `by_reference`: the caller's variable may be changed (VAR)."""
+    """A parameter of a `PROC`: its type and name, and its value where the call leaves it out.
+
+    by_reference  the caller's variable may be changed (VAR)
+    is_array      that is an array
+    """
 
     kind: str
     name: str
     by_reference: bool
+    is_array: bool
+    left_out: Value
 
 
 class SinumerikUnit(TextUnit[SinumerikPlan]):
@@ -215,7 +222,9 @@ def parameters(text: str) -> Iterator[ProcParameter]:
     """The parameters between the brackets of a PROC."""
     for part in text.split(","):
         if found := PARAMETER.match(part):
-            yield ProcParameter(found["type"].lower(), found["name"].lower(), bool(found["var"]))
+            kind, default = found["type"].lower(), found["default"]
+            value = INITIAL.get(kind, Unknown()) if default is None else constant(default)
+            yield ProcParameter(kind, found["name"].lower(), bool(found["var"]), bool(found["array"]), value)
 
 
 def is_remark(plan: SinumerikPlan) -> bool:

@@ -434,3 +434,31 @@ def test_rapids_with_another_length_in_a_swivelled_plane_may_name_its_axes_one_a
     setup = replace(KNOWN, tools={1: Tool(50.0)})
     moves = follow(text, "".join(machine.axis_names), setup, kinematics=kinematics_of(machine)).moves
     assert moves.rule.tolist()[2:] == [Rule.PASS, Rule.CORRECT, Rule.CORRECT]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "arguments", "x"),
+    [
+        ("REAL FAR=7", "", 7),
+        ("REAL FAR=7", "2", 2),
+        ("REAL FAR", "", 0),
+        ("INT FAR", "2.6", 3),
+        ("BOOL FAR", "5", 1),
+        ("REAL WIDE=1.5EX1, REAL FAR=WIDE", "", math.nan),
+    ],
+)
+def test_parameters_that_a_call_leaves_out_have_the_value_of_their_procedure(
+    parameters: str, arguments: str, x: float
+) -> None:
+    text = f"SUB1({arguments})\nM30\n%_N_SUB1_SPF\nPROC SUB1({parameters})\nG0 X=FAR Y1 Z1\nM17\n"
+    assert last(follow(text))[0] == pytest.approx(x, nan_ok=True)
+
+
+def test_an_array_is_handed_over_with_its_elements_and_comes_back_changed() -> None:
+    head = (
+        "DEF REAL LIST[2]=(2,3)\nSUB1(LIST)\nG0 X=LIST[0] Y=LIST[1] Z1\nM30\n%_N_SUB1_SPF\nPROC SUB1(VAR REAL ROW[2])\n"
+    )
+    assert last(follow(head + "ROW[0]=ROW[0]*ROW[1]\nM17\n")) == [6, 3, 1]
+    known = follow(head + "ROW[R99]=5\nM17\n")
+    assert known.moves.rule.tolist() == [Rule.REFUSE]
+    assert last(follow("SUB1(_LIST)\nM30\n%_N_SUB1_SPF\nPROC SUB1(VAR REAL ROW[])\nG0 X=ROW[1] Y1 Z1\nM17\n"))[0] != 0
