@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import reduce
 
 from lark import Token, UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
@@ -35,6 +36,7 @@ from ncfix.text.tree import (
     START,
     Anchor,
     Assignment,
+    Binary,
     Command,
     Comment,
     Constant,
@@ -205,9 +207,15 @@ class SinumerikBuilder(TreeBuilder):
         return OWordLine("", "for", values, self.span(tree))
 
     def jump(self, tree: Branch) -> Item:
-        """`GOTOF`, `GOTOB`, ... and where to."""
+        """`GOTOF`, `GOTOB`, ... and where to; a label may be put together, `"MARK"<<R1`."""
         keyword, *where = tree.children
-        return OWordLine(destination(where[0]) if where else "", str(keyword).lower(), (), self.span(tree))
+        label: str | Expression = ""
+        if where and kind(where[0]) == "joined":
+            parts = map(self.expression, where[0].children[::2])  # type: ignore[union-attr]
+            label = reduce(lambda left, right: Binary("<<", left, right), parts)
+        elif where:
+            label = destination(where[0])
+        return OWordLine(label, str(keyword).lower(), (), self.span(tree))
 
     def repetition(self, tree: Branch) -> Item:
         """`REPEAT` that begins a loop, or repeats what stands from a label on, to another if there is one."""
@@ -278,7 +286,7 @@ def is_word(name: str) -> bool:
     return len(name) == 1 or name[1:].isdigit() or name.lower() in SETTERS
 
 
-def destination(node: Node) -> str | Expression:
+def destination(node: Node) -> str:
     """Where a jump leads: a label or `N100`; a text names one."""
     text = str(node)
     if kind(node) == "TEXT":

@@ -29,6 +29,13 @@ def decided(value: Value) -> float:
     return found
 
 
+def told(value: Value) -> str:
+    """A text that names a label; raises `AtRuntimeError` where only the control knows it."""
+    if not isinstance(value, str):
+        raise AtRuntimeError
+    return value.upper()
+
+
 class SinumerikFlow(ProgramFlow[SinumerikUnit]):
     """Where execution stands, and what takes it elsewhere.
 
@@ -140,12 +147,14 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         unit, keyword = self.unit, step.keyword.rpartition(" ")[2]
 
         def target() -> int | None:
-            if not step.label:
-                raise AtRuntimeError
-            found = unit.find(step.label, here, keyword)
+            label = step.label if step.composed is None else told(step.composed(self.control))
+            found = unit.find(label, here, keyword)
+            if found is None and self.control.variables.scope_of(label.lower()) is not None:
+                label = told(self.control.variables.value(label.lower()))
+                found = unit.find(label, here, keyword)
             if found is None and keyword != "gotoc":
                 where = {"gotof": " further down", "gotob": " further up"}.get(keyword, "")
-                raise Fault(NO_LABEL, f"there is no label {step.label}{where}")
+                raise Fault(NO_LABEL, f"there is no label {label}{where}")
             return found
 
         return Jump(unit.begin, when) if keyword == "gotos" else Jump(target, when, out=True)

@@ -395,9 +395,7 @@ def targets(unit: SinumerikUnit, step: Branching, block: int) -> list[int]:
         return [unit.begin]
     if "goto" not in step.keyword and step.keyword not in ("repeat", "repeatb"):
         return []
-    if not step.label:
-        return [unit.begin] if "goto" in step.keyword else []
-    return unit.labelled(step.label)
+    return unit.labelled(step.label) or ([unit.begin] if "goto" in step.keyword else [])
 
 
 def demoted(moves: Moves, first: int | None) -> Moves:
@@ -426,7 +424,7 @@ def bypassed(control: Sinumerik, flow: SinumerikFlow, step: Branching, steps: It
         return False
     here, unit = flow.block - 1, flow.unit
     jump = next((each for each in steps if each.keyword.startswith("goto")), None)
-    end = unit.find(jump.label, here, jump.keyword) if jump is not None and jump.label else unit.ends.get(here)
+    end = unit.ends.get(here) if jump is None else unit.find(jump.label, here, jump.keyword)
     if end is None or end <= here or not all(is_quiet(unit.plan(block)) for block in range(here + 1, end)):
         return False
     if unbalanced(unit, here, end, alone=jump is None):

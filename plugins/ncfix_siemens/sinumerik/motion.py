@@ -20,7 +20,13 @@ from ncfix_siemens.sinumerik.destination import (
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.orientation import oriented
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS, BlockWordValues, ProgrammedMotion
+from ncfix_siemens.sinumerik.vocabulary import (
+    ALONG_TOOL,
+    MOTIONS,
+    UNFOLLOWED_MOTIONS,
+    BlockWordValues,
+    ProgrammedMotion,
+)
 
 _ACTION = r"""
     \$A_\w+(?:\[[^\]]*\])?=\S+
@@ -80,6 +86,9 @@ def moved(control: Sinumerik, words: BlockWordValues, special: frozenset[str]) -
     code = control.modal.motion
     if code in (0, 10):
         control.modal.straight = code
+    if ALONG_TOOL in words.values:
+        control.refuse_here(f"a motion along the tool ({ALONG_TOOL})")
+        return
     take_up(control)
     machine = next((name for name in ("supa", "g53", "g153") if name in special), "")
     if not machine:

@@ -87,13 +87,14 @@ class Calling:
 
 @dataclass(frozen=True, slots=True)
 class Branching:
-    """A control structure or jump."""
+    """A control structure or jump; `composed`: the label of a jump, where it is put together (`"MARK"<<R1`)."""
 
     keyword: str
     label: str
     values: tuple[Evaluate, ...]
     written: tuple[Expression, ...]
     span: Span
+    composed: Evaluate | None = None
 
 
 Step = AssignedVariable | Calling | Branching
@@ -253,8 +254,8 @@ def calling(item: Command) -> Calling:
 
 def branching(item: OWordLine) -> Branching:
     """A control structure with its values as functions."""
-    label = item.label if isinstance(item.label, str) else ""
-    return Branching(item.keyword, label, tuple(map(compiled, item.arguments)), item.arguments, item.span)
+    label, composed = (item.label, None) if isinstance(item.label, str) else ("", compiled(item.label))
+    return Branching(item.keyword, label, tuple(map(compiled, item.arguments)), item.arguments, item.span, composed)
 
 
 def lane_of(plan: SinumerikPlan) -> Lane | None:

@@ -17,7 +17,7 @@ from ncfix.control.frames import ZEROS
 from ncfix.control.moves import Arc, MotionEnd, MotionKind, Passing
 
 _SETTERS = """
-    ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos
+    movt ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos
     ovr ovrra fl fb fz fprda spos sposa meas meaw meawa measa po pl pw sd prio rpl lims disrp dism
 """
 SETTERS = frozenset(_SETTERS.split())
@@ -34,10 +34,14 @@ ANGLES = ("A2", "B2", "C2")
 NORMALS = frozenset(["A4", "B4", "C4", "A5", "B5", "C5"])
 """Normals of the surface: with them the control offsets the contour, and leads the tool along it with ORIPATH."""
 
+ALONG_TOOL = "MOVT"
+"""How far the tool goes along itself."""
+
 OTHERS = frozenset(["A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA", "PSI", "PHI", "NUT"])
 """Other ways to say how the tool stands, which are not followed."""
 
-PATH_WORDS = POLAR | NORMALS | OTHERS | {*INDEX, *VECTOR, *ANGLES, "ANG", "CR", "AR", "TURN", "I1", "J1", "K1"}
+_ARCS = frozenset({"CR", "AR", "TURN", "I1", "J1", "K1"})
+PATH_WORDS = POLAR | NORMALS | OTHERS | _ARCS | {*INDEX, *VECTOR, *ANGLES, ALONG_TOOL, "ANG"}
 """The words that lead somewhere, whatever motion is in force."""
 
 ABSOLUTE, INCREMENTAL = "ac", "ic"
@@ -91,7 +95,7 @@ _HARMLESS = """
     iptrlock iptrunlock actblocno extopen extclose protdef cprot cprotdef nprot nprotdef prots collpair
     afison afisof auxfudel auxfudelg auxfumseq auxfusync axtochan blsync callpath chandata coupofs coupres ctablock
     ctabunlock deldl delmt deltc esrr esrs fctdef finea coarsea ipobrka lock unlock polfa polfmask polfmlin qeclrnon
-    qeclrnof rdisable sirelin sirelout splinepath stopreof comppath dyn3d cycle62 waitenc
+    qeclrnof rdisable sirelin sirelout splinepath stopreof comppath dyn3d cycle62 waitenc ipoenda
 """
 HARMLESS = frozenset(_HARMLESS.split())
 """Names that move no geometry axis and change no coordinates: passed over."""
@@ -183,7 +187,7 @@ UNSEEN = {
 """Names that with an index change what motions after them do, in a way that is not followed."""
 
 OF_THE_CONTROL = re.compile(
-    r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans|sn_cec_)|toff|tcarr$|cutmodk?$"
+    r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans|sn_cec_)|toff|tcarr$|cutmodk?$|mtl$"
     r"|\$sc_(?:mirror_tool|wear_|tool_length_(?:type|const_t$)|tool_temp|tocarr|toframe)"
 )
 """Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""

@@ -462,3 +462,28 @@ def test_an_array_is_handed_over_with_its_elements_and_comes_back_changed() -> N
     known = follow(head + "ROW[R99]=5\nM17\n")
     assert known.moves.rule.tolist() == [Rule.REFUSE]
     assert last(follow("SUB1(_LIST)\nM30\n%_N_SUB1_SPF\nPROC SUB1(VAR REAL ROW[])\nG0 X=ROW[1] Y1 Z1\nM17\n"))[0] != 0
+
+
+@pytest.mark.parametrize(
+    ("jump", "places"),
+    [
+        ('R1=2\nGOTOF "MARK"<<R1', [2]),
+        ('GOTOF "MARK"<<1', [1, 2]),
+        ('DEF STRING[9] WHERE="MARK2"\nGOTOF WHERE', [2]),
+        ('DEF STRING[9] WHERE="MARK"\nGOTOF WHERE<<(1+1)', [2]),
+        ("IF R1==R1 GOTOF MARK2", [math.nan, math.nan]),
+        ('GOTOF "MARK"<<$AC_TIME', [math.nan, math.nan]),
+    ],
+)
+def test_labels_may_be_put_together(jump: str, places: list[float]) -> None:
+    assert xs(f"{jump}\nMARK1: G0 X1 Y1 Z1\nMARK2: G0 X2") == pytest.approx(places, nan_ok=True)
+
+
+def test_a_label_that_nobody_has_is_named_as_it_was_put_together() -> None:
+    with pytest.raises(SourceError, match="there is no label MARK7 further down"):
+        follow('GOTOF "MARK"<<7\nG0 X5')
+
+
+def test_a_motion_along_the_tool_leads_nobody_knows_where() -> None:
+    found = follow("G0 X1 Y1 Z1\nMOVT=IC(5)\nG1 X2 F100\nG0 X1 Y1 Z1").moves
+    assert found.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.REFUSE, Rule.CORRECT]
