@@ -105,7 +105,8 @@ def oriented(control: Sinumerik, words: BlockWordValues) -> None:
     ways = [way for way in (VECTOR, ANGLES) if any(address in words.values for address in way)]
     if not others and not ways:
         return
-    reason = NOT_FOLLOWED.format(others[0]) if others else MIXED if len(ways) > 1 else by_direction(control, words)
+    mixed = len(ways) > 1 or any(LETTERS[index] in words.values for index in control.turning)
+    reason = NOT_FOLLOWED.format(others[0]) if others else MIXED if mixed else by_direction(control, words)
     if reason:
         words.refuse(reason, control.turning)
 

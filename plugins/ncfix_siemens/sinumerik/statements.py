@@ -56,8 +56,8 @@ FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF
 def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     """A subprogram, or a cycle of the machine's builder."""
     if turn.modal:
-        text = f"the modal subprogram {step.name.upper()} is in force, which ncfix does not follow"
-        control.suspend("cycle", text)
+        kind = "cycle" if MADE_BY_THE_CONTROL.fullmatch(step.name) else "subprogram"
+        control.suspend("cycle", f"the modal {kind} {step.name.upper()} is in force, which ncfix does not follow")
         return
     unit = find(step.name)
     if unit is not None:

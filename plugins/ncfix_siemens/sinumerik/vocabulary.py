@@ -88,7 +88,7 @@ _HARMLESS = """
     protd protz proa cutconon cutconof rtlion rtliof delt getselt delobj
     oric orid orirota orirotr orirott orirotc orison orisof oriaxpos
     drfof delayfston delayfstof fendnorm icycof icycon eauto enat etan bauto bnat btan prepro
-    workpiece setpiece norm kont sons cprecon cprecof diamcycof spath lftxt lfwp lfpos clearm init start isvar
+    workpiece setpiece norm kont sons cprecon cprecof spath lftxt lfwp lfpos clearm init start isvar
     tangdel tlift cut3dcc cut3dccd cut2dd cut2dfd cut3dcd cut3dfd rmbbl rmibl rmebl rmnbl
     osof osc oss osse osd ost
     towstd towmcs towwcs towbcs towtcs towkcs walcs4 walcs5 walcs6 walcs7 walcs8 walcs9 walcs10
@@ -151,6 +151,7 @@ UNFOLLOWED = {
     "call": "a program that is named by a text (CALL)",
     "isocall": "a program in another language (ISOCALL)",
     **dict.fromkeys(("diamona", "diamofa", "diam90a", "diamchan", "diamchana"), "diameters axis by axis (DIAMONA)"),
+    **dict.fromkeys(("diamcycof", "diacycofa"), "radii of a cycle (DIAMCYCOF)"),
 }
 """Names after which coordinates are no longer those that are followed."""
 

@@ -484,6 +484,14 @@ def test_a_label_that_nobody_has_is_named_as_it_was_put_together() -> None:
         follow('GOTOF "MARK"<<7\nG0 X5')
 
 
+@pytest.mark.parametrize("words", ["A3=0 B3=0 C3=1 A10", "A2=5 B2=3 C10", "A3=0.1 C3=1 A2=3", "C=IC(5) B3=0.1 C3=1"])
+def test_a_direction_of_the_tool_that_is_given_in_two_ways(words: str, root: Path) -> None:
+    machine = load(root / "examples" / "machines" / "wCAYFXZSt.toml")
+    text = f"TRAORI G54 ORIEULER\nG0 X0 Y0 Z9 A0 C0\nG1 X5 {words} F100"
+    found = follow(text, "".join(machine.axis_names), kinematics=kinematics_of(machine))
+    assert reasons(found) == ["", "the direction of the tool is given in more than one way"]
+
+
 def test_a_motion_along_the_tool_leads_nobody_knows_where() -> None:
     found = follow("G0 X1 Y1 Z1\nMOVT=IC(5)\nG1 X2 F100\nG0 X1 Y1 Z1").moves
     assert found.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.REFUSE, Rule.CORRECT]
