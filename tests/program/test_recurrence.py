@@ -56,7 +56,6 @@ COUNTING = {
         "R1=0\nAA: G0 X1\nG0 Y1\nG0 Z1\nR1=R1+1\nIF R1>8 GOTOF CC\nBB: G0 X2\nREPEAT AA BB P9999\nCC: M30",
         35,
     ),
-    "linuxcnc, where the axes stand": ("linuxcnc", "G91\no1 while [#5420 LT 40]\nG0 X1\no1 endwhile\nM2", 40),
     "fanuc": ("fanuc", "%\nO1\n#1=0\nWHILE[#1 LT 300]DO1\nG0 X1.\n#1=#1+1\nEND1\nM30\n%", 300),
     "fanuc, calls": ("fanuc", "%\nO1\nM98 P2 L30\nM98 P2\nM30\nO2\nGOTO 3\nN2 G0 X1.\nM99\nN3 GOTO 2\n%", 31),
     "klartext": (

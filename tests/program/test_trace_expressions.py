@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ncfix.control.moves import Rule
 from ncfix.diagnostics import SourceError
 from ncfix_iso.rs274 import parameters
 from program.tracing import follow, last, reasons
@@ -163,15 +164,18 @@ def test_the_setup_gives_values() -> None:
     assert last(follow(text, variables=variables)) == [3.0, 4.0, 5.0]
 
 
-def test_positions_and_modes_can_be_read() -> None:
-    text = "G0 X12 Y3\n#1=#5420 #2=#<_y> #3=#<_metric> #4=#<_coord_system>\nG55 G20\n"
-    moved = follow(text + "G21 G0 X[#1+1] Y[#2+#3] Z#4")
-    assert last(moved) == [13.0, 4.0, 540.0]
+def test_modes_can_be_read() -> None:
+    text = "G0 X12 Y3\n#3=#<_metric> #4=#<_coord_system> #2=#5221\nG55 G20\nG21 G0 X#2 Y#3 Z#4"
+    assert last(follow(text)) == [0.0, 1.0, 540.0]
 
 
-def test_positions_are_in_program_units_and_coordinates() -> None:
-    text = "G10 L2 P1 X25.4\nG0 X25.4\nG20\n#1=#5420 #2=#5221\nG21 G0 X#1 Y#2"
-    assert last(follow(text))[:2] == [26.4, 25.4]
+@pytest.mark.parametrize("position", ["#5420", "#<_x>"])
+def test_a_position_that_is_read_is_another_one_in_the_corrected_program(position: str) -> None:
+    found = follow(f"G0 X12 Y3 Z1\n#1={position}\nG0 X[#1+1] Y5\nG0 X3")
+    assert found.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT]
+    assert [message.code for message in found.messages] == ["NCF241"]
+    waits = follow(f"G91\no1 while [{position} LT 40]\nG0 X1\no1 endwhile").moves
+    assert set(waits.rule.tolist()) <= {Rule.REFUSE}
 
 
 @pytest.mark.parametrize(

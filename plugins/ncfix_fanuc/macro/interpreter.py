@@ -20,7 +20,7 @@ from ncfix_fanuc.macro.data import is_data
 from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
 from ncfix_fanuc.macro.lengths import LENGTH_IN_STEPS, lone_number
 from ncfix_fanuc.macro.rules import MACRO
-from ncfix_fanuc.macro.variables import POSITION_READ, is_system, is_vacant, variable_number
+from ncfix_fanuc.macro.variables import is_system, is_vacant, variable_number
 from ncfix_iso.rs274.control import Block
 from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, RS274Interpreter
 from ncfix_iso.rs274.order import MACHINE
@@ -108,8 +108,7 @@ class MacroInterpreter(RS274Interpreter):
 
     def position_read(self, number: int) -> None:
         """The program reads where the machine stands, which compensation changes."""
-        text = f"the program reads the position #{number}: on the machine it finds the corrected one there"
-        self.control.warn(POSITION_READ, text, "motions that are computed from it are refused")
+        self.control.position_is_read(f"#{number}")
 
     def not_set(self, number: int) -> None:
         """The program reads a variable that somebody else may have set."""

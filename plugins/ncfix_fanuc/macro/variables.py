@@ -189,8 +189,6 @@ LAST = 149_999
 POSITIONS = (range(5001, 5021), range(5021, 5041), range(5041, 5061))
 """End of the block before, machine position, present position."""
 
-POSITION_READ = "NCF241"
-
 
 @dataclass(slots=True)
 class MacroVariables(NumberedParameters):

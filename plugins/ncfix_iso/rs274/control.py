@@ -59,6 +59,9 @@ class Block:
         return Unknown(letter, self.values[letter]) if letter in self.unknown else self.values[letter]
 
 
+POSITION_READ = "NCF241"
+
+
 class RS274Control(shared.ProgramControl):
     """Everything that the steps of a block read and change.
 
@@ -147,6 +150,16 @@ class RS274Control(shared.ProgramControl):
         if isinstance(value, Unknown):
             self.refuse_rest(RUNTIME_BRANCH)
         return nominal(value)
+
+    def read_position(self, name: str, index: int) -> Value:
+        """The same for the program, which reads it by this name: when it is corrected, it finds another value there."""
+        self.position_is_read(name)
+        return Unknown(name, nominal(self.coordinate(index)))
+
+    def position_is_read(self, name: str) -> None:
+        """Say that the program reads where the machine stands."""
+        text = f"the program reads the position {name}: on the machine it finds the corrected one there"
+        self.warn(POSITION_READ, text, "motions that are computed from it are refused")
 
     def coordinate(self, index: int) -> Value:
         """Where an axis stands in program units, X not as a diameter; marked where it is known only at run time."""

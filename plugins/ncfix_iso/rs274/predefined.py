@@ -28,7 +28,9 @@ def install(control: RS274Control, flow: OWords) -> None:
 
 def numbered(control: RS274Control) -> dict[int, Getter]:
     """Numbered parameters: tool number and data (5400 ..), position in program units (5420 ..)."""
-    getters: dict[int, Getter] = {5420 + index: partial(control.coordinate, index) for index in range(9)}
+    getters: dict[int, Getter] = {
+        number: partial(control.read_position, f"#{number}", number - 5420) for number in range(5420, 5429)
+    }
     getters[5400] = lambda: of_tool(control, control.tools.spindle)
     getters[5403] = lambda: of_tool(control, number_or_zero(control.tool_length()[1]))
     getters[5410] = lambda: of_tool(control, 2.0 * (control.knowledge.known_tool_radius(control.tools.spindle) or 0.0))
@@ -48,7 +50,8 @@ def number_or_zero(value: float) -> float:
 
 def positions(control: RS274Control) -> dict[str, Getter]:
     """`_x` to `_w`: where the control stands in program units."""
-    return {f"_{letter.lower()}": partial(control.coordinate, index) for index, letter in enumerate(LETTERS)}
+    names = [f"_{letter.lower()}" for letter in LETTERS]
+    return {name: partial(control.read_position, f"#<{name}>", index) for index, name in enumerate(names)}
 
 
 def modes(control: RS274Control) -> dict[str, Getter]:
