@@ -67,6 +67,8 @@ UNSTEADY = (
     'variables."{}" = 0 in the setup file says that it does not'
 )
 
+TURNED_AWAY = "a rotary axis turns in a swivelled plane, which does not turn with it: CYCLE800 has to be called anew"
+
 TAKEN_ALONG = ("by machine coordinates",)
 """What an axis of a turned frame counts from that an axis of the machine has moved: neither frames nor none."""
 
@@ -276,6 +278,9 @@ class Sinumerik(ProgramControl):
         refusal, self.whole = motion.refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
         sure = (letter for letter, form in words.forms.items() if form in TURNING and letter in INDEX)
         self.builder.says_the_way(mask_of(INDEX[letter] for letter in sure))
+        leaves = self._leaves_plane(motion)
+        if leaves and not motion.passing:
+            refusal = refusal or TURNED_AWAY
         follows = not motion.passing and not refusal
         if follows:
             self.ask_for_length()
@@ -283,6 +288,20 @@ class Sinumerik(ProgramControl):
         self.make(Motion(motion.kind, axes, end, motion.code, refusal, motion.passing, motion.arc, placed))
         self.whole = False
         self.count_from_here(axes, by_machine=motion.by_machine)
+        if leaves:
+            self.suspend("tilt", TURNED_AWAY)
+
+    def _leaves_plane(self, motion: ProgrammedMotion) -> bool:
+        """Whether a rotary axis turns in a swivelled plane: without TRAORI the plane stays where it was."""
+        if not self.held or (motion.passing is not None and motion.passing.rule == Pass.ALIGNMENT):
+            return False
+        end, here = motion.end.target, self.position
+        return any(end[i] != here[i] or (i in self.unknown and i not in motion.end.unknown) for i in self.turning)
+
+    @property
+    def held(self) -> bool:
+        """Whether the plane is swivelled (CYCLE800), and the control does not lead the tip."""
+        return self.modes.swivelled and not (self.modes.transformed or self.setup.tcp)
 
     def _head(self, motion: ProgrammedMotion, *, follows: bool) -> None:
         """Keep the direction in which a motion is about to end; None where it is not known, or not followed."""
@@ -336,12 +355,11 @@ class Sinumerik(ProgramControl):
 
     def _style(self, kind: MotionKind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
         index = super()._style(kind, rule, reason, code, passing)
-        held = self.modes.swivelled and not self.modes.transformed
-        if not held and not self.whole:
+        if not self.held and not self.whole:
             return index
         style = self.builder.styles[index]
         return self.builder.style(
-            style._replace(rotary_as_programmed=held, compensated=style.compensated or self.whole)
+            style._replace(rotary_as_programmed=self.held, compensated=style.compensated or self.whole)
         )
 
     def _passes_zero(self, words: BlockWordValues, target: Vector) -> bool:

@@ -229,8 +229,8 @@ CODES: dict[str, Code] = {
     ),
     "NCF241": Code(
         "Program reads a position",
-        "The program reads where the machine stands. In the corrected program it will find the corrected position there, "
-        "so what is computed from it would be another value than here.",
+        "The program reads where the machine stands. When it is corrected it finds the corrected position there, so "
+        "what is computed from it would be another value than here.",
         "Motions that depend on it are refused; write the position as a number, or keep it in a variable of its own.",
     ),
     "NCF242": Code(

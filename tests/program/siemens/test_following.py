@@ -495,3 +495,13 @@ def test_a_direction_of_the_tool_that_is_given_in_two_ways(words: str, root: Pat
 def test_a_motion_along_the_tool_leads_nobody_knows_where() -> None:
     found = follow("G0 X1 Y1 Z1\nMOVT=IC(5)\nG1 X2 F100\nG0 X1 Y1 Z1").moves
     assert found.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.REFUSE, Rule.CORRECT]
+
+
+@pytest.mark.parametrize("turn", ["G1 X5 C20 F100", "G0 A0", "SUPA G0 A0 C0", "C=IC(1)"])
+def test_a_swivelled_plane_does_not_turn_with_the_rotary_axes(turn: str, root: Path) -> None:
+    machine = load(root / "examples" / "machines" / "wCAYFXZSt.toml")
+    plane = 'CYCLE800(1,"TABLE",200000,57,0,0,0,-30,0,0,0,0,0,-1)\nG0 X0 Y0 Z9\n'
+    text = f"G54 G0 X0 Y0 Z9 A0 C0\n{plane}G1 X5 A=IC(0) F100\n{turn}\nG0 X5 Y5 Z5\n{plane}G1 X7 F100"
+    rules = follow(text, "".join(machine.axis_names), kinematics=kinematics_of(machine)).moves.rule.tolist()
+    turned = Rule.PASS if "SUPA" in turn else Rule.REFUSE
+    assert rules[2:] == [Rule.CORRECT, Rule.CORRECT, turned, Rule.REFUSE, Rule.PASS, Rule.CORRECT, Rule.CORRECT]
