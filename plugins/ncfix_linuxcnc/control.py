@@ -55,6 +55,8 @@ TRIPLE = re.compile(rf"\s*({NUMBER}){GAP}({NUMBER}){GAP}({NUMBER})(.*)")
 SECTION = re.compile(r"\s*\[(\w+)\]\s*")
 ENTRY = re.compile(r"\s*(\w+)\s*=\s*(.*?)\s*")
 UNITS = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
+DECIMALS = {"mm": 6, "inch": 7}
+"""Of a file of that unit: a nanometre, and less than three."""
 LOADS = re.compile(rb"(?im)^[ \t]*COMP_FILE[ \t]*=")
 Entries = dict[str, tuple[int, str]]
 
@@ -80,18 +82,19 @@ class JointTable:
         return own_terms(self.axis, self.nodes * unit, self.forward * unit, self.reverse * unit)
 
 
-def comp_text(joint: JointTable, kind: int) -> bytes:
+def comp_text(joint: JointTable, kind: int, unit: str = "mm") -> bytes:
     """A `.comp` file: nominal, forward, reverse. No comments: LinuxCNC stops reading where a line has another form."""
     columns = [joint.nodes, joint.forward, joint.reverse]
     if kind == 0:
         columns = [joint.nodes, joint.nodes - joint.forward, joint.nodes - joint.reverse]
-    rows = zip(*(np.round(column, 6) + 0.0 for column in columns), strict=True)
-    return "".join(f"{a:.6f} {b:.6f} {c:.6f}\n" for a, b, c in rows).encode()
+    digits, scale = (DECIMALS["mm"], 1.0) if joint.axis in TURNING else (DECIMALS[unit], UNITS[unit])
+    rows = zip(*(np.round(column / scale, digits) + 0.0 for column in columns), strict=True)
+    return "".join(f"{a:.{digits}f} {b:.{digits}f} {c:.{digits}f}\n" for a, b, c in rows).encode()
 
 
-def ini_text(joints: list[JointTable], letters: str, kind: int) -> bytes:
+def ini_text(joints: list[JointTable], letters: str, kind: int, unit: str = "mm") -> bytes:
     """The lines of the ini file that load the files."""
-    head = ["[TRAJ]", f"COORDINATES = {' '.join(letters)}", "LINEAR_UNITS = mm", "ANGULAR_UNITS = degree"]
+    head = ["[TRAJ]", f"COORDINATES = {' '.join(letters)}", f"LINEAR_UNITS = {unit}", "ANGULAR_UNITS = degree"]
     parts = [
         ["", f"[JOINT_{joint.number}]", f"COMP_FILE = {joint.file}", f"COMP_FILE_TYPE = {kind}"] for joint in joints
     ]
@@ -171,6 +174,9 @@ def _scale(sections: dict[str, Entries], ini: Remarks) -> float:
     line, unit = sections.get("TRAJ", {}).get("LINEAR_UNITS", (0, ""))
     if unit.lower() not in UNITS:
         ini.refuse(line, f"LINEAR_UNITS = {unit or 'nothing'}", "mm or inch, under [TRAJ]")
+    turn_line, turn = sections.get("TRAJ", {}).get("ANGULAR_UNITS", (0, "degree"))
+    if turn.lower() not in ("deg", "degree"):
+        ini.refuse(turn_line, f"ANGULAR_UNITS = {turn}: tables of rotary axes are read in degrees", "degree")
     return UNITS.get(unit.lower(), 1.0)
 
 
@@ -300,11 +306,12 @@ class LinuxCnc(Control):
         "type": Option("1", "COMP_FILE_TYPE: 1 corrections, 0 actual positions", one_of("0", "1")),
         "coordinates": Option("", "axis letters in the order of the joints, e.g. XYZBC"),
         "points": Option(str(MOST), "most points of one file, at most 256", whole(2, MOST)),
+        "unit": Option("mm", "LINEAR_UNITS of the machine: mm or inch", one_of("mm", "inch")),
     }
     steps = (
         "Save the ini file, and note the values of BACKLASH: a joint with COMP_FILE ignores it.",
-        "The files are in mm and degree: look that LINEAR_UNITS and ANGULAR_UNITS of the ini file are, too. A machine "
-        "in inches would take them for 25.4 times as much.",
+        "Look that LINEAR_UNITS and ANGULAR_UNITS of the ini file are those of comp.ini (--set unit=inch for inches): "
+        "otherwise it would take the files for 25.4 times as much, or as little.",
         "Copy the .comp files beside the ini file.",
         "Put the lines of comp.ini into the [JOINT_n] sections.",
         "Start LinuxCNC and home all joints.",
@@ -319,9 +326,9 @@ class LinuxCnc(Control):
         most = int(settings["points"])
         letters = _coordinates(request, settings["coordinates"])
         tables = positioning(request.machine, request.space, request.tool_length, most, request.target)
-        joints = _joints(tables, letters)
-        files = {joint.file: comp_text(joint, int(kind)) for joint in joints}
-        files["comp.ini"] = ini_text(joints, letters, int(kind))
+        joints, unit = _joints(tables, letters), settings["unit"]
+        files = {joint.file: comp_text(joint, int(kind), unit) for joint in joints}
+        files["comp.ini"] = ini_text(joints, letters, int(kind), unit)
         return Written(files, _notes(), least_of_own_axis(request.machine, request.space, request.tool_length))
 
     def read(self, files: Files) -> Compensation:

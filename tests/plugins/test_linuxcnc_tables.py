@@ -64,6 +64,24 @@ def test_inches() -> None:
     assert at({"comp.ini": ini, "x.comp": GOOD}, 254.0, 1) == pytest.approx(-0.0254, abs=1e-8)
 
 
+def test_a_machine_in_inches_gets_its_tables_in_inches() -> None:
+    """Positions and values are 25.4 times smaller, what they do is the same to 3 nm; the last digit is 2.5 nm."""
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (1e-4,), Polynomial((1,))),))
+    request = Request(machine, ranges_of(machine), 0.0, 0.001, CONTROL.settings({"unit": "inch"}))
+    made = export(CONTROL, request, 100)
+    assert b"LINEAR_UNITS = inch" in made.native["comp.ini"]
+    assert made.native["joint_0_X.comp"].startswith(b"-7.8740157 0.0007873 ")
+    assert made.left.after.max() < 5e-6
+
+
+def test_tables_of_rotary_axes_are_in_degrees() -> None:
+    ini = INI.replace(b"= mm", b"= mm\nANGULAR_UNITS = rad")
+    (found,) = CONTROL.lint({"comp.ini": ini, "x.comp": GOOD})
+    assert "ANGULAR_UNITS = rad" in found.text
+    assert found.place is not None
+    assert found.place.line == 4
+
+
 def test_two_joints_of_one_axis_are_not_added_up() -> None:
     """A gantry: each joint has its table, and the axis is not corrected twice."""
     ini = INI.replace(b"X Y Z", b"X X Y Z") + b"[JOINT_1]\nCOMP_FILE = x.comp\nCOMP_FILE_TYPE = 1\n"

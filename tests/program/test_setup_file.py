@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from ncfix.control.setup import Setup, Tool
-from ncfix.control.setup_file import load, load_tool_table, loads, may_be_in_inches
+from ncfix.control.setup_file import load, loads
+from ncfix.control.tool_files.tables import load_tool_table, may_be_in_inches
 from ncfix.diagnostics import ConfigError, ExitCode, SourceError
 
 FULL = """
@@ -121,7 +122,7 @@ def test_files_are_utf_8_with_or_without_its_mark(tmp_path: Path) -> None:
 # -- tool tables ------------------------------------------------------------------------------------------------------
 
 
-def table(tmp_path: Path, name: str, text: str) -> dict[int, Tool]:
+def table(tmp_path: Path, name: str, text: str) -> dict[int | str, Tool]:
     """The tools of a table."""
     path = tmp_path / name
     path.write_text(text, encoding="utf-8")
@@ -168,6 +169,15 @@ def test_csv_tables(tmp_path: Path) -> None:
     assert table(tmp_path, "tools.csv", "tool,length\n1,100.5\n") == {1: Tool(100.5, None)}
 
 
+@pytest.mark.parametrize("mark", [";", "\t"])
+@pytest.mark.parametrize("decimal", [",", "."])
+@pytest.mark.parametrize("coding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+def test_csv_tables_of_spreadsheets(tmp_path: Path, mark: str, decimal: str, coding: str) -> None:
+    text = "tool|length|radius\r\n1|100.5|5\r\n2|80.25|2.5\r\n".replace(".", decimal).replace("|", mark)
+    (tmp_path / "tools.csv").write_bytes(text.encode(coding))
+    assert load_tool_table(str(tmp_path / "tools.csv")) == {1: Tool(100.5, 5.0), 2: Tool(80.25, 2.5)}
+
+
 @pytest.mark.parametrize(
     ("name", "text", "faults"),
     [
@@ -176,13 +186,17 @@ def test_csv_tables(tmp_path: Path) -> None:
         ("t.tbl", "T3 Z1 Z2\nT4 Z1.2.3\nT5 Z1,2\nT6 R5 Z1\n", [1, 2, 3, 4]),
         ("t.tbl", "POC FMS LEN DIAM\n1 1 100.0 6.0\n", [2]),
         ("t.csv", "tool,length\n1,2,3\n2,1.5x\n-1,1\n1.5,2\n", [2, 3, 4, 5]),
-        ("t.csv", "tool;length\n1;2\n", [1]),
+        ("t.csv", "tool;length\n1;1.234,5\n2;100,5\n3;100.5\n", [2, 4]),
+        ("t.csv", "tool|length\n1|2\n", [1]),
         ("t.csv", "tool,length,colour\n1,2,red\n", [1]),
         ("t.csv", 'tool,length\n1,"2,5"\n', [2]),
         ("t.csv", "tool,length\n1,\n", [2]),
         ("t.csv", "tool,length,length\n1,100,50\n", [1]),
         ("t.csv", "tool,length,radius,diameter\n1,100,5,10\n2,100,5,12\n", [3]),
         ("t.csv", "tool,length\n1,nan\n", [2]),
+        ("t.toa", "$TC_DP3[1,1]=1O0\n$TC_DP3[2,1]=100\n$TC_ADP1[3]=50.0\n", [1, 3]),
+        ("t.toa", "CHANDATA(1)\n$TC_DP3[1,1]=100\nCHANDATA(2)\n$TC_DP3[1,1]=90\n", [0]),
+        ("t.nc", "G10 L10 P1 R100.\nG10 L10 P1 R90.\nG10 L10 P2 R90000\nG91 G10 L10 P3 R1.\nG1 X5.\n", [2, 3, 4, 5]),
     ],
 )
 def test_wrong_lines_are_named_all_at_once(tmp_path: Path, name: str, text: str, faults: list[int]) -> None:
@@ -190,6 +204,67 @@ def test_wrong_lines_are_named_all_at_once(tmp_path: Path, name: str, text: str,
         table(tmp_path, name, text)
     assert [message.place.line for message in caught.value.messages if message.place] == faults
     assert {message.code for message in caught.value.messages} == {"NCF385"}
+
+
+TOOL_DATA = """\
+%_N_TO1_TOA
+;$PATH=/_N_TOA_DIR
+CHANDATA(1)
+$TC_DP1[1,1]=120
+$TC_DP3[1,1]=120.5
+$TC_DP6[1,1]=5 $TC_DP12[1,1]=-0.02 $TC_DP15[1,1]=0.01
+$TC_DP3[1,2]=90 ; the shoulder
+$TC_TP2[2]="Drill 8.5"
+$TC_DP1[2,1]=200
+$TC_DP3[2,1]=85
+$TC_DP21[2,1]=50.0
+$TC_DP3[2,2]=80.0
+$TC_DP3[3,1]=70.0
+$TC_DP5[3,1]=2.5
+$TC_DP1[4,1]=500
+$TC_DP3[4,1]=40.0
+$TC_TP2[5]="MILL"
+$TC_TP2[6]="MILL"
+$TC_DP3[5,1]=100.0
+$TC_DP3[6,1]=101.0
+M17
+"""
+
+
+def test_tool_data_of_sinumerik(tmp_path: Path) -> None:
+    """Wear and base count; edges, names and lengths aside; no turning tools, and none of two of the same name."""
+    found = table(tmp_path, "TO.INI", TOOL_DATA)
+    assert found == {
+        1: Tool(pytest.approx(120.48), pytest.approx(5.01)),
+        "1 D2": Tool(90.0, 0.0),
+        "DRILL 8.5": Tool(135.0, 0.0),
+        "DRILL 8.5 D2": Tool(80.0, 0.0),
+        3: Tool(None, 0.0, "X2.5"),
+    }
+
+
+def test_offsets_of_fanuc_as_a_program(tmp_path: Path) -> None:
+    text = (
+        "%\nO9000(OFFSETS)\nG90G10L10P1R120.5\nG10 L11 P1 R-.02\nG10 L12 P1 R5.\nG10 L11 P2 R0\nG10L1P3R80.\nM30\n%\n"
+    )
+    found = table(tmp_path, "OFFSET.TXT", text)
+    assert found == {1: Tool(pytest.approx(120.48)), 2: Tool(0.0), 3: Tool(80.0)}
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("tool.tbl", "T1 P1 Z4.5 D0.5\n"),
+        ("tools.csv", "tool,length,diameter\n1,4.5,0.5\n"),
+        ("to.ini", "$TC_DP3[1,1]=4.5\n$TC_DP6[1,1]=0.25\n"),
+        ("BEGIN.T", "BEGIN TOOL .T INCH\nT   L    R\n1   4.5  0.25\n[END]\n"),
+    ],
+)
+def test_tables_in_inches(tmp_path: Path, name: str, text: str) -> None:
+    """A TOOL.T says its unit itself."""
+    (tmp_path / name).write_text(text)
+    found = load_tool_table(str(tmp_path / name), unit="inch")
+    assert found == {1: Tool(pytest.approx(114.3), pytest.approx(6.35))}
 
 
 def test_a_machine_file_is_known_for_one(root: Path) -> None:

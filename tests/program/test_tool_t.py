@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ncfix.control.setup import Tool
-from ncfix.control.setup_file import load_tool_table
+from ncfix.control.tool_files.tables import load_tool_table
 from ncfix.diagnostics import ConfigError
 
 TABLE = """\

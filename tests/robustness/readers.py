@@ -32,8 +32,8 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import traced
 from ncfix.control.setup import Setup
-from ncfix.control.setup_file import load_tool_table
 from ncfix.control.setup_file import loads as load_setup
+from ncfix.control.tool_files.tables import load_tool_table
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine
 from ncfix.machine import loads as load_machine

@@ -206,9 +206,10 @@ def _com(text: str) -> tuple[Array, dict[str, Array]]:
 
 def _inputs(files: Texts) -> dict[str, tuple[Array, dict[str, Array]]]:
     _, titles, *rows = files["config.cma"].splitlines()
-    active = next(row.split() for row in rows if "*" in row)
-    letters = titles.split()[2:]
-    return {letter: _com(files[name]) for letter, name in zip(letters, active[2:], strict=True) if name in files}
+    row = next(row for row in rows if "*" in row)
+    starts = {found[0]: found.start() for found in re.finditer(r"\S+", titles)}
+    named = {letter: row[start:].split(" ", 1)[0] for letter, start in starts.items() if len(letter) == 1}
+    return {letter: _com(files[name]) for letter, name in named.items() if name in files}
 
 
 def heidenhain(files: Texts, names: Sequence[str], q: Array, ways: Array, said: Texts) -> Array:

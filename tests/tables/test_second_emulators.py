@@ -99,7 +99,10 @@ def _errors(rng: Rng, names: list[str], spans: dict[str, tuple[float, float]]) -
 
 
 CONTROLS: dict[str, tuple[Callable[..., second.Array], list[dict[str, str]]]] = {
-    "linuxcnc": (second.linuxcnc, [{}, {"type": "0"}, {"points": "9"}]),
+    "linuxcnc": (
+        second.linuxcnc,
+        [{}, {"type": "0"}, {"points": "9"}, {"unit": "inch"}, {"unit": "inch", "type": "0"}],
+    ),
     "siemens": (
         second.siemens,
         [
@@ -150,11 +153,8 @@ def test_what_is_stated_is_what_a_second_emulator_leaves(name: str, seed: int) -
     length = float(rng.choice([0.0, 80.0, 250.0]))
     for _ in range(30):
         one = machine(rng)
-        places = ",".join(
-            f"{axis.name}{np.clip(0, *(x / axis.unit for x in axis.range)):.3f}"
-            for axis in one.axes
-            if axis.name in "XYZABC"
-        )
+        ends = [(axis.name, *(x / axis.unit for x in axis.range)) for axis in one.axes if axis.name in "XYZABC"]
+        places = ",".join(f"{name}{np.clip(0, low + 1, high - 1):.3f}" for name, low, high in ends)
         chosen = {**settings, "reference": places} if "reference" in settings else settings
         try:
             made = export(control, Request(one, ranges_of(one), length, 0.004, chosen), POSES)

@@ -144,6 +144,12 @@ OPTIONS = (
     ),
     click.option("--tool-table", "tool_table", type=PATH, metavar="FILE", help="The control's own tool table."),
     click.option(
+        "--tool-unit",
+        type=click.Choice(("mm", "inch")),
+        metavar="[mm|inch]",
+        help="The unit of a tool table that does not say it; mm without this option.",
+    ),
+    click.option(
         "--initial",
         type=AxisValues(),
         multiple=True,
@@ -195,6 +201,7 @@ class SetupOptions:
     offsets: tuple[tuple[str, dict[str, float]], ...] = ()
     tools: tuple[tuple[str, tuple[float, ...]], ...] = ()
     tool_table: str | None = None
+    tool_unit: str | None = None
     initial: tuple[dict[str, float], ...] = ()
     inputs: tuple[tuple[str, float], ...] = ()
     no_point: str | None = None
@@ -221,23 +228,25 @@ class SetupOptions:
             from ncfix.control.setup_file import load
 
             setup = load(self.setup_file)
-        tools = dict(setup.tools)
+        tools, named = dict(setup.tools), dict(setup.named_tools)
         if self.tool_table is not None:
-            from ncfix.control.setup_file import ASIDE, load_tool_table, may_be_in_inches
+            from ncfix.control.tool_files.tables import ASIDE, load_tool_table, may_be_in_inches
 
-            found = load_tool_table(self.tool_table, ASIDE if machine is None else machine.axis_names)
-            if doubt := may_be_in_inches(found):
-                tell(Message("NCF386", doubt, Place(self.tool_table), "lengths are mm: 25.4 times as much"))
-            tools |= found
+            axes = ASIDE if machine is None else machine.axis_names
+            found = load_tool_table(self.tool_table, axes, self.tool_unit or "mm")
+            if self.tool_unit is None and (doubt := may_be_in_inches(found)):
+                tell(Message("NCF386", doubt, Place(self.tool_table), "--tool-unit inch if it is, else --tool-unit mm"))
+            tools |= {key: tool for key, tool in found.items() if isinstance(key, int)}
+            named |= {key: tool for key, tool in found.items() if isinstance(key, str)}
         given = {key.strip('"'): Tool(values[0], values[1] if len(values) > 1 else None) for key, values in self.tools}
         tools |= {int(key): tool for key, tool in given.items() if key.isdecimal()}
-        named = {key: tool for key, tool in given.items() if not key.isdecimal()}
+        named |= {key: tool for key, tool in given.items() if not key.isdecimal()}
         probed = {axis: value for given in self.probed for axis, value in given.items()}
         whole = replace(
             setup,
             work_offsets={**setup.work_offsets, **dict(self.offsets)},
             tools=tools,
-            named_tools={**setup.named_tools, **named},
+            named_tools=named,
             initial={**setup.initial, **{axis: value for given in self.initial for axis, value in given.items()}},
             inputs={**setup.inputs, **dict(self.inputs)},
             no_point=self.no_point or setup.no_point,

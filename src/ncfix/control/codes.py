@@ -320,12 +320,13 @@ CODES: dict[str, Code] = {
     "NCF385": Code(
         "Wrong line in a tool table",
         "A line of the tool table cannot be understood, or a tool stands twice.",
-        "LinuxCNC: `T1 P1 Z120.5 D10`; CSV: a header `tool,length,radius`, decimal points.",
+        "LinuxCNC: `T1 P1 Z120.5 D10`; CSV: a header `tool,length,radius`; SINUMERIK: `$TC_DP3[1,1]=120.5`; Fanuc: "
+        "`G10 L10 P1 R120.5`.",
     ),
     "NCF386": Code(
         "Tool table that may be in inches",
-        "No tool of the table is as long as tools with their holders are in mm. Tables are read in mm; one of LinuxCNC "
-        "has the unit of its machine, and does not say which.",
-        "Write lengths and diameters in mm if they are in inches.",
+        "No tool of the table is as long as tools with their holders are in mm. Tables are read in mm; most have the "
+        "unit of their machine, and do not say which.",
+        "`--tool-unit inch` or `--tool-unit mm`.",
     ),
 }

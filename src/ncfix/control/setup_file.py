@@ -1,30 +1,15 @@
-"""The setup file (TOML): work offsets, tool lengths, start position and the rest that a program cannot know.
-
-Tool tables: LinuxCNC's `.tbl`, Heidenhain's TOOL.T, and CSV with a header.
-
-- LinuxCNC: one tool a line, `T1 P1 Z120.5 D10 ; comment`. Z is the length offset and D the diameter, both in mm here,
-  since the machine's unit is mm. G43 adds the offsets of all other axes, too: the length of a tool that has one is not
-  known. I, J and Q are of a lathe's tool nose. Lines above the first tool that are none are for people, as the control
-  takes them. Source: LinuxCNC documentation, "Tool table format".
-- TOOL.T: columns at fixed places under a line of names. L and R count with their oversizes DL and DR. A tool with an
-  index (5.1) and a row without a length are left out. A word that begins in one column and ends in the next is refused:
-  columns are at other places then. Source: TNC 640 user's manual, "Entering tool data in the table".
-"""
+"""The setup file (TOML): work offsets, tool lengths, start position and the rest that a program cannot know."""
 
 from __future__ import annotations
 
-import csv
-import math
 import os
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import partial
-from pathlib import PurePath
 from typing import Any
 
-from ncfix.control.coordinates import INCH, LETTERS
+from ncfix.control.coordinates import LETTERS
 from ncfix.control.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
@@ -50,18 +35,6 @@ G_CODE = re.compile(r"G(\d{1,4})(?:\.(\d))?")
 
 TOOL = re.compile(r"\d{1,9}$|(?!T\d+$|\d+$).{2,}")
 """A tool is called by its number or by a name."""
-
-BAD_TABLE = "NCF385"
-ENTRY = re.compile(r"([TPXYZABCUVWDIJQ])\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?)(?![\d.E])", re.IGNORECASE)
-"""A word of LinuxCNC's tool table."""
-ASIDE = "XYABCUVW"
-"""Axes along which a tool has no length here."""
-SHORT = 15.0
-"""mm; no tool with its holder is as short."""
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)\Z")
-LONGEST = 1e6
-"""mm; a number beyond it is a slip."""
-COLUMNS = ("tool", "length", "radius", "diameter")
 
 
 def load(path: str) -> Setup:
@@ -287,156 +260,3 @@ def flattened(table: Mapping[str, Any]) -> dict[str, Any]:
         if rest or not inner:
             flat[key] = rest or value
     return flat
-
-
-# -- tool tables -------------------------------------------------------------------------------------------------------
-
-
-def load_tool_table(path: str, axes: Collection[str] = ASIDE) -> dict[int, Tool]:
-    """The tools in a control's table, by number: Heidenhain's by its first line, CSV by its suffix, else LinuxCNC's.
-
-    axes  of the machine: offsets along others do nothing
-
-    Raises SourceError NCF002, ConfigError NCF385 with every line that is wrong.
-    """
-    source = read_bytes(path, MOST_SAID)
-    if b"\0" in source:
-        raise ConfigError.of(BAD_TABLE, "not plain text, or text in UTF-16", Place(path), "save it as UTF-8")
-    text = source.decode("utf-8-sig", "replace")
-    reader = csv_rows if PurePath(path).suffix.lower() == ".csv" else partial(linuxcnc_rows, axes=axes)
-    if TOOL_T_BEGIN.match(text):
-        reader = tool_t_rows
-    faults: list[Message] = []
-    tools: dict[int, Tool] = {}
-    for line, content in reader(text):
-        if isinstance(content, str):
-            rows = text.splitlines()
-            row = rows[line - 1] if 0 < line <= len(rows) else ""
-            faults.append(Message(BAD_TABLE, content, Place(path, line, 0, row)))
-        elif max(abs(content[1].length or 0.0), abs(content[1].radius or 0.0)) > LONGEST:
-            faults.append(Message(BAD_TABLE, f"no tool is longer than {LONGEST:g} mm", Place(path, line)))
-        elif content[0] in tools:
-            faults.append(Message(BAD_TABLE, f"tool {content[0]} stands twice", Place(path, line)))
-        else:
-            tools[content[0]] = content[1]
-    if not tools and not faults:
-        faults.append(Message(BAD_TABLE, "there is no tool in it", Place(path)))
-    if faults:
-        raise ConfigError.collected(faults)
-    return tools
-
-
-Row = tuple[int, tuple[int, Tool] | str]
-"""Line number, and a tool or what is wrong."""
-
-
-def may_be_in_inches(tools: Mapping[int, Tool]) -> str:
-    """What is said of a table in which no tool is as long as tools are in mm; "" of any other."""
-    lengths = [tool.length for tool in tools.values() if tool.length is not None and tool.length > 0]
-    if len(lengths) < 2 or max(lengths) > SHORT:
-        return ""
-    return f"no tool is longer than {max(lengths):g} mm: is the table in inches?"
-
-
-def linuxcnc_rows(text: str, axes: Collection[str]) -> Iterator[Row]:
-    """The lines of a LinuxCNC table for a machine with these axes."""
-    begun = False
-    for line, content in enumerate(text.splitlines(), 1):
-        entry = content.partition(";")[0].strip()
-        begun = begun or re.match(r"[TP]\s*\d", entry, re.IGNORECASE) is not None
-        if not entry or not (begun or re.match(r"\d", entry)):
-            continue
-        rest, words = ENTRY.sub("", entry).strip(), ENTRY.findall(entry.upper())
-        values = {letter: float(number) for letter, number in words}
-        aside = [f"{letter}{values[letter]:g}" for letter in ASIDE if letter in axes and values.get(letter)]
-        if rest:
-            yield line, f"{rest!r} is not understood in a tool table"
-        elif len(values) < len(words):
-            twice = next(letter for letter in values if [each for each, _ in words].count(letter) > 1)
-            yield line, f"{twice} stands twice"
-        elif "T" not in values or not values["T"].is_integer():
-            yield line, "the line names no tool (T)"
-        else:
-            length, radius = values.get("Z", 0.0), values["D"] / 2 if "D" in values else None
-            yield line, (int(values["T"]), Tool(None if aside else length, radius, " ".join(aside)))
-
-
-def csv_rows(text: str) -> Iterator[Row]:
-    """The rows of a CSV table with a header: `tool`, `length`, and `radius` or `diameter`, mm."""
-    rows = [
-        (line, row) for line, row in enumerate(csv.reader(text.splitlines()), 1) if any(part.strip() for part in row)
-    ]
-    if not rows:
-        return
-    first, names = rows[0][0], [name.strip().lower() for name in rows[0][1]]
-    strangers = [name for name in names if name not in COLUMNS]
-    if strangers or not {"tool", "length"} <= set(names):
-        apart = ", separated by commas" if re.search(r"[;\t]", names[0]) else ""
-        yield first, f"the columns are {', '.join(COLUMNS)}{apart}; found {', '.join(names)}"
-        return
-    if len(set(names)) < len(names):
-        yield first, f"a column stands twice: {', '.join(names)}"
-        return
-    for line, row in rows[1:]:
-        yield line, csv_tool(names, [part.strip() for part in row])
-
-
-def csv_tool(names: list[str], row: list[str]) -> tuple[int, Tool] | str:
-    """One tool, or what is wrong with its row."""
-    if len(row) != len(names):
-        return f"{len(row)} values for {len(names)} columns"
-    for name, part in zip(names, row, strict=True):
-        if not NUMBER.match(part):
-            return f"{name}: {part!r} is not a number (with a decimal point)"
-    values = {name: float(part) for name, part in zip(names, row, strict=True)}
-    if not values["tool"].is_integer() or values["tool"] < 0:
-        return f"{values['tool']:g} is not a tool number"
-    radius = values.get("radius", values.get("diameter", math.nan) / 2)
-    if "diameter" in values and not math.isclose(radius, values["diameter"] / 2, abs_tol=1e-6):
-        return f"radius {radius:g} and diameter {values['diameter']:g} are of two tools"
-    return int(values["tool"]), Tool(values["length"], None if math.isnan(radius) else radius)
-
-
-TOOL_T_BEGIN = re.compile(r"\s*BEGIN\s+\S*TOOL\S*\s*\.T\b\s*(?P<unit>MM|INCH)?", re.IGNORECASE)
-TOOL_T_END = re.compile(r"\s*(\[END\]|END\b)", re.IGNORECASE)
-TOOL_T_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)\Z")
-WANTED = ("L", "R", "DL", "DR")
-
-
-def tool_t_rows(text: str) -> Iterator[Row]:
-    """The rows of a TOOL.T."""
-    lines = text.splitlines()
-    head = TOOL_T_BEGIN.match(lines[0])
-    names = [(name[0].upper(), name.start()) for name in re.finditer(r"\S+", lines[1])] if len(lines) > 1 else []
-    if head is None or not {"T", "L"} <= {name for name, _ in names}:
-        yield 2, "the second line names no columns T and L"
-        return
-    if head["unit"] is None:
-        yield 1, "the first line does not say MM or INCH"
-        return
-    scale = INCH if head["unit"].upper() == "INCH" else 1.0
-    stops = [start for _, start in names[1:]] + [None]
-    sides = ((start, stop) for (name, start), stop in zip(names, stops, strict=True) if name in ("T", *WANTED))
-    edges = {edge for side in sides for edge in side if edge}
-    for number, line in enumerate(lines[1:], 2):
-        if TOOL_T_END.match(line):
-            return
-        if "\t" in line or any(re.match(r"\S\S", line[edge - 1 : edge + 1]) for edge in edges):
-            yield number, "words are not below the names of their columns"
-            continue
-        if number == 2:
-            continue
-        cells = {name: line[start:stop].strip() for (name, start), stop in zip(names, stops, strict=True)}
-        if cells["T"].isdigit() and cells["L"]:
-            yield number, tool_of(cells, scale)
-        elif line.strip() and not re.fullmatch(r"\d+(\.\d+)?", cells["T"]):
-            yield number, f"{cells['T']!r} is not a tool number"
-
-
-def tool_of(cells: dict[str, str], scale: float) -> tuple[int, Tool] | str:
-    """One tool, or what is wrong with its row."""
-    wrong = [name for name in WANTED if cells.get(name) and not TOOL_T_NUMBER.match(cells[name])]
-    if wrong:
-        return f"{wrong[0]}: {cells[wrong[0]]!r} is not a number"
-    length, radius, longer, wider = (float(cells.get(name, "").replace(",", ".") or 0) * scale for name in WANTED)
-    return int(cells["T"]), Tool(length + longer, radius + wider)

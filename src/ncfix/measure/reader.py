@@ -6,7 +6,6 @@ faults noted. What is well formed but odd is looked at afterwards, in `ncfix.mea
 
 from __future__ import annotations
 
-import codecs
 import math
 import re
 from collections.abc import Iterable
@@ -15,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix import files
+from ncfix.cells import MARKS, Cell, SeparatedText, plain_text
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Machine
 from ncfix.machine.fields import LARGEST, did_you_mean
@@ -30,7 +30,6 @@ ONCE = ("ncfix-measurement", "kind", "noise_um", "noise_urad", "point", "frame",
 """Header lines of which there can only be one."""
 NAMED = {"distance": (2, 2), "target": (1, 3)}
 """Header lines that are names and then numbers: `distance: 1 2 304.6686 0.0012`."""
-SEPARATED = "cells are separated by commas, numbers have a decimal point"
 COMMA = re.compile(r"[-+]?\d+,\d+")
 LABELS = ("set", "repeat")
 """Columns of labels that any kind may have."""
@@ -61,14 +60,10 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
 
 
 def _decoded(source: bytes, path: str) -> str:
-    if source.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise ConfigError.of("NCF600", "the text is in UTF-16", Place(path), "save it as UTF-8")
-    if b"\0" in source:
+    text = plain_text(source)
+    if text is None:
         raise ConfigError.of("NCF600", "not a text file", Place(path), "a measurement file is comma-separated text")
-    try:
-        return source.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return source.decode("latin-1")
+    return text
 
 
 def _measurement(text: MeasurementLines, machine: Machine, plan: bool) -> Measurement:
@@ -83,10 +78,8 @@ def _measurement(text: MeasurementLines, machine: Machine, plan: bool) -> Measur
         text.stop()
     assert start is not None
     _note_stray(text, start, kind)
-    names = _cells(text.lines[start], start + 1)
-    if len(names) == 1 and any(mark in names[0].text for mark in ";\t"):
-        text.note("NCF604", "the columns are not separated by commas", start + 1, 0, SEPARATED)
-        text.stop()
+    text.separated = SeparatedText.of(text.lines[start])
+    names = text.separated.cells(text.lines[start], start + 1)
     _check_names(text, names, form, machine, plan)
     rows = _rows(text, names, start)
     text.stop()
@@ -104,6 +97,7 @@ class MeasurementLines:
     path: str
     lines: list[str]
     messages: list[Message] = field(default_factory=list)
+    separated: SeparatedText = field(default_factory=lambda: SeparatedText(","))
 
     def note(self, code: str, text: str, line: int = 0, column: int = 0, hint: str = "") -> None:
         """Note a fault at a line and column, counted from 1."""
@@ -123,15 +117,6 @@ class MeasurementLines:
             raise ConfigError.collected([*self.messages[:SHOWN], *rest])
 
 
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """A cell's text with its line and column from 1."""
-
-    text: str
-    line: int
-    column: int
-
-
 # -- the head ----------------------------------------------------------------------------------------------------------
 
 
@@ -141,7 +126,7 @@ def _header_lines(text: MeasurementLines) -> list[tuple[Cell, Cell]]:
     for number, line in enumerate(text.lines, 1):
         if line.strip() and not line.startswith("#"):
             break
-        key, colon, value = line.removeprefix("#").partition(":")
+        key, colon, value = line.rstrip(MARKS).removeprefix("#").partition(":")
         if colon:
             at = line.index(":") + 2 + len(value) - len(value.lstrip())
             pairs.append((Cell(key.strip(), number, line.index(key.strip()) + 1), Cell(value.strip(), number, at)))
@@ -225,17 +210,6 @@ def _finite(text: str) -> float | None:
 # -- columns and rows --------------------------------------------------------------------------------------------------
 
 
-def _cells(line: str, number: int) -> list[Cell]:
-    """The cells of a line with their columns; a spreadsheet's quotes round a cell are taken off."""
-    cells, column = [], 1
-    for part in line.split(","):
-        text, at = part.strip(), column + len(part) - len(part.lstrip())
-        quoted = len(text) > 1 and text[0] == text[-1] == '"'
-        cells.append(Cell(text[1:-1].strip(), number, at + 1) if quoted else Cell(text, number, at))
-        column += len(part) + 1
-    return cells
-
-
 def _check_names(
     text: MeasurementLines, names: list[Cell], form: MeasurementKind, machine: Machine, plan: bool
 ) -> None:
@@ -292,7 +266,7 @@ def _rows(text: MeasurementLines, names: list[Cell], start: int) -> list[list[Ce
     for number, line in enumerate(text.lines[start + 1 :], start + 2):
         if not line.strip() or line.startswith("#"):
             continue
-        cells = _cells(line, number)
+        cells = text.separated.cells(line, number)
         if len(cells) != len(names):
             hint = "a number has a decimal point, not a comma" if COMMA.search(line) and len(cells) > len(names) else ""
             text.note("NCF606", f"{len(cells)} cells, there are {len(names)} columns", number, 0, hint)
@@ -337,7 +311,12 @@ def _number(text: MeasurementLines, cell: Cell, name: str) -> float:
         text.mark(cell, "NCF607", f"column {name!r} is empty in this row")
         return math.nan
     try:
-        value = float(cell.text.replace("_", "?"))
+        plain = text.separated.plain(cell.text)
+    except ValueError as error:
+        text.mark(cell, "NCF608", f"column {name!r}: {cell.text}: {error}")
+        return math.nan
+    try:
+        value = float(plain.replace("_", "?"))
     except ValueError:
         hint = "1 towards plus, -1 towards minus, 0 not known" if name == "direction" or name.startswith("dir_") else ""
         text.mark(cell, "NCF608", f"column {name!r}: {cell.text!r} is not a number", hint)

@@ -1,0 +1,108 @@
+"""Tool data that controls write as a program: `$TC_DP...` of SINUMERIK, G10 of Fanuc.
+
+- SINUMERIK (`%_N_TO1_TOA` and the like): `$TC_DP3[T, D]=120.5` is length 1 of edge D of the tool with number T; wear
+  ($TC_DP12) and base ($TC_DP21) count with it, and so does $TC_DP15 with the radius, $TC_DP6. A tool with
+  lengths along the two other axes has no known length here, and turning tools are left out: their length 1 is along
+  another axis. Where a tool has a name ($TC_TP2) it is called by that. Tools with the same name take turns: which one
+  is in the spindle only the control knows, and they are left out. Source: Function Manual Tools (W1, WZV).
+- Fanuc: `G10 L10 P1 R120.5`, length of offset number P; L11 (or L1) its wear, or the whole where there is no other;
+  L12 and L13 are radii or diameters, which a parameter says (5004#2), and are left out. A value without a decimal point
+  counts in increments that nobody says here, and is refused. Source: operator's manuals, "Tool compensation values".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from ncfix.control.setup import Tool
+
+Row = tuple[int, tuple[int | str, Tool] | str]
+"""Line number, and the number or name of a tool with what it is, or what is wrong."""
+
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+ASSIGNED = re.compile(
+    r"\$TC_([A-Z]+)(\d*)\s*\[\s*(\d+)\s*(?:,\s*(\d+)\s*)?\]\s*=\s*(\"[^\"]*\"|[^\s;$]+)", re.IGNORECASE
+)
+UNIT = re.compile(r"CHANDATA\s*\(\s*(\d+)\s*\)", re.IGNORECASE)
+LENGTHS, RADII = (3, 12, 21), (6, 15)
+"""$TC_DP of length 1 (geometry, wear, base) and of the radius (geometry, wear)."""
+ASIDE = {"X": (5, 14, 23), "Y": (4, 13, 22)}
+"""Of lengths 3 and 2, along the axes of the plane G17."""
+TURNING = range(500, 600)
+"""Types of turning tools."""
+ADAPTER = "ADP"
+
+OFFSET = re.compile(
+    rf"(?:N\d+)?(?:G9(?P<way>[01]))?G10L(?P<kind>\d+)P(?P<number>\d+)R(?P<value>{NUMBER});?", re.IGNORECASE
+)
+GEOMETRY, WEAR, OLD, ACROSS = 10, 11, 1, (12, 13)
+
+
+def is_tool_data(text: str) -> bool:
+    """Whether a text assigns data of edges."""
+    return re.search(r"(?im)^[^;\n]*\$TC_DP\d+\s*\[", text) is not None
+
+
+def tool_data_rows(text: str, scale: float) -> Iterator[Row]:
+    """The tools of SINUMERIK's tool data; scale: mm per unit of a length."""
+    edges: dict[tuple[int, int], dict[int, float]] = {}
+    names: dict[int, str] = {}
+    lines: dict[int, int] = {}
+    units: set[str] = set()
+    for line, row in enumerate(text.splitlines(), 1):
+        units |= {found[1] for found in UNIT.finditer(row.partition(";")[0])}
+        for what, number, tool, edge, value in ASSIGNED.findall(row.partition(";")[0]):
+            if what.upper() == "TP" and number == "2":
+                names[int(tool)] = value.strip('"').strip().upper()
+            elif what.upper() == "DP" and edge:
+                if not re.fullmatch(NUMBER, value):
+                    yield line, f"$TC_DP{number}[{tool},{edge}]: {value!r} is not a number"
+                    continue
+                edges.setdefault((int(tool), int(edge)), {})[int(number)] = float(value)
+                lines.setdefault(int(tool), line)
+            elif what.upper() == ADAPTER and re.fullmatch(NUMBER, value) and float(value):
+                yield line, "adapters of tools ($TC_ADP) are not followed"
+    if len(units) > 1:
+        yield 0, f"tools of several units: CHANDATA {', '.join(sorted(units))}; give those of one"
+    taken = list(names.values())
+    for (tool, edge), values in edges.items():
+        name = names.get(tool, str(tool))
+        if int(values.get(1, 0)) in TURNING or taken.count(name) > 1:
+            continue
+        length, radius = (sum(values.get(each, 0.0) for each in several) * scale for several in (LENGTHS, RADII))
+        sizes = {letter: sum(values.get(each, 0.0) for each in several) * scale for letter, several in ASIDE.items()}
+        aside = " ".join(f"{letter}{size:g}" for letter, size in sizes.items() if size)
+        key: int | str = int(name) if name.isdecimal() and edge == 1 else name if edge == 1 else f"{name} D{edge}"
+        yield lines[tool], (key, Tool(None if aside else length, radius, aside))
+
+
+def is_offsets(text: str) -> bool:
+    """Whether a text is of G10 with tool offsets alone."""
+    rows = ["".join(row.split()) for row in text.splitlines() if row.strip().strip("%")]
+    return bool(rows) and any(OFFSET.fullmatch(row) for row in rows[:3])
+
+
+def offset_rows(text: str, scale: float) -> Iterator[Row]:
+    """The offset numbers of a file of G10; scale: mm per unit of a length."""
+    found: dict[tuple[int, int], tuple[int, float]] = {}
+    for line, row in enumerate(text.splitlines(), 1):
+        plain = "".join(row.partition("(")[0].split())
+        match = OFFSET.fullmatch(plain)
+        if not plain.strip("%;") or re.fullmatch(r"O\d+;?|M(?:0?2|30|99);?", plain, re.IGNORECASE):
+            continue
+        kind = int(match["kind"]) if match else 0
+        if match is None or kind not in (GEOMETRY, WEAR, OLD, *ACROSS):
+            yield line, "is not understood: tool offsets are written as G10 L10 P1 R120.5, with L10 to L13"
+        elif match["way"] == "1":
+            yield line, "G91: adds to a value that is not here"
+        elif "." not in match["value"] and float(match["value"]):
+            yield line, "a value without a decimal point: nobody says in which increments it counts"
+        elif kind not in ACROSS:
+            key = int(match["number"]), WEAR if kind == OLD else kind
+            if key in found:
+                yield line, f"offset {key[0]} has two values"
+            found[key] = line, float(match["value"])
+    for number in dict.fromkeys(number for number, _ in found):
+        parts = [found[number, kind] for kind in (GEOMETRY, WEAR) if (number, kind) in found]
+        yield parts[0][0], (number, Tool(sum(value for _, value in parts) * scale))
