@@ -10,7 +10,7 @@ from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
-from ncfix.control.setup import Setup
+from ncfix.control.setup import Setup, Tool
 from ncfix.text.dialect import get
 from ncfix.text.reader import read
 
@@ -65,3 +65,63 @@ def test_what_smooths_the_path_moves_nothing(words: str) -> None:
     text = LINES.replace(b"G1 X15.", words.encode() + b"\nG1 X15.")
     proof = proof_of(text, "table", {}, "fanuc")
     assert (proof.faults, proof.unproved, proof.proved_motions) == ([], 0, 5)
+
+
+KLARTEXT = """0 BEGIN PGM A MM
+1 CYCL DEF 247 DATUM SETTING ~
+    Q339=+1 ;DATUM NUMBER
+2 TOOL CALL "FR10" Z S8000
+3 FN 0: Q1=+1200
+4 CYCL DEF 32.0 TOLERANCE
+5 CYCL DEF 32.1 T0.02
+6 M126
+7 L X+10 Y+20 Z+50 A-10 C+0 R0 FMAX M3
+8 {on}
+9 L X+10 Y+20 Z+5 FMAX M107
+10 L X+15 Y+10 Z+2 A-12 C+20 FQ1
+11 M120 LA20
+12 L X-20 Y-3.5 A-14 C+40 F AUTO
+13 L Z+50 FMAX
+14 {off}
+15 M30
+16 END PGM A MM
+"""
+TIP = {"on": "M128", "off": "M129"}
+
+
+def klartext_proof(text: str, change: tuple[str, str] = ("", "")) -> BlockProof:
+    """The proof of the correction of a Klartext program, in which something is changed behind it."""
+    initial = dict.fromkeys("XYZAC", 0.0)
+    offsets, length = {"PRESET1": {"X": 5.0, "Y": 0.0, "Z": 40.0}}, 90.0
+    setup = Setup(work_offsets=offsets, named_tools={"FR10": Tool(length)}, initial=initial)
+    known, options = machine("table"), FixOptions(verify=False)
+    fixed = fix_program(read(text.encode(), "part", get("heidenhain")), known, setup, options).text.decode()
+    assert change[0] in fixed
+    given = Given(offsets=offsets, tools={"FR10": length}, initial=initial)
+    return prove(text.encode(), fixed.replace(*change).encode() if change[0] else fixed.encode(), known, given)
+
+
+@pytest.mark.parametrize(
+    "words", [TIP, {"on": "FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS", "off": "FUNCTION RESET TCPM"}]
+)
+def test_what_cam_systems_write_in_klartext_is_followed(words: dict[str, str]) -> None:
+    proof = klartext_proof(KLARTEXT.format(**words))
+    assert (proof.faults, dict(proof.reasons), proof.proved_motions) == ([], {}, 5)
+    assert klartext_proof(KLARTEXT.format(**words), ("A-14", "A-14.01")).faults
+
+
+@pytest.mark.parametrize(
+    ("line", "instead", "reason"),
+    [
+        ("Q339=+1", "Q339=+Q5", "where an axis stands is not known"),
+        ("S8000", "S8000 DL+0.1", "a tool call without a tool that this reader knows, or with an oversize"),
+        ("C+20 FQ1", "C+220 FQ1", "a rotary axis goes the shorter way (M126)"),
+        ("PATHCTRL AXIS", "PATHCTRL VECTOR", "FUNCTION is not known to this reader"),
+    ],
+)
+def test_what_is_not_followed_in_klartext_is_not_proved(line: str, instead: str, reason: str) -> None:
+    text = KLARTEXT.format(on="FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS", off="FUNCTION RESET TCPM")
+    given = Given(offsets={"PRESET1": {}}, tools={"FR10": 90.0}, initial=dict.fromkeys("XYZAC", 0.0))
+    changed = text.replace(line, instead).encode()
+    proof = prove(changed, changed, machine("table"), given)
+    assert reason in proof.reasons

@@ -1,4 +1,4 @@
-"""The second reader: what the words of each family do."""
+"""The second reader: what the words of word addresses and SINUMERIK do."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from ncfix.certificate.following import (
     CENTRES,
     INCH,
     NO_CENTRE,
-    NO_POLE,
     PLANES,
     UNKNOWN_WORDS,
     AxisFollower,
     Given,
     Turned,
 )
+from ncfix.certificate.klartext import KlartextFollower
 from ncfix.certificate.reading import AXES, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind
 
@@ -31,8 +31,6 @@ WORDS_QUIET = re.compile(
 """Words of SINUMERIK that move nothing and change no coordinates."""
 SINGLE = frozenset("NFSTDMHPLEQO")
 """Letters whose words are seen to, or mean nothing here."""
-FRAMES = re.compile(r"CYCL DEF (?:7|8|9|10|11|13|19|26|32|247)\b|PLANE|TRANS|FUNCTION")
-"""Lines of Klartext that this reader does not follow, behind which blocks keep their form."""
 
 
 class WordAddressFollower(AxisFollower):
@@ -320,137 +318,6 @@ class WordAddressFollower(AxisFollower):
         self.at = {**bottom, "Z": back}
         self.said["Z"] = self.said_before or back != self.before_cycle
         return step
-
-
-class KlartextFollower(AxisFollower):
-    """Follows Klartext."""
-
-    def block(self, row: int, line: TextLine) -> AxisStep | None:
-        """What one line does; None if it moves nothing."""
-        if line.plain and line.path and not self.lost and self._leads_straight(line):
-            return self.straight(row, line)
-        lead = line.codes[0].name if line.codes else ""
-        if self._took_statement(lead):
-            return None
-        if line.odd:
-            if line.rest.strip():
-                self.lost["frame" if FRAMES.match(lead) else "odd"] = line.odd
-            return self.step(row, Kind.FEED, dict(self.at), line, line.odd) if line.path else None
-        self._klartext_words(line)
-        words = {word.name: word for word in line.path if word.name in AXES}
-        if lead == "CC":
-            self._set_pole(words)
-            return None
-        if not words and line.word("PA") is None:
-            return None
-        if any(word.name == "M" and word.value in (91, 92) for word in line.codes):
-            end = self.target(words, machine=True) if not self.tcp else dict.fromkeys(self.at, NAN)
-            step = self.step(row, Kind.FIXED, end, line)
-            self.unsay(tuple(words))
-            return step
-        return self._path(row, line, lead, words)
-
-    def _took_statement(self, lead: str) -> bool:
-        """Take in a line that says something of tools, units or the control of the tip; whether it is one."""
-        if lead.startswith("TOOL CALL"):
-            parts = lead.split()
-            if len(parts) > 2 and parts[2].isdigit():
-                self.tool = int(parts[2])
-                if self.tcp:
-                    self.lead(False)
-                self.new_length(self.length_of(self.tool))
-                self.unsay()
-            else:
-                self.lost["tool"] = "a tool call without a number"
-        elif lead.startswith("BEGIN PGM"):
-            self.unit = INCH if lead.endswith("INCH") else 1.0
-        elif lead in ("M128", "M129"):
-            self.lead(lead == "M128")
-        else:
-            return lead.startswith(("BLK FORM", "END PGM", "TOOL DEF", "LBL "))
-        return True
-
-    def _path(self, row: int, line: TextLine, lead: str, words: Mapping[str, TextWord]) -> AxisStep:
-        """A motion by a path function."""
-        turn, keys = line.word("PA"), {word.name for word in line.codes}
-        if lead not in ("L", "C", "CR", "CP") or (lead == "CP") != (turn is not None):
-            return self.step(row, Kind.FEED, dict(self.at), line, f"{lead} is not known to this reader")
-        self.kind = Kind.RAPID if "FMAX" in keys else Kind.FEED
-        end = self.target({k: v for k, v in words.items() if k in self.at})
-        if turn is not None:
-            end |= self._turned_about_pole(turn)
-        step = self.step(row, self.kind, end, line)
-        step.said = [self.said[axis] for axis in self.axes]
-        if lead == "L" or step.why:
-            return step
-        if keys.isdisjoint(("DR+", "DR-")):
-            step.why = "an arc without its sense"
-        elif lead == "CR":
-            radius = line.word("R")
-            if radius is not None and radius.value is not None:
-                return self.circle(step, {}, "DR-" in keys, radius.value * self.unit)
-            step.why = "an arc without a radius"
-        elif not {"X", "Y"} <= set(self.pole) or any(math.isnan(value) for value in self.pole.values()):
-            step.why = NO_POLE
-        else:
-            step = self.circle(step, self.pole, "DR-" in keys, None)
-            if turn is not None and turn.value is not None:
-                step.sweep = math.radians(turn.value)
-        return step
-
-    def _leads_straight(self, line: TextLine) -> bool:
-        """Whether a line only brings axes straight to places; takes in its motion and feed if so."""
-        for name, *_ in line.path:
-            if name not in self.at:
-                return False
-        kind, feed = Kind.FEED, self.feed
-        for name, _, value, _ in line.codes[1:]:
-            if name == "F":
-                feed = value
-            elif name == "FMAX":
-                kind = Kind.RAPID
-            else:
-                return False
-        self.kind, self.feed = kind, feed
-        return True
-
-    def _turned_about_pole(self, turn: TextWord) -> dict[str, float]:
-        """Where a turn about the pole leads, in the plane."""
-        x, y = self.pole.get("X", NAN), self.pole.get("Y", NAN)
-        if turn.value is None or turn.counted != "+" or not {"X", "Y"} <= set(self.at):
-            return dict.fromkeys(("X", "Y"), NAN)
-        angle, dx, dy = math.radians(turn.value), self.at["X"] - x, self.at["Y"] - y
-        cos, sin = math.cos(angle), math.sin(angle)
-        return {"X": x + cos * dx - sin * dy, "Y": y + sin * dx + cos * dy}
-
-    def _klartext_words(self, line: TextLine) -> None:
-        for word in line.codes:
-            if word.name == "F":
-                self.feed = word.value
-            elif word.name in ("RL", "RR"):
-                self.beside = True
-            elif word.name == "R0":
-                if self.beside:
-                    self.unsay()
-                self.beside = False
-            elif word.name == "M":
-                match word.value:
-                    case 128 | 129:
-                        self.lead(word.value == 128)
-                    case 0 | 1 | 2 | 3 | 4 | 5 | 6 | 8 | 9 | 13 | 14 | 30 | 91 | 92:
-                        self.auxiliary(word)
-                    case _:
-                        self.lost[f"M{word.number}"] = f"M{word.number} is not known to this reader"
-
-    def _set_pole(self, words: Mapping[str, TextWord]) -> None:
-        if set(words) - {"X", "Y"}:
-            self.lost["pole"] = "a pole in another plane"
-        said = dict(self.said)
-        target = self.target(words)
-        self.said = said
-        self.pole = {axis: target[axis] if words else self.at[axis] for axis in "XY" if axis in self.at}
-        if words and len(words) < 2:
-            self.pole = dict.fromkeys(self.pole, NAN)
 
 
 def follower_of(family: Family, axes: Sequence[str], given: Given, turned: Turned) -> AxisFollower:

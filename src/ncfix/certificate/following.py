@@ -104,7 +104,7 @@ class AxisFollower:
         row, tried = 0, 0
         while row < len(lines):
             if straight is not None and not self.lost and row >= tried and stops[row] - row >= LEAST:
-                run = self._straight_run(straight, row, stops[row])
+                run = self.straight_run(straight, row, stops[row])
                 if run is not None:
                     log.append(run)
                     row = stops[row]
@@ -142,7 +142,7 @@ class AxisFollower:
             lines = [lines[row] for row in np.flatnonzero(~plain[lines.kinds]).tolist()] if len(lines) else ()
         return any(line.odd is JUMPS for line in lines)
 
-    def _straight_run(self, lines: StraightLines, row: int, stop: int) -> StraightRun | None:
+    def straight_run(self, lines: StraightLines, row: int, stop: int) -> StraightRun | None:
         """The steps of lines that only bring axes straight to places; None if that takes more than columns."""
         klartext = self.family is Family.KLARTEXT
         if not klartext and (self.kind is None or self.kind > Kind.FEED) and lines.code[row] < 0:

@@ -353,7 +353,8 @@ class Prover(Deviations):
         if not said.all() and self._changed(pair):
             most = self.half_steps(step, True) + np.where(rotary, TURNED, AS_IF)
             return (UNSAID, True) if loose or (off <= most).all() else (OFF.format(*self._worst(off, most)), False)
-        halves = self.half_steps(step, len(pieces) > 1)
+        anew = self.first.family is Family.KLARTEXT and step.kind is Kind.ARC  # a C or CP may have become a CR
+        halves = self.half_steps(step, anew or len(pieces) > 1)
         if len(pieces) == 1:  # less than a digit of the control is left out
             left = [
                 name in step.named and pieces[0].named.get(name) == step.named[name] for name in self.machine.axis_names

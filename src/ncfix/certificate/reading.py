@@ -148,6 +148,7 @@ def _word_address(number: int, text: str) -> TextLine:
 
 
 JUMPS = "the program has loops, jumps or subprograms"
+RETRACTS = "M140 retracts the tool by a way that the control finds"
 CODE = r"[A-Z]{1,2}\d*"
 SINUMERIK_WORD = re.compile(
     rf"(;.*|\"[^\"]*\")"
@@ -201,10 +202,16 @@ def _sinumerik(number: int, text: str) -> TextLine:
 
 DECIMAL = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)"
 KLARTEXT_WORD = re.compile(
-    rf"(;.*)|(R0|RL|RR|FMAX|DR[+-])(?![\w.,])|(I?(?:[XYZABCUVW]|P[AR])|R|F|M|S)({DECIMAL})(?![\w.,])|([A-Z]+)|([^ \t])",
+    rf"(;.*)|(R0|RL|RR|FMAX|F ?AUTO|DR[+-])(?![\w.,])|(I?(?:[XYZABCUVW]|P[AR])|R|FQ?|LA|M|S)({DECIMAL})(?![\w.,])"
+    rf"|([A-Z]+)|([^ \t])",
     re.IGNORECASE,
 )
 KLARTEXT_LEAD = frozenset(("L", "C", "CC", "CP", "CR", "M", "STOP"))
+KLARTEXT_STATEMENT = re.compile(
+    r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$|CYCL DEF (?:32|247)\b|FN ?[0-8]\b"
+    r"|Q[LRS]?\d+ ?=|FUNCTION (?:TCPM F (?:TCP|CONT) AXIS POS PATHCTRL AXIS|RESET TCPM)[ \t]*(?:;|$)"
+)
+"""Blocks of Klartext that say something and lead no axis, as the follower knows them."""
 KLARTEXT_FLOW = re.compile(r"^(?:CALL (?:LBL|PGM)|FN ?(?:9|1[0-2])\b|SEL PGM|CALL SELECTED|PATTERN|CYCL CALL)")
 
 
@@ -225,7 +232,7 @@ def _klartext(number: int, text: str) -> TextLine:
         line.rest = body
         line.codes.append(TextWord(body_upper, "", None))
         line.odd = JUMPS if KLARTEXT_FLOW.match(body_upper) else f"{first} is not known to this reader"
-        if re.match(r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$", body_upper):
+        if KLARTEXT_STATEMENT.match(body_upper):
             line.odd = ""
         return line
     rest = _Rest(body)
@@ -247,6 +254,8 @@ def _klartext(number: int, text: str) -> TextLine:
                 line.odd = line.odd or f"{found[5]} is not known to this reader"
         elif found[6] is not None and found[6] not in "*/":
             line.odd = line.odd or f"{_piece(body, start)!r} is no plain word"
+    if any(word.name == "M" and word.value == 140 for word in line.codes):
+        line.odd = RETRACTS
     line.rest = str(rest)
     return line
 

@@ -1,0 +1,206 @@
+"""The second reader: what the blocks of Klartext do."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.certificate.following import INCH, NO_POLE, AxisFollower
+from ncfix.certificate.reading import AXES, RETRACTS, TextLine, TextWord
+from ncfix.certificate.steps import NAN, AxisStep, Kind, StraightRun
+from ncfix.certificate.text import StraightLines
+
+FRAMES = re.compile(r"CYCL DEF (?:7|8|9|10|11|13|19|26)\b|PLANE|TRANS|FUNCTION")
+"""Lines of Klartext that this reader does not follow, behind which blocks keep their form."""
+
+
+DATUM = re.compile(r"Q339 ?= ?\+?(\d+)[ \t]*(?:[;~]|$)")
+"""Which datum CYCL DEF 247 sets."""
+TOOL = re.compile(r'TOOL CALL (?:(\d+)|"([^"]*)")')
+SPEED = re.compile(r"TOOL CALL (?:Z )?[SF][\d ]")
+"""TOOL CALL without a tool: another speed or feed."""
+ROUND = 179.0
+"""Degrees from which on the shorter way may be the other one: half a turn, less what a correction may be."""
+OVERSIZE = re.compile(r"\bD[LR]2? ?[+-]?[\d.]*[1-9Q]")
+
+
+class KlartextFollower(AxisFollower):
+    """Follows Klartext.
+
+    shortest  M126: rotary axes go the shorter way, which is another one from half a turn on
+    datum     CYCL DEF 247 has begun, and its number is still to come
+    """
+
+    shortest = datum = False
+
+    def block(self, row: int, line: TextLine) -> AxisStep | None:
+        """What one line does; None if it moves nothing."""
+        if line.plain and line.path and not self.lost and self._leads_straight(line):
+            return self.straight(row, line)
+        lead = line.codes[0].name if line.codes else ""
+        if not line.odd and self._took_statement(lead):
+            return None
+        if line.odd is RETRACTS:
+            return self.step(row, Kind.FEED, dict(self.at), line, RETRACTS)
+        if line.odd:
+            if line.rest.strip():
+                self.lost["frame" if FRAMES.match(lead) else "odd"] = line.odd
+            return self.step(row, Kind.FEED, dict(self.at), line, line.odd) if line.path else None
+        self._klartext_words(line)
+        words = {word.name: word for word in line.path if word.name in AXES}
+        if lead == "CC":
+            self._set_pole(words)
+            return None
+        if not words and line.word("PA") is None:
+            return None
+        if any(word.name == "M" and word.value in (91, 92) for word in line.codes):
+            end = self.target(words, machine=True) if not self.tcp else dict.fromkeys(self.at, NAN)
+            step = self.step(row, Kind.FIXED, end, line)
+            self.unsay(tuple(words))
+            return step
+        return self._path(row, line, lead, words)
+
+    def _took_statement(self, lead: str) -> bool:
+        """Take in a line that says something of tools, units or the control of the tip; whether it is one."""
+        if lead.startswith("TOOL CALL"):
+            self._call_tool(lead)
+        elif lead.startswith(("CYCL DEF 247", "Q339")):
+            self._set_datum(lead)
+        elif lead.startswith("FUNCTION TCPM F"):
+            self.lead(True)
+        elif lead.startswith("FUNCTION RESET TCPM"):
+            self.lead(False)
+        elif lead.startswith("BEGIN PGM"):
+            self.unit = INCH if lead.endswith("INCH") else 1.0
+        elif lead in ("M128", "M129"):
+            self.lead(lead == "M128")
+        else:
+            return lead.startswith(("BLK FORM", "END PGM", "TOOL DEF", "LBL ", "CYCL DEF 32", "FN", "Q"))
+        return True
+
+    def _call_tool(self, lead: str) -> None:
+        found = TOOL.match(lead)
+        if OVERSIZE.search(lead) or not (found or SPEED.match(lead)):
+            self.lost["tool"] = "a tool call without a tool that this reader knows, or with an oversize"
+        elif found:
+            self.tool = int(found[1]) if found[1] else found[2]
+            if self.tcp:
+                self.lead(False)
+            self.new_length(self.length_of(self.tool))
+            self.unsay()
+
+    def _set_datum(self, lead: str) -> None:
+        """CYCL DEF 247 with its number, which may stand in the next line; until it does the datum is not known."""
+        found = DATUM.search(lead)
+        if found and (self.datum or lead.startswith("CYCL")):
+            self.system = f"PRESET{found[1]}"
+            self.unsay()
+        self.datum = found is None and lead.startswith("CYCL")
+
+    def _path(self, row: int, line: TextLine, lead: str, words: Mapping[str, TextWord]) -> AxisStep:
+        """A motion by a path function."""
+        turn, keys = line.word("PA"), {word.name for word in line.codes}
+        if lead not in ("L", "C", "CR", "CP") or (lead == "CP") != (turn is not None):
+            return self.step(row, Kind.FEED, dict(self.at), line, f"{lead} is not known to this reader")
+        self.kind = Kind.RAPID if "FMAX" in keys else Kind.FEED
+        end = self.target({k: v for k, v in words.items() if k in self.at})
+        if turn is not None:
+            end |= self._turned_about_pole(turn)
+        step = self.step(row, self.kind, end, line)
+        step.said = [self.said[axis] for axis in self.axes]
+        if self.shortest and self._goes_round(np.array([step.start, step.end])):
+            step.why = step.why or "a rotary axis goes the shorter way (M126)"
+        if lead == "L" or step.why:
+            return step
+        if keys.isdisjoint(("DR+", "DR-")):
+            step.why = "an arc without its sense"
+        elif lead == "CR":
+            radius = line.word("R")
+            if radius is not None and radius.value is not None:
+                return self.circle(step, {}, "DR-" in keys, radius.value * self.unit)
+            step.why = "an arc without a radius"
+        elif not {"X", "Y"} <= set(self.pole) or any(math.isnan(value) for value in self.pole.values()):
+            step.why = NO_POLE
+        else:
+            step = self.circle(step, self.pole, "DR-" in keys, None)
+            if turn is not None and turn.value is not None:
+                step.sweep = math.radians(turn.value)
+                step.why = step.why or ("a helix of more than a turn" if abs(turn.value) > 360.0 else "")
+        return step
+
+    def _goes_round(self, places: NDArray[np.float64]) -> bool:
+        """Whether a rotary axis goes half a turn or more from one of places (n, n_axes) to the next."""
+        turns = [column for column, axis in enumerate(self.axes) if axis in "ABC"]
+        return bool((np.abs(np.diff(places[:, turns], axis=0)) >= ROUND).any())
+
+    def straight_run(self, lines: StraightLines, row: int, stop: int) -> StraightRun | None:
+        """As that of all families; none where a rotary axis goes the shorter way round."""
+        before = list(self.at.values())
+        kept = dict(self.at), dict(self.said), self.kind, self.feed
+        run = super().straight_run(lines, row, stop)
+        if run is None or not (self.shortest and self._goes_round(np.vstack([before, run.end]))):
+            return run
+        self.at, self.said, self.kind, self.feed = kept
+        return None
+
+    def _leads_straight(self, line: TextLine) -> bool:
+        """Whether a line only brings axes straight to places; takes in its motion and feed if so."""
+        for name, *_ in line.path:
+            if name not in self.at or self.shortest:
+                return False
+        kind, feed = Kind.FEED, self.feed
+        for name, _, value, _ in line.codes[1:]:
+            if name == "F":
+                feed = value
+            elif name == "FMAX":
+                kind = Kind.RAPID
+            else:
+                return False
+        self.kind, self.feed = kind, feed
+        return True
+
+    def _turned_about_pole(self, turn: TextWord) -> dict[str, float]:
+        """Where a turn about the pole leads, in the plane."""
+        x, y = self.pole.get("X", NAN), self.pole.get("Y", NAN)
+        if turn.value is None or turn.counted != "+" or not {"X", "Y"} <= set(self.at):
+            return dict.fromkeys(("X", "Y"), NAN)
+        angle, dx, dy = math.radians(turn.value), self.at["X"] - x, self.at["Y"] - y
+        cos, sin = math.cos(angle), math.sin(angle)
+        return {"X": x + cos * dx - sin * dy, "Y": y + sin * dx + cos * dy}
+
+    def _klartext_words(self, line: TextLine) -> None:
+        for word in line.codes:
+            if word.name == "F":
+                self.feed = word.value
+            elif word.name in ("FQ", "FAUTO", "F AUTO"):
+                self.feed = None
+            elif word.name in ("RL", "RR"):
+                self.beside = True
+            elif word.name == "R0":
+                if self.beside:
+                    self.unsay()
+                self.beside = False
+            elif word.name == "M":
+                match word.value:
+                    case 128 | 129:
+                        self.lead(word.value == 128)
+                    case 126 | 127:
+                        self.shortest = word.value == 126
+                    case 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9 | 13 | 14 | 30 | 91 | 92 | 107 | 108 | 120:
+                        self.auxiliary(word)
+                    case _:
+                        self.lost[f"M{word.number}"] = f"M{word.number} is not known to this reader"
+
+    def _set_pole(self, words: Mapping[str, TextWord]) -> None:
+        if set(words) - {"X", "Y"}:
+            self.lost["pole"] = "a pole in another plane"
+        said = dict(self.said)
+        target = self.target(words)
+        self.said = said
+        self.pole = {axis: target[axis] if words else self.at[axis] for axis in "XY" if axis in self.at}
+        if words and len(words) < 2:
+            self.pole = dict.fromkeys(self.pole, NAN)
