@@ -81,6 +81,8 @@ class SinumerikVariables:
         scope = self.scope_of(name)
         if scope is None:
             return self.shared.get(key, CUTTING.get(name, Unknown()))
+        if key in scope.sizes and scope.sizes[name]:
+            return Unknown()  # an array as a whole
         return scope.values.get(key, INITIAL.get(scope.kinds[name], Unknown()))
 
     def assign(self, key: Key, value: Value) -> None:

@@ -32,7 +32,16 @@ from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
 from ncfix_siemens.sinumerik.plans import AssignedVariable, Branching, Calling, SinumerikPlan, is_statement
 from ncfix_siemens.sinumerik.scanning import all_or_none
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.statements import Turn, act, call_word, finish_block, function, ran_elsewhere, say
+from ncfix_siemens.sinumerik.statements import (
+    Turn,
+    act,
+    call_word,
+    finish_block,
+    function,
+    lose_arguments,
+    ran_elsewhere,
+    say,
+)
 from ncfix_siemens.sinumerik.unit import HEAD, PROCEDURE, SinumerikUnit, units_of
 from ncfix_siemens.sinumerik.vocabulary import (
     ASYNCHRONOUS,
@@ -221,12 +230,13 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
                 case Branching():
                     continue
         for called in plan.functions:
-            function(control, called)
+            function(control, turn, called)
         self.span = None
         if turn.subprogram is None:
             call_word(control, turn, self.find)
         if self.watcher is not None:
             self.watcher.record(unit, block, turn, main=not flow.calls)
+        lose_arguments(control, turn.handed)
         finish_block(control, turn)
         if turn.elsewhere:
             ran_elsewhere(control, turn.elsewhere, changes_tool=control.tools.selected != 0)

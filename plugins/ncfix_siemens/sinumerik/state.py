@@ -187,7 +187,9 @@ class Sinumerik(ProgramControl):
     def restore(self, modal: Modal, modes: Modes, frames: FrameStack) -> None:
         """Bring back what was in force before a subprogram that says SAVE."""
         motion, straight, feed = self.modal.motion, self.modal.straight, self.modal.feed
-        self.modal, self.frames = modal, frames
+        if frames.plane != self.frames.plane:
+            self.suspend("tilt", "a swivelled plane (CYCLE800) of a subprogram with SAVE, which may stay in force")
+        self.modal, self.frames = modal, replace(frames, plane=self.frames.plane)
         self.modal.motion, self.modal.straight, self.modal.feed = motion, straight, feed
         transformed, swivelled = self.modes.transformed, self.modes.swivelled
         self.modes = modes

@@ -70,7 +70,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
     if MADE_BY_THE_CONTROL.fullmatch(step.name):
         cycle(control, turn.words, step, modal=False)
         return
-    lose_arguments(control, step.written)
+    turn.handed += step.written
     ran_elsewhere(control, step.name.upper(), changes_tool=control.fresh_tool)
 
 
@@ -84,11 +84,11 @@ def lose_arguments(control: Sinumerik, written: Iterable[Expression | None]) -> 
                 control.variables.forget(name)
 
 
-def function(control: Sinumerik, step: Calling) -> None:
+def function(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """A function that only the control can evaluate stands in the block."""
     if step.name in UNFOLLOWED:
         control.suspend(step.name, f"{UNFOLLOWED[step.name]} is in force, which ncfix does not follow")
-    lose_arguments(control, step.written)
+    turn.handed += step.written
 
 
 def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
@@ -186,6 +186,7 @@ class Turn:
     modal       MCALL stands in the block
     ends        RET stands in the block
     used        something takes the axis words for itself
+    handed      arguments of what is not at hand
     """
 
     words: BlockWordValues
@@ -202,6 +203,7 @@ class Turn:
     modal: bool = False
     ends: bool = False
     used: bool = False
+    handed: list[Expression | None] = field(default_factory=list)
 
     @property
     def m(self) -> set[int]:
@@ -241,7 +243,7 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     elif name in PUNCHING:
         control.modes.by_block = control.modes.by_block - {STROKES} | PUNCHING[name]
     elif name in HARMLESS:
-        lose_arguments(control, step.written[RESULTS.get(name, len(step.written)) :])
+        turn.handed += step.written[RESULTS.get(name, len(step.written)) :]
     elif name == "cycle800":
         swivel(control, turn.words.block, step)
     elif name in DRILLING:

@@ -505,3 +505,9 @@ def test_a_swivelled_plane_does_not_turn_with_the_rotary_axes(turn: str, root: P
     rules = follow(text, "".join(machine.axis_names), kinematics=kinematics_of(machine)).moves.rule.tolist()
     turned = Rule.PASS if "SUPA" in turn else Rule.REFUSE
     assert rules[2:] == [Rule.CORRECT, Rule.CORRECT, turned, Rule.REFUSE, Rule.PASS, Rule.CORRECT, Rule.CORRECT]
+
+
+def test_a_plane_that_a_subprogram_with_save_swivels_may_stay() -> None:
+    body = 'CYCLE800(1,"T",0,57,5,0,0,0,0,0,0,0,0,0)\nM17\n'
+    found = follow(f"G0 X1 Y1 Z1\nSUB1\nG0 X1 Y1 Z1\nM30\n%_N_SUB1_SPF\nPROC SUB1 SAVE\n{body}", "XYZAC")
+    assert found.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE]

@@ -43,3 +43,9 @@ def test_blocks_of_a_subprogram_file_come_from_the_line_that_calls_it() -> None:
     files = {"SUBX.SPF": b"; far from here\n\n\n\nG0 X2\nG0 X3\nM17\n"}
     found = flatten(program, KNOWN, ("X", "Y", "Z"), frozenset(), dict.fromkeys("XYZ", 1e-3), files.get)
     assert list(found.lines) == [1, 3, 3, 4, 5]
+
+
+def test_what_is_handed_over_has_its_value_of_before() -> None:
+    assert flat("R1=2\nR2=R1\nMYCYCLE(R1,R2+1)") == ["R1=2", "R2=2", "MYCYCLE(2,3)"]
+    with pytest.raises(RefusedError, match="an argument of MYCYCLE is known only at run time"):
+        flat("DEF REAL LIST[2]=(1,2)\nMYCYCLE(LIST)")
