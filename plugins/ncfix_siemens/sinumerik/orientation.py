@@ -273,7 +273,7 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
     if any(value is None and part is not None and not isinstance(part, StringLiteral) for value, part in written):
         control.refuse_rest("a tilted plane (CYCLE800) is known only at run time")
         return
-    plane = SwivelPlane.of([value or 0.0 for value in values] + [0.0] * 16)
+    plane = SwivelPlane.of([value or 0.0 for value in values] + [0.0] * 16, control.modal.unit)
     if plane.fault:
         control.suspend("tilt", UNFOLLOWED.format(plane.fault))
         control.lose_all(AFTER_SWIVEL)
@@ -302,8 +302,8 @@ class SwivelPlane:
     fault: str
 
     @classmethod
-    def of(cls, values: list[float]) -> SwivelPlane:
-        """From the numbers of the call."""
+    def of(cls, values: list[float], unit: float) -> SwivelPlane:
+        """From the numbers of the call; `unit`: mm per unit of its lengths."""
         mode, table = round(values[PLACES["mode"]]), round(values[PLACES["st"]])
         direction = round(values[PLACES["dir"]])
         before, angles, after = (values[PLACES[name] : PLACES[name] + 3] for name in ("before", "angles", "after"))
@@ -313,7 +313,8 @@ class SwivelPlane:
             fault = fault or ", which aligns the tool"
         if direction not in (-1, 0, 1) or (direction == 0 and turn is not None and turn.rotation != WORLD.rotation):
             fault = fault or STILL
-        frame = shifted(dict(enumerate(before))).then(turn or WORLD).then(shifted(dict(enumerate(after))))
+        to, on = (shifted({index: unit * each for index, each in enumerate(way)}) for way in (before, after))
+        frame = to.then(turn or WORLD).then(on)
         return cls(frame, table % 10 == 1, direction, round(values[PLACES["fr"]]) != 0, fault)
 
     def within(self, before: Affine) -> Affine:

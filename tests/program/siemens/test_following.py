@@ -511,3 +511,16 @@ def test_a_plane_that_a_subprogram_with_save_swivels_may_stay() -> None:
     body = 'CYCLE800(1,"T",0,57,5,0,0,0,0,0,0,0,0,0)\nM17\n'
     found = follow(f"G0 X1 Y1 Z1\nSUB1\nG0 X1 Y1 Z1\nM30\n%_N_SUB1_SPF\nPROC SUB1 SAVE\n{body}", "XYZAC")
     assert found.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE]
+
+
+def test_a_plane_in_inches_has_its_zero_point_in_inches(root: Path) -> None:
+    machine = load(root / "examples" / "machines" / "wCAYFXZSt.toml")
+    ends_of = [
+        follow(
+            f'{unit}\nCYCLE800(1,"T",200000,57,{before},0,30,0,{after},-1)\nG0 X0 Y0 Z0',
+            "".join(machine.axis_names),
+            kinematics=kinematics_of(machine),
+        ).moves.end[-1]
+        for unit, before, after in (("G700", "1,2,3", "0,0,1"), ("G710", "25.4,50.8,76.2", "0,0,25.4"))
+    ]
+    assert ends_of[0] == pytest.approx(ends_of[1])
