@@ -304,3 +304,24 @@ def test_an_axis_measured_again_at_one_temperature_keeps_its_expansion():
         found = calibrate([laser], machine("three_axis").replace(effects=effects)).machine.effects
         values = {effect.times: effect.coefficients[0] for effect in found}
         assert values == pytest.approx({"temp_x": -11e-6, None: 31e-6})
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_sigma_counts_in_what_was_pruned(seed: int) -> None:
+    """With A near zero the tilts of A and C about Y act alike: one goes, the other carries it and its sigma says so."""
+    known = machine("wCAYFXZSt")
+    tilts = {"EB0A": 60e-6, "EB0C": 0.0, "EA0C": 17e-6, "EC0X": 15e-6, "EB0Z": -20e-6}
+    known = known.replace(effects=tuple(Effect(name, (tilt,)) for name, tilt in tilts.items()))
+    poses = plan(known, "tcp", 900, seed)
+    poses = poses.rows(np.flatnonzero(np.abs(poses.columns["A"]) < 4)[:60])
+    data = simulate(poses, known, Faults(noise_um=3.0), seed)
+    found = calibrate([data], perfect(known), prune=0.99)
+    assert "NCF644" in {message.code for message in found.remarks}
+    true = np.array([tilts[label] for label in found.labels])
+    assert (np.abs(found.estimate.coefficients - true) < 4 * found.sigma).all()
+    anywhere = plan(known, "tcp", 50, 99)
+    q, state = anywhere.positions(known), anywhere.state(known)
+    error = [of.design(q, state, of.effects) @ [e.coefficients[0] for e in of.effects] for of in (known, found.machine)]
+    missed = np.sqrt(((error[0] - error[1])[:, :3] ** 2).mean())
+    # all of it comes from one combination that hardly shows: four sigma of a single number
+    assert missed < 4 * np.sqrt((deviations(found, q, state) ** 2).mean())

@@ -68,7 +68,7 @@ def agreeing(data: ResidualData, residual: Array, sigma: float) -> None:
     q = np.round(data.q, 6)
     places: dict[tuple[bytes, float, int], list[tuple[int, float]]] = {}
     length = data.column("tool_length")
-    for value, row, part in zip(residual, data.row, data.component, strict=True):
+    for value, row, part in zip(residual / data.relative, data.row, data.component, strict=True):
         if row >= 0:
             key = (q[row].tobytes(), float(length[row]), int(part))
             places.setdefault(key, []).append((int(data.file[row]), float(value)))
@@ -88,7 +88,7 @@ def agreeing(data: ResidualData, residual: Array, sigma: float) -> None:
 def _misstated(data: ResidualData) -> list[Message]:
     """A noise that the files state and that repeats deny."""
     squares, freedom = repeat_scatter(data, data.row >= 0)
-    if freedom < ENOUGH_REPEATS or any(each.noise[0] is None for each in data.measurements):
+    if freedom < ENOUGH_REPEATS or not data.noise_stated:
         return []
     seen = float(np.sqrt(squares / freedom))
     if 1 / MISSTATED < seen / data.sigma < MISSTATED:

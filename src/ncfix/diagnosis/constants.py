@@ -164,9 +164,8 @@ class FileLikelihood:
 
     @cached_property
     def sizes(self) -> Array:
-        """(k,) rms of what a constant shows per mm or rad, um; zero where nothing."""
-        found: Array = np.sqrt((self.constants**2).sum(axis=0) / max(self.data.count, 1))
-        return found
+        """(k,) how much a constant shows per mm or rad, um; zero where nothing."""
+        return np.array([self.data.size(column) for column in self.constants.T])
 
     @cached_property
     def _columns(self) -> tuple[Array, Array, int]:
@@ -271,7 +270,7 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     said = [unit for effect in data.problem.selection.estimated for unit in units(data.machine, effect)]
     moved = []
     for place, index in enumerate(chosen):
-        size = data.rms(beside(asked.constants[:, index] * change[index]))
+        size = data.size(beside(asked.constants[:, index] * change[index]))
         own, alike = (0.0, ()) if whole else _own(asked, chosen, index, offered)
         if whole and abs(change[index]) <= DOUBT * sigma[place]:
             continue
@@ -292,7 +291,7 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     shown = beside(asked.constants @ change)
     moved.sort(key=lambda each: -each.size_um)
     return ConstantsVerdict(
-        change, tuple(moved), odds, distance, len(kept), data.rms(shown), shown, solution, bool(whole), paid
+        change, tuple(moved), odds, distance, len(kept), data.size(shown), shown, solution, bool(whole), paid
     )
 
 

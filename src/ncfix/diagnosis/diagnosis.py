@@ -32,8 +32,8 @@ from ncfix.diagnosis.joint_fit import (
     held_out_as_given,
     machine_with,
     passing,
-    unnamed_um,
-    visible_um,
+    unnamed_by_view,
+    visible,
 )
 from ncfix.diagnosis.mistakes.kinds import Mistake
 from ncfix.diagnosis.mistakes.search import find
@@ -245,7 +245,7 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
     sigma = _sigma(evidence, every, share)
     checks.agreeing(data, joint.before, sigma)
     floor = noise_floor(data, evidence.background, sigma, keep)
-    noise_um = data.rms(np.where(data.row >= 0, floor.sigma_um * data.relative, 0.0), keep)
+    noise = floor.sigma_um * data.relative
     constants = judged_constants(evidence, told, share)
     machine, added = machine_with(evidence, told, fitted(evidence, told, share, constants.stay))
     named = _findings(case, selected, joint, added)
@@ -255,19 +255,21 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
     places = scaled_axes(data)
     sets: list[dict[str, Member]] = [{}, {name: selected.members[name] for name in selected.named}, selected.members]
     weights = [scale.weight(each) for each in sets]
-    rest = _rest(case, selected, joint, floor, noise_um, weights[2] - weights[1])
+    rest = _rest(case, selected, joint, floor, noise, weights[2] - weights[1])
     return Diagnosis(
         case=case,
-        verdict=verdict_of(findings, rest, visible_um(data, joint.together), floor, noise_um, data.little),
+        verdict=verdict_of(
+            findings, rest, data.size(visible(data, joint.together)), floor, data.size(noise, keep), data.little
+        ),
         findings=findings,
         rest=rest,
-        gap=_gap(case, told, joint, share, noise_um),
+        gap=_gap(case, told, joint, share, data.rms(noise, keep)),
         floor=floor,
         machine=machine if any(added) or off else None,
         selected=selected,
         before=joint.before,
         after=joint.after,
-        p_lack=lack_of_fit(floor, joint.before[keep], _constants(case)),
+        p_lack=lack_of_fit(floor, (joint.before / data.relative)[keep], _constants(case)),
         patterns=tuple(patterns(evidence.background, sigma)),
         clustering=(
             clustering(evidence.background, joint.before, places),
@@ -288,7 +290,7 @@ def _findings(
     found = []
     for name, effects, shown in zip(selected.named, added, joint.shown, strict=True):
         owner = case.evidence.groups[selected.members[name].group].owner
-        size, judgement = case.data.rms(shown, case.kept), plausibility(case.data, owner, effects)
+        size, judgement = case.data.size(shown, case.kept), plausibility(case.data, owner, effects)
         alike = tuple(aliases(selected, name))
         found.append(
             EffectFinding(owner, selected.odds[name], selected.p_value(name), alike, size, effects, shown, judgement)
@@ -339,20 +341,18 @@ def _owners(data: ResidualData, machine: Machine) -> list[Effect]:
     return [replace(effect, covariance=None) for effect in free for _ in range(effect.basis.size)]
 
 
-def _rest(
-    case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, noise_um: float, odds: float
-) -> Unexplained:
+def _rest(case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, noise: Array, odds: float) -> Unexplained:
     """What has no name."""
     evidence, keep = case.evidence, case.kept
     every = list(selected.members.values())
     whole = fitted(evidence, every, evidence.share(every))
     parameters = _constants(case) + sum(map(len, joint.numbers)) / 2
     return Unexplained(
-        unnamed_um(evidence, selected, whole, keep),
+        float(unnamed_by_view(evidence, selected, whole, keep).max(initial=0.0)),
         tuple(evidence.groups[selected.members[name].group].owner.title for name in selected.unnamed),
         odds,
-        beyond_noise(floor, noise_um, case.data.rms(joint.after, keep), case.data.little),
-        lack_of_fit(floor, joint.after[keep], parameters),
+        beyond_noise(case.data, floor, noise, joint.after, keep),
+        lack_of_fit(floor, (joint.after / case.data.relative)[keep], parameters),
     )
 
 
@@ -423,16 +423,21 @@ def _changes(found: Diagnosis) -> Diagnosis:
     every = list(members.values())
     shown = zip(members, fitted(evidence, every, evidence.share(every)).shown, strict=True)
     unnamed = {name: own for name, own in shown if name in found.selected.unnamed and name.startswith(CHANGE)}
-    size = visible_um(found.data, np.sum([np.zeros(len(found.data.y)), *unnamed.values()], axis=0))
+    size = _visible_size(found.data, list(unnamed.values()))
     titles = tuple(evidence.groups[members[name].group].owner.title for name in unnamed)
     rest = Unexplained(size, titles, found.rest.odds if unnamed else 0.0, 0.0, None)
-    told = visible_um(found.data, np.sum([np.zeros(len(found.data.y)), *(each.shown for each in new)], axis=0))
+    told = _visible_size(found.data, [each.shown for each in new])
     verdict = verdict_of(new, rest, told, found.floor, found.gap.floor, found.data.little)
     machine = found.machine if new else None
     proposal = found.proposal if found.proposal and found.proposal.name.startswith(CHANGE) else None
     return replace(
         found, verdict=verdict, findings=new, rest=rest, machine=machine, proposal=proposal, steady=steady, dates=True
     )
+
+
+def _visible_size(data: ResidualData, shown: Sequence[Array]) -> float:
+    """The size of what several effects show together beside what is free, um."""
+    return data.size(visible(data, np.sum([np.zeros(len(data.y)), *shown], axis=0)))
 
 
 def _explained(

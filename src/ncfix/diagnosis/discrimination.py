@@ -210,12 +210,12 @@ def _contest(evidence: Evidence, new: Observation, true: Hypothesis, other: Hypo
     data = evidence.background.data
     constants = data.problem.design.shape[1]
     used = data.base.shape[1] - constants
-    setup = 1e3 * new.unknown_design(new.unknowns.start)
+    setup = new.um[:, None] * new.unknown_design(new.unknowns.start)
     fresh, weight = setup.shape[1], 1 / (sigma * data.relative)
     imitating = [size * group.columns for group, size in other.forms]
     old = np.concatenate([data.base[:, :used], np.zeros((len(data.y), fresh)), data.base[:, used:], *imitating], axis=1)
     imitating = [size * _shown(new, group) for group, size in other.forms]
-    kinematic = 1e3 * new.design(data.problem.selection.estimated)
+    kinematic = new.um[:, None] * new.design(data.problem.selection.estimated)
     rows = np.concatenate([np.zeros((len(setup), used)), setup, kinematic, *imitating], axis=1)
     free = used + fresh + constants
     scale = np.ones(old.shape[1])
@@ -234,4 +234,4 @@ def _contest(evidence: Evidence, new: Observation, true: Hypothesis, other: Hypo
 def _shown(new: Observation, group: EffectForm) -> Array:
     """What the numbers of a form show in the poses on offer, um."""
     used = group.loading.any(axis=1)
-    return 1e3 * new.design(group.owner.effects)[:, used] @ group.loading[used]
+    return new.um[:, None] * new.design(group.owner.effects)[:, used] @ group.loading[used]

@@ -1,7 +1,7 @@
 """Candidates as columns of the data: what each form of an effect would show, with a size of 1 um.
 
-The size is the root mean square over rows of the length of what a row shows, before anything else is fitted. So all
-effects compete on one scale, that of the tool tip.
+The size is the root mean square over rows of the length of what a row shows, before anything else is fitted, over the
+sort of rows that shows most. So all effects compete on one scale, that of the tool tip.
 
 Whatever depends smoothly on pose or time, or on from where the axes came: rivals at the tool tip.
 
@@ -162,7 +162,7 @@ def changes(data: ResidualData, groups: Sequence[EffectForm], first: int) -> tup
     basis, found = orthonormal(data.base / data.relative[:, None]), []
     for group in groups:
         columns = np.where(later[:, None], group.columns, 0.0)
-        size = data.rms(columns)
+        size = data.size(columns)
         if size > UNSEEN_UM and _visible_shares(data, basis, [replace(group, columns=columns)])[0] >= VISIBLE:
             owner = replace(group.owner, name=CHANGE + group.owner.name, title=CAME + group.owner.title, constant=False)
             found.append(EffectForm(owner, group.loading / size, columns / size))
@@ -192,8 +192,8 @@ def _form(data: ResidualData, candidate: Candidate, loading: Array, design: Arra
     """The form at a size of 1 um, with as few columns as it needs."""
     used = loading.any(axis=1)
     columns = design @ loading if used.all() else design[:, used] @ loading[used]
-    size = data.rms(columns)
-    if size < UNSEEN_UM or _lead_squares(candidate, loading, design) < LEAD_SHARE * size**2 * data.count:
+    size = data.size(columns)
+    if size < UNSEEN_UM or _lead_squares(candidate, loading, design) < LEAD_SHARE * float((columns**2).sum()):
         return None
     turned = principal_rotation(columns) / size
     return EffectForm(candidate, loading @ turned, columns @ turned)
@@ -342,7 +342,7 @@ def _variations(data: ResidualData, places: Array, time: Array) -> Array:
 
 def combined_form(data: ResidualData, owner: Candidate, parts: Sequence[Array]) -> EffectForm | None:
     """The parts with the same share each, at a size of 1 um together, with as few columns as they need."""
-    sizes = [data.rms(part) for part in parts]
+    sizes = [data.size(part) for part in parts]
     count = sum(size > 0 for size in sizes)
     if not count:
         return None

@@ -271,28 +271,31 @@ def _failed(scale: Comparison, selected: Selected) -> list[str]:
     share = evidence.share(members)
     held = held_out(evidence, members, share)
     joint = fitted(evidence, members, share)
-    least = max(evidence.background.data.little * MATERIAL_UM, RATHER * unnamed_um(evidence, selected, joint))
-    found = []
+    data, found = evidence.background.data, []
+    least = np.maximum(data.little * MATERIAL_UM, RATHER * unnamed_by_view(evidence, selected, joint))
     for k, name in enumerate(selected.members):
         mean, error = prediction_gain(held, held.less[k])
         predicts = mean > error or _stands_behind(scale, selected, name)
         shown = joint.shown[k]
-        size = visible_um(evidence.background.data, shown)
+        size = data.size_by_view(visible(data, shown))
         if evidence.groups[members[k].group].owner.dynamic:
-            size = max(size, float(np.abs(shown).max()) / SHARP)
-        matters = size >= least
+            size = np.maximum(size, float(np.abs(shown).max()) / SHARP)
+        matters = (size >= least).any()
         if name in selected.named and not (matters and predicts):
             found.append(name)
     return found
 
 
-def unnamed_um(evidence: Evidence, selected: Selected, whole: JointFit, keep: Mask | None = None) -> float:
-    """How much of what the names leave something without a name explains, rms um; `whole` is the fit with both."""
-    if not selected.unnamed:
-        return 0.0
+def unnamed_by_view(evidence: Evidence, selected: Selected, whole: JointFit, keep: Mask | None = None) -> Array:
+    """How much of what the names leave something without a name explains, um in each sort of rows; `whole` is the fit
+    with both.
+    """
     data, every = evidence.background.data, list(selected.members.values())
-    told = fitted(evidence, [selected.members[name] for name in selected.named], evidence.share(every))
-    return float(np.sqrt(max(data.rms(told.after, keep) ** 2 - data.rms(whole.after, keep) ** 2, 0.0)))
+    left = whole.after
+    if selected.unnamed:
+        left = fitted(evidence, [selected.members[name] for name in selected.named], evidence.share(every)).after
+    squares = data.size_by_view(left, keep) ** 2 - data.size_by_view(whole.after, keep) ** 2
+    return np.sqrt(np.maximum(squares, 0.0))
 
 
 def _stands_behind(scale: Comparison, selected: Selected, name: str) -> bool:
@@ -300,7 +303,7 @@ def _stands_behind(scale: Comparison, selected: Selected, name: str) -> bool:
     return scale.evidence.constant(name) and not all(scale.evidence.constant(each) for each in selected.named)
 
 
-def visible_um(data: ResidualData, shown: Array) -> float:
-    """The size of what an effect shows, (m,) um, beside what is free: rms over rows, um."""
+def visible(data: ResidualData, shown: Array) -> Array:
+    """What an effect shows, (m,) um, beside what is free."""
     free = orthonormal(data.base / data.relative[:, None])
-    return data.rms(without(free, (shown / data.relative)[:, None])[:, 0] * data.relative)
+    return without(free, (shown / data.relative)[:, None])[:, 0] * data.relative

@@ -1,7 +1,8 @@
 """The ladder of a diagnosis: from the machine file as it was given, rung by rung, down to the noise.
 
 Each rung explains a share of the squares of the misfit as it was given. Its evidence is the natural logarithm of how
-much likelier the data are with it, less what it pays; all rungs are on that scale.
+much likelier the data are with it, less what it pays; all rungs are on that scale. What is left in the end is noise as
+far as noise leaves so much by chance; else what exceeds the noise is not explained.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ import numpy as np
 
 from ncfix.diagnosis.diagnosis import CONSTANT_FAMILY, Diagnosis
 
-GIVEN, MISTAKES, CONSTANTS, NAMED, UNNAMED, NOISE = (
+GIVEN, MISTAKES, CONSTANTS, NAMED, UNNAMED, UNEXPLAINED, NOISE = (
     "file as given",
     "mistakes",
     "constants of the file",
     "named effects",
     "without a name",
+    "not explained",
     "noise",
 )
 
@@ -29,7 +31,7 @@ class Rung:
     name        which; `found` are the findings on it
     left_um     what is left below it, rms um; holdout_um the same on poses left out of the fit, NaN where not known
     share       of the squares of the misfit as given that it explains; of the noise: what is left of them
-    log_odds    its evidence; NaN for the first and the last
+    log_odds    its evidence; NaN for the first and the last two
     """
 
     name: str
@@ -59,7 +61,9 @@ def ladder(diagnosis: Diagnosis) -> tuple[Rung, ...]:
     for name, left, held, odds, those in steps:
         found.append(Rung(name, left, held, _share(above**2 - left**2, first), odds, those))
         above = min(left, above)
-    found.append(Rung(NOISE, gap.floor, none, _share(above**2, first), none))
+    noise = min(gap.floor, above) if diagnosis.rest.lacking else above
+    found.append(Rung(UNEXPLAINED, noise, none, _share(above**2 - noise**2, first), none))
+    found.append(Rung(NOISE, gap.floor, none, _share(noise**2, first), none))
     return tuple(found)
 
 

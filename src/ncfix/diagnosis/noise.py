@@ -173,8 +173,7 @@ def estimated_background(
 
 def _noise(data: ResidualData) -> tuple[float, float]:
     """Noise of a plain value, um, and how well it is known."""
-    given = all(each.noise[0] is not None for each in data.measurements)
-    return data.sigma, STATED_NOISE if given else UNKNOWN_NOISE
+    return data.sigma, STATED_NOISE if data.noise_stated else UNKNOWN_NOISE
 
 
 def _drift_correlation(data: ResidualData, relative: Array) -> Array | None:
@@ -376,27 +375,36 @@ def noise_floor(data: ResidualData, background: Background, sigma_um: float, kee
     squares, freedom = repeat_scatter(data, keep)
     if freedom >= ENOUGH_REPEATS:
         return NoiseFloor(float(np.sqrt(squares / freedom)), "repeats", freedom, squares)
-    if all(each.noise[0] is not None for each in data.measurements):
+    if data.noise_stated:
         return NoiseFloor(background.sigma, "given", 0)
     return NoiseFloor(sigma_um, "neighbours", 0)
 
 
-def beyond_noise(noise_floor: NoiseFloor, noise_um: float, left_um: float, little: float) -> float:
-    """What is left beyond the noise and what machines have of everything, um rms.
+def beyond_noise(
+    data: ResidualData, noise_floor: NoiseFloor, noise: Array, left: Array, keep: NDArray[np.bool_]
+) -> float:
+    """What is left beyond the noise (m,) and what machines have of everything, um rms, in the rows of the worst sort.
 
-    Noise that comes from repeats with long tails is known to two standard deviations only, a given one to a tenth.
+    Noise that comes from repeats with long tails is known to two standard deviations only, a given one to a tenth, and
+    no better than so many rows tell it.
     """
-    doubt = 2 * np.sqrt(TAILS / noise_floor.freedom) if noise_floor.freedom else TRUSTED
-    return float(np.sqrt(max(left_um**2 - (noise_um * (1 + doubt)) ** 2 - (little * USUAL_UM) ** 2, 0.0)))
+    known = 2 * np.sqrt(TAILS / noise_floor.freedom) if noise_floor.freedom else TRUSTED
+    counts = np.bincount(data.views[keep], minlength=data.views.max(initial=0) + 1)
+    doubt = np.maximum(known, 2 / np.sqrt(np.maximum(counts, 1)))
+    expected = data.size_by_view(noise, keep) ** 2 * (1 + doubt) ** 2 + (data.little * USUAL_UM) ** 2
+    beyond: Array = np.sqrt(np.maximum(data.size_by_view(left, keep) ** 2 - expected, 0.0))
+    return float(beyond.max(initial=0.0))
 
 
 def repeat_scatter(data: ResidualData, keep: NDArray[np.bool_]) -> tuple[float, int]:
-    """Sum of squares about the means of values taken at one commanded state one after another, and its freedom."""
+    """Sum of squares of plain values about the means of those taken at one commanded state one after another, um^2, and
+    its freedom.
+    """
     same = states(data)
     keys = [
         f"{same[row]} {name}" for row, name, kept in zip(data.row, data.names, keep, strict=True) if row >= 0 and kept
     ]
-    values = data.y[(data.row >= 0) & keep]
+    values = (data.y / data.relative)[(data.row >= 0) & keep]
     if not keys:
         return 0.0, 0
     _, index = groups(keys)
@@ -430,7 +438,10 @@ def states(data: ResidualData) -> list[int]:
 
 
 def lack_of_fit(noise_floor: NoiseFloor, residual: Array, parameters: float) -> float | None:
-    """How likely residuals so much larger than the noise are by chance; None without repeats or a given noise."""
+    """How likely residuals so much larger than the noise are by chance; None without repeats or a given noise.
+
+    residual  um, each by how many times its noise is that of a plain value
+    """
     n = len(residual)
     squares = float((residual**2).sum())
     if noise_floor.source == "repeats":

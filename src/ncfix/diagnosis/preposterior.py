@@ -60,7 +60,7 @@ class PredictedValues:
 def shown_at(new: Observation, groups: Sequence[EffectForm]) -> list[Array]:
     """What the numbers of each form show at further poses, (v, p) um; nothing of what is no error of the machine."""
     owners = {group.owner.name: group.owner for group in groups if not group.owner.kept_out}
-    design = 1e3 * new.design([effect for owner in owners.values() for effect in owner.effects])
+    design = new.um[:, None] * new.design([effect for owner in owners.values() for effect in owner.effects])
     ends = np.cumsum([sum(effect.basis.size for effect in owner.effects) for owner in owners.values()])
     designs = dict(zip(owners, np.split(design, ends[:-1], axis=1), strict=True))
     nothing = [np.zeros((len(design), group.columns.shape[1])) for group in groups]
@@ -134,8 +134,8 @@ class _Predictor:
         self.noise = (sigma / self.background.sigma) ** 2
         constants = data.problem.design.shape[1]
         used = data.base.shape[1] - constants
-        setup = 1e3 * new.unknown_design(new.unknowns.start)
-        kinematic = 1e3 * new.design(data.problem.selection.estimated)
+        setup = new.um[:, None] * new.unknown_design(new.unknowns.start)
+        kinematic = new.um[:, None] * new.design(data.problem.selection.estimated)
         old = np.concatenate(
             [data.base[:, :used], np.zeros((len(data.y), setup.shape[1])), data.base[:, used:]], axis=1
         )

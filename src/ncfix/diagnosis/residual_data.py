@@ -1,7 +1,8 @@
 """What several measurement files show of one machine: residuals, what explains them already, and where each came from.
 
-All values in um; one entry per measured value, m in all. `base` are the columns of what is free anyway: the unknowns of
-the set-ups, and the constants of the machine file (lines, squareness, gains), which a day and a set-up change.
+All values in um, angles as what they move at half the reach of the machine; one entry per measured value, m in all.
+`base` are the columns of what is free anyway: the unknowns of the set-ups, and the constants of the machine file
+(lines, squareness, gains), which a day and a set-up change.
 
 How well a machine file as it stands agrees with data: its constants nearly fixed, only the set-up free.
 """
@@ -22,10 +23,9 @@ from ncfix.machine.basis import ConstantBasis, Polynomial
 from ncfix.machine.plausible import times_a_machining_centre
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import gauss_newton, solve
-from ncfix.measure.measurement import Array, Index, Measurement
+from ncfix.measure.measurement import Array, Index, Measurement, groups
 from ncfix.measure.selection import Selection
 
-UM = 1e3
 STEPS = 6
 SETTLED_UM = 1e-3
 FAR = 1.0
@@ -79,8 +79,12 @@ class ResidualData:
     @property
     def sigma(self) -> float:
         """Standard deviation of a plain value as the files tell it, um."""
-        known = [each.sigma for each in self.problem.observations if each.noise_known]
-        return UM * float(np.median(np.concatenate(known) if known else self.problem.sigma))
+        return usual_noise(self.problem)
+
+    @property
+    def noise_stated(self) -> bool:
+        """Whether all files state it."""
+        return all(each.noise_stated for each in self.problem.observations)
 
     @cached_property
     def sizes(self) -> tuple[float, ...]:
@@ -114,7 +118,7 @@ class ResidualData:
 
     def design(self, effects: Sequence[Effect]) -> Array:
         """The derivative of all values by the coefficients of effects, um, (m, k)."""
-        return UM * np.concatenate([each.design(effects) for each in self.problem.observations])
+        return np.concatenate([each.um[:, None] * each.design(effects) for each in self.problem.observations])
 
     def expansion(self, drive: Sequence[Effect]) -> Array:
         """What is seen when things on the table expand, um, (m, 4 k): the effects say with what, k coefficients.
@@ -135,8 +139,8 @@ class ResidualData:
             along = each.machine.design(each.q, each.state, [Effect(drive[0].name, (0.0,))])[:, :3]
             course = np.einsum("nik,ni->nk", driven, along[:, :, 0]) / (along[:, :, 0] ** 2).sum(axis=1)[:, None]
             shown = seen[:, :, None] * course[np.maximum(each.rows, 0)][:, None]
-            parts.append(-shown.reshape(len(shown), -1))
-        return UM * np.concatenate(parts)
+            parts.append(-each.um[:, None] * shown.reshape(len(shown), -1))
+        return np.concatenate(parts)
 
     def shares(self, columns: Array, of: Sequence[Array]) -> Array:
         """What least squares of columns (m, p) give each of some other columns, beside all that is free, (k, p)."""
@@ -175,11 +179,11 @@ class ResidualData:
 
     @cached_property
     def names(self) -> list[str]:
-        """The name of each value's component."""
+        """The name of what each value is."""
         return [
             name
             for each in self.problem.observations
-            for name in [*each.components * len(each.measurement), *["distance"] * len(each.extra_values)]
+            for name in [*each.value_names, *["distance"] * len(each.extra_values)]
         ]
 
     @cached_property
@@ -195,10 +199,38 @@ class ResidualData:
             f"{each.path} set {name}" if many else f"set {name}" for each in self.measurements for name in each.sets
         )
 
+    @cached_property
+    def views(self) -> Index:
+        """Number of the sort of row of each value, (m,): rows of one file in which the same was read."""
+        sorts = [f"{file} {name}" for file, name in zip(self.file, self._first_names, strict=True)]
+        return groups(sorts)[1][np.maximum(self.row, 0)]
+
+    @property
+    def _first_names(self) -> list[str]:
+        """Of each row what its first value is."""
+        seen = self.problem.observations
+        return [name for each in seen for name in each.value_names[:: len(each.components)]]
+
+    def size(self, values: Array, keep: NDArray[np.bool_] | None = None) -> float:
+        """How large something is that is shown like this, um: `rms` over the sort of rows in which it is largest.
+
+        Rows of another sort do not make it smaller, however many there are.
+        """
+        return float(self.size_by_view(values, keep).max(initial=0.0))
+
+    def size_by_view(self, values: Array, keep: NDArray[np.bool_] | None = None) -> Array:
+        """`rms` over each sort of rows by itself, (views,); zero where no row is in `keep`."""
+        inside = self._inside if keep is None else self._inside & keep
+        squares = (values**2).reshape(len(values), -1).sum(axis=1)
+        rows = np.unique(self.row[inside], return_index=True)[1] if keep is not None else self._firsts
+        count = self.views.max(initial=-1) + 1
+        total = np.bincount(self.views[inside], squares[inside], minlength=count)
+        return np.sqrt(total / np.maximum(np.bincount(self.views[inside][rows], minlength=count), 1))
+
     def rms(self, values: Array, keep: NDArray[np.bool_] | None = None) -> float:
         """Root mean square over rows of the length of what each shows; values (m, ...), um, those in `keep` (m,)."""
         inside = self._inside if keep is None else self._inside & keep
-        rows = self._seen if keep is None else len(np.unique(self.row[inside]))
+        rows = len(self._firsts) if keep is None else len(np.unique(self.row[inside]))
         return float(np.linalg.norm(values if inside.all() else values[inside]) / np.sqrt(max(rows, 1)))
 
     @cached_property
@@ -207,9 +239,9 @@ class ResidualData:
         return self.row >= 0
 
     @cached_property
-    def _seen(self) -> int:
-        """How many rows have values."""
-        return len(np.unique(self.row[self._inside]))
+    def _firsts(self) -> Index:
+        """Of the values of rows the first of each row."""
+        return np.unique(self.row[self._inside], return_index=True)[1]
 
     @cached_property
     def measured(self) -> MeasuredRange:
@@ -254,22 +286,27 @@ def residual_data(measurements: Sequence[Measurement], machine: Machine) -> Resi
     selection = Selection(machine.effects, tuple(is_free(effect) for effect in machine.effects))
     problem = Problem.of(measurements, machine, selection)
     relative = relative_noise(problem)
-    scale = UM * problem.sigma.mean() * relative
-    nuisance = problem.nuisance(problem.start)
-    base = UM * np.concatenate([nuisance, problem.design], axis=1)
-    seen, free = UM * problem.design / scale[:, None], UM * nuisance / scale[:, None]
+    scale = usual_noise(problem) * relative
+    base = problem.um[:, None] * np.concatenate([problem.nuisance(problem.start), problem.design], axis=1)
+    free, seen = np.split(base / scale[:, None], [len(problem.start)], axis=1)
 
     def step(at: tuple[Array, Array]) -> tuple[tuple[Array, Array], float]:
         coefficients, unknowns = at
-        target = UM * problem.residual(coefficients, unknowns) / scale
+        target = problem.um * problem.residual(coefficients, unknowns) / scale
         change = solve(seen, free, target, problem.limits).change
         moved = damped(free, target - seen @ change)
         size = float(np.abs((seen @ change + free @ moved) * scale).max(initial=0.0))
         return (coefficients + change, unknowns + moved), size
 
     (coefficients, unknowns), _ = gauss_newton(step, (selection.start, problem.start), STEPS, SETTLED_UM)
-    residual = problem.residual(coefficients, unknowns)
-    return ResidualData(problem, coefficients, unknowns, UM * residual, base, rows_of(problem), relative)
+    residual = problem.um * problem.residual(coefficients, unknowns)
+    return ResidualData(problem, coefficients, unknowns, residual, base, rows_of(problem), relative)
+
+
+def usual_noise(problem: Problem) -> float:
+    """Standard deviation of a plain value as the files tell it, um; of those that do not only where none does."""
+    known = [each.um * each.sigma for each in problem.observations if each.noise_known]
+    return float(np.median(np.concatenate(known) if known else problem.um * problem.sigma))
 
 
 def little_of(machine: Machine, noise_um: float) -> float:
@@ -279,13 +316,11 @@ def little_of(machine: Machine, noise_um: float) -> float:
 
 def relative_noise(problem: Problem) -> Array:
     """Standard deviation of each value against the usual one, (m,); files that do not tell are like those that do."""
-    known = [each.sigma for each in problem.observations if each.noise_known]
-    usual = float(np.median(np.concatenate(known))) if known else float(np.median(problem.sigma))
-    own = [
-        each.sigma if each.noise_known else each.sigma * usual / np.median(each.sigma) for each in problem.observations
-    ]
-    sigma = np.concatenate(own)
-    return sigma / np.median(sigma)
+    usual = usual_noise(problem)
+    noise = [(each.um * each.sigma, each.noise_known) for each in problem.observations]
+    sigma = np.concatenate([own if known else own * usual / np.median(own) for own, known in noise])
+    relative: Array = sigma / np.median(sigma)
+    return relative
 
 
 def damped(columns: Array, y: Array) -> Array:
@@ -372,36 +407,35 @@ def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequenc
     """Ready to be asked."""
     selection = Selection((*machine.effects, *loose), tuple(map(is_free, (*machine.effects, *loose))))
     problem = Problem.of(measurements, machine, selection)
-    known = [each.sigma for each in problem.observations if each.noise_known]
-    sigma = UM * float(np.median(np.concatenate(known) if known else problem.sigma))
-    return Misfit(problem, relative_noise(problem), sigma, sum(effect.basis.size for effect in loose))
+    free = sum(effect.basis.size for effect in loose)
+    return Misfit(problem, relative_noise(problem), usual_noise(problem), free)
 
 
 def _fitted(
     problem: Problem, relative: Array, sigma: float, prior_um: float, free: int, loose_um: float
 ) -> tuple[float, Array]:
     """Least squares with a prior on the constants, on the exact model."""
-    start, k = problem.selection.start, len(problem.start)
+    start, k, scale = problem.selection.start, len(problem.start), problem.um / relative
     held: Array
 
     def step(at: tuple[Array, Array]) -> tuple[tuple[Array, Array], float]:
         nonlocal held
         coefficients, unknowns = at
-        columns = UM * np.concatenate([problem.nuisance(unknowns), problem.design], axis=1) / relative[:, None]
+        columns = np.concatenate([problem.nuisance(unknowns), problem.design], axis=1) * scale[:, None]
         size = np.sqrt((columns**2).mean(axis=0))
         size = np.where(size > 0, size, 1.0)
         allowed = np.full(columns.shape[1], WIDE_UM)
         allowed[k:] = prior_um
         allowed[len(allowed) - free :] = loose_um
         held = sigma / allowed * size
-        y = UM * problem.residual(coefficients, unknowns) / relative
+        y = scale * problem.residual(coefficients, unknowns)
         back = -held * np.concatenate([np.zeros(k), coefficients - start])
         stacked = np.concatenate([columns / size, np.diag(sigma / allowed)])
         change = np.linalg.lstsq(stacked, np.concatenate([y, back]), rcond=1e-9)[0] / size
         return (coefficients + change[k:], unknowns + change[:k]), float(np.abs(columns @ change).max(initial=0.0))
 
     (coefficients, unknowns), _ = gauss_newton(step, (start, problem.start), EXACT_STEPS, EXACT_SETTLED_UM)
-    y = np.abs(UM * problem.residual(coefficients, unknowns) / relative)
+    y = np.abs(scale * problem.residual(coefficients, unknowns))
     y = np.sort(np.where(np.isfinite(y), y, 1e12))[: int(TRIM * len(y))]
     moved = held[k:] * (coefficients - start)
     return float(np.sqrt(((y**2).sum() + (moved**2).sum()) / len(y))), coefficients

@@ -57,7 +57,8 @@ def patterns(background: Background, sigma_um: float) -> list[ResidualPattern]:
             break
         left = without(basis, column[:, None])[:, 0]
         explained = left * (left @ y) / (left @ left)
-        found.append(ResidualPattern(text.format(_signed(size)), data.rms(explained * background.relative), p))
+        said = text.format(_signed(size, data.problem.um[np.argmax(column != 0)]))
+        found.append(ResidualPattern(said, data.size(explained * background.relative), p))
         basis = np.column_stack([basis, left / np.linalg.norm(left)])
         y = y - explained
     return found
@@ -71,8 +72,9 @@ def _gain(basis: Array, y: Array, column: Array) -> tuple[float, float]:
     return float(left @ y) ** 2 / squares, float(left @ y) / squares
 
 
-def _signed(size: float) -> str:
-    return f"{size:+.1f} um"
+def _signed(size: float, um: float) -> str:
+    """A size in um; of an angle, of which 1 rad is more um than 1 mm is, in urad."""
+    return f"{size:+.1f} um" if um == 1e3 else f"{1e6 * size / um:+.1f} urad"
 
 
 def _offered(data: ResidualData) -> Iterator[tuple[str, Array]]:

@@ -158,7 +158,7 @@ def _left_out(names: Sequence[str], level: float | None) -> Iterator[Message]:
     if names:
         more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
         listed = ", ".join(names[:NAMED]) + more
-        yield Message("NCF644", f"left out, not significant at {level:g}: {listed}; sigmas count them as zero")
+        yield Message("NCF644", f"left out, not significant at {level:g}: {listed}; sigmas count in what they may be")
 
 
 def _noise(problem: Problem, scale: float) -> Iterator[Message]:
@@ -256,19 +256,19 @@ def guesses(calibration: Calibration, over: Prediction) -> tuple[Message, ...]:
         f"at {at} the tip error is known to {over.worst_um:.1f} um (1 sigma), and only {calibration.before_um:.1f} um "
         "rms were there before: away from the measured poses the model is a guess"
     )
-    hint = "measure where `ncfix plan --existing` says, or estimate fewer effects: --effects, --prune 0.99"
+    hint = "measure where `ncfix plan --existing` says, or estimate fewer effects: --effects"
     return (Message("NCF641", text, hint=hint),)
 
 
 def deviations(calibration: Calibration, q: Array, state: State) -> Array:
     """Standard deviation of the predicted tip error at any poses, (n, 3) mm, directions of the workpiece frame."""
-    design = calibration.problem.machine.design(q, state, calibration.problem.selection.estimated)
+    design = calibration.problem.machine.design(q, state, calibration.asked.estimated)
     return calibration.uncertainty(design[:, :3])
 
 
 def _inputs(calibration: Calibration, machine: Machine) -> dict[str, Array]:
     """The middle of every signal that the estimated effects need."""
-    signals = (each for effect in calibration.problem.selection.estimated for each in signals_of(machine.axes, effect))
+    signals = (each for effect in calibration.asked.estimated for each in signals_of(machine.axes, effect))
     names = {name for signal in signals if signal is not None for name in signal.inputs} - {"tool_length"}
     values = {}
     for name in names:

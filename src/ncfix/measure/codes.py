@@ -204,10 +204,11 @@ CODES = {
     "NCF644": Code(
         "coefficients that were left out",
         "With `--prune` they are not significant at the level that was asked for, so they are zero in the new machine "
-        "file. The standard deviations of the others count them as known to be zero. That is too little where a "
-        "coefficient that was left out acts like one that stays, as squareness errors and tilts of rotary axes may: "
-        "one of them then carries the others.",
-        "Calibrate without `--prune` to see how well each one is known; name those that must stay with `--effects`, "
-        "and leave `--prune` out.",
+        "file. Nobody knows that they are zero, so standard deviations count in what they may be: by the measurements, "
+        "and by a third of what is much of such an error. Where a coefficient that was left out acts like one that "
+        "stays, as squareness errors and tilts of rotary axes may, the one that stays carries the other, and its "
+        "standard deviation is large.",
+        "Where a standard deviation grew too large, measure where the two act otherwise (`ncfix plan`), or name what "
+        "is known to be zero out of the model with `--effects`.",
     ),
 }

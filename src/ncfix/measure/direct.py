@@ -69,10 +69,7 @@ class DirectReading(Observation):
     @property
     def noise_known(self) -> bool:
         """See `Observation`; where there are only angles, theirs will do."""
-        lengths, angles = self.measurement.noise
-        if self.turns.all():
-            return not (lengths is None and angles is None and self._repeats(self.turns) is None)
-        return lengths is not None or self._repeats(~self.turns) is not None
+        return self.noise_stated or self._repeats(self.turns if self.turns.all() else ~self.turns) is not None
 
     def _repeats(self, rows: Mask) -> float | None:
         """The standard deviation over repeats among these rows (n,), mm or rad."""

@@ -56,6 +56,7 @@ class Estimate:
     residual                values minus predictions, (m,), mm or rad
     weight                  (m,) 0 ... 1
     share                   how much of the squares of normal noise the weights leave: 1 if values count in full
+    left_out                what was taken out of the model for not being significant
     """
 
     coefficients: Array
@@ -64,6 +65,7 @@ class Estimate:
     residual: Array
     weight: Array
     share: float = 1.0
+    left_out: LeftOut | None = None
 
     @property
     def freedom(self) -> int:
@@ -77,9 +79,27 @@ class Estimate:
 
     def covariance(self, scale: float) -> Array:
         """Of all coefficients for a noise `scale` times as large as it is said to be, (p, p); NaN where held."""
-        full = np.full((len(self.coefficients), len(self.coefficients)), np.nan)
-        full[np.ix_(self.solution.kept, self.solution.kept)] = self.solution.covariance * scale**2
+        full, kept = np.full((len(self.coefficients), len(self.coefficients)), np.nan), self.solution.kept
+        own = self.solution.covariance
+        if self.left_out is not None:
+            of_all = np.flatnonzero(self.left_out.stays)[kept]
+            own = self.left_out.covariance[np.ix_(of_all, of_all)]
+        full[np.ix_(kept, kept)] = own * scale**2
         return full
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Coefficients that were left out of a model as if they were zero, which nobody knows for certain.
+
+    selection   with them
+    stays       (q,) which of its coefficients the model has
+    covariance  (q, q) of all about what the model says of them, for a noise of one; zero where held
+    """
+
+    selection: Selection
+    stays: Mask
+    covariance: Array
 
 
 @dataclass(frozen=True)
@@ -113,6 +133,11 @@ class Problem:
         """Which values were stated by a certificate and not read, (m,): calibrated distances."""
         rows: Index = np.concatenate([each.rows for each in self.observations])
         return rows < 0
+
+    @cached_property
+    def um(self) -> Array:
+        """What each value is multiplied with to be in um, (m,); an angle counts as what it moves at half the reach."""
+        return np.concatenate([each.um for each in self.observations])
 
     @cached_property
     def limits(self) -> Array:
@@ -204,15 +229,19 @@ class Calibration:
         """The standard deviations of all coefficients, (p,); NaN where they were held."""
         return np.sqrt(np.diag(self.covariance))
 
-    def uncertainty(self, design: Array) -> Array:
-        """Standard deviation of a prediction with this design over the coefficients, (..., p) -> (...).
+    @property
+    def asked(self) -> Selection:
+        """What was asked for, with what was left out since."""
+        return self.problem.selection if self.estimate.left_out is None else self.estimate.left_out.selection
 
-        `machine.design(q, state, selection.estimated)` gives that of the pose error. What was held counts as known.
+    def uncertainty(self, design: Array) -> Array:
+        """Standard deviation of a prediction with this design over the coefficients asked for, (..., p) -> (...).
+
+        `machine.design(q, state, asked.estimated)` gives that of the pose error. What was held counts as known.
         """
-        kept = self.estimate.solution.kept
-        own = design[..., kept]
-        covariance = self.estimate.solution.covariance * self.scale**2
-        deviation: Array = np.sqrt(np.einsum("...i,ij,...j->...", own, covariance, own))
+        left_out = self.estimate.left_out
+        covariance = np.nan_to_num(self.covariance) if left_out is None else left_out.covariance * self.scale**2
+        deviation: Array = np.sqrt(np.einsum("...i,ij,...j->...", design, covariance, design))
         return deviation
 
 

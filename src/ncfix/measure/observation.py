@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Effect, GaugeLine, Machine, se3
 from ncfix.machine.axes import SPINDLE
+from ncfix.machine.plausible import reach
 from ncfix.measure.measurement import Array, Index, Measurement, groups
 
 Mask = NDArray[np.bool_]
@@ -140,6 +141,12 @@ class Observation(ABC):
         """Which values of the rows are angles, one after another."""
         return np.tile(np.array(self.angular, dtype=np.bool_), len(self.measurement))
 
+    @property
+    def um(self) -> Array:
+        """What each value is multiplied with to be in um, (m,); an angle counts as what it moves at half the reach."""
+        turns = np.concatenate([self.turns, np.zeros(len(self.extra_values), dtype=np.bool_)])
+        return np.where(turns, 1e3 * max(LEVER, reach(self.machine) / 2), 1e3)
+
     @cached_property
     def sigma(self) -> Array:
         """The standard deviation of each value, (m,), mm or rad: from the header, else from repeats, else 1 um."""
@@ -150,12 +157,15 @@ class Observation(ABC):
         return np.concatenate([np.tile(each, len(self.measurement)), self.extra_sigma])
 
     @property
+    def noise_stated(self) -> bool:
+        """Whether the header says how large the noise is; of angles alone theirs will do."""
+        lengths, angles = self.measurement.noise
+        return lengths is not None or (angles is not None and bool(self.turns.all()))
+
+    @property
     def noise_known(self) -> bool:
         """Whether the noise was given or can be told from repeats."""
-        lengths, angles = self.measurement.noise
-        if lengths is not None or (angles is not None and all(self.angular)):
-            return True
-        return self._repeatability is not None
+        return self.noise_stated or self._repeatability is not None
 
     @cached_property
     def _repeatability(self) -> float | None:

@@ -3,7 +3,8 @@
 Stepwise regression (Soons 1993, section 3.3): coefficients that cannot be told from zero are taken out, one at a time.
 The least significant one goes first; one that went comes back if it has become significant. A coefficient that is out
 is zero; one that the measurements cannot tell stays at what the machine file says. Tests are two-sided t-tests with the
-noise that the residuals show.
+noise that the residuals show. What is out is not known to be zero: the covariance of the others is that of all with
+what is out at zero give or take what such errors are, and with how far taking it out has moved the others.
 
 Time constants (section 2.7): an effect with a lag is linear in its coefficients once its time constant is known. So
 only the constants are searched for, on a coarse scale of times first and then by descent, with all else solved for at
@@ -16,13 +17,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.special import stdtr
 
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis, Polynomial
 from ncfix.machine.piecewise import Truncated
-from ncfix.measure.estimate import Estimate, Problem, fit
+from ncfix.measure.estimate import HOPELESS, Estimate, LeftOut, Problem, fit, noise_scale
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Mask
@@ -30,6 +32,8 @@ from ncfix.measure.selection import Selection, labels_of
 
 SCALE = 24
 """Time constants tried first, from the shortest step of time to three times the whole."""
+USUAL = 1 / 3
+"""Standard deviation of an error that was left out, of what is much."""
 STEP = 1e-3
 """Relative change of a time constant that is none."""
 
@@ -40,7 +44,27 @@ def pruned(problem: Problem, estimate: Estimate, level: float, loss: str) -> tup
     if chosen.all():
         return problem, estimate, ()
     smaller = _without(problem, chosen)
-    return smaller, fit(smaller, loss), tuple(_left_out(problem.selection, chosen))
+    found = fit(smaller, loss)
+    left_out = LeftOut(problem.selection, chosen, _covariance(problem, estimate, chosen, found))
+    return smaller, replace(found, left_out=left_out), tuple(_left_out(problem.selection, chosen))
+
+
+def _covariance(problem: Problem, estimate: Estimate, stays: Mask, found: Estimate) -> Array:
+    """Of all coefficients of a problem about those `found` without some of them, for a noise of one, (p, p)."""
+    kept, scale = estimate.solution.kept, noise_scale(problem, estimate) or 1.0
+    design, target = _alone(problem, estimate)
+    usual = USUAL * problem.limits[kept] / HOPELESS
+    held = np.diag(np.where(stays[kept], 0.0, scale / usual))
+    columns = np.concatenate([design[:, kept], held])
+    size = np.linalg.norm(columns, axis=0)
+    orthogonal, triangle = np.linalg.qr(columns / size)
+    inverse = solve_triangular(triangle, np.eye(len(kept))) / size[:, None]
+    model = np.zeros(len(stays))
+    model[stays] = found.coefficients
+    astray = (model[kept] - inverse @ (orthogonal[: len(target)].T @ target)) / scale
+    covariance = np.zeros((len(stays), len(stays)))
+    covariance[np.ix_(kept, kept)] = inverse @ inverse.T + np.outer(astray, astray)
+    return covariance
 
 
 def _left_out(selection: Selection, chosen: Mask) -> Iterator[str]:
@@ -62,12 +86,8 @@ def _significant(problem: Problem, estimate: Estimate, risk: float) -> Mask:
     inside = np.zeros(len(estimate.coefficients), dtype=np.bool_)
     inside[estimate.solution.kept] = True
     held = ~inside & (estimate.coefficients != 0)
-    root = np.sqrt(estimate.weight) / problem.sigma
-    basis = estimate.solution.nuisance
-    design = without(basis, problem.design * root[:, None])
-    asked = np.where(held, 0.0, estimate.coefficients)
-    target = without(basis, (estimate.residual + problem.design @ asked) * root)
-    start = int((estimate.weight > 0).sum()) - basis.shape[1]
+    design, target = _alone(problem, estimate)
+    start = int((estimate.weight > 0).sum()) - estimate.solution.nuisance.shape[1]
     banned = set(np.flatnonzero(held).tolist())
     while inside.any():
         chances, left = _chances(design[:, inside], target, start)
@@ -80,8 +100,26 @@ def _significant(problem: Problem, estimate: Estimate, risk: float) -> Mask:
             banned.add(back[0])
             continue
         inside[worst] = False
-    stays: Mask = inside | held
+    return _whole(problem.selection, inside | held)
+
+
+def _whole(selection: Selection, chosen: Mask) -> Mask:
+    """What stays, with the rest of what cannot be taken apart."""
+    stays, at = chosen.copy(), 0
+    for effect in selection.estimated:
+        part = slice(at, at + effect.basis.size)
+        at = part.stop
+        stays[part] |= _reduced(effect, chosen[part]) is effect
     return stays
+
+
+def _alone(problem: Problem, estimate: Estimate) -> tuple[Array, Array]:
+    """What coefficients show beside the set-up, and what those that were estimated have to explain, in noises."""
+    root, basis = np.sqrt(estimate.weight) / problem.sigma, estimate.solution.nuisance
+    asked = np.zeros(len(estimate.coefficients))
+    asked[estimate.solution.kept] = estimate.coefficients[estimate.solution.kept]
+    design = without(basis, problem.design * root[:, None])
+    return design, without(basis, (estimate.residual + problem.design @ asked) * root)
 
 
 def _chances(design: Array, target: Array, start: int) -> tuple[Array, Array]:

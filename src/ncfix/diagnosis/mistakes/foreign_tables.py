@@ -17,7 +17,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from ncfix.diagnosis.evidence import FURTHER, marginal
-from ncfix.diagnosis.residual_data import UM, Misfit, is_free, misfit
+from ncfix.diagnosis.residual_data import Misfit, is_free, misfit
 from ncfix.machine import Effect, Machine
 from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.measure.least_squares import orthonormal, without
@@ -69,9 +69,9 @@ class CurvesOfFile:
     @staticmethod
     def of(now: Misfit) -> CurvesOfFile:
         """Those of the file of a misfit."""
-        problem = now.problem
-        free = np.concatenate([problem.nuisance(problem.start), problem.design], axis=1) / now.relative[:, None]
-        basis, scale = orthonormal(free), UM / (now.noise * now.relative)
+        problem, scale = now.problem, now.problem.um / (now.noise * now.relative)
+        free = np.concatenate([problem.nuisance(problem.start), problem.design], axis=1) * scale[:, None]
+        basis = orthonormal(free)
         y = problem.residual(problem.selection.start, problem.start) * scale
         curves = [effect for effect in problem.machine.effects if effect.active and not is_free(effect)]
         shown, drawn = [], []

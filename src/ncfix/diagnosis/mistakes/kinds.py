@@ -14,7 +14,7 @@ import numpy as np
 
 from ncfix.diagnosis.mistakes.foreign_tables import without_foreign_tables
 from ncfix.diagnosis.mistakes.stale_tables import shifted_tables
-from ncfix.diagnosis.residual_data import TIGHT_UM, UM, Misfit, is_free, misfit, rows_of
+from ncfix.diagnosis.residual_data import TIGHT_UM, Misfit, is_free, misfit, rows_of
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
 from ncfix.machine.plausible import much, times_a_machining_centre
@@ -82,7 +82,9 @@ def at_first_sight(
 ) -> Iterator[tuple[float, Mistake]]:
     """Mistakes that change what the file says by a known column, or the values: with what is left to first order."""
     rest, problem = FirstOrder.of(now, held_um), now.problem
-    shown = [UM * (problem_design @ np.asarray(effect.coefficients)) for effect, problem_design in _designs(problem)]
+    shown = [
+        problem.um * (problem_design @ np.asarray(effect.coefficients)) for effect, problem_design in _designs(problem)
+    ]
     for factor, parts, name, title, axis in _scalings(machine):
         change = sum((shown[k] for k in parts), np.zeros(len(problem.values)))
         effects = tuple(
@@ -155,7 +157,7 @@ def _one_sided(
                 continue
             column = np.where(there, np.sum([shown[k] for k in own], axis=0), 0.0)
             sizes = [len(each.components) * len(each.measurement) for each in seen]
-            parts = np.split(column / UM, np.cumsum(sizes)[:-1])
+            parts = np.split(column / rest.now.problem.um, np.cumsum(sizes)[:-1])
             changed = tuple(
                 each.with_columns(
                     {
@@ -230,14 +232,14 @@ class FirstOrder:
     def of(now: Misfit, held_um: float) -> FirstOrder:
         """About the first guess of the set-up, constants held within so much."""
         problem = now.problem
-        free = UM * problem.nuisance(problem.start) / now.relative[:, None]
-        own = UM * problem.design / now.relative[:, None]
+        scale = (problem.um / now.relative)[:, None]
+        free, own = scale * problem.nuisance(problem.start), scale * problem.design
         size = np.sqrt((own**2).mean(axis=0))
         held_um *= times_a_machining_centre(problem.machine)
         prior = np.diag(now.noise / held_um * np.where(size > 0, size, 1.0))
         below = np.concatenate([np.zeros((len(prior), free.shape[1])), prior], axis=1)
         columns = np.concatenate([np.concatenate([free, own], axis=1), below])
-        y = UM * problem.residual(problem.selection.start, problem.start)
+        y = problem.um * problem.residual(problem.selection.start, problem.start)
         return FirstOrder(now, y, orthonormal(columns))
 
     def of_values(self, measurements: Sequence[Measurement]) -> Array:
@@ -250,12 +252,12 @@ class FirstOrder:
             ])
             for each, seen in pairs
         ])  # fmt: skip
-        return self.y + UM * (values - problem.values)
+        return self.y + problem.um * (values - problem.values)
 
     def of_places(self, measurements: Sequence[Measurement]) -> Array:
         """(m,) values minus what the file says at other positions, or with other tools, um."""
         seen = Problem.of(measurements, self.now.problem.machine, self.now.problem.selection)
-        return UM * seen.residual(seen.selection.start, seen.start)
+        return seen.um * seen.residual(seen.selection.start, seen.start)
 
     @property
     def rows(self) -> Index:
