@@ -101,10 +101,10 @@ def test_each_motion_without_a_figure_is_counted_once_by_its_first_reason() -> N
         rule=rules(Rule.PASS, Rule.CORRECT, Rule.CORRECT, Rule.CORRECT, Rule.CORRECT, Rule.PASS, Rule.PASS),
         measured=measured,
     )
-    kept = mask(1, 1, 0, 0, 0, 0, 0)
-    assert without_figure(moves, kept, lacking) == {BY_RULE: 1, REFUSED: 1, MEASURED: 2, LEFT: 1}
-    assert without_figure(moves, kept, None) == {BY_RULE: 1, REFUSED: 1, MEASURED: 2}
-    assert without_figure(moves, kept, lacking, mask(0, 1, 0, 1, 1, 1, 1)) == {REFUSED: 1, MEASURED: 1, LEFT: 1}
+    unchanged = mask(1, 1, 0, 0, 0, 0, 0)
+    assert without_figure(moves, unchanged, lacking) == {BY_RULE: 1, REFUSED: 1, MEASURED: 2, LEFT: 1}
+    assert without_figure(moves, unchanged, None) == {BY_RULE: 1, REFUSED: 1, MEASURED: 2}
+    assert without_figure(moves, unchanged, lacking, mask(0, 1, 0, 1, 1, 1, 1)) == {REFUSED: 1, MEASURED: 1, LEFT: 1}
 
 
 def test_a_turn_that_is_left_takes_no_figure_away() -> None:

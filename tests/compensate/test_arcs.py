@@ -127,7 +127,7 @@ def test_an_arc_whose_ends_could_be_rounded_onto_each_other_is_not_risked(sweep:
 
 
 def test_an_arc_from_a_kept_motion_fits_its_own_start() -> None:
-    """The machine stands where the kept motion left it, uncorrected: the arc is refused, pieces take that up."""
+    """The machine stands where the unchanged motion left it, uncorrected: the arc is refused, pieces take that up."""
     machine = random_machine(np.random.default_rng(7), TOPOLOGIES["three-axis"], ("polynomial",), 30.0, 20.0)
     moves = motions(machine, (80, 60, 40), [(80, 60, 40), Arc((60, 60, 40), (0, 0, 1), 2.0), (0, 0, 0)])
     keep = np.array([True, False, False])
@@ -183,21 +183,21 @@ def test_under_cutter_compensation_an_arc_stays_one_or_is_kept_and_named() -> No
     moves = changed(moves, compensated=np.array([False, True, True]))
     result = planned(machine, moves, ROUNDING)
     assert len(result.pieces) == 3
-    assert result.pieces.kept.tolist() == [False, True, False]
+    assert result.pieces.unchanged.tolist() == [False, True, False]
     first = result.findings[0]
     assert (first.code, first.moves.tolist()) == ("NCF415", [1])
     assert result.pieces.arc[2]
     assert moves.kind[2] == MotionKind.ARC
 
 
-@pytest.mark.parametrize(("rise", "kept"), [(2.0, False), (60.0, True)])
-def test_a_full_circle_whose_ends_come_apart_does_not_get_another_centre(rise: float, kept: bool) -> None:
+@pytest.mark.parametrize(("rise", "unchanged"), [(2.0, False), (60.0, True)])
+def test_a_full_circle_whose_ends_come_apart_does_not_get_another_centre(rise: float, unchanged: bool) -> None:
     """Z leads X off by 0.4 and 12 um; the bisector of ends so near to each other leads away from the centre."""
     machine = perfect("w F X Y Z t").replace(effects=(Effect("EXZ", (0.05,), Polynomial((1,)), 0.0, 250.0),))
     circle = Arc((20, 20, 0), (0, 0, 1), -2 * np.pi, rise)
     moves = motions(machine, (27, 27, 0), [(27, 27, 0), circle])
     whole = planned(machine, changed(moves, compensated=np.array([False, True])), ROUNDING / 10).pieces
-    assert whole.kept.tolist() == [False, kept]
+    assert whole.unchanged.tolist() == [False, unchanged]
     assert np.linalg.norm((whole.centre[1] - moves.centre[1])[:2]) < 0.02
     assert worst(machine, moves, planned(machine, moves, ROUNDING / 10)) < TOLERANCE
 

@@ -160,7 +160,7 @@ def test_a_led_tip_is_looked_at_as_often_as_its_axes_have_to_go(root: Path, name
 def largest_on_each(written: WrittenPieces, known: Known | None) -> Array:
     """The largest tip error on each motion (2, n), mm, of the program and corrected."""
     found = np.zeros((2, len(written.intent.moves)))
-    for part in samples(written, np.flatnonzero(~written.pieces.kept), tilts=False, known=known):
+    for part in samples(written, np.flatnonzero(~written.pieces.unchanged), known):
         np.maximum.at(found[0], part.move, part.before)
         np.maximum.at(found[1], part.move, part.after)
     return found
@@ -178,7 +178,7 @@ def test_figures_from_what_is_known(root: Path, name: str, led: bool) -> None:
     pieces = replace(planned.pieces, end=np.round(planned.pieces.end, 4))
     pieces.end[:, machine.rotary] = planned.pieces.end[:, machine.rotary]
     given = machine, intent.moves, pieces, planned.start
-    looked, known = (path_error(*given, tilts=False, known=each) for each in (None, planned.known))
+    looked, known = (path_error(*given, known=each) for each in (None, planned.known))
     assert known.before.max == pytest.approx(looked.before.max, abs=10 * PM)
     assert known.after.max == pytest.approx(looked.after.max, abs=10 * PM)
     assert known.after.rms == pytest.approx(looked.after.rms, abs=10 * PM)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ncfix.compensate.driver import fix_program
-from ncfix.compensate.plan.written import idle, without_idle
+from ncfix.compensate.plan.written import standing_still, without_idle
 from ncfix.control.setup import Setup
 from ncfix.machine import loads
 from ncfix.text.reader import read
@@ -54,6 +54,10 @@ def written(*ends: float, start: float = 0.0, move: tuple[int, ...] = ()) -> tup
     no, nowhere = np.zeros(n, dtype=bool), np.full((n, 3), np.nan)
     pieces = Pieces(which, np.linspace(0, 1, n + 1)[1:], end, no, nowhere, no, np.arange(1.0, n + 1))
     return pieces, Emission(None, end, nowhere, starts, {}, 0)  # type: ignore[arg-type]
+
+
+def idle(pieces: Pieces, emission: Emission) -> np.ndarray:
+    return standing_still(pieces, emission.end, emission.start)
 
 
 def test_what_does_not_move_is_dropped_and_the_last_piece_stays() -> None:

@@ -9,14 +9,14 @@ import pytest
 
 from compensate.machines_at_random import STROKE, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, interpolated, motions
-from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.plan.findings import Finding, Notes
 from ncfix.compensate.plan.limits import FUZZ, findings, increments_beyond_travel
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Moves
-from ncfix.diagnostics import Place
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash, Polynomial
+from ncfix.text.reader import read
 from ncfix.writer.pieces import Pieces
 
 XYZ = [0, 1, 2]
@@ -179,7 +179,7 @@ JUMP, PER_MM, PER_RAD = 0.05, 0.02, 1.0
 def test_findings_are_what_their_definitions_say() -> None:
     """Random straight motions with random corrections, near all limits, against the definitions one by one.
 
-    Each has one piece. Some are kept: nothing is said of these. Axes that get no word do not count as jumping.
+    Each has one piece. Some are unchanged: nothing is said of these. Axes that get no word do not count as jumping.
     """
     rng = np.random.default_rng(22)
     machine = perfect("w C B F X Y Z S t").replace(max_correction=(0.5, 0.02))
@@ -210,9 +210,9 @@ def _near_all_limits(machine: Machine, rng: np.random.Generator, n: int) -> tupl
     corrected[rng.random(n) < 0.03, rng.integers(5)] = np.nan
     silent = rng.random((n, 5)) < (0.3 if rng.random() < 0.5 else 0.0)
     moves = changed(moves, placed=~silent, programmed=moves.programmed & ~silent)
-    kept = rng.random(n) < 0.2
+    unchanged = rng.random(n) < 0.2
     none = np.full((n, 3), np.nan)
-    pieces = Pieces(np.arange(n), np.ones(n), corrected, np.zeros(n, dtype=bool), none, kept)
+    pieces = Pieces(np.arange(n), np.ones(n), corrected, np.zeros(n, dtype=bool), none, unchanged)
     return moves, pieces, np.vstack((moves.start[:1], corrected[:-1]))
 
 
@@ -221,7 +221,7 @@ def _by_definition(machine: Machine, moves: Moves, pieces: Pieces) -> dict[tuple
     found: dict[tuple[str, int], tuple[object, ...]] = {}
     low, high = np.array(machine.ranges).T
     shift = pieces.end - moves.end
-    for row in np.flatnonzero(~pieces.kept).tolist():
+    for row in np.flatnonzero(~pieces.unchanged).tolist():
         if not np.isfinite(pieces.end[row]).all():
             found["NCF408", row] = (0.0,)
         begun, ended, corrected = (
@@ -238,7 +238,7 @@ def _by_definition(machine: Machine, moves: Moves, pieces: Pieces) -> dict[tuple
         share = np.maximum(np.linalg.norm(linear) / 0.5, turns.max() / 0.02)
         if share > 1 + FUZZ:
             found["NCF406", row] = (share,)
-        if row and not pieces.kept[row - 1]:
+        if row and not pieces.unchanged[row - 1]:
             way = np.abs(moves.end[row] - moves.start[row])
             change = np.where(moves.wordless[row - 1], 0.0, shift[row] - shift[row - 1])
             jump = np.linalg.norm(change[~machine.rotary])
@@ -256,7 +256,7 @@ def test_increments_are_led_astray_where_they_stay_and_begin_elsewhere() -> None
         moves, pieces, start = _near_all_limits(machine, rng, 12)
         moves = changed(moves, incremental=rng.random(12) < 0.6)
         beyond = [(np.maximum(low - places, places - high) > FUZZ) for places in (pieces.end, moves.end)]
-        expected = np.flatnonzero(moves.incremental & pieces.kept & (beyond[0] & ~beyond[1]).any(axis=1))
+        expected = np.flatnonzero(moves.incremental & pieces.unchanged & (beyond[0] & ~beyond[1]).any(axis=1))
         assert increments_beyond_travel(machine, moves, pieces, start, State()).tolist() == expected.tolist()
         count += len(expected)
     assert count > 10
@@ -290,7 +290,7 @@ def test_an_error_model_that_gives_no_number_is_refused_by_the_plan() -> None:
     machine = perfect("w F X Y Z t").replace(effects=(Effect("EXX", (np.nan,)),))
     moves = motions(machine, (0, 0, 0), [(10.0, 0, 0), (20, 0, 0)])
     result = corrected(machine, moves)
-    assert result.pieces.kept.all()
+    assert result.pieces.unchanged.all()
     assert [(each.code, each.moves.tolist()) for each in result.findings] == [("NCF403", [0, 1])]
 
 
@@ -321,8 +321,8 @@ def test_a_step_between_a_kept_motion_and_a_corrected_one_is_no_jump() -> None:
 def test_kept_motions_are_not_looked_at() -> None:
     machine = shifted(5.0)
     moves = motions(machine, (0, 0, 0), [(10.0, 0, 0), (STROKE + 5, 0, 0)])
-    kept = plan(machine, moves, get_strategy("position"), 1e-3, keep=np.ones(2, dtype=bool))
-    assert found(machine, moves, kept) == {}
+    unchanged = plan(machine, moves, get_strategy("position"), 1e-3, keep=np.ones(2, dtype=bool))
+    assert found(machine, moves, unchanged) == {}
 
 
 def test_a_finding_names_axis_amount_and_place_and_counts_what_it_does_not_show() -> None:
@@ -330,11 +330,12 @@ def test_a_finding_names_axis_amount_and_place_and_counts_what_it_does_not_show(
     moves = motions(machine, (0, 0, 0), [(STROKE - 0.002, y, 0) for y in range(30)])
     result = corrected(machine, moves)
     over = next(each for each in findings(machine, moves, result.pieces, result.start) if each.code == "NCF404")
-    messages = over.messages(lambda row: Place("part.ngc", row + 1), most=3)
-    assert len(messages) == 4
-    assert messages[1].place == Place("part.ngc", 2)
-    assert "axis X 0.008 " in messages[0].text
-    assert "27 more" in messages[3].text
+    notes, program = Notes(), read(b"G0\n" * len(moves), "part.ngc", "linuxcnc")
+    notes.add(over, program, moves)
+    *shown, rest = notes.messages()
+    assert [each.place and each.place.line for each in shown] == [row + 1 for row in range(20)]
+    assert "axis X 0.008 " in shown[0].text
+    assert "10 more" in rest.text
 
 
 def test_findings_of_a_clean_program_are_none() -> None:

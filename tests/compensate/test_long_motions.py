@@ -40,7 +40,7 @@ def helix(turns: float) -> Moves:
 def test_a_helix_of_many_turns_is_followed(arc_pieces: bool) -> None:
     moves = helix(100 if arc_pieces else 15)
     result = planned(moves=moves, machine=SCALED, arc_pieces=arc_pieces)
-    assert not result.pieces.kept.any()
+    assert not result.pieces.unchanged.any()
     assert len(result.pieces) > 200
     assert np.nanmax(dense_errors(SCALED, moves, result, 20)[result.pieces.move > 0]) < TOLERANCE
 
@@ -48,7 +48,7 @@ def test_a_helix_of_many_turns_is_followed(arc_pieces: bool) -> None:
 @pytest.mark.parametrize("turns", [30_000, 99_999_999])
 def test_turns_without_end_are_refused(turns: int) -> None:
     result = planned(SCALED, helix(turns))
-    assert result.pieces.kept.tolist() == [False, True]
+    assert result.pieces.unchanged.tolist() == [False, True]
     assert [(each.code, each.moves.tolist()) for each in result.findings] == [("NCF417", [1])]
 
 
@@ -71,9 +71,9 @@ def test_an_axis_that_turns_without_end(turns: float) -> None:
     """There is a kink each turn, of which no list can be made; far from zero a single turn has no more than near it."""
     machine = KINKED
     far = motions(machine, (turns * TURN, 50, 0, 0), [(turns * TURN, 50, 0, 1), ((turns + 0.6) * TURN, 50, 0, 2)])
-    assert not planned(machine, far).pieces.kept.any()
+    assert not planned(machine, far).pieces.unchanged.any()
     moves = motions(machine, (0, 50, 0, 0), [(0, 50, 0, 1), (turns * TURN, 50, 0, 2)])
-    assert planned(machine, moves).pieces.kept.tolist()[-1] == (turns > 3)
+    assert planned(machine, moves).pieces.unchanged.tolist()[-1] == (turns > 3)
 
 
 @pytest.mark.parametrize("nodes", [STRETCH, 2 * STRETCH, 2 * STRETCH + 1, 5 * STRETCH + 7])

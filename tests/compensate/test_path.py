@@ -33,7 +33,7 @@ def walk(machine: Machine, rng: np.random.Generator, count: int, step: float, tu
 def worst_of(machine: Machine, moves: Moves, strategy: str, with_play: bool = False) -> tuple[float, int]:
     """The largest error in mm from the second motion on, and the number of pieces."""
     result = plan(machine, moves, get_strategy(strategy), TOLERANCE)
-    assert not result.pieces.kept.any()
+    assert not result.pieces.unchanged.any()
     errors = dense_errors(machine, moves, result, 200, with_play)[result.pieces.move > 0]
     return float(np.nanmax(errors)), len(result.pieces)
 
@@ -115,7 +115,7 @@ def test_kept_and_ruled_motions_stay_and_the_others_start_from_them() -> None:
     rule = np.array([Rule.CORRECT, Rule.PASS, Rule.REFUSE, Rule.CORRECT], dtype=np.int8)
     keep = np.array([True, False, False, False])
     result = plan(machine, changed(moves, rule=rule), get_strategy("position"), TOLERANCE, keep=keep)
-    assert result.pieces.kept.tolist()[:3] == [True, True, True]
+    assert result.pieces.unchanged.tolist()[:3] == [True, True, True]
     np.testing.assert_array_equal(result.pieces.end[:3], moves.end[:3])
     np.testing.assert_array_equal(result.start[3], moves.end[2])
 
@@ -125,7 +125,7 @@ def test_a_motion_to_an_unknown_place_is_kept_and_named() -> None:
     moves = motions(machine, (np.nan, np.nan, np.nan), [(10, 0, np.nan), (20, 10, 0), (30, 0, 0)])
     result = plan(machine, moves, get_strategy("position"), TOLERANCE)
     assert [(finding.code, finding.moves.tolist()) for finding in result.findings] == [("NCF408", [0])]
-    assert result.pieces.kept.tolist() == [True, False, False]
+    assert result.pieces.unchanged.tolist() == [True, False, False]
 
 
 def test_a_tool_of_unknown_length_stops_what_depends_on_it_only() -> None:
@@ -219,5 +219,5 @@ def test_programs_without_anything_to_correct() -> None:
     lost = motions(machine, (0, 0, 0), [(np.nan, 0, 0), (np.nan, 1, 0)])
     for name in STRATEGIES:
         result = plan(machine, lost, get_strategy(name), TOLERANCE)
-        assert result.pieces.kept.all()
+        assert result.pieces.unchanged.all()
         assert [finding.code for finding in result.findings] == ["NCF408"]

@@ -43,7 +43,7 @@ def circle(machine: Machine, sweep: float = TURN, rise: float = 0.0, radius: flo
 def pieces_of(machine: Machine, moves: Moves, round_: bool, **options: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Arc flags and fractions of the pieces of the last motion, and the largest error along it, mm."""
     result = plan(machine, moves, get_strategy("position"), TOLERANCE, arc_pieces=round_, **options)
-    assert not result.pieces.kept.any()
+    assert not result.pieces.unchanged.any()
     last = result.pieces.move == len(moves) - 1
     errors = dense_errors(machine, moves, result, 60)[last]
     return result.pieces.arc[last], result.pieces.fraction[last], float(np.nanmax(errors))

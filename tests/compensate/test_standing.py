@@ -15,8 +15,8 @@ MACHINE = perfect("w F X Y Z t")
 SHIFT = np.array([0.01, -0.02, 0.03])
 
 
-def stand(moves: Moves, kept: list[bool], machine: Machine = MACHINE, shift: np.ndarray = SHIFT) -> EndCommands:
-    return standing(machine, moves, moves.end + shift, np.array(kept))
+def stand(moves: Moves, unchanged: list[bool], machine: Machine = MACHINE, shift: np.ndarray = SHIFT) -> EndCommands:
+    return standing(machine, moves, moves.end + shift, np.array(unchanged))
 
 
 def test_a_motion_starts_where_the_one_before_really_ended() -> None:

@@ -45,18 +45,18 @@ def moved(moves: Moves, seed: int, size: float) -> Pieces:
     rng = np.random.default_rng(seed)
     shift = size * np.cumsum(rng.normal(size=moves.end.shape), axis=0) / 10
     shift[:, moves.rotary] *= rng.integers(0, 2) / 100
-    kept = (moves.rule != Rule.CORRECT) | (rng.random(len(moves)) < 0.01)
-    shift[kept] = 0.0
+    unchanged = (moves.rule != Rule.CORRECT) | (rng.random(len(moves)) < 0.01)
+    shift[unchanged] = 0.0
     dwells = np.flatnonzero(moves.kind[1:] == MotionKind.DWELL) + 1
     for row in dwells.tolist():
         shift[row] = shift[row - 1]
-    counts = np.where((rng.random(len(moves)) < 0.02) & ~kept & (moves.kind != MotionKind.CYCLE), 2, 1)
+    counts = np.where((rng.random(len(moves)) < 0.02) & ~unchanged & (moves.kind != MotionKind.CYCLE), 2, 1)
     move = np.repeat(np.arange(len(moves)), counts)
     last = np.append(np.diff(move) != 0, True)
     end = (moves.end + shift)[move]
     end[~last] = ((moves.start + moves.end) / 2 + shift)[move[~last]]
     arc = (moves.kind == MotionKind.ARC)[move] & (counts[move] == 1)
-    return Pieces(move, np.where(last, 1.0, 0.5), end, arc, moves.centre[move].copy(), kept[move])
+    return Pieces(move, np.where(last, 1.0, 0.5), end, arc, moves.centre[move].copy(), unchanged[move])
 
 
 def in_all_ways(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emission, ...]:
@@ -231,7 +231,7 @@ def test_long_stretches_of_arcs(dialect: str) -> None:
     pieces = moved(moves, 3, 0.01)
     with mock.patch.object(CentreWords, "splices", autospec=True, side_effect=CentreWords.splices) as written:
         emit(program, moves, pieces, STEPS)
-    arcs = np.count_nonzero(pieces.arc & ~pieces.kept)
+    arcs = np.count_nonzero(pieces.arc & ~pieces.unchanged)
     assert arcs > 1000
     assert sum(len(call.args[0].block) for call in written.call_args_list) > 0.4 * arcs
     assert_same(program, moves, pieces)
@@ -285,9 +285,9 @@ def test_arcs_and_dwells_do_not_part_a_stretch() -> None:
     line = [f"X{n / 7:.3f} Z{n / 9:.3f} B{n / 5:.3f}" for n in range(1, 41)]
     lines = [*line, "G4 P1.", "X9. Y1. Z4.", "G2 X11. Y3. I2. J0.", "G3 X9. Y1. Z3. I-2. J0.", "G1 X9. Z4.", *line]
     program, moves = followed("\n".join(["G90 G21 G94 G17", "G0 X0 Y0 Z0 B0 C0 F1000", *lines, "M2\n"]).encode())
-    rows, kept = np.arange(len(moves)), moves.kind == MotionKind.DWELL
+    rows, unchanged = np.arange(len(moves)), moves.kind == MotionKind.DWELL
     shifted = moves.end + 0.0123, moves.kind == MotionKind.ARC, moves.centre + 0.0123
-    pieces = Pieces(rows, np.ones(len(rows)), *shifted, kept)
+    pieces = Pieces(rows, np.ones(len(rows)), *shifted, unchanged)
     with mock.patch.object(Bulk, "take", autospec=True, side_effect=Bulk.take) as taken:
         emit(program, moves, pieces, STEPS)
     assert taken.call_count == 1
@@ -339,7 +339,7 @@ def test_an_arc_whose_centre_is_not_clear_is_written_by_itself(centre: str, off:
     lines = [f"X{n / 8:.3f} Z{n / 8:.3f}\nG1 X9. Y1. Z4.\nG2 X11. Y3. {centre}\nG1 X9. Y1. Z{n / 5}" for n in range(9)]
     program, moves = followed("\n".join(["G90 G21 G94 G17", "G1 X0 Y0 Z0 B0 C0 F1000", *lines, "M2\n"]).encode())
     pieces = moved(moves, seed, 0.01)
-    assert_same(program, moves, replace(pieces, centre=pieces.centre + off * ~pieces.kept[:, None]))
+    assert_same(program, moves, replace(pieces, centre=pieces.centre + off * ~pieces.unchanged[:, None]))
 
 
 def test_arcs_written_by_themselves_in_another_order_than_they_stand_in() -> None:

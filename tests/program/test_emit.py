@@ -23,17 +23,17 @@ def traced(text: str) -> tuple:
     return program, trace(program, GIVEN, AXES, frozenset()).moves
 
 
-def whole(moves: Moves, shift=(0.0, 0.0, 0.0), kept: np.ndarray | None = None) -> Pieces:
+def whole(moves: Moves, shift=(0.0, 0.0, 0.0), unchanged: np.ndarray | None = None) -> Pieces:
     """One piece per motion, all ends and centres shifted alike."""
     arc = moves.kind == MotionKind.ARC
     n = len(moves)
-    keep = np.zeros(n, dtype=bool) if kept is None else kept
+    keep = np.zeros(n, dtype=bool) if unchanged is None else unchanged
     return Pieces(np.arange(n), np.ones(n), moves.end + np.array(shift), arc, moves.centre + np.array(shift), keep)
 
 
-def rewritten(text: str, shift=(0.0, 0.0, 0.0), kept: np.ndarray | None = None) -> str:
+def rewritten(text: str, shift=(0.0, 0.0, 0.0), unchanged: np.ndarray | None = None) -> str:
     program, moves = traced(text)
-    emission = emit(program, moves, whole(moves, shift, kept), STEP)
+    emission = emit(program, moves, whole(moves, shift, unchanged), STEP)
     assert not emission.conflicts
     return apply(program.source, emission.edits).decode("latin-1")
 
@@ -107,7 +107,7 @@ def split(moves: Moves, row: int, fraction: float) -> Pieces:
         np.insert(moves.end, row, middle, axis=0),
         np.insert(arc, row, False),
         np.insert(whole_pieces.centre, row, np.nan, axis=0),
-        np.insert(whole_pieces.kept, row, False),
+        np.insert(whole_pieces.unchanged, row, False),
     )
 
 
@@ -259,7 +259,7 @@ def test_a_motion_that_is_kept_must_not_rely_on_a_code_that_another_one_takes_aw
     """The first arc becomes lines; the block behind it is not written, and so cannot state its code."""
     program, moves = traced(f"G0 X0 Y0 Z0\n{text}\nM2\n")
     pieces = split(moves, 1, 0.5)
-    pieces.kept[pieces.move > 1] = True
+    pieces.unchanged[pieces.move > 1] = True
     emission = emit(program, moves, pieces, STEP)
     assert emission.conflicts == dict.fromkeys(lost, MODE_LOST)
 

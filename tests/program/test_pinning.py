@@ -24,13 +24,13 @@ def moves_of(text: str, dialect: str = "linuxcnc") -> Moves:
 
 
 def pinned(text: str, refused: int, dialect: str = "linuxcnc") -> list[int]:
-    """The motions (from 0, the one of the head) that are kept because motion `refused` is."""
+    """The motions (from 0, the one of the head) that stay unchanged because motion `refused` is."""
     moves = moves_of(text, dialect)
-    kept = np.zeros(len(moves), dtype=bool)
-    kept[refused] = True
-    closure = closure_of_refusals(moves, kept)
-    found, added = closure.kept, closure.added
-    assert sorted(np.flatnonzero(found & ~kept).tolist()) == sorted(added)
+    unchanged = np.zeros(len(moves), dtype=bool)
+    unchanged[refused] = True
+    closure = closure_of_refusals(moves, unchanged)
+    found, added = closure.unchanged, closure.added
+    assert sorted(np.flatnonzero(found & ~unchanged).tolist()) == sorted(added)
     arcs = [row for row in np.flatnonzero(found).tolist() if row == refused or moves.kind[row] == MotionKind.ARC]
     assert all(cause == next(row for row in arcs if row > each) for each, cause in added.items())
     return sorted(added)
@@ -84,7 +84,7 @@ def test_arcs_of_klartext(text: str, expected: list[int]) -> None:
     moves = trace(
         read(body.encode(), "part.h", "heidenhain"), Setup(assume_zero=True), ("X", "Y", "Z"), frozenset()
     ).moves
-    found = closure_of_refusals(moves, np.array([False, False, True])).kept
+    found = closure_of_refusals(moves, np.array([False, False, True])).unchanged
     assert np.flatnonzero(found[:2]).tolist() == expected
 
 
@@ -94,19 +94,20 @@ def test_holes_are_drilled_where_their_blocks_say() -> None:
 
 def test_a_bound_increment_begins_where_it_began() -> None:
     moves = moves_of("G1 X1 Y1\nY2\nG91 X5")
-    kept = np.array([False, False, False, True])
-    added = closure_of_refusals(moves, kept, kept).added
+    unchanged = np.array([False, False, False, True])
+    added = closure_of_refusals(moves, unchanged, unchanged).added
     assert added == {2: 3, 1: 3}
 
 
 def test_several_refusals_need_what_each_of_them_needs() -> None:
     moves = moves_of("G1 X5 Y5\nX1 Y1\nG2 X2 Y0 I1 J0\nG1 X9\nX5 Y3\nG2 X6 Y2 I1\nG1 X9\nX5\nY1\nG2 X6 Y2 I1\nG1 X0")
     arcs = np.flatnonzero(moves.kind == MotionKind.ARC).tolist()
-    alone = [closure_of_refusals(moves, np.isin(np.arange(len(moves)), arc)).kept for arc in arcs]
+    alone = [closure_of_refusals(moves, np.isin(np.arange(len(moves)), arc)).unchanged for arc in arcs]
     assert (
-        closure_of_refusals(moves, np.isin(np.arange(len(moves)), arcs)).kept.tolist() == np.any(alone, axis=0).tolist()
+        closure_of_refusals(moves, np.isin(np.arange(len(moves)), arcs)).unchanged.tolist()
+        == np.any(alone, axis=0).tolist()
     )
-    assert [kept.sum() for kept in alone] == [2, 2, 3]
+    assert [unchanged.sum() for unchanged in alone] == [2, 2, 3]
 
 
 def test_where_tool_centre_point_control_goes_on_all_axes_stand_elsewhere() -> None:
@@ -135,8 +136,8 @@ def test_refused_arcs_close_whatever_is_before_them(lines: list[str], refused: i
         moves = moves_of("\n".join(lines))
     except Exception:  # an arc that cannot reach its end
         return
-    kept = (moves.rule != Rule.CORRECT) | np.array([refused >> row & 1 for row in range(len(moves))], dtype=bool)
-    found = closure_of_refusals(moves, kept).kept
+    unchanged = (moves.rule != Rule.CORRECT) | np.array([refused >> row & 1 for row in range(len(moves))], dtype=bool)
+    found = closure_of_refusals(moves, unchanged).unchanged
     off = np.zeros(3, dtype=bool)
     for row in range(len(moves)):
         own = moves.programmed[row].any() and not moves.incremental[row] and moves.kind[row] == MotionKind.ARC

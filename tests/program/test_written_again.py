@@ -127,16 +127,16 @@ def corrected(rng: np.random.Generator, moves: Moves, size: float, *, arc_pieces
     n = len(moves)
     shift = size * np.cumsum(rng.normal(size=moves.end.shape), axis=0) / 10 * np.where(moves.rotary, 0.01, 1.0)
     shift[:, moves.rotary] *= rng.integers(0, 2)
-    is_arc, kept = moves.kind == MotionKind.ARC, (moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)
+    is_arc, unchanged = moves.kind == MotionKind.ARC, (moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)
     way = (moves.end - moves.start)[:, XYZ]
     way = way - moves.normal * np.sum(way * moves.normal, axis=1)[:, None]
     round_ = is_arc & (np.abs(np.nan_to_num(way)).max(axis=1) < 0.05)
     is_arc &= ~round_ | (np.abs(way).max(axis=1) < 1e-6) | (size == 0)  # a micrometre of an arc becomes a line
-    for row in np.flatnonzero(round_ | kept).tolist():
+    for row in np.flatnonzero(round_ | unchanged).tolist():
         shift[row] = shift[row - 1]
     straight = np.isin(moves.kind, (MotionKind.RAPID, MotionKind.FEED)) | (is_arc & ~round_ & arc_pieces)
     straight &= np.abs(moves.end - moves.start)[:, XYZ].max(axis=1) > 0.1
-    counts = np.where((rng.random(n) < 0.2) & straight & ~kept & (size > 0), 2, 1)
+    counts = np.where((rng.random(n) < 0.2) & straight & ~unchanged & (size > 0), 2, 1)
     move = np.repeat(np.arange(n), counts)
     last = np.append(np.diff(move) != 0, True)
     end = (moves.end + shift)[move]
@@ -160,7 +160,7 @@ def corrected(rng: np.random.Generator, moves: Moves, size: float, *, arc_pieces
             centre[piece] -= way * off / (way @ way)
     approach = None if moves.approach is None else moves.approach[move] + shift[move]
     fraction = np.where(last, 1.0, 0.5)
-    return Pieces(move, fraction, end, is_arc[move], centre, kept[move], approach=approach)
+    return Pieces(move, fraction, end, is_arc[move], centre, unchanged[move], approach=approach)
 
 
 @pytest.mark.parametrize("control", list(FRAMES))
@@ -206,7 +206,7 @@ def assert_understood(moves: Moves, pieces: Pieces, emission: Emission, again: M
     assert np.abs(off).max(initial=0.0) < ROUND
     swept = moves.sweep[row] / np.bincount(row)[row]
     assert np.abs(again.sweep - swept)[arc].max(initial=0.0) < 0.5
-    free = ~(pieces.kept | arc)[:, None] & ~moves.wordless[row]
+    free = ~(pieces.unchanged | arc)[:, None] & ~moves.wordless[row]
     assert (np.abs(emission.end - pieces.end) < coarser * HALF)[free].all()
     assert np.abs(emission.centre - pieces.centre)[arc].max(initial=0.0) < 2.1 * coarser * STEP[0]
     if moves.approach is not None and pieces.approach is not None and again.approach is not None:

@@ -172,7 +172,7 @@ class Motions:
         machine = self.following.machine
         parts, found = parts_of(self.following, self.source, dialect_in(self.following, self.source))
         table = self.written(table_of(part.program, part.moves, machine) for part in found)
-        parts.blocks_behind()
+        parts.check_behind()
         return table, parts.follower.messages
 
     def whole(self) -> tuple[TableTexts, Sequence[Message]]:

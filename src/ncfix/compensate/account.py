@@ -57,19 +57,19 @@ def at_measured_places(moves: Moves) -> Mask:
     return np.zeros(len(moves), dtype=bool) if moves.measured is None else np.any(moves.measured, axis=1)
 
 
-def without_figure(moves: Moves, kept: Mask, left: Mask | None, own: Mask | None = None) -> Counter[str]:
+def without_figure(moves: Moves, unchanged: Mask, left: Mask | None, own: Mask | None = None) -> Counter[str]:
     """Motions without a figure before and after a correction, by reason, of those that are `own` (n,) if given.
 
-    kept  (n,) left as they were
+    unchanged  (n,) left as they were
     left  (n, n_axes) axes that were left where they stand, along which figures say nothing; None: none
     """
     fed = at_feed(moves) if own is None else at_feed(moves) & own
     beside = np.zeros(len(moves), dtype=bool) if left is None else left[:, ~moves.rotary].any(axis=1)
     passed, measured = moves.rule == Rule.PASS, at_measured_places(moves)
     found = Counter(rule_of(moves, row).reason for row in np.flatnonzero(fed & passed).tolist())
-    found[REFUSED] += int(np.count_nonzero(fed & kept & ~passed))
-    found[MEASURED] += int(np.count_nonzero(fed & ~kept & ~passed & measured))
-    found[LEFT] += int(np.count_nonzero(fed & ~kept & ~passed & ~measured & beside))
+    found[REFUSED] += int(np.count_nonzero(fed & unchanged & ~passed))
+    found[MEASURED] += int(np.count_nonzero(fed & ~unchanged & ~passed & measured))
+    found[LEFT] += int(np.count_nonzero(fed & ~unchanged & ~passed & ~measured & beside))
     return +found
 
 
@@ -257,15 +257,15 @@ class Account:
     rules: Mapping[int, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, moves: Moves, kept: NDArray[np.bool_], reasons: Mapping[int, Reason]) -> Account:
+    def of(cls, moves: Moves, unchanged: NDArray[np.bool_], reasons: Mapping[int, Reason]) -> Account:
         """Account for the motions. A block with several motions is refused if any of them is, else passed if any is."""
         motion = moves.kind != MotionKind.DWELL
         by_rule = np.flatnonzero(motion & (moves.rule == Rule.PASS))
-        refused = {block: reasons[block] for block in moves.block[motion & kept].tolist() if block in reasons}
+        refused = {block: reasons[block] for block in moves.block[motion & unchanged].tolist() if block in reasons}
         passed = {int(moves.block[row]): moves.reasons[moves.reason[row]] for row in by_rule}
         passed = {block: reason for block, reason in passed.items() if block not in refused}
         rules = {int(moves.block[row]): rule_of(moves, row).reason for row in by_rule.tolist()}
-        compensated = frozenset(moves.block[motion & ~kept].tolist())
+        compensated = frozenset(moves.block[motion & ~unchanged].tolist())
         others = refused.keys() | passed.keys()
         return cls(
             compensated - others if others else compensated, passed, refused, {each: rules[each] for each in passed}

@@ -205,13 +205,6 @@ def stamped(positions: Sequence[SwitchSetting]) -> str:
     return f"block delete on or off{'' if len(positions) == 2 else ' (all switches)'}"
 
 
-def not_in_all(why: Exception, program: Program) -> RefusedError:
-    """NCF453: what each position wants, put together, is not what the control makes of it in all of them."""
-    text = f"no text was found that is right in all positions of block delete: {why}"
-    hint = "--block-skip on or off corrects it for one position, if the switch always stands so"
-    return RefusedError.of(NOT_IN_ALL, text, Place(program.path), hint)
-
-
 # -- one text for all positions ---------------------------------------------------------------------------------------
 
 
@@ -266,7 +259,7 @@ def plan_and_write_all(
         if not differing:
             return _merged(found, edits)
         if differing <= refused.keys():
-            raise AssertionError(f"blocks {sorted(differing)} are kept and yet differ")
+            raise AssertionError(f"blocks {sorted(differing)} are unchanged and yet differ")
         for block in differing - spelled.keys():
             spelled[block] = _named(found, block)
             whole.add(block)
@@ -405,7 +398,9 @@ class WholeProof:
         except SelfCheckError as why:
             if len(self.follows) == 1:
                 raise
-            raise not_in_all(why, self.program) from why
+            wrong = f"no text was found that is right in all positions of block delete: {why}"
+            hint = "--block-skip on or off corrects it for one position, if the switch always stands so"
+            raise RefusedError.of(NOT_IN_ALL, wrong, Place(self.program.path), hint) from why
 
     def _misreadings(self, joint: JointPlan, text: bytes) -> Readings | None:
         pairs = list(zip(joint.plans, (self._again(text, each) for each in self.follows), strict=True))
@@ -417,7 +412,7 @@ class WholeProof:
         if not self.attempts:
             (solution, again), piece = pairs[at], int(np.argmax(wrong[at]))
             pieces, move = solution.plan.pieces, int(solution.plan.pieces.move[piece])
-            meant = solution.moves.end[move] if pieces.kept[piece] else solution.emission.end[piece]
+            meant = solution.moves.end[move] if pieces.unchanged[piece] else solution.emission.end[piece]
             line = self.program.line(int(solution.moves.block[move]))
             raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {meant}")
         return [SecondReading.of(again, solution.plan.pieces) for solution, again in pairs]

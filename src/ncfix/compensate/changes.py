@@ -120,7 +120,7 @@ class Changes:
             return
         plan, moves = self.plan, self.plan.moves
         steps = np.where(moves.rotary, self.machine.least_increment[1], self.machine.least_increment[0])
-        changed = (np.abs(plan.shift) > steps / 2) & ~plan.kept[:, None]
+        changed = (np.abs(plan.shift) > steps / 2) & ~plan.unchanged[:, None]
         rows = np.flatnonzero(changed.any(axis=1))
         pieces = np.bincount(plan.plan.pieces.move, minlength=len(moves))
         lines, shift = self.program.lines(moves.block), plan.shift

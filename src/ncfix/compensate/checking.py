@@ -127,8 +127,8 @@ class Survey:
                 self.refused.append(Message("NCF432", moves.reasons[moves.reason[row]], program.place(block)))
         if self.machine is not None:
             lost_centre = (moves.kind == MotionKind.ARC) & ~np.isfinite(moves.centre).all(axis=1)
-            kept = (moves.rule == Rule.PASS) | ~np.isfinite(moves.end).all(axis=1) | lost_centre
-            for finding in findings(self.machine, moves, untouched(moves, kept).pieces):
+            unchanged = (moves.rule == Rule.PASS) | ~np.isfinite(moves.end).all(axis=1) | lost_centre
+            for finding in findings(self.machine, moves, untouched(moves, unchanged).pieces):
                 self.travel.add(finding, program, moves, position=position)
 
     def checked(self, blocks: int, remarks: Iterable[Message]) -> Checked:
@@ -155,9 +155,10 @@ def _checked(
 
 def _surveyed(parts: Parts, survey: Survey, report: FixReport | None = None) -> Checked:
     """What was found in parts, also of what a correction says, else of what there is to say of following them."""
-    blocks, follower = parts.blocks + parts.blocks_behind(), parts.follower
+    parts.check_behind()
+    follower = parts.follower
     said = (*follower.messages[len(follower.assumed) :], *survey.refused)
-    return survey.checked(blocks, said if report is None else _remarks_of(report))
+    return survey.checked(parts.blocks, said if report is None else _remarks_of(report))
 
 
 def _remarks_of(report: FixReport) -> tuple[Message, ...]:

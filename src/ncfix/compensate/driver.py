@@ -168,7 +168,7 @@ class Corrector:
         while readings is not None:
             joint = plan_and_write_all(part.program, moves, self.machine, task.options, readings, before, accepted)
             solution = joint.plans[0]
-            if before is not None and (solution.reaches_back or solution.kept[0] != before.kept):
+            if before is not None and (solution.reaches_back or solution.unchanged[0] != before.unchanged):
                 raise NotInPartsError("a refusal reaches back into an earlier part")
             text = self._text(part.program, joint.splices, before is None)
             if not part.last:
@@ -212,7 +212,6 @@ class Corrector:
             emission.start,
             state=State() if continued.head is None else State(direction=continued.direction),
             rows=shown if own is None else own & shown,
-            tilts=False,
             known=solution.plan.known,
         )
 
@@ -366,14 +365,14 @@ class PartCorrector(Corrector):
         before = share.before(number)
         if before is not None and skipped:
             self.parts_proof.follower.stand(before.position)
-        if plan is not None and before is not None and not before.kept:
+        if plan is not None and before is not None and not before.unchanged:
             plain = written(self.language, plan, before.position, increments(self.machine))
             if plain is not None:
                 return self._plainly(plan, plain, number, share)
         accepted, moves = accepted or self._accepted_plan(continued), continued.joined.moves
         if before is not None:
             before, (first, *_) = replace(before, direction=continued.direction), before.rounds
-            if first.kept.any() or (moves.wordless[0] & (first.shift != 0)).any():
+            if first.unchanged.any() or (moves.wordless[0] & (first.shift != 0)).any():
                 accepted = None  # the motion before was left as it was, or an axis goes on standing off its place
         return self.correct(continued, [moves], accepted, before, partial(share.leave, number))
 
@@ -467,7 +466,10 @@ class Stream:
                 others.put(number, done)
                 self._take(others.ready())
             self._take(others.rest(own.parts.count))
-        self._pass_on(own.parts.rest, own.parts.read)
+        for text in own.parts.behind():  # goes out as it came in
+            if stamp.SIGN.search(text.decode("latin-1")) and not task.options.force:
+                raise NotInPartsError("there is a stamp after the end of the program")
+            self.write(text)
         self.tally.blocks += own.parts.blocks
         report = own.report(self.tally, self._judged())
         return Streamed(report, Stamp(own.at, own.stamped, own.stamp() if self.tally.changed else b""))
@@ -487,14 +489,3 @@ class Stream:
             force = self.task.options.force
             self.suspicion = suspected(self.tally.numbers, self.tally.step, self.task.path, force)
         return self.suspicion
-
-    def _pass_on(self, text: bytes, read: Read) -> None:
-        """What comes after the end of the program goes out as it came in."""
-        while text:
-            if stamp.SIGN.search(text.decode("latin-1")) and not self.task.options.force:
-                raise NotInPartsError("there is a stamp after the end of the program")
-            ended = text.endswith(b"\n")
-            self.tally.blocks += text.count(b"\n")
-            self.write(text)
-            text = read(self.task.size)
-            self.tally.blocks += not text and not ended

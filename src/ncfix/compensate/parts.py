@@ -111,17 +111,20 @@ class Parts:
             if last:
                 return
 
-    def blocks_behind(self) -> int:
-        """Blocks behind the end of the program; raises `NotInPartsError` if there is more there than the tape mark."""
-        count, text = 0, self.rest
+    def behind(self) -> Iterator[bytes]:
+        """The text behind the end of the program, piece by piece; its lines are counted, too."""
+        text = self.rest
         while text:
-            if text.strip(b"% \t\r\n"):
-                raise NotInPartsError("text comes after the end of the program")
             ended = text.endswith(b"\n")
-            count += text.count(b"\n")
+            self.blocks += text.count(b"\n")
+            yield text
             text = self.read(self.size)
-            count += not text and not ended
-        return count
+            self.blocks += not text and not ended
+
+    def check_behind(self) -> None:
+        """Raise `NotInPartsError` if there is more behind the end of the program than the tape mark."""
+        if any(text.strip(b"% \t\r\n") for text in self.behind()):
+            raise NotInPartsError("text comes after the end of the program")
 
     def _tell(self, checkpoint: PartCheckpoint | None) -> None:
         """Tell others of an own part, once: before more text is read, which the first process may wait to hand out."""

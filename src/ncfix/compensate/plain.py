@@ -22,7 +22,7 @@ from ncfix import core
 from ncfix.compensate import FixOptions
 from ncfix.compensate.parts import ContinuedPart, Part
 from ncfix.compensate.plan.arcs import Closure, fitted, full_circles
-from ncfix.compensate.plan.arrays import Array, Index, Mask, distinct, lengths, offsets, owners, picked, places, some
+from ncfix.compensate.plan.arrays import Array, Index, Mask, distinct, lengths, offsets, owners, picked, ranges, some
 from ncfix.compensate.plan.deviation import CORNER, SURE, looked_at, tcp_bounds
 from ncfix.compensate.plan.ends import commands_of_positions
 from ncfix.compensate.plan.findings import Finding
@@ -163,14 +163,13 @@ def by_the_long_way(
     near = distinct(np.concatenate([odd - 1, odd, odd + 1]))
     few = taken(moves, near)
     accepted = accepted_plan(few, machine, dialect, options)
-    if accepted.reasons or accepted.plan.findings or (accepted.kept != (few.kind == MotionKind.DWELL)).any():
+    if accepted.reasons or accepted.plan.findings or (accepted.unchanged != (few.kind == MotionKind.DWELL)).any():
         return None
     pieces = accepted.plan.pieces
     own = ~(plain[near] & plain[near - 1])
-    chosen = own[pieces.move]
-    columns = {name: getattr(pieces, name)[chosen] for name in ("fraction", "end", "arc", "centre", "kept")}
-    move = near[pieces.move[chosen]]
-    return MorePieces(near[own], np.bincount(pieces.move, minlength=len(near))[own], Pieces(move=move, **columns))
+    counts = np.bincount(pieces.move, minlength=len(near))[own]
+    chosen = pieces.rows(np.flatnonzero(own[pieces.move]))
+    return MorePieces(near[own], counts, replace(chosen, move=near[chosen.move]))
 
 
 SplitChoice = tuple[Index, Split | None, tuple[Finding, ...]]
@@ -472,17 +471,13 @@ def pieces_of(real: Segments, over: Index, parts: Split | None, others: MorePiec
     first, move, m = offsets(counts), owners(counts), int(counts.sum())
     fraction, end = np.ones(m), picked(real.end, move)
     if parts is not None:
-        at = _pieces_at(first, over, parts.counts)
+        at = ranges(first[over], parts.counts)
         fraction[at], end[at] = parts.fraction, parts.end
     none, nowhere = np.broadcast_to(False, m), np.broadcast_to(np.nan, (m, 3))
     if others is None:
         return Pieces(move, fraction, end, none, nowhere, none), first
-    at, own = _pieces_at(first, others.rows, others.counts), others.pieces
-    arc, centre, kept = none.copy(), nowhere.copy(), none.copy()
-    fraction[at], end[at], arc[at], centre[at], kept[at] = own.fraction, own.end, own.arc, own.centre, own.kept
-    return Pieces(move, fraction, end, arc, centre, kept), first
-
-
-def _pieces_at(first: Index, rows: Index, counts: Index) -> Index:
-    """The pieces of motions `rows` (k,), of which there are so many."""
-    return np.repeat(first[:-1][rows], counts) + places(counts)
+    at, own = ranges(first[others.rows], others.counts), others.pieces
+    arc, centre, unchanged = none.copy(), nowhere.copy(), none.copy()
+    fraction[at], end[at] = own.fraction, own.end
+    arc[at], centre[at], unchanged[at] = own.arc, own.centre, own.unchanged
+    return Pieces(move, fraction, end, arc, centre, unchanged), first

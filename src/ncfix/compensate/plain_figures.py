@@ -22,7 +22,7 @@ from ncfix.compensate.plan.arrays import (
     lengths,
     owners,
     picked,
-    places,
+    ranges,
     squares,
 )
 from ncfix.compensate.plan.deviation import BATCH, STRAIGHT, errors_at, samples
@@ -92,7 +92,8 @@ def _at_ends(plan: PlainPlan, text: Emission, written: Segments, masks: tuple[Ma
     places = np.array([0, -1, -1], dtype=np.int64)
     counts, (shown, apart), bending = np.zeros(len(moves), dtype=np.intp), masks, features(machine)
     if moves.tcp[0]:
-        counts, bending = _looks(plan, shown, _led_bends(plan)), np.full_like(bending, np.inf)
+        counts = _looks(plan, shown, bends_closely(plan.intent, np.arange(len(moves))))
+        bending = np.full_like(bending, np.inf)
     linear, followed = ~machine.rotary, moves.kind == MotionKind.FEED
     motions.at_ends(
         moves.start,
@@ -124,11 +125,6 @@ def _at_ends(plan: PlainPlan, text: Emission, written: Segments, masks: tuple[Ma
     return counts
 
 
-def _led_bends(plan: PlainPlan) -> Array:
-    """About how many times the error may bend along each motion under TCP, (n,)."""
-    return bends_closely(plan.intent, np.arange(len(plan.part.moves)))
-
-
 def _looks(plan: PlainPlan, among: Mask, bends: Array) -> Index:
     """At how many places inside of motions `among` (n,) to look, over which the error may bend so many times, (n,)."""
     bent = among & (plan.part.moves.kind == MotionKind.FEED) & (bends >= STRAIGHT)
@@ -140,15 +136,15 @@ def _inside(plan: PlainPlan, written: Segments, rows: Index, counts: Index) -> P
     intent, move, fraction = plan.intent, np.repeat(rows, counts), even(counts)
     chord = (picked(written.end, rows) - picked(written.start, rows))[:, ~intent.machine.rotary]
     weight = np.repeat(lengths(chord) / (counts + 1), counts)
-    return PathSamples(move, fraction, *errors_at(intent, move, fraction, written.at(move, fraction)), weight, 0.0, 0.0)
+    return PathSamples(move, fraction, *errors_at(intent, move, fraction, written.at(move, fraction)), weight)
 
 
 def _along(plan: PlainPlan, text: Emission, rows: Index, check_start: Mask) -> Iterator[PathSamples]:
     """The errors along motions `rows` (k,); `check_start` (n,) as in `PlainPlan`."""
     counts = np.diff(plan.first)[rows]
-    own = np.repeat(plan.first[:-1][rows], counts) + places(counts)
+    own = ranges(plan.first[rows], counts)
     whole, no = plan.pieces, np.broadcast_to(False, len(own))
     pieces = Pieces(rows[owners(counts)], whole.fraction[own], text.end[own], whole.arc[own], text.centre[own], no)
     written = WrittenPieces(plan.intent, pieces, text.start)
     known = Known(plan.before, plan.real.end)
-    return samples(written, np.arange(len(own)), tilts=False, known=known, check_start=check_start)
+    return samples(written, np.arange(len(own)), known, check_start=check_start)

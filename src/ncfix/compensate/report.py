@@ -209,13 +209,13 @@ class Tally:
         lacking = [each.lacking(steps, own) for each in every]
         left = [left_where_they_stand(program, each.moves, lack) for each, lack in zip(every, lacking, strict=True)]
         self.left = joined(self.left, either(left))
-        account = Account.together([Account.of(each.moves, each.kept, each.reasons) for each in every])
+        account = Account.together([Account.of(each.moves, each.unchanged, each.reasons) for each in every])
         unseen = Counter[str]()
         for k, (solution, lack, found) in enumerate(zip(every, lacking, worst_findings(every), strict=True)):
             moves, plan, intent = solution.moves, solution.plan, Intent(machine, solution.moves, State())
             self.rounding = max(self.rounding, rounding_along(intent, plan.pieces, plan.corners, own))
             self.largest = max(self.largest, largest_correction(moves, solution, own))
-            unseen |= without_figure(moves, solution.kept, lack.axes if lack else None, own)
+            unseen |= without_figure(moves, solution.unchanged, lack.axes if lack else None, own)
             for finding in (*found, *in_inverse_time(solution)):
                 self.found.add(finding, program, moves, own, k)
         self.unseen += unseen
@@ -236,7 +236,7 @@ class Tally:
         """
         self.rounding = max(self.rounding, rounding_along(intent, solution.plan.pieces, solution.plan.corners))
         self.moves += len(solution.moves)
-        self.compensated += int(np.count_nonzero(~solution.kept))
+        self.compensated += int(np.count_nonzero(~solution.unchanged))
         self.inserted += solution.emission.added_blocks
         self.largest = max(self.largest, largest)
         self.changed |= len(solution.emission.splices) > 0
@@ -247,7 +247,7 @@ class Tally:
     def _look_at_numbers(self, program: Program, solution: WrittenPlan, own: Mask | bool = True) -> None:
         """Note the numbers in the first lines of a program; `own` (n,) motions of the part."""
         if program.first_line <= LOOKED:
-            among = ~solution.kept & own & (program.lines(solution.moves.block) <= LOOKED)
+            among = ~solution.unchanged & own & (program.lines(solution.moves.block) <= LOOKED)
             self.numbers = numbers_of(solution.moves, solution.shift, among, self.step)
 
     def take(self, other: Tally) -> None:
@@ -333,7 +333,7 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
 
 def largest_correction(moves: Moves, solution: WrittenPlan, own: Mask | None = None) -> float:
     """The largest shift of a linear command, mm; of motions `own` (n,) if given."""
-    done = ~solution.kept if own is None else own & ~solution.kept
+    done = ~solution.unchanged if own is None else own & ~solution.unchanged
     return float(np.nanmax(lengths(solution.shift[:, ~moves.rotary])[done], initial=0.0)) if done.any() else 0.0
 
 

@@ -2,8 +2,8 @@
 
 A block that is executed from several states may need another correction each time; a refused arc must begin where it
 began. Both show only when the text is written, and both change what the other motions have to do. So plan and emitter
-take turns until nothing more has to be kept; motions are only ever added to those that are, so this ends: a fixed
-point.
+take turns until no further motion has to stay unchanged. Motions are only ever added to those that do, so this ends: a
+fixed point.
 
 A part of a program goes through the same rounds as the part before it, with what that one left in each
 (`PrecedingMotion`): what has to be left shows by and by, and motions behind it are planned before that, too. So a part
@@ -45,25 +45,29 @@ from ncfix.writer.pieces import BEYOND_TRAVEL, PINNED, SecondReading, closure_of
 class Round:
     """The last motion of a part in one round: the plans that are made until nothing speaks against one, and its text.
 
-    kept      (k,) in each plan, whether that motion is left as it was
-    shift     (k, n_axes) how far off the axes stand at its start then, mm and rad
-    position  (n_axes,) the command at its end, as written
+    unchanged  (k,) in each plan, whether that motion is left as it was
+    shift      (k, n_axes) how far off the axes stand at its start then, mm and rad
+    position   (n_axes,) the command at its end, as written
     """
 
-    kept: Mask
+    unchanged: Mask
     shift: Array
     position: Array
 
     def shortened(self) -> Round:
         """Without plans that only repeat the one before."""
-        changes = np.append(True, (self.kept[1:] != self.kept[:-1]) | (self.shift[1:] != self.shift[:-1]).any(axis=1))
-        count = int(np.flatnonzero(changes)[-1]) + 1
-        return Round(self.kept[:count], self.shift[:count], self.position)
+        changes = (self.unchanged[1:] != self.unchanged[:-1]) | (self.shift[1:] != self.shift[:-1]).any(axis=1)
+        count = int(np.flatnonzero(np.append(True, changes))[-1]) + 1
+        return Round(self.unchanged[:count], self.shift[:count], self.position)
 
     def goes_on(self, other: Round) -> bool:
         """Whether another round, behind this one, only repeats its end."""
-        same = len(other.kept) == 1 and other.kept[0] == self.kept[-1] and (other.shift[0] == self.shift[-1]).all()
-        return bool(same and np.array_equal(other.position, self.position, equal_nan=True))
+        return (
+            len(other.unchanged) == 1
+            and np.array_equal(other.unchanged, self.unchanged[-1:])
+            and np.array_equal(other.shift, self.shift[-1:])
+            and np.array_equal(other.position, self.position, equal_nan=True)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,9 +100,9 @@ class PrecedingMotion:
         return self.rounds[min(number, len(self.rounds) - 1)]
 
     @property
-    def kept(self) -> bool:
+    def unchanged(self) -> bool:
         """Whether it was left as it was in the end."""
-        return bool(self.rounds[-1].kept[-1])
+        return bool(self.rounds[-1].unchanged[-1])
 
     @property
     def position(self) -> Array:
@@ -120,17 +124,17 @@ class SelfCheckError(Exception):
 class WrittenPlan:
     """A plan that can be written, and its text.
 
-    moves     the motions as programmed
-    kept      (n,) those left as they were
-    reasons   block -> why it was refused
+    moves      the motions as programmed
+    unchanged  (n,) those left as they were
+    reasons    block -> why it was refused
     reaches_back  a refusal needs something before the first motion as it was
-    rounds    what the last motion was in each round that plan and emitter took
+    rounds     what the last motion was in each round that plan and emitter took
     """
 
     moves: Moves
     plan: Plan
     emission: Emission
-    kept: Mask
+    unchanged: Mask
     reasons: dict[int, Reason]
     reaches_back: bool
     rounds: tuple[Round, ...] = ()
@@ -141,7 +145,7 @@ class WrittenPlan:
         Not those to a place that the machine measures itself: what it finds has its error in it.
         """
         wanted = self.moves.cutting | (self.moves.kind == MotionKind.RAPID) if rapids else self.moves.cutting
-        return wanted & ~self.kept & ~at_measured_places(self.moves)
+        return wanted & ~self.unchanged & ~at_measured_places(self.moves)
 
     @property
     def shift(self) -> Array:
@@ -161,7 +165,7 @@ class WrittenPlan:
         off = np.abs(known.end - moves.end - self.shift)
         if known.beside is not None:
             off = np.maximum(off, known.beside)
-        lacking = wordless & (off >= steps / 2) & ~self.kept[:, None]
+        lacking = wordless & (off >= steps / 2) & ~self.unchanged[:, None]
         if own is not None:
             lacking &= own[:, None]
         return Lacking(lacking, off)
@@ -171,22 +175,22 @@ class WrittenPlan:
 class AcceptedPlan:
     """A plan that nothing speaks against but, perhaps, its text.
 
-    kept      (n,) motions left as they were
-    reasons   block -> why it was refused
+    unchanged  (n,) motions left as they were
+    reasons    block -> why it was refused
     reaches_back  a refusal needs something before the first motion as it was
-    history     in each plan on the way here, whether the last motion was left as it was, and how far off its start was
+    history    in each plan on the way here, whether the last motion was left as it was, and how far off its start was
     """
 
     plan: Plan
-    kept: Mask
+    unchanged: Mask
     reasons: dict[int, Reason]
     reaches_back: bool
     history: tuple[tuple[bool, Array], ...]
 
     def round(self, position: Array) -> Round:
         """What the last motion was, the end of which was written as a command `position` (n_axes,)."""
-        kept, shift = zip(*self.history, strict=True)
-        return Round(np.array(kept), np.array(shift), position.copy())
+        unchanged, shift = zip(*self.history, strict=True)
+        return Round(np.array(unchanged), np.array(shift), position.copy())
 
 
 def plan_and_write(
@@ -219,10 +223,16 @@ def plan_and_write(
             rounds.append(accepted.round(emission.end[-1]))
         if not emission.conflicts and (before is None or len(rounds) >= len(before.rounds)):
             return WrittenPlan(
-                moves, accepted.plan, emission, accepted.kept, accepted.reasons, accepted.reaches_back, tuple(rounds)
+                moves,
+                accepted.plan,
+                emission,
+                accepted.unchanged,
+                accepted.reasons,
+                accepted.reaches_back,
+                tuple(rounds),
             )
         if emission.conflicts and emission.conflicts.keys() <= accepted.reasons.keys():
-            raise AssertionError(f"blocks {sorted(emission.conflicts)} are kept and yet in conflict")
+            raise AssertionError(f"blocks {sorted(emission.conflicts)} are unchanged and yet in conflict")
         for block, why in emission.conflicts.items():
             _explain(accepted.reasons, [block], CODE_OF_TEXT, why)
         accepted = accepted_plan(moves, machine, program.dialect, options, before, accepted, len(rounds))
@@ -238,12 +248,14 @@ def accepted_plan(
     number: int = 0,
     refused: Mapping[int, Reason] = NONE,
 ) -> AcceptedPlan:
-    """Plan until nothing speaks against it; `earlier` says what is kept already, and why, in round `number`.
+    """Plan until nothing speaks against it; `earlier` says what stays unchanged already, and why, in round `number`.
 
     refused  blocks that are refused in any case, where there is no `earlier` plan
     """
-    kept = (
-        np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)) if earlier is None else earlier.kept
+    unchanged = (
+        np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL))
+        if earlier is None
+        else earlier.unchanged
     )
     reasons = {**refused, **_by_rule(moves)} if earlier is None else earlier.reasons
     head = None if before is None else before.in_round(number)
@@ -252,17 +264,17 @@ def accepted_plan(
     while True:
         shift = None
         if head is not None:
-            at = min(len(history), len(head.kept) - 1)
-            kept[0] |= head.kept[at]
+            at = min(len(history), len(head.unchanged) - 1)
+            unchanged[0] |= head.unchanged[at]
             shift = head.shift[at]
-        kept, reaches_back = _with_what_they_need(moves, kept, bound, reasons)
+        unchanged, reaches_back = _with_what_they_need(moves, unchanged, bound, reasons)
         planned = plan(
             machine,
             moves,
             get_strategy(options.strategy),
             options.tolerance_mm,
             Closure(dialect.closure_mm, dialect.closure_relative),
-            kept,
+            unchanged,
             rounding_mm=rounding(machine),
             split_rapids=options.split_rapids,
             state=state,
@@ -271,26 +283,26 @@ def accepted_plan(
         )
         if len(moves):  # of the last one
             off = planned.start[-1] - moves.start[-1]
-            history.append((bool(planned.pieces.kept[-1]), np.where(np.isfinite(off), off, 0.0)))
+            history.append((bool(planned.pieces.unchanged[-1]), np.where(np.isfinite(off), off, 0.0)))
         planned = replace(planned, pieces=on_digits(Intent(machine, moves, state), planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start, state)
-        stays = planned.pieces.kept[np.searchsorted(planned.pieces.move, np.arange(len(moves)))] & ~kept
+        stays = planned.pieces.unchanged[np.searchsorted(planned.pieces.move, np.arange(len(moves)))] & ~unchanged
         for finding in against:
             stays[finding.moves] = True
         beyond = increments_beyond_travel(machine, moves, planned.pieces, planned.start, state)
-        waiting = head is not None and len(history) < len(head.kept)
+        waiting = head is not None and len(history) < len(head.unchanged)
         if not (stays.any() or (~bound[beyond]).any() or waiting):
-            return AcceptedPlan(planned, kept, reasons, reaches_back, tuple(history))
+            return AcceptedPlan(planned, unchanged, reasons, reaches_back, tuple(history))
         for finding in (*against, *planned.findings):
             for k, row in enumerate(finding.moves.tolist()):
                 if stays[row]:
                     _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
         _explain(reasons, moves.block[stays].tolist(), CODE_OF_RULE, "no correction was found for it")
-        kept |= stays
+        unchanged |= stays
         bound[beyond] = True
 
 
-def _with_what_they_need(moves: Moves, kept: Mask, bound: Mask, reasons: dict[int, Reason]) -> tuple[Mask, bool]:
+def _with_what_they_need(moves: Moves, unchanged: Mask, bound: Mask, reasons: dict[int, Reason]) -> tuple[Mask, bool]:
     """All motions (n,) that have to be left as they were: those of refused blocks, and those that such ones begin from.
 
     bound  (n,) other motions that must begin where they began
@@ -298,14 +310,14 @@ def _with_what_they_need(moves: Moves, kept: Mask, bound: Mask, reasons: dict[in
     Also whether something before the first motion would have to be left, too. What is added goes into `reasons`.
     """
     while True:
-        kept = kept | (np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS))
-        closure, count = closure_of_refusals(moves, kept, bound), len(reasons)
+        unchanged = unchanged | (np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS))
+        closure, count = closure_of_refusals(moves, unchanged, bound), len(reasons)
         for row, cause in closure.added.items():
             why = BEYOND_TRAVEL if bound[cause] else PINNED
             reasons.setdefault(int(moves.block[row]), Reason(CODE_OF_TEXT, why, int(moves.block[cause])))
-        kept = closure.kept
+        unchanged = closure.unchanged
         if len(reasons) == count:
-            return kept, closure.reaches_back
+            return unchanged, closure.reaches_back
 
 
 def increments(machine: Machine) -> Array:
@@ -332,7 +344,7 @@ def _explain(reasons: dict[int, Reason], blocks: list[int], code: str, text: str
 SAME = 1e-6
 """mm and rad; the emitter's book and a second reading differ by floating-point noise only."""
 STRAY = 1.0
-"""mm and rad; more than earlier corrections can shift a motion that is kept (or `STRAYS` times the largest of them)."""
+"""mm and rad; more than earlier corrections can shift an unchanged motion (or `STRAYS` times the largest of them)."""
 STRAYS = 10.0
 TURN = 1.0
 """rad; a corrected arc turns by what it did but for little, or else by a full turn more or less."""
@@ -353,7 +365,7 @@ def differences(solution: WrittenPlan, again: Moves, own: Mask | None = None) ->
     differs: Mask = differ(again.end, meant) | _strayed(solution, again, rows)
     if not pieces.arc.any():
         return differs
-    arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
+    arcs = np.flatnonzero((pieces.arc & ~pieces.unchanged)[rows])
     if not arcs.size:
         return differs
     off = again.centre[arcs] - emission.centre[rows[arcs]]
@@ -367,20 +379,20 @@ def differences(solution: WrittenPlan, again: Moves, own: Mask | None = None) ->
 
 
 def _strayed(solution: WrittenPlan, again: Moves, rows: Index) -> Mask:
-    """Motions that are kept, and that the new text leads elsewhere: what they rely on was not kept."""
+    """Unchanged motions that the new text leads elsewhere, because what they rely on has changed."""
     pieces, ends = solution.plan.pieces, solution.moves.end
-    if not pieces.kept.any():
+    if not pieces.unchanged.any():
         return np.zeros(len(rows), dtype=bool)
-    kept = pieces.kept[rows]
-    own = np.flatnonzero(kept)
+    strayed = pieces.unchanged[rows]
+    own = np.flatnonzero(strayed)
     off = np.abs(again.end[own] - ends[pieces.move[rows[own]]])
     if not (off > STRAY).any():
-        return np.zeros_like(kept)
+        return np.zeros_like(strayed)
     last = np.flatnonzero(pieces.fraction == 1)
     shifts = np.abs(picked(pieces.end, last) - picked(ends, pieces.move[last]))
     most = max(STRAY, STRAYS * float(np.max(shifts[np.isfinite(shifts)], initial=0.0)))
-    kept[own] = (off > most).any(axis=1)
-    return kept
+    strayed[own] = (off > most).any(axis=1)
+    return strayed
 
 
 def differ(found: Array, meant: Array) -> Mask:

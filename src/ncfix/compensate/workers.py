@@ -243,16 +243,16 @@ class ReadAhead:
 
     source: Read
     pieces: int = 0
-    kept: bytes = b""
+    unread: bytes = b""
     ended: bool = False
 
     def __call__(self, size: int) -> bytes:
         """The next bytes."""
-        while not self.ended and len(self.kept) < (1 + self.pieces) * size:
+        while not self.ended and len(self.unread) < (1 + self.pieces) * size:
             text = self.source(size)
             self.ended = not text
-            self.kept += text
-        text, self.kept = self.kept[:size], self.kept[size:]
+            self.unread += text
+        text, self.unread = self.unread[:size], self.unread[size:]
         return text
 
 

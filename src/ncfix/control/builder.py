@@ -5,7 +5,7 @@ arrays. No object is kept per motion.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -94,7 +94,7 @@ class MotionBuilder:
         self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
         self._arcs: dict[int, Arc] = {}
         self._circles: list[Circles] = []
-        self._approaches: dict[int, Vector] = {}
+        self._approaches: dict[int, list[float]] = {}
         self._calls: dict[CycleCall, int] = {}
         self._called: dict[int, int] = {}
         self._counted: dict[int, int] = {}
@@ -167,7 +167,7 @@ class MotionBuilder:
 
     def approach(self, command: Vector) -> None:
         """The command at the level R of the canned cycle that is added next."""
-        self._approaches[self.count] = command
+        self._approaches[self.count] = [command[column] for column in self.columns]
 
     def called(self, call: CycleCall) -> None:
         """The call of the canned cycle that is added next."""
@@ -244,6 +244,8 @@ class MotionBuilder:
         counted = self._mask_column(self._counted, styles["incremental"])
         angles = self._keep_whole(styles, programmed, counted, start, end, block)
         centre, normal, sweep = self._arc_columns(len(block))
+        fixed = [row for row, arc in self._arcs.items() if arc.fixed]
+        fixed += [row for each in self._circles for row in each.row[each.fixed].tolist()]
         return Moves(
             axes=self.axes,
             rotary=self.rotary,
@@ -261,14 +263,14 @@ class MotionBuilder:
             ),
             reasons=tuple(self._reasons),
             pointing=None,
-            approach=self._approach_column(len(block)),
+            approach=_sparse(self._approaches, len(block), np.nan, np.float64),
             placed=(~named).take(unplaced, axis=0, mode="clip") if unplaced.any() else None,
-            fixed_centre=self._fixed_column(len(block)),
+            fixed_centre=_sparse(dict.fromkeys(fixed, True), len(block), False, np.bool_),
             counted=counted,
             measured=self._mask_column(self._measured, np.zeros(len(block), dtype=np.bool_)),
             angles=angles,
             resting=self._mask_column(self._resting, np.zeros(len(block), dtype=np.bool_)),
-            call=self._call_column(len(block)),
+            call=_sparse(self._called, len(block), -1, np.int32),
             calls=tuple(self._calls),
             **styles,
         )
@@ -334,29 +336,6 @@ class MotionBuilder:
         angles[turning] = extremes(plain, end - offset)
         return angles
 
-    def _approach_column(self, count: int) -> FloatArray | None:
-        if not self._approaches:
-            return None
-        column = np.full((count, len(self.columns)), np.nan)
-        column[list(self._approaches)] = np.array(list(self._approaches.values()))[:, self.columns]
-        return column
-
-    def _call_column(self, count: int) -> NDArray[np.int32] | None:
-        if not self._called:
-            return None
-        column = np.full(count, -1, dtype=np.int32)
-        column[list(self._called)] = list(self._called.values())
-        return column
-
-    def _fixed_column(self, count: int) -> NDArray[np.bool_] | None:
-        rows = [row for row, arc in self._arcs.items() if arc.fixed]
-        rows += [row for each in self._circles for row in each.row[each.fixed].tolist()]
-        if not rows:
-            return None
-        column = np.zeros(count, dtype=np.bool_)
-        column[rows] = True
-        return column
-
     def _mask_column(self, masks: dict[int, int], otherwise: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
         """(n, n_axes) from bit masks of some motions, and what holds for the others (n,); None if there are none."""
         if not masks:
@@ -382,6 +361,16 @@ def _first(block: IntArray, rows: NDArray[np.bool_], known: int | None) -> int |
     """The block of the first of these motions, if none is known from before."""
     found = np.flatnonzero(rows)
     return int(block[found[0]]) if known is None and found.size else known
+
+
+def _sparse(values: Mapping[int, Any], count: int, otherwise: float, kind: type[np.generic]) -> NDArray[Any] | None:
+    """A column (count, ...) of what some rows have, and `otherwise` in the others; None if there are none."""
+    if not values:
+        return None
+    own = np.array(list(values.values()), dtype=kind)
+    column = np.full((count, *own.shape[1:]), otherwise, dtype=kind)
+    column[list(values)] = own
+    return column
 
 
 def _joined_ends(parts: Sequence[MotionColumns], columns: list[int]) -> tuple[FloatArray, FloatArray]:

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,12 +80,6 @@ class TextUnit(ABC, Generic[P]):
         self.ahead = Lookahead()
         self._lanes: Any = None
         self._stops: NDArray[np.int64] | None = None
-
-    def followed_by(self, program: Program) -> Self:
-        """The next part of the same program: its templates are those of this one, and more."""
-        part = copy(self)
-        part.take(program, 0, len(program))
-        return part
 
     def plan(self, block: int) -> P:
         """What a block does."""
@@ -323,7 +317,8 @@ class Interpreter(ABC, Generic[U]):
 
     def next_part(self, program: Program, blocks: int) -> None:
         """Take the next part; so many blocks may be executed."""
-        self.main = self.main.followed_by(program)
+        self.main = copy(self.main)  # whoever holds the part before keeps it
+        self.main.take(program, 0, len(program))
         self.flow.unit, self.flow.block = self.main, 0
         self.first = False
         self.control.budget.left = blocks

@@ -189,11 +189,11 @@ class BlockWriter(BlockText):
     def _may_add(self, column: int) -> bool:
         """Whether an axis may get a word that has none."""
         allowed = self.layout.allowed is None or self.target.letters[column] in self.layout.allowed
-        return allowed and column not in self.turning and self.target.may_name(column)
+        return allowed and column not in self.turning and not self.target.wordless[column]
 
     def _must_name(self, column: int) -> bool:
         """Whether an axis gets a word even if it stands where that leads it."""
-        return self.target.must_name(column)
+        return bool(self.target.spelled) and self.target.spelled[column]
 
     def _name_a_place(self, position: FloatArray) -> None:
         """A word for where an axis stands: the first line of what was an arc is a motion, even if it goes nowhere."""

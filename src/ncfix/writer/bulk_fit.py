@@ -35,7 +35,7 @@ def qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntAr
 def sound(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
     """(n,) motions that are corrected, from absolute words to where all is known."""
     first = first_piece[:-1]
-    fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~pieces.kept[first] & pieces.known[first]
+    fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~pieces.unchanged[first] & pieces.known[first]
     fit &= _undisplaced(moves, pieces, first_piece)
     return fit
 
@@ -52,7 +52,7 @@ def with_dwells(
     at, block = first_piece[rows], moves.block[rows]
     alone = (block != moves.block[rows - 1]) & (block != np.append(moves.block, -1)[rows + 1])
     wordless = (layouts.slots[program.template[block]] == NONE).all(axis=1)
-    stays = pieces.kept[at] & (pieces.end[at] == pieces.end[at - 1]).all(axis=1)
+    stays = pieces.unchanged[at] & (pieces.end[at] == pieces.end[at - 1]).all(axis=1)
     rows = rows[fit[rows - 1] & stays & alone & wordless]
     found = fit.copy()
     found[rows] = True

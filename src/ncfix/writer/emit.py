@@ -149,7 +149,7 @@ class _Emitter:
                 continue
             self._resync(row)
             self.start[row] = self.position
-            if self.pieces.kept[self.first_piece[row]]:
+            if self.pieces.unchanged[self.first_piece[row]]:
                 self._keep(row)
             else:
                 self._write(row)
@@ -170,7 +170,7 @@ class _Emitter:
 
     @cached_property
     def moved(self) -> NDArray[np.bool_]:
-        """(n, n_axes) axes that a motion takes to its end; found out when a motion is kept."""
+        """(n, n_axes) axes that a motion takes to its end; found out at the first unchanged motion."""
         return self.moves.moved
 
     @cached_property
@@ -208,7 +208,7 @@ class _Emitter:
     def _written(self, row: int) -> FloatArray:
         """Write a motion by itself from its start on; the command at its end."""
         self.position, self.replaced = self.start[row], None
-        (self._keep if self.pieces.kept[self.first_piece[row]] else self._write)(row)
+        (self._keep if self.pieces.unchanged[self.first_piece[row]] else self._write)(row)
         return np.asarray(self.position)
 
     def _write_centres(self) -> None:
@@ -268,7 +268,7 @@ class _Emitter:
         return np.asarray(np.where(self.increments[row], self.position + way, moves.end[row]))
 
     def _check_code(self, row: int) -> None:
-        """A motion that is kept must not rely on a code that was replaced."""
+        """An unchanged motion must not rely on a code that was replaced."""
         layout = self._layout(int(self.moves.block[row]))
         lost = self.replaced not in (None, int(self.moves.modal[row])) and (layout is None or layout.motion is None)
         if lost and self.replaced_by not in self.conflicts:

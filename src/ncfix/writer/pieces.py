@@ -9,7 +9,8 @@ an end or centre of its own no longer closes, so what is before it must end wher
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,17 +22,17 @@ from ncfix.control.moves import Frame, MotionKind, Moves, Rule
 class Pieces:
     """The corrected path, struct of arrays; m rows in order, at least one per motion.
 
-    A motion that need not be split has one row; a motion that is kept as it was has one row with its original end.
+    A motion that need not be split has one row; a motion that stays unchanged has one row with its original end.
 
-    move      (m,) index of the motion in `Moves`
-    fraction  (m,) where on the original motion the piece ends, in (0, 1]; the last piece of a motion has 1
-    end       (m, n_axes) the command at the end of the piece, mm and rad, before rounding to the control's digits
-    arc       (m,) the piece is an arc (its motion is an arc and stays one), else straight
-    centre    (m, 3) centre of an arc piece in command coordinates, mm, NaN elsewhere
-    kept      (m,) the motion is left as it was
-    share     (m,) the piece's share of its motion's time, for inverse-time feed; None: that of the fraction. They
-              differ for pieces that only take up a jump (play, a step): these have next to no fraction, but a way
-    approach  (m, n_axes) of canned cycles: the command at the level R, as `Moves.approach`; None: nowhere
+    move       (m,) index of the motion in `Moves`
+    fraction   (m,) where on the original motion the piece ends, in (0, 1]; the last piece of a motion has 1
+    end        (m, n_axes) the command at the end of the piece, mm and rad, before rounding to the control's digits
+    arc        (m,) the piece is an arc (its motion is an arc and stays one), else straight
+    centre     (m, 3) centre of an arc piece in command coordinates, mm, NaN elsewhere
+    unchanged  (m,) the motion is left as it was
+    share      (m,) the piece's share of its motion's time, for inverse-time feed; None: that of the fraction. They
+               differ for pieces that only take up a jump (play, a step): these have next to no fraction, but a way
+    approach   (m, n_axes) of canned cycles: the command at the level R, as `Moves.approach`; None: nowhere
     """
 
     move: NDArray[np.int64]
@@ -39,12 +40,17 @@ class Pieces:
     end: NDArray[np.float64]
     arc: NDArray[np.bool_]
     centre: NDArray[np.float64]
-    kept: NDArray[np.bool_]
+    unchanged: NDArray[np.bool_]
     share: NDArray[np.float64] | None = None
     approach: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.move)
+
+    def rows(self, rows: NDArray[np.intp]) -> Pieces:
+        """Some of the pieces."""
+        columns: dict[str, Any] = {each.name: getattr(self, each.name) for each in fields(self)}
+        return replace(self, **{name: column[rows] for name, column in columns.items() if column is not None})
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -60,7 +66,7 @@ class SecondReading:
     A program may set its frames where the machine stands (G92, G10 L20): then they move with the corrections.
 
     frame, frames  (n,) index into `frames`: the frame in which each motion is really read
-    start, end     (n, n_axes) where motions that are kept really start and end; None before any attempt
+    start, end     (n, n_axes) where unchanged motions really start and end; None before any attempt
     """
 
     frame: NDArray[np.int32]
@@ -88,33 +94,33 @@ STILL = 1e-9
 class Refusals:
     """Motions that have to be left as they were.
 
-    kept      (n,) all of them
-    added     those that others need: row -> the row that needs it
+    unchanged  (n,) all of them
+    added      those that others need: row -> the row that needs it
     reaches_back  something before the first motion would have to stay, too
     """
 
-    kept: Mask
+    unchanged: Mask
     added: dict[int, int]
     reaches_back: bool
 
 
-def closure_of_refusals(moves: Moves, kept: Mask, bound: Mask | None = None) -> Refusals:
-    """Extend `kept` (n,) so that refused arcs begin where they began.
+def closure_of_refusals(moves: Moves, unchanged: Mask, bound: Mask | None = None) -> Refusals:
+    """Extend `unchanged` (n,) so that refused arcs begin where they began.
 
     bound  (n,) other motions that must begin where they began, along the axes that they name
     """
-    walk = _Walk(moves, kept.copy(), np.zeros(len(moves), dtype=bool) if bound is None else bound)
-    for row in np.flatnonzero(kept & walk.anchored)[::-1].tolist():
+    walk = _Walk(moves, unchanged.copy(), np.zeros(len(moves), dtype=bool) if bound is None else bound)
+    for row in np.flatnonzero(unchanged & walk.anchored)[::-1].tolist():
         walk.back_from(row)
-    return Refusals(walk.kept, walk.added, walk.reaches_back)
+    return Refusals(walk.unchanged, walk.added, walk.reaches_back)
 
 
 class _Walk:
     """Goes back from refused arcs to motions that name all axes in question."""
 
-    def __init__(self, moves: Moves, kept: Mask, bound: Mask) -> None:
+    def __init__(self, moves: Moves, unchanged: Mask, bound: Mask) -> None:
         self.moves = moves
-        self.kept = kept
+        self.unchanged = unchanged
         self.bound = bound
         self.added: dict[int, int] = {}
         self.reaches_back = False
@@ -147,8 +153,8 @@ class _Walk:
             row = self.reached
             if self.moves.tcp[row] != self.moves.tcp[row + 1]:
                 needed[:] = True
-            if not self.passed[row] and not self.kept[row]:
-                self.kept[row] = True
+            if not self.passed[row] and not self.unchanged[row]:
+                self.unchanged[row] = True
                 self.added[row] = cause
             needed &= ~self._decided(row)
             if self.anchored[row]:

@@ -136,14 +136,6 @@ class Target:
     spelled: tuple[bool, ...]
     back_to_inverse_time: bool = False
 
-    def may_name(self, column: int) -> bool:
-        """Whether an axis has a word, or may get one."""
-        return not self.wordless[column]
-
-    def must_name(self, column: int) -> bool:
-        """Whether an axis gets a word even if it stands where that leads it."""
-        return bool(self.spelled) and self.spelled[column]
-
     @property
     def last_code(self) -> int:
         """The motion code in force after the pieces, in tenths; behind a call in a block of its own as before."""

@@ -160,7 +160,7 @@ def test_numbers_of_further_pieces() -> None:
             end=np.vstack((moves.end / 2, moves.end)),
             arc=np.zeros(2, dtype=bool),
             centre=np.repeat(pieces.centre[:1], 2, axis=0),
-            kept=np.zeros(2, dtype=bool),
+            unchanged=np.zeros(2, dtype=bool),
         )
         assert_same(found, moves, pieces)
         from program.test_bulk import in_all_ways, spliced

@@ -26,7 +26,7 @@ from ncfix.compensate.account import NoFigureReason, not_looked_at
 from ncfix.compensate.figures.backlash import BacklashBodies, Flank
 from ncfix.compensate.figures.curve import Curve, CurvePoints, Stretches
 from ncfix.compensate.figures.nearest import Nearest, Search, over_holes, over_peaks
-from ncfix.compensate.figures.simulation import SimulatedErrors, actual_tip, lines_of
+from ncfix.compensate.figures.simulation import SimulatedErrors, actual_tip
 from ncfix.compensate.following import Task
 from ncfix.compensate.parts import MachineParts
 from ncfix.compensate.plan.arrays import Array, Index
@@ -339,19 +339,9 @@ class RunningComparison:
         return self.tolerance + self.rounding
 
     @property
-    def lines_unseen(self) -> list[int]:
-        """Lines of the original that may cut and are not looked at, in order."""
-        return lines_of([lines for why, parts in self.unseen.items() if why.cuts for lines in parts])
-
-    @property
     def no_figure(self) -> Counter[NoFigureReason]:
         """How many motions at feed are not looked at, and why: of the program that has more of them."""
         return Counter({why: sum(map(len, parts)) for why, parts in self.unseen.items()}) | self.blind
-
-    @property
-    def lines_left(self) -> dict[str, list[int]]:
-        """Linear axis -> lines of the original in which nothing can be corrected along it."""
-        return {axis: lines_of(lines) for axis, lines in self.left.items()}
 
     def run(self, original: Iterator[CutPath], other: Iterator[CutPath]) -> None:
         """Go along both programs. Raises what reading them does, `NearestNotHereError`, `DifferenceError` NCF420."""

@@ -22,7 +22,7 @@ import numpy as np
 
 from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, length
-from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places
+from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places, ranges
 from ncfix.control.trace import NotInPartsError
 
 ALONG = 0.02
@@ -239,7 +239,7 @@ class Search:
     def _among(self, points: Array, expected: Array, found: Nearest, rows: Index, where: tuple[Index, Index]) -> None:
         """Look at runs of parabolas for points `rows` (k,): the first of each, and how many."""
         (first, counts), cost = where, self._cost(expected, found, rows)
-        owner, piece = owners(counts), np.repeat(first, counts) + places(counts)
+        owner, piece = owners(counts), ranges(first, counts)
         share, least = _on_chords(self.curve, picked(points, rows[owner]), piece)
         way = np.clip(expected[rows[owner]], self.curve.lengths[piece], self.curve.way(piece, np.ones(len(piece))))
         hopeful = np.flatnonzero(np.hypot(least, ALONG * (way - expected[rows[owner]])) < cost[owner])

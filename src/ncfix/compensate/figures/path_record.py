@@ -143,7 +143,7 @@ class PathRecord:
             "kind": np.where(found.lifted, RAPID, kind[found.move]),
         }
         shift = np.nan_to_num(solution.shift)
-        self._note_corrections(moves, shift, lines, mine & ~solution.kept)
+        self._note_corrections(moves, shift, lines, mine & ~solution.unchanged)
         self._note_blocks(moves, solution, lines, values, found.move, mine)
         self._note_worst(values, shown[found.move])
         self._hold(values, shift[found.move])
@@ -165,7 +165,7 @@ class PathRecord:
     def _note_blocks(
         self, moves: Moves, solution: WrittenPlan, lines: Index, values: Mapping[str, Array], at: Index, mine: Mask
     ) -> None:
-        account = Account.of(moves, solution.kept, solution.reasons)
+        account = Account.of(moves, solution.unchanged, solution.reasons)
         if not (account.refused or account.passed):
             return
         theirs = set(moves.block[~mine].tolist())
@@ -195,8 +195,8 @@ class PathRecord:
 
     def _hold(self, values: dict[str, Array], shift: Array) -> None:
         self.total += len(shift)
-        kept = {name: values[name].astype(kind) for name, kind in COLUMNS.items()}
-        self._parts.append((kept, shift.astype("f4")))
+        columns = {name: values[name].astype(kind) for name, kind in COLUMNS.items()}
+        self._parts.append((columns, shift.astype("f4")))
         self._held += len(shift)
         if self._held > HELD:
             self._thin(HELD // 8)
@@ -265,7 +265,7 @@ class _Places:
     def of(cls, written: WrittenPieces, mine: Mask, solution: WrittenPlan) -> _Places:
         """Those at which figures look, and some more where the way is bent."""
         intent, which = written.intent, np.flatnonzero(mine[written.pieces.move])
-        looked = list(samples(written, which, tilts=False, known=solution.plan.known))
+        looked = list(samples(written, which, solution.plan.known))
         piece, fraction = _bent(written, which)
         move, at = written.pieces.move[piece], written.before[piece] + fraction * written.span[piece]
         before, after = errors_at(intent, move, at, written.segments.at(piece, fraction))
@@ -312,8 +312,8 @@ def _bent(written: WrittenPieces, which: Index) -> tuple[Index, Array]:
 def _kinds(moves: Moves, solution: WrittenPlan) -> Array:
     """(n,) what leads to places of motions."""
     refused = np.isin(moves.block, np.fromiter(solution.reasons, dtype=np.int64, count=len(solution.reasons)))
-    kind = np.where(moves.kind == MotionKind.RAPID, RAPID, np.where(solution.kept, PASSED, CUT))
-    return np.where(solution.kept & refused, REFUSED, kind)
+    kind = np.where(moves.kind == MotionKind.RAPID, RAPID, np.where(solution.unchanged, PASSED, CUT))
+    return np.where(solution.unchanged & refused, REFUSED, kind)
 
 
 def _said(reason: Reason) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -27,25 +27,6 @@ from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
-
-
-class SampledErrors(Protocol):
-    """Errors at k places of a path: lines (k,), sizes (k,) mm, and the way (k,) mm that each stands for."""
-
-    @property
-    def lines(self) -> Index:
-        """The line in which each is."""
-
-    @property
-    def size(self) -> Array:
-        """How large it is."""
-
-    @property
-    def weight(self) -> Array:
-        """The way that it stands for."""
-
-
-SomeErrors = TypeVar("SomeErrors", bound=SampledErrors)
 
 
 @dataclass(slots=True)
@@ -86,13 +67,13 @@ class SimulatedErrors:
                 self.beyond.append((lines[over[first]], np.maximum.reduceat(error[over], first)))
 
     @classmethod
-    def of(cls, errors: Iterable[SampledErrors]) -> SimulatedErrors:
+    def of(cls, errors: Iterable[TipError]) -> SimulatedErrors:
         """Of all samples of a path."""
         along = cls()
         deque(along.adding(errors), maxlen=0)
         return along
 
-    def adding(self, errors: Iterable[SomeErrors]) -> Iterator[SomeErrors]:
+    def adding(self, errors: Iterable[TipError]) -> Iterator[TipError]:
         """Add samples as they are asked for."""
         for each in errors:
             self.add(each.lines, each.size, each.weight)
@@ -204,7 +185,7 @@ def tip_errors_on(task: Task, read: Read, said: list[Message]) -> Iterator[TipEr
             yield from tip_errors(intent, lines, int(continued.head is not None))
         else:
             yield from tip_errors(Intent(parts.placed, continued.part.moves, State()), continued.part.lines)
-    parts.blocks_behind()
+    parts.check_behind()
     said += parts.messages
 
 
@@ -258,10 +239,10 @@ def tip_with(correct: Correct) -> Tip:
 
 def refuse_corrected(machine: Machine, moves: Moves, path: str, hint: str) -> None:
     """Raise RefusedError NCF438 for a program that seems to have been corrected for this machine (see `suspected`)."""
-    kept: Mask = (moves.rule != Rule.CORRECT) | ~np.isfinite(moves.end).all(axis=1)
+    correctable: Mask = (moves.rule == Rule.CORRECT) & np.isfinite(moves.end).all(axis=1)
     shift = np.zeros_like(moves.end)
     intent = Intent(machine, moves, State())
-    rows = np.flatnonzero(~kept)
+    rows = np.flatnonzero(correctable)
     for part in slices(len(rows), BATCH):
         some = rows[part]
         ends = np.ones(len(some))
@@ -271,4 +252,4 @@ def refuse_corrected(machine: Machine, moves: Moves, path: str, hint: str) -> No
         commands = commands_from_joints(machine, corrected, moves.tcp[some], moves.length_under_tcp[some])
         shift[some] = commands - moves.end[some]
     step = machine.least_increment[0]
-    suspected(numbers_of(moves, shift, ~kept, step), step, path, False, hint)
+    suspected(numbers_of(moves, shift, correctable, step), step, path, False, hint)

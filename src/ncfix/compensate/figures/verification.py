@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from ncfix.arguments import TOLERANCE_UM
-from ncfix.compensate.account import NoFigureReason
 from ncfix.compensate.block_delete import SwitchSetting, in_pairs, messages_of, positions_of
 from ncfix.compensate.figures.comparison import RunningComparison, whole
+from ncfix.compensate.figures.simulation import lines_of
 from ncfix.compensate.following import Resolve, follow, placed
 from ncfix.compensate.plan.written import rounding
 from ncfix.control.setup import Setup
@@ -57,8 +57,11 @@ class Compared:
 
     @classmethod
     def of_all(cls, comparisons: Sequence[RunningComparison], said: Sequence[Sequence[Message]]) -> Compared:
-        """The worst of several ways in which the programs may run, and what is said of following the two."""
-        return replace(cls.together([cls.of(each) for each in comparisons]), messages=tuple(told_once(*said)))
+        """The worst of several ways in which the programs may run, and what is said of following the two, once."""
+        of_first, of_second = said
+        told = {(each.code, each.text) for each in of_first}
+        messages = *of_first, *(each for each in of_second if (each.code, each.text) not in told)
+        return replace(cls.together([cls.of(each) for each in comparisons]), messages=messages)
 
     @classmethod
     def of(cls, comparison: RunningComparison) -> Compared:
@@ -70,10 +73,10 @@ class Compared:
             left_out=back.figures(),
             beyond=there.lines_beyond,
             not_reached=back.lines_beyond,
-            unseen=comparison.lines_unseen,
-            left=comparison.lines_left,
+            unseen=lines_of([lines for why, parts in comparison.unseen.items() if why.cuts for lines in parts]),
+            left={axis: lines_of(lines) for axis, lines in comparison.left.items()},
             rounding_um=comparison.rounding * 1e3,
-            no_figure=reason_counts(comparison.no_figure),
+            no_figure={why.reason: count for why, count in sorted(comparison.no_figure.items())},
             blind=any(why.cuts for why in comparison.no_figure),
         )
 
@@ -108,11 +111,6 @@ def _lines(several: Iterable[Sequence[int]]) -> list[int]:
     return sorted({line for each in several for line in each})
 
 
-def reason_counts(found: Mapping[NoFigureReason, int]) -> dict[str, int]:
-    """Counts by reason, in plain words."""
-    return {why.reason: count for why, count in sorted(found.items())}
-
-
 def side_by_side(
     original: Program,
     other: Program,
@@ -139,9 +137,3 @@ def side_by_side(
         cuts = whole(known, original, first.trace.moves, meant=True)
         found[-1].run(cuts, whole(known, other, second.trace.moves))
     return found, (messages_of(of_first), messages_of(of_second))
-
-
-def told_once(of_first: Sequence[Message], of_second: Sequence[Message]) -> list[Message]:
-    """What is said of following two programs, without what is said of the first one already."""
-    told = {(each.code, each.text) for each in of_first}
-    return [*of_first, *(each for each in of_second if (each.code, each.text) not in told)]

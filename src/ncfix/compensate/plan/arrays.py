@@ -109,6 +109,11 @@ def places(counts: Index) -> Index:
     return np.arange(int(counts.sum())) - np.repeat(offsets(counts)[:-1], counts)
 
 
+def ranges(begin: Index, counts: Index) -> Index:
+    """Whole numbers from each `begin` on, so many of them."""
+    return np.repeat(begin, counts) + places(counts)
+
+
 def largest(values: Array, counts: Index) -> Array:
     """The largest member of each list, 0 for an empty one; (n,). NaN if a member is NaN."""
     result = np.zeros(len(counts))

@@ -199,15 +199,15 @@ def beside(intent: Intent, real: Segments, rows: Index) -> Array | None:
     return result
 
 
-def starts_to_check(intent: Intent, kept: Mask) -> Mask:
+def starts_to_check(intent: Intent, unchanged: Mask) -> Mask:
     """Motions that may not begin where they should, though the one before ended where it should, (n,).
 
-    Because that one is kept, or ended with another tool, or elsewhere, or because an axis reverses.
+    Because that one is unchanged, or ended with another tool, or elsewhere, or because an axis reverses.
     """
     moves = intent.moves
     check_start = np.ones(len(moves), dtype=bool)
     joined = every(moves.start[1:] == moves.end[:-1]) & (moves.tool_length[1:] == moves.tool_length[:-1])
-    check_start[1:] = kept[:-1] | ~joined
+    check_start[1:] = unchanged[:-1] | ~joined
     if intent.arrival is not None:
         rows = np.arange(1, len(moves))
         now = intent.direction(rows, np.full(len(rows), INSTANT))
@@ -234,23 +234,19 @@ def path_error(
     *,
     state: State = State(),  # noqa: B008
     rows: Mask | None = None,
-    density: float = DENSITY,
-    tilts: bool = True,
     known: Known | None = None,
 ) -> PathError:
     """Tip errors of the real machine along the whole path, by simulation.
 
     pieces   what is written, with the ends as the control will understand them (`Emission.end`, `.centre`)
     start    (n, n_axes) where motions really start, as in `Plan` or `Emission`; those of the program if not given
-    rows     (n,) motions to look at; all that are not kept if not given
-    density  samples for each time that the error model may bend
-    tilts    find the tilts of the tool, too; else they are 0
+    rows     (n,) motions to look at; all corrected ones if not given
     known    what has been found out of the ends of motions; they are not looked at again then
     """
     written = WrittenPieces(Intent(machine, moves, state), pieces, moves.start if start is None else start)
-    chosen = ~pieces.kept if rows is None else rows[pieces.move]
+    chosen = ~pieces.unchanged if rows is None else rows[pieces.move]
     tally, which = FigureTally(), np.flatnonzero(chosen & (moves.kind != MotionKind.DWELL)[pieces.move])
-    for part in samples(written, which, density, tilts, known):
+    for part in samples(written, which, known):
         tally.add(part)
     if (found := _beside(written, chosen)) is not None:
         tally.add(found)
@@ -268,37 +264,32 @@ def _beside(written: WrittenPieces, chosen: Mask) -> PathSamples | None:
         return None
     shown = chosen[last][found.move]
     before, after, move = found.before[shown], found.after[shown], found.move[shown]
-    return PathSamples(move, np.ones(len(move)), before, after, np.zeros(len(move)), 0.0, 0.0) if len(move) else None
+    return PathSamples(move, np.ones(len(move)), before, after, np.zeros(len(move))) if len(move) else None
 
 
 def samples(
-    written: WrittenPieces,
-    which: Index,
-    density: float = DENSITY,
-    tilts: bool = True,
-    known: Known | None = None,
-    check_start: Mask | None = None,
+    written: WrittenPieces, which: Index, known: Known | None = None, check_start: Mask | None = None
 ) -> Iterator[PathSamples]:
     """Look at pieces `which`, in batches; what is known of their ends need not be looked at.
 
     check_start  (n,) motions whose start is looked at, too, if that is known
     """
-    counts, along = _counts(written, which, density)
+    counts, along = _counts(written, which)
     if check_start is None:
         check_start = _starts_to_check(written)
     for batch in batches(counts + 1, BATCH):
         piece, fraction = _places(written, which[batch], counts[batch], along[batch], check_start)
-        yield _errors(written, piece, fraction, known, tilts)
+        yield _errors(written, piece, fraction, known)
 
 
-def _counts(written: WrittenPieces, which: Index, density: float) -> tuple[Index, Mask]:
+def _counts(written: WrittenPieces, which: Index) -> tuple[Index, Mask]:
     """Samples inside each piece, ends left out, and which pieces are looked at along the way, not at the end only."""
     intent, move, span = written.intent, written.pieces.move[which], written.span[which]
     wished, kind = bends_closely(intent, move) * span, intent.moves.kind[move]
     along = ((kind == MotionKind.FEED) | (kind == MotionKind.ARC)) & (span > 2 * INSTANT) & intent.moving(move)
     begun = picked(written.segments.start, which) + picked(written.start, move) + picked(intent.moves.start, move)
     along &= finite(begun)
-    counts = np.minimum(np.nan_to_num(np.ceil(density * wished)), MOST_SHOWN)
+    counts = np.minimum(np.nan_to_num(np.ceil(DENSITY * wished)), MOST_SHOWN)
     return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 
 
@@ -324,9 +315,9 @@ def _starts_to_check(written: WrittenPieces) -> Mask:
     only where it has to be led aside (`_leaps`).
     """
     moves = written.intent.moves
-    kept = np.ones(len(moves), dtype=bool)
-    kept[written.pieces.move] = written.pieces.kept
-    found = starts_to_check(written.intent, kept)
+    unchanged = np.ones(len(moves), dtype=bool)
+    unchanged[written.pieces.move] = written.pieces.unchanged
+    found = starts_to_check(written.intent, unchanged)
     found[1:] |= (moves.kind[:-1] == MotionKind.RAPID) & ~some(moves.wordless[:-1])
     return found
 
@@ -356,7 +347,7 @@ def _passed(written: WrittenPieces, which: Index, along: Mask) -> tuple[Index, A
     return long[on], share
 
 
-def _errors(written: WrittenPieces, piece: Index, fraction: Array, known: Known | None, tilts: bool) -> PathSamples:
+def _errors(written: WrittenPieces, piece: Index, fraction: Array, known: Known | None) -> PathSamples:
     """The errors at fractions of pieces (k,); those at ends where they are known are taken from there."""
     move, at = written.pieces.move[piece], written.before[piece] + fraction * written.span[piece]
     before, after = np.empty(len(piece)), np.empty(len(piece))
@@ -370,8 +361,7 @@ def _errors(written: WrittenPieces, piece: Index, fraction: Array, known: Known 
     if rows.size:
         commands = written.segments.at(piece[rows], fraction[rows])
         before[rows], after[rows] = errors_at(written.intent, move[rows], at[rows], commands)
-    tilted = _tilts(written, piece[ends]) if tilts else (0.0, 0.0)
-    return PathSamples(move, at, before, after, _way(written, piece), *tilted)
+    return PathSamples(move, at, before, after, _way(written, piece))
 
 
 def errors_at(intent: Intent, move: Index, fraction: Array, commands: Array) -> tuple[Array, Array]:
@@ -381,23 +371,6 @@ def errors_at(intent: Intent, move: Index, fraction: Array, commands: Array) -> 
     gaps = intent.gaps(move, programmed, done, intent.states(move, fraction))
     before, after = (lengths(correctable(intent, move, commands, gap)) for gap in gaps)
     return before, after
-
-
-def _tilts(written: WrittenPieces, piece: Index) -> tuple[float, float]:
-    """The largest angles between the actual tool direction and the meant one at ends of pieces, before and after."""
-    intent, move = written.intent, written.pieces.move[piece]
-    intended, done = written.programmed[piece], written.done[piece]
-    states = intent.states(move, written.pieces.fraction[piece])
-    meant = intent.machine.nominal(intended, states.tool_length)
-    return _tilt(intent.machine, intended, states, meant), _tilt(intent.machine, done, states, meant)
-
-
-def _tilt(machine: Machine, q: Array, state: State, meant: Array) -> float:
-    """The largest angle between the actual tool direction and the meant one, rad."""
-    tool = np.asarray(machine.tool.direction)
-    actual = machine.actual(q, state)[:, :3, :3] @ tool
-    sine = np.linalg.norm(np.cross(actual, meant[:, :3, :3] @ tool), axis=1)
-    return float(np.nanmax(np.arcsin(np.minimum(sine, 1.0)), initial=0.0))
 
 
 def _way(written: WrittenPieces, piece: Index) -> Array:

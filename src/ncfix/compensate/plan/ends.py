@@ -1,8 +1,8 @@
 """The corrected ends of motions, in bulk: where each really starts and ends, and what cannot be corrected and why.
 
-A motion that is kept moves the axes that it names to where it says, and leaves the others where the corrected motions
-before it have left them; a kept increment starts from there. So what matters is the displacement of each axis from
-where the program believes it to be, and which motions take it away.
+An unchanged motion moves the axes that it names to where it says, and leaves the others where the corrected motions
+before it have left them; an unchanged increment starts from there. So what matters is the displacement of each axis
+from where the program believes it to be, and which motions take it away.
 
 A canned cycle has one place in its plane, that of the bottom of the hole. Of the level from which it feeds, and to
 which it may return (R), only the height is its own; that is corrected, too.
@@ -46,11 +46,11 @@ def standing(
     machine: Machine,
     moves: Moves,
     wanted: Array,
-    kept: Mask,
+    unchanged: Mask,
     before: Array | None = None,
     approaches: Array | None = None,
 ) -> EndCommands:
-    """Where each motion starts and ends if motions that are not `kept` (n,) end at `wanted` (n, n_axes).
+    """Where each motion starts and ends if all that are not `unchanged` (n,) end at `wanted` (n, n_axes).
 
     Axes that must get no word stay where they stand.
 
@@ -59,10 +59,10 @@ def standing(
     """
     shift = wanted - moves.end
     shift[~np.isfinite(shift)] = 0.0
-    shift[kept] = 0.0
-    decides = ~stays(moves, kept, shift, before)
-    if kept.any():
-        decides[kept] &= (moves.moved & ~moves.increments)[kept]
+    shift[unchanged] = 0.0
+    decides = ~stays(moves, unchanged, shift, before)
+    if unchanged.any():
+        decides[unchanged] &= (moves.moved & ~moves.increments)[unchanged]
     if _goes_on(moves):
         first = np.zeros((1, shift.shape[1])) if before is None else before[None]
         left = _carried(shift, decides, first)
@@ -172,15 +172,15 @@ def _translated(machine: Machine, moves: Moves, row: int, shift: Array) -> Array
     return result
 
 
-def corrected_approaches(intent: Intent, wanted: Array, kept: Mask) -> Array | None:
-    """(n, n_axes) where cycles that are not `kept` (n,) shall feed from, if they end at `wanted` (n, n_axes).
+def corrected_approaches(intent: Intent, wanted: Array, unchanged: Mask) -> Array | None:
+    """(n, n_axes) where cycles that are not `unchanged` (n,) shall feed from, if they end at `wanted` (n, n_axes).
 
     NaN where there is no such level, or it cannot be corrected; None if there is none at all.
     """
     moves = intent.moves
     if moves.approach is None:
         return None
-    rows = np.flatnonzero(~kept & np.isfinite(moves.approach).all(axis=1) & np.isfinite(wanted).all(axis=1))
+    rows = np.flatnonzero(~unchanged & np.isfinite(moves.approach).all(axis=1) & np.isfinite(wanted).all(axis=1))
     result = np.full(moves.approach.shape, np.nan)
     commands, arrived = _steered(intent, rows, moves.approach[rows], wanted[rows])
     result[rows[arrived]] = _over_the_hole(moves, rows[arrived], commands[arrived], wanted[rows[arrived]])
@@ -306,24 +306,24 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
         before[good[result.converged]] = result.before[result.converged]
     wanted[failed] = moves.end[failed]
     troubles = (
-        _finding("NCF408", rows[~named], "the end of this motion is not known in all axes"),
-        _finding("NCF414", rows[named & ~np.isfinite(lengths)], "the length of the tool is not known here"),
-        _finding(
+        Finding.of("NCF408", rows[~named], "the end of this motion is not known in all axes"),
+        Finding.of("NCF414", rows[named & ~np.isfinite(lengths)], "the length of the tool is not known here"),
+        Finding.of(
             "NCF402",
             rows[named & np.isfinite(lengths) & ~fit],
             "the linear axes cannot bring the tool tip there with the rotary axes where they are",
         ),
-        _finding("NCF403", good[~result.converged], "no command found that brings the tool tip where it should be"),
+        Finding.of("NCF403", good[~result.converged], "no command found that brings the tool tip where it should be"),
     )
     return Ends(wanted, failed, oriented, tuple(trouble for trouble in troubles if len(trouble)), before)
 
 
-def with_rotary_as_it_stands(intent: Intent, ends: Ends, kept: Mask) -> Ends:
+def with_rotary_as_it_stands(intent: Intent, ends: Ends, unchanged: Mask) -> Ends:
     """The ends with X Y Z for rotary axes that get no word, where corrections before have left these."""
     if intent.wordless is None:
         return ends
-    stands = standing(intent.machine, intent.moves, ends.wanted, kept, intent.before).end
-    off = intent.wordless & intent.machine.rotary & (stands != ends.wanted) & ~kept[:, None]
+    stands = standing(intent.machine, intent.moves, ends.wanted, unchanged, intent.before).end
+    off = intent.wordless & intent.machine.rotary & (stands != ends.wanted) & ~unchanged[:, None]
     rows = np.flatnonzero(off.any(axis=1))
     if not rows.size:
         return ends
@@ -379,7 +379,7 @@ def commands_of_positions(
 
 
 def along(intent: Intent, rows: Index, fraction: Array) -> PoseSequence:
-    """How the ends of motions follow each other, for limits on rates; a motion that is kept begins a new stretch."""
+    """How the ends of motions follow each other, for limits on rates; an unchanged motion begins a new stretch."""
     q = intent.joints_at(rows, fraction)
     tips = intent.machine.tip(q, intent.lengths(rows))
     begins = np.ones(len(rows), dtype=bool)
@@ -397,7 +397,7 @@ def path_of(intent: Intent, q: Array, tips: Array, begins: Mask, pinned: Mask, d
 
 
 def with_closed_circles(
-    intent: Intent, wanted: Array, kept: Mask, within: float, approaches: Array | None = None
+    intent: Intent, wanted: Array, unchanged: Mask, within: float, approaches: Array | None = None
 ) -> Array:
     """Full circles made to end, within their plane, exactly where they really start.
 
@@ -405,7 +405,7 @@ def with_closed_circles(
     one starts.
     """
     moves, columns = intent.moves, intent.columns
-    rows = np.flatnonzero(intent.segments.arc & ~kept)
+    rows = np.flatnonzero(intent.segments.arc & ~unchanged)
     rows = rows[arcs.full_circles(intent, rows)]
     if not rows.size:
         return wanted
@@ -414,7 +414,7 @@ def with_closed_circles(
     joined = (moves.start[rows[1:]] == moves.end[rows[:-1]]).all(axis=1)
     chained[1:] = (np.diff(rows) == 1) & same & joined
     first = rows[np.maximum.accumulate(np.where(chained, 0, np.arange(len(rows))))]
-    where = standing(intent.machine, moves, wanted, kept, intent.before, approaches)
+    where = standing(intent.machine, moves, wanted, unchanged, intent.before, approaches)
     shift = (where.start - moves.start)[first[:, None], columns]
     own = (wanted - moves.end)[rows[:, None], columns]
     off = arcs.across(shift - own, moves.normal[rows])
@@ -422,7 +422,3 @@ def with_closed_circles(
     result = wanted.copy()
     result[rows[near, None], columns] += off[near]
     return result
-
-
-def _finding(code: str, moves: Index, text: str) -> Finding:
-    return Finding(code, moves, np.zeros(len(moves)), text)

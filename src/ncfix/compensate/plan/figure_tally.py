@@ -17,14 +17,12 @@ class Figures:
     rms       mm, by length of way
     move      the motion in which the largest is, -1 if there is none
     fraction  where on it
-    tilt      largest angle between the actual and the intended tool direction at the ends of pieces, rad
     """
 
     max: float
     rms: float
     move: int
     fraction: float
-    tilt: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +42,13 @@ class PathError:
 
 @dataclass(frozen=True, slots=True)
 class PathSamples:
-    """Places on a path, flat: motion, fraction, tip error before and after (mm), share of the way (mm); tilts (rad)."""
+    """Places on a path, flat: motion, fraction, tip error before and after (mm), share of the way (mm)."""
 
     move: Index
     fraction: Array
     before: Array
     after: Array
     weight: Array
-    tilt_before: float
-    tilt_after: float
 
 
 def _early(at: tuple[float, int, float]) -> tuple[float, int, float]:
@@ -66,7 +62,6 @@ class FigureTally:
 
     def __init__(self) -> None:
         self.squares = [0.0, 0.0]
-        self.tilts = [0.0, 0.0]
         self.at: list[tuple[float, int, float]] = [(0.0, -1, 0.0), (0.0, -1, 0.0)]
         self.way = 0.0
         self.samples = 0
@@ -78,7 +73,6 @@ class FigureTally:
         for side, error in enumerate((part.before, part.after)):
             known = np.nan_to_num(error)
             self.squares[side] += float((part.weight * known**2).sum())
-            self.tilts[side] = max(self.tilts[side], (part.tilt_before, part.tilt_after)[side])
             best = int(known.argmax())
             there = float(known[best]), int(part.move[best]), float(part.fraction[best])
             self.at[side] = max(self.at[side], there, key=_early)
@@ -93,7 +87,7 @@ class FigureTally:
     def result(self) -> PathError:
         """The figures of all batches."""
         before, after = (
-            Figures(value, float(np.sqrt(squares / self.way)) if self.way else 0.0, move, fraction, tilt)
-            for (value, move, fraction), squares, tilt in zip(self.at, self.squares, self.tilts, strict=True)
+            Figures(value, float(np.sqrt(squares / self.way)) if self.way else 0.0, move, fraction)
+            for (value, move, fraction), squares in zip(self.at, self.squares, strict=True)
         )
         return PathError(before, after, self.samples, self.way)

@@ -5,14 +5,14 @@ Findings of the parts of a program are put together in `Notes`: the first few ar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.control.moves import Moves
-from ncfix.diagnostics import Message, Place, RefusedError
+from ncfix.diagnostics import Message, RefusedError
 from ncfix.text.tree import Program
 
 MOST = 20
@@ -42,6 +42,11 @@ class Finding:
     turns: tuple[bool, ...] = ()
     ranges: Mapping[str, str] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, code: str, moves: Index, text: str, hint: str = "") -> Finding:
+        """One without a figure."""
+        return cls(code, moves, np.zeros(len(moves)), text, hint=hint)
+
     def __len__(self) -> int:
         return len(self.moves)
 
@@ -58,16 +63,6 @@ class Finding:
         axes = tuple(self.axes[row] for row in rows) if self.axes else ()
         turns = tuple(self.turns[row] for row in rows) if self.turns else ()
         return replace(self, moves=self.moves[rows], values=self.values[rows], axes=axes, turns=turns)
-
-    def messages(self, place_of: Callable[[int], Place | None], most: int = MOST) -> tuple[Message, ...]:
-        """One message per motion, at most `most`; the last one says how many more there are."""
-        shown = [
-            Message(self.code, self.sentence(k), place_of(int(self.moves[k])), self.hint)
-            for k in range(min(most, len(self)))
-        ]
-        if len(self) > most:
-            shown.append(Message(self.code, f"and {len(self) - most} more motions like these"))
-        return tuple(shown)
 
 
 @dataclass(eq=False)

@@ -241,7 +241,7 @@ SQUARE = 1 - 1e-9
 """An axis that makes no smaller a component of a unit normal is square to its plane."""
 
 
-def stays(moves: Moves, kept: Mask, shift: Array, before: Array | None) -> Mask:
+def stays(moves: Moves, unchanged: Mask, shift: Array, before: Array | None) -> Mask:
     """(n, n_axes) axes of corrected motions that stay where they stand, and would not without this rule.
 
     shift   (n, n_axes) wanted corrections
@@ -250,7 +250,7 @@ def stays(moves: Moves, kept: Mask, shift: Array, before: Array | None) -> Mask:
     moving = (shift != 0).any(axis=0)
     if before is not None:
         moving |= before != 0
-    result: Mask = moves.wordless & ~kept[:, None] & moving
+    result: Mask = moves.wordless & ~unchanged[:, None] & moving
     return result
 
 

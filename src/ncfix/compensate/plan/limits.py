@@ -57,8 +57,8 @@ def not_a_number(written: WrittenPieces) -> Finding:
     pieces = written.pieces
     bad = ~finite(pieces.end)
     bad[pieces.arc] |= ~finite(pieces.centre[pieces.arc])
-    rows = distinct(pieces.move[bad & ~pieces.kept])
-    return Finding("NCF408", rows, np.zeros(len(rows)), "the corrected position is not a finite number")
+    rows = distinct(pieces.move[bad & ~pieces.unchanged])
+    return Finding.of("NCF408", rows, "the corrected position is not a finite number")
 
 
 def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
@@ -81,15 +81,15 @@ def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
 def increments_beyond_travel(machine: Machine, moves: Moves, pieces: Pieces, start: Array, state: State) -> Index:
     """Increments that are left as they are, and that leave the range of an axis because of where they begin."""
     rows = np.flatnonzero(moves.incremental)
-    if not rows.size or not pieces.kept.any():
+    if not rows.size or not pieces.unchanged.any():
         return rows[:0]
-    kept = np.zeros(len(moves), dtype=bool)
-    kept[pieces.move] = pieces.kept
+    unchanged = np.zeros(len(moves), dtype=bool)
+    unchanged[pieces.move] = pieces.unchanged
     written = WrittenPieces(Intent(machine, moves, state), pieces, start)
     beyond = _corrected_excess(written)
     if (beyond > FUZZ).any():
         beyond[programmed_excess(written) > FUZZ] = -np.inf
-    return rows[kept[rows] & (beyond[rows] > FUZZ).any(axis=1)]
+    return rows[unchanged[rows] & (beyond[rows] > FUZZ).any(axis=1)]
 
 
 def _begun_beyond(written: WrittenPieces, corrected: Array) -> Array:
@@ -124,7 +124,7 @@ def too_large(written: WrittenPieces) -> Finding:
     linear = lengths(shift[:, ~machine.rotary]) / machine.max_correction[0]
     rotary = greatest(np.abs(shift[:, machine.rotary])) / machine.max_correction[1]
     share = np.maximum(linear, rotary)
-    over = (share > 1 + FUZZ) & ~written.pieces.kept
+    over = (share > 1 + FUZZ) & ~written.pieces.unchanged
     rows, values = _worst(written.pieces.move[over], share[over])
     text = "the correction is {value:.3g} times as large as the machine file allows"
     return Finding("NCF406", rows, values, text)
@@ -137,7 +137,7 @@ def too_fast(written: WrittenPieces) -> Finding:
     if written.intent.wordless is not None:
         change[written.intent.wordless[pieces.move[:-1]][:, ~machine.rotary]] = 0.0
     change = lengths(change)
-    over = np.flatnonzero((change > JUMP) & ~pieces.kept[1:] & ~pieces.kept[:-1])
+    over = np.flatnonzero((change > JUMP) & ~pieces.unchanged[1:] & ~pieces.unchanged[:-1])
     way = np.abs(written.programmed[over + 1] - written.programmed[over])
     allowed = JUMP + RATE * way[:, ~machine.rotary].sum(axis=1) + RATE_TURNING * way[:, machine.rotary].sum(axis=1)
     over = over[change[over] > allowed]
@@ -238,12 +238,12 @@ def _of_axes(written: WrittenPieces, code: str, text: str, beyond: Array) -> Fin
     """A finding for each corrected motion with an axis beyond its range; values in mm or degrees."""
     machine, pieces = written.intent.machine, written.pieces
     if not (beyond > FUZZ).any():
-        return Finding(code, np.zeros(0, dtype=np.intp), np.empty(0), text)
-    kept = np.zeros(len(beyond), dtype=bool)
-    kept[pieces.move] = pieces.kept
+        return Finding.of(code, np.zeros(0, dtype=np.intp), text)
+    unchanged = np.zeros(len(beyond), dtype=bool)
+    unchanged[pieces.move] = pieces.unchanged
     axis = np.where(np.isnan(beyond), -np.inf, beyond).argmax(axis=1)
     most = beyond[np.arange(len(beyond)), axis]
-    rows = np.flatnonzero((most > FUZZ) & ~kept)
+    rows = np.flatnonzero((most > FUZZ) & ~unchanged)
     units = np.where(machine.rotary, 180 / np.pi, 1.0)[axis[rows]]
     letters = machine.axis_names
     names = tuple(letters[j] for j in axis[rows].tolist())

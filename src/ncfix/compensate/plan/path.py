@@ -25,7 +25,7 @@ from ncfix.compensate.plan.arrays import (
     offsets,
     owners,
     picked,
-    places,
+    ranges,
     sums,
     vector_product,
 )
@@ -62,7 +62,7 @@ class Plan:
     start      (n, n_axes) the command at which each motion really starts, NaN where not known
     deviation  (n,) mm: how far the tip was found to leave the intended path, before rounding; 0 where not looked at
     oriented   (n,) the tool direction is corrected too, without damping or limits
-    findings   what is wrong, by motion; `pieces.kept` tells what was left as it was
+    findings   what is wrong, by motion; `pieces.unchanged` tells what was left as it was
     known      what is known of the ends of motions
     corners    what rounding may do at corners that the control offsets, in half output steps; 0 where there are none
     """
@@ -76,17 +76,19 @@ class Plan:
     corners: float = 0.0
 
 
-def untouched(moves: Moves, kept: Mask) -> Plan:
+def untouched(moves: Moves, unchanged: Mask) -> Plan:
     """The plan that changes nothing."""
     n = len(moves)
-    pieces = Pieces(np.arange(n), np.ones(n), moves.end.copy(), moves.kind == MotionKind.ARC, moves.centre.copy(), kept)
+    pieces = Pieces(
+        np.arange(n), np.ones(n), moves.end.copy(), moves.kind == MotionKind.ARC, moves.centre.copy(), unchanged
+    )
     return Plan(pieces, moves.start.copy(), np.zeros(n), np.ones(n, dtype=bool), ())
 
 
 def assembled(
     moves: Moves,
     real: Segments,
-    kept: Mask,
+    unchanged: Mask,
     rows: Index,
     parts: Split | None,
     deviation: Array,
@@ -102,9 +104,9 @@ def assembled(
     centre = np.full((len(move), 3), np.nan)
     centre[arc] = real.centre[move[arc]]
     if parts is not None:
-        at = np.repeat(offsets(counts)[:-1][rows], parts.counts) + places(parts.counts)
+        at = ranges(offsets(counts)[rows], parts.counts)
         fraction[at], end[at], arc[at], centre[at] = parts.fraction, parts.end, parts.arc, parts.centre
-    pieces = Pieces(move, fraction, end, arc, centre, kept[move])
+    pieces = Pieces(move, fraction, end, arc, centre, unchanged[move])
     pieces = replace(pieces, share=_shares(pieces, real, counts))
     return Plan(pieces, real.start, deviation, oriented, findings)
 
@@ -198,76 +200,75 @@ def plan(
     arc_pieces    make arcs of several arcs where one is not enough; of straight pieces if not
     before        (n_axes,) how far off the axes stand at the start of the first motion, mm and rad; not if not given
 
-    Motions that cannot be corrected are kept and named in the findings. Raises `RefusedError` NCF401 if the machine
-    has no X, Y and Z.
+    Motions that cannot be corrected stay unchanged and are named in the findings. Raises `RefusedError` NCF401 if the
+    machine has no X, Y and Z.
     """
-    kept = (moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)
-    kept |= keep if keep is not None else False
-    if machine.is_perfect or kept.all():
-        as_it_is = untouched(moves, kept)
+    unchanged = (moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)
+    unchanged |= keep if keep is not None else False
+    if machine.is_perfect or unchanged.all():
+        as_it_is = untouched(moves, unchanged)
         return as_it_is if before is None else _behind(machine, as_it_is, moves, before)
     demands = Requirements(PathTolerance(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
-    return _plan(Intent(machine, moves, state, before), strategy, demands, kept)
+    return _plan(Intent(machine, moves, state, before), strategy, demands, unchanged)
 
 
 def _behind(machine: Machine, as_it_is: Plan, moves: Moves, before: Array) -> Plan:
     """A plan that changes nothing, behind motions that have left the axes so far off, (n_axes,) mm and rad."""
-    kept = as_it_is.pieces.kept
-    where = standing(machine, moves, moves.end, kept, before)
+    unchanged = as_it_is.pieces.unchanged
+    where = standing(machine, moves, moves.end, unchanged, before)
     return replace(as_it_is, start=where.start, pieces=replace(as_it_is.pieces, end=where.end))
 
 
-def _plan(intent: Intent, strategy: Strategy, demands: Requirements, kept: Mask) -> Plan:
-    ends = corrected(intent, strategy, np.flatnonzero(~kept))
-    kept = kept | ends.failed
+def _plan(intent: Intent, strategy: Strategy, demands: Requirements, unchanged: Mask) -> Plan:
+    ends = corrected(intent, strategy, np.flatnonzero(~unchanged))
+    unchanged = unchanged | ends.failed
     if strategy.corrects_orientation:
-        ends = with_rotary_as_it_stands(intent, ends, kept)
-    approaches = corrected_approaches(intent, ends.wanted, kept) if strategy.follows_path else None
-    real, broken = _real(intent, ends.wanted, kept, demands, approaches)
-    bound = intent.moves.compensated | crooked(intent) if strategy.follows_path else np.ones(len(kept), dtype=bool)
-    if (broken & bound).any():
-        again = _plan(intent, strategy, demands, kept | (broken & bound))
-        return replace(again, findings=(*ends.findings, _stuck(np.flatnonzero(broken & bound)), *again.findings))
+        ends = with_rotary_as_it_stands(intent, ends, unchanged)
+    approaches = corrected_approaches(intent, ends.wanted, unchanged) if strategy.follows_path else None
+    real, broken = _real(intent, ends.wanted, unchanged, demands, approaches)
+    bound = intent.moves.compensated | crooked(intent) if strategy.follows_path else np.ones(len(unchanged), dtype=bool)
+
+    def without(finding: Finding) -> Plan:
+        """The plan in which the motions of a finding stay unchanged, too."""
+        also = unchanged.copy()
+        also[finding.moves] = True
+        planned = _plan(intent, strategy, demands, also)
+        return replace(planned, findings=(*ends.findings, finding, *planned.findings))
+
+    text = "this arc would have to be made of straight pieces, and must not be split"
+    if stuck := Finding.of("NCF415", np.flatnonzero(broken & bound), text):
+        return without(stuck)
     beside = beside_contours(intent, real) if strategy.follows_path else None
-    worse = _worse_contours(intent, beside, kept, demands)
-    if len(worse):
-        again = _plan(intent, strategy, demands, _with(kept, worse.moves))
-        return replace(again, findings=(*ends.findings, worse, *again.findings))
-    followed = _followed(intent, real, kept, strategy, demands)
-    deviation = _judged(intent, real, kept, broken, followed, demands)
+    if worse := _worse_contours(intent, beside, unchanged, demands):
+        return without(worse)
+    followed = _followed(intent, real, unchanged, strategy, demands)
+    deviation = _judged(intent, real, unchanged, broken, followed, demands)
     limit = demands.budget.path
     over = _not_far_off(intent, np.flatnonzero((deviation > limit) & ~bound))
     over = over[~too_long(intent, over)]
     parts = in_pieces(intent, real, over, deviation[over], strategy, demands)
     deviation[over] = parts.worst
-    unseen = _not_far_off(intent, np.flatnonzero(np.isinf(deviation)))
-    if unseen.size:
-        again = _plan(intent, strategy, demands, _with(kept, unseen))
-        return replace(again, findings=(*ends.findings, _too_long(unseen), *again.findings))
-    findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
-    planned = assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
+    unseen, hint = _not_far_off(intent, np.flatnonzero(np.isinf(deviation))), "make several motions of it"
+    text = "this motion is so long, or makes so many turns, that it cannot be looked at closely enough"
+    if too_far := Finding.of("NCF417", unseen, text, hint):
+        return without(too_far)
+    findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, unchanged, strategy, demands))
+    planned = assembled(intent.moves, real, unchanged, over, parts, deviation, ends.oriented, findings)
     known = Known(ends.before, ends.wanted, left_beside(intent, real, np.flatnonzero(followed)))
-    corners = 0.0 if beside is None else float(beside.rounding[~kept[beside.move]].max(initial=0.0))
+    corners = 0.0 if beside is None else float(beside.rounding[~unchanged[beside.move]].max(initial=0.0))
     pieces = planned.pieces
     if approaches is not None:
         pieces = replace(pieces, approach=approaches[pieces.move])
     return replace(planned, pieces=pieces, known=known, corners=corners)
 
 
-def _with(kept: Mask, rows: Index) -> Mask:
-    """The motions that are kept, and `rows` (k,) with them."""
-    also = kept.copy()
-    also[rows] = True
-    return also
-
-
-def _worse_contours(intent: Intent, beside: OffsetPoints | None, kept: Mask, demands: Requirements) -> Finding:
+def _worse_contours(intent: Intent, beside: OffsetPoints | None, unchanged: Mask, demands: Requirements) -> Finding:
     """NCF454: contours (k,) with a corner that the control would make worse of what is corrected than it is without.
 
     Worse is what is beyond the tolerance, and more than before and what the control's digits do there.
     """
     text = "beside this contour the control would take the tool up to {value:.1f} um off, farther than uncorrected"
-    none = Finding("NCF454", np.zeros(0, dtype=np.intp), np.zeros(0), text)
+    none = Finding.of("NCF454", np.zeros(0, dtype=np.intp), text)
     if beside is None or intent.moves.beside is None:
         return none
     digits = 0.5 * intent.machine.least_increment[0] * beside.rounding
@@ -278,20 +279,20 @@ def _worse_contours(intent: Intent, beside: OffsetPoints | None, kept: Mask, dem
     contour = np.cumsum(np.diff(offset.astype(np.int8), prepend=0) == 1)
     most = np.zeros(int(contour[-1]) + 1)
     np.maximum.at(most, contour[beside.move[worse]], beside.after[worse])
-    rows = np.flatnonzero(offset & (most[contour] > 0) & ~kept)
+    rows = np.flatnonzero(offset & (most[contour] > 0) & ~unchanged)
     return Finding("NCF454", rows, most[contour[rows]] * 1e3, text)
 
 
 def _real(
-    intent: Intent, wanted: Array, kept: Mask, demands: Requirements, approaches: Array | None
+    intent: Intent, wanted: Array, unchanged: Mask, demands: Requirements, approaches: Array | None
 ) -> tuple[Segments, Mask]:
     """What the control would be told without splitting, and the arcs (n,) that cannot stay arcs."""
     moves, programmed = intent.moves, intent.segments
-    wanted = with_closed_circles(intent, wanted, kept, demands.budget.path / 2, approaches)
-    where = standing(intent.machine, moves, wanted, kept, intent.before, approaches)
+    wanted = with_closed_circles(intent, wanted, unchanged, demands.budget.path / 2, approaches)
+    where = standing(intent.machine, moves, wanted, unchanged, intent.before, approaches)
     real = replace(programmed, start=where.start, end=where.end)
     broken = np.zeros(len(moves), dtype=bool)
-    rows = np.flatnonzero(programmed.arc & ~kept)
+    rows = np.flatnonzero(programmed.arc & ~unchanged)
     if not rows.size:
         return real, broken
     fit = fitted(intent, real, rows, demands.closure, demands.budget.rounding)
@@ -301,23 +302,25 @@ def _real(
     return replace(real, centre=centre, sweep=sweep, arc=programmed.arc & ~broken), broken
 
 
-def _followed(intent: Intent, real: Segments, kept: Mask, strategy: Strategy, demands: Requirements) -> Mask:
+def _followed(intent: Intent, real: Segments, unchanged: Mask, strategy: Strategy, demands: Requirements) -> Mask:
     """(n,) motions that are looked at along their way."""
     if not strategy.follows_path:
-        return np.zeros(len(kept), dtype=bool)
+        return np.zeros(len(unchanged), dtype=bool)
     kind = intent.moves.kind
     followed = (
         (kind == MotionKind.FEED) | (kind == MotionKind.ARC) | ((kind == MotionKind.RAPID) & demands.split_rapids)
     )
-    result: Mask = followed & ~kept & intent.moving(np.arange(len(kept))) & finite(real.start)
+    result: Mask = followed & ~unchanged & intent.moving(np.arange(len(unchanged))) & finite(real.start)
     return result
 
 
-def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, followed: Mask, demands: Requirements) -> Array:
+def _judged(
+    intent: Intent, real: Segments, unchanged: Mask, broken: Mask, followed: Mask, demands: Requirements
+) -> Array:
     """How far the tip leaves the intended path along each motion, (n,) mm; 0 where it is not looked at."""
-    deviation = np.zeros(len(kept))
+    deviation = np.zeros(len(unchanged))
     rows = np.flatnonzero(followed & ~broken)
-    deviation[rows] = deviations(intent, real, rows, starts_to_check(intent, kept), demands.budget.path)
+    deviation[rows] = deviations(intent, real, rows, starts_to_check(intent, unchanged), demands.budget.path)
     deviation[followed & broken] = np.inf
     return deviation
 
@@ -366,21 +369,11 @@ def _pieces(intent: Intent, real: Segments, rows: Index, deviation: Array, toler
     return count
 
 
-def _stuck(rows: Index) -> Finding:
-    text = "this arc would have to be made of straight pieces, and must not be split"
-    return Finding("NCF415", rows, np.zeros(len(rows)), text)
-
-
 def _not_far_off(intent: Intent, rows: Index) -> Index:
     """Motions `rows` (k,) without those that end farther beyond a range than it is wide: for that they are refused."""
     low, high = intent.machine.ranges.T
     q = intent.joints_at(rows, np.ones(len(rows)))
     return rows[every((q > 2 * low - high) & (q < 2 * high - low))]
-
-
-def _too_long(rows: Index) -> Finding:
-    text = "this motion is so long, or makes so many turns, that it cannot be looked at closely enough"
-    return Finding("NCF417", rows, np.zeros(len(rows)), text, hint="make several motions of it")
 
 
 def not_split(rows: Index, deviation: Array) -> Finding:
@@ -390,20 +383,20 @@ def not_split(rows: Index, deviation: Array) -> Finding:
 
 
 def _remarks(
-    intent: Intent, deviation: Array, oriented: Mask, kept: Mask, strategy: Strategy, demands: Requirements
+    intent: Intent, deviation: Array, oriented: Mask, unchanged: Mask, strategy: Strategy, demands: Requirements
 ) -> list[Finding]:
-    """What is not as it was asked for, though nothing is kept for it."""
+    """What is not as it was asked for, though no motion stays unchanged for it."""
     remarks = []
     budget = demands.budget
     over = np.flatnonzero((deviation > budget.path) & (intent.moves.compensated | crooked(intent)))
     if over.size:
         remarks.append(not_split(over, deviation[over]))
-    unknown = _unknown_radius(intent, kept)
+    unknown = _unknown_radius(intent, unchanged)
     if unknown.size:
         text = "the radius of the tool is not known: what the control makes of corners beside it is not in the figures"
         hint = "give it as --tool NUMBER=LENGTH,RADIUS"
-        remarks.append(Finding("NCF455", unknown, np.zeros(len(unknown)), text, hint=hint))
-    done = np.flatnonzero(~kept)
+        remarks.append(Finding.of("NCF455", unknown, text, hint))
+    done = np.flatnonzero(~unchanged)
     if not budget.fine and done.size:
         text = (
             "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um, on top of the tolerance"
@@ -412,14 +405,14 @@ def _remarks(
     held = done[~oriented[done]]
     if strategy.corrects_orientation and held.size:
         text = "the tool direction is not, or not fully, corrected here"
-        remarks.append(Finding("NCF410", held, np.zeros(len(held)), text))
+        remarks.append(Finding.of("NCF410", held, text))
     return remarks
 
 
-def _unknown_radius(intent: Intent, kept: Mask) -> Index:
+def _unknown_radius(intent: Intent, unchanged: Mask) -> Index:
     """The first corrected motions of contours beside which the tool goes by a radius that is not known."""
     beside = intent.moves.beside
     if beside is None:
         return np.zeros(0, dtype=np.intp)
-    unknown = np.isnan(beside) & ~kept
+    unknown = np.isnan(beside) & ~unchanged
     return np.flatnonzero(unknown & ~np.append(False, unknown[:-1]))

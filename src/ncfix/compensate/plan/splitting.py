@@ -28,7 +28,19 @@ import numpy as np
 
 from ncfix import core
 from ncfix.compensate.plan.arcs import APART, NUDGE, Closure, across
-from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, largest, offsets, owners, picked, places, sums
+from ncfix.compensate.plan.arrays import (
+    Array,
+    Index,
+    Mask,
+    batches,
+    largest,
+    offsets,
+    owners,
+    picked,
+    places,
+    ranges,
+    sums,
+)
 from ncfix.compensate.plan.ends import as_commands, path_of, with_rotary_held
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import regular
@@ -272,15 +284,7 @@ def _on_bisector(pieces: Segments, way: Array, height: Array) -> Segments:
     rise = np.einsum("ij,ij->i", end - start, pieces.normal)[:, None] * pieces.normal
     centre = (start + end - rise) / 2 + height[:, None] * way
     sweep = sweep_between(start, end, centre, pieces.normal, pieces.sweep)
-    return Segments(
-        pieces.start,
-        pieces.end,
-        pieces.arc,
-        np.where(pieces.arc[:, None], centre, np.nan),
-        pieces.normal,
-        sweep,
-        pieces.columns,
-    )
+    return replace(pieces, centre=np.where(pieces.arc[:, None], centre, np.nan), sweep=sweep)
 
 
 PER_BEND = 8
@@ -386,7 +390,7 @@ def _replaced(result: Split, which: Index, finer: Split) -> Split:
 def taken(parts: Split, order: Index) -> Split:
     """The motions of `parts` in another order."""
     counts = parts.counts[order]
-    take = np.repeat(offsets(parts.counts)[order], counts) + places(counts)
+    take = ranges(offsets(parts.counts)[order], counts)
     ends, centres = (parts.fraction[take], picked(parts.end, take)), (parts.arc[take], parts.centre[take])
     return Split(counts, *ends, *centres, parts.worst[order])
 

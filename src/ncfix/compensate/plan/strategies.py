@@ -364,7 +364,8 @@ class Thesis(Strategy):
             )
         still = np.where(machine.rotary, 0.0, q)
         point = machine.tip(still, state.tool_length) + np.asarray(machine.workpiece_offset)
-        rotary = rotary_shift([motion_errors(machine, axis, q) for axis in turning_axes(machine)], point)
+        errors = [motion_errors(machine, axis, q) for axis in reversed(machine.axes) if axis.rotary]
+        rotary = rotary_shift(errors, point)
         axes_from_base = affine_tip(machine, still[:1])[0]
         shifted = q.copy()
         shifted[:, linear_columns(machine)] += solve(axes_from_base, rotary)
@@ -372,11 +373,6 @@ class Thesis(Strategy):
         corrected[:, linear_columns(machine)] -= solve(axes_from_base, linear_deviation(machine, shifted))
         corrected[:1] = q[:1]
         return Correction(corrected, np.isfinite(corrected.sum(axis=1)), np.zeros(len(q), dtype=bool))
-
-
-def turning_axes(machine: Machine) -> list[Axis]:
-    """The rotary axes from the foundation to the workpiece: B, then C."""
-    return [axis for axis in reversed(machine.axes) if axis.rotary]
 
 
 def motion_errors(machine: Machine, axis: Axis, q: Array) -> Array:

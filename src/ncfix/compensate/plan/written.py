@@ -161,7 +161,7 @@ def on_digits(intent: Intent, pieces: Pieces, among: Index | None = None) -> Pie
 def _newly_written(moves: Moves, pieces: Pieces, among: Index) -> Index:
     """Straight pieces with a rotary position that the program does not have as a number of its own."""
     turned = some((picked(pieces.end, among) != picked(moves.end, pieces.move[among]))[:, moves.rotary])
-    return among[turned & ~pieces.kept[among] & ~pieces.arc[among]]
+    return among[turned & ~pieces.unchanged[among] & ~pieces.arc[among]]
 
 
 def _rounded(angle: Array, machine: Machine) -> Array:
@@ -177,13 +177,15 @@ def without_idle(moves: Moves, pieces: Pieces, emission: Emission, first: int = 
     """
     if len(pieces) == len(moves):
         return pieces
-    drop = idle(pieces, emission, first)
-    return _without(pieces, drop) if drop.any() else pieces
-
-
-def idle(pieces: Pieces, emission: Emission, first: int = 0) -> Mask:
-    """As `standing_still`, of what was written."""
-    return standing_still(pieces, emission.end, emission.start, first)
+    drop = standing_still(pieces, emission.end, emission.start, first)
+    if not drop.any():
+        return pieces
+    left = np.flatnonzero(~drop)
+    chosen = pieces.rows(left)
+    if pieces.share is None:
+        return chosen
+    begins = np.append(0, left[:-1] + 1)  # the time of a piece goes to the next one that is left, of the same motion
+    return replace(chosen, share=np.add.reduceat(pieces.share, begins))
 
 
 def standing_still(pieces: Pieces, end: Array, start: Array, first: int = 0) -> Mask:
@@ -199,7 +201,7 @@ def standing_still(pieces: Pieces, end: Array, start: Array, first: int = 0) -> 
         return found
     move, end = pieces.move[rows], end[rows]
     inner = move[1:] == move[:-1]
-    plain = ~(pieces.arc[rows] | pieces.kept[rows]) & (move >= first)
+    plain = ~(pieces.arc[rows] | pieces.unchanged[rows]) & (move >= first)
     stays = np.zeros(len(rows), dtype=bool)
     stays[1:] = inner & (end[1:] == end[:-1]).all(axis=1)
     begins = np.flatnonzero(np.append(True, ~inner))
@@ -208,21 +210,6 @@ def standing_still(pieces: Pieces, end: Array, start: Array, first: int = 0) -> 
     before_last = np.append(last[1:] & stays[1:] & inner, False)
     found[rows] = plain & ((stays & ~last) | before_last)
     return found
-
-
-def _without(pieces: Pieces, drop: Mask) -> Pieces:
-    left = np.flatnonzero(~drop)
-    columns = {name: getattr(pieces, name)[left] for name in ("move", "fraction", "end", "arc", "centre", "kept")}
-    approach = None if pieces.approach is None else pieces.approach[left]
-    return replace(pieces, **columns, share=_shares(pieces, left), approach=approach)
-
-
-def _shares(pieces: Pieces, left: Index) -> Array | None:
-    """The time of a piece that is dropped goes to the next one that is left, which is of the same motion."""
-    if pieces.share is None:
-        return None
-    begins = np.append(0, left[:-1] + 1)
-    return np.add.reduceat(pieces.share, begins)
 
 
 CENTRE = 2.0
@@ -247,7 +234,7 @@ def rounding_along(intent: Intent, pieces: Pieces, corners: float, own: Mask | N
     own      (n,) motions that count; all if not given
     """
     machine, moves = intent.machine, intent.moves
-    rows = np.flatnonzero(~pieces.kept & (moves.kind != MotionKind.DWELL)[pieces.move])
+    rows = np.flatnonzero(~pieces.unchanged & (moves.kind != MotionKind.DWELL)[pieces.move])
     rows = rows if own is None else rows[own[pieces.move[rows]]]
     if not rows.size:
         return 0.0
