@@ -169,7 +169,7 @@ SUMS = ("blocks", "moves", "compensated", "passed", "unseen", "samples", "insert
 def in_inverse_time(solution: WrittenPlan) -> tuple[Finding, ...]:
     """The turns that get inverse time."""
     rows = np.array(solution.emission.timed, dtype=np.intp)
-    return (Finding("NCF456", rows, np.zeros(len(rows)), TIMED, hint=HAS_G93),) if len(rows) else ()
+    return (Finding.of("NCF456", rows, TIMED, HAS_G93),) if len(rows) else ()
 
 
 @dataclass(slots=True)
