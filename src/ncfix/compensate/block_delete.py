@@ -310,7 +310,7 @@ def _named(found: Sequence[WrittenPlan], block: int) -> Mask:
     axes = np.zeros(len(found[0].moves.axes), dtype=np.bool_)
     for each in found:
         rows = np.flatnonzero(each.moves.block == block)
-        last = np.searchsorted(each.plan.pieces.move, rows, side="right") - 1
+        last = each.plan.pieces.last[rows]
         off = each.emission.end[last] != each.emission.start[rows]
         axes |= (off & ~np.isnan(each.emission.end[last])).any(axis=0)
     return axes

@@ -150,8 +150,7 @@ class WrittenPlan:
     @property
     def shift(self) -> Array:
         """(n, n_axes) by how much the command at the end of each motion is changed, as written, mm and rad."""
-        last = np.searchsorted(self.plan.pieces.move, np.arange(len(self.moves)), side="right") - 1
-        return picked(self.emission.end, last) - self.moves.end
+        return picked(self.emission.end, self.plan.pieces.last) - self.moves.end
 
     def lacking(self, steps: Array, own: Mask | None = None) -> Lacking | None:
         """The axes that were left, of motions `own` (n,) if given; `steps` (n_axes,) what the control resolves.
@@ -286,7 +285,7 @@ def accepted_plan(
             history.append((bool(planned.pieces.unchanged[-1]), np.where(np.isfinite(off), off, 0.0)))
         planned = replace(planned, pieces=on_digits(Intent(machine, moves, state), planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start, state)
-        stays = planned.pieces.unchanged[np.searchsorted(planned.pieces.move, np.arange(len(moves)))] & ~unchanged
+        stays = planned.pieces.unchanged[planned.pieces.first] & ~unchanged
         for finding in against:
             stays[finding.moves] = True
         beyond = increments_beyond_travel(machine, moves, planned.pieces, planned.start, state)
@@ -372,8 +371,7 @@ def differences(solution: WrittenPlan, again: Moves, own: Mask | None = None) ->
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
     off = across(off, again.normal[arcs])  # the height of a centre means nothing
     differs[arcs[differ(off, np.zeros_like(off))]] = True
-    before = np.where(np.diff(pieces.move, prepend=-1) == 0, np.append(0.0, pieces.fraction[:-1]), 0.0)
-    sweeps = solution.moves.sweep[pieces.move] * (pieces.fraction - before)  # its share of what its motion does
+    sweeps = solution.moves.sweep[pieces.move] * (pieces.fraction - pieces.begun)  # its share of what its motion does
     differs[arcs] |= np.abs(again.sweep[arcs] - sweeps[rows[arcs]]) > TURN
     return differs
 

@@ -53,6 +53,23 @@ class Pieces:
         return replace(self, **{name: column[rows] for name, column in columns.items() if column is not None})
 
     @property
+    def first(self) -> NDArray[np.intp]:
+        """(n,) the first piece of each motion."""
+        return np.flatnonzero(np.diff(self.move, prepend=-1))
+
+    @property
+    def last(self) -> NDArray[np.intp]:
+        """(n,) the last one."""
+        return np.flatnonzero(np.diff(self.move, append=self.move[-1:] + 1))
+
+    @property
+    def begun(self) -> NDArray[np.float64]:
+        """(m,) where on its motion each piece begins, as `fraction` says where it ends."""
+        begun = np.append(0.0, self.fraction)[:-1]
+        begun[self.first] = 0.0
+        return begun
+
+    @property
     def known(self) -> NDArray[np.bool_]:
         """(m,) the command at the end is known in all axes."""
         finite = np.isfinite(self.end)
@@ -77,9 +94,8 @@ class SecondReading:
     @classmethod
     def of(cls, moves: Moves, pieces: Pieces) -> SecondReading:
         """From the motions that were read where `pieces` were written (same rows)."""
-        last = np.flatnonzero(np.append(pieces.move[1:] != pieces.move[:-1], True))
-        first = np.append(0, last[:-1] + 1)
-        return cls(moves.frame[last], moves.frames, moves.start[first], moves.end[last])
+        last = pieces.last
+        return cls(moves.frame[last], moves.frames, moves.start[pieces.first], moves.end[last])
 
 
 Mask = NDArray[np.bool_]

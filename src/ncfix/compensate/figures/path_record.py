@@ -14,10 +14,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ncfix.compensate.account import Account, Reason
-from ncfix.compensate.plan.arrays import Array, Index, Mask, owners, picked, places
+from ncfix.compensate.plan.arrays import Array, Index, Mask, owners, picked
 from ncfix.compensate.plan.deviation import errors_at, samples
+from ncfix.compensate.plan.figure_tally import PathSamples
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs
+from ncfix.compensate.plan.sampling import even
 from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.compensate.solve import WrittenPlan
 from ncfix.control.moves import MotionKind, Moves
@@ -265,16 +267,13 @@ class _Places:
     def of(cls, written: WrittenPieces, mine: Mask, solution: WrittenPlan) -> _Places:
         """Those at which figures look, and some more where the way is bent."""
         intent, which = written.intent, np.flatnonzero(mine[written.pieces.move])
-        looked = list(samples(written, which, solution.plan.known))
         piece, fraction = _bent(written, which)
         move, at = written.pieces.move[piece], written.before[piece] + fraction * written.span[piece]
         before, after = errors_at(intent, move, at, written.segments.at(piece, fraction))
-        nothing = np.zeros(0)
-        move = np.concatenate([np.zeros(0, dtype=np.intp), *(each.move for each in looked), move])
-        at = np.concatenate([nothing, *(each.fraction for each in looked), at])
-        before = np.concatenate([nothing, *(each.before for each in looked), before])
-        after = np.concatenate([nothing, *(each.after for each in looked), after])
-        weight = np.concatenate([nothing, *(each.weight for each in looked), np.zeros(len(piece))])
+        bent = PathSamples(move, at, before, after, np.zeros(len(piece)))
+        looked = [*samples(written, which, solution.plan.known), bent]
+        columns = ("move", "fraction", "before", "after", "weight")
+        move, at, before, after, weight = (np.concatenate([getattr(each, name) for each in looked]) for name in columns)
         tip = intent.tip(move, at)
         lifted = np.zeros(len(move), dtype=bool)
         if intent.moves.approach is not None:
@@ -301,7 +300,7 @@ def _bent(written: WrittenPieces, which: Index) -> tuple[Index, Array]:
     drawn = np.isin(moves.kind[move], (MotionKind.FEED, MotionKind.ARC))
     counts = np.where(drawn, np.minimum(np.ceil(np.nan_to_num(turned) / STEP), MOST_STEPS), 0).astype(np.intp)
     counts = np.maximum(counts - 1, 0)
-    inside = which[owners(counts)], (places(counts) + 1) / np.repeat(counts + 1, counts)
+    inside = which[owners(counts)], even(counts)
     first = np.flatnonzero(
         np.diff(moves.kind[move], prepend=-1) != 0
     )  # where a rapid has led a cut, and where all begins
@@ -355,15 +354,11 @@ def _largest(values: Array, first: Index) -> Index:
     return at[np.searchsorted(at, first)]
 
 
-def _from_line(points: Array, begin: Array, end: Array) -> Array:
-    """How far points (k, 3) are from the straight lines between two others, (k,) mm."""
-    along = end - begin
-    size = np.maximum((along**2).sum(axis=1), 1e-12)
-    share = np.clip(((points - begin) * along).sum(axis=1) / size, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - begin - share[:, None] * along, axis=1))
-
-
 def _off_lines(tips: Array, rows: Index) -> Array:
     """How far all points are from the polyline through those in `rows`, mm."""
     after = np.clip(np.searchsorted(rows, np.arange(len(tips))), 1, len(rows) - 1)
-    return _from_line(tips, tips[rows[after - 1]], tips[rows[after]])
+    begin = tips[rows[after - 1]]
+    along = tips[rows[after]] - begin
+    size = np.maximum((along**2).sum(axis=1), 1e-12)
+    share = np.clip(((tips - begin) * along).sum(axis=1) / size, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(tips - begin - share[:, None] * along, axis=1))

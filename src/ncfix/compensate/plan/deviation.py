@@ -258,7 +258,7 @@ def _beside(written: WrittenPieces, chosen: Mask) -> PathSamples | None:
     moves = written.intent.moves
     if moves.beside is None:
         return None
-    last = np.searchsorted(written.pieces.move, np.arange(len(moves)), side="right") - 1
+    last = written.pieces.last
     found = beside_contours(written.intent, written.segments.rows(last))
     if found is None:
         return None
@@ -297,7 +297,7 @@ def _places(written: WrittenPieces, which: Index, counts: Index, along: Mask, ch
     """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
     many = counts + 1
     fraction = (places(many) + 1) / np.repeat(many, many)
-    begins = np.flatnonzero(written.opens[which])
+    begins = np.flatnonzero(written.before[which] == 0)
     looked_at = check_start[written.pieces.move[which[begins]]] & along[begins]
     begun = begins[looked_at | _leaps(written, which[begins])]
     extra = [(begun, np.full(len(begun), START))]

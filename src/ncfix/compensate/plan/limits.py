@@ -83,8 +83,7 @@ def increments_beyond_travel(machine: Machine, moves: Moves, pieces: Pieces, sta
     rows = np.flatnonzero(moves.incremental)
     if not rows.size or not pieces.unchanged.any():
         return rows[:0]
-    unchanged = np.zeros(len(moves), dtype=bool)
-    unchanged[pieces.move] = pieces.unchanged
+    unchanged = pieces.unchanged[pieces.first]
     written = WrittenPieces(Intent(machine, moves, state), pieces, start)
     beyond = _corrected_excess(written)
     if (beyond > FUZZ).any():
@@ -239,8 +238,7 @@ def _of_axes(written: WrittenPieces, code: str, text: str, beyond: Array) -> Fin
     machine, pieces = written.intent.machine, written.pieces
     if not (beyond > FUZZ).any():
         return Finding.of(code, np.zeros(0, dtype=np.intp), text)
-    unchanged = np.zeros(len(beyond), dtype=bool)
-    unchanged[pieces.move] = pieces.unchanged
+    unchanged = pieces.unchanged[pieces.first]
     axis = np.where(np.isnan(beyond), -np.inf, beyond).argmax(axis=1)
     most = beyond[np.arange(len(beyond)), axis]
     rows = np.flatnonzero((most > FUZZ) & ~unchanged)

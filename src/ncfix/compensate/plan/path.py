@@ -113,17 +113,13 @@ def assembled(
 
 def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
     """Shares of time: those of the fraction; a piece that only takes up a jump has the share of its way."""
-    before = np.zeros(len(pieces))
-    before[1:] = pieces.fraction[:-1]
-    first = offsets(counts)[:-1]
-    before[first] = 0.0
-    span = pieces.fraction - before
+    span = pieces.fraction - pieces.begun
     jumps = span < 2 * INSTANT
     if not jumps.any():
         return span
     start = np.empty_like(pieces.end)
     start[1:] = pieces.end[:-1]
-    start[first] = real.start
+    start[pieces.first] = real.start
     way = lengths(pieces.end - start)
     whole = np.repeat(sums(way, counts), counts)
     share = np.where(jumps, np.maximum(way / np.maximum(whole, 1e-300), LEAST_SHARE), span)

@@ -43,18 +43,9 @@ class WrittenPieces:
     start: Array
 
     @cached_property
-    def opens(self) -> Mask:
-        """Pieces with which a motion begins, (m,)."""
-        opens = np.ones(len(self.pieces), dtype=bool)
-        opens[1:] = np.diff(self.pieces.move) != 0
-        return opens
-
-    @cached_property
     def before(self) -> Array:
         """The fraction of the motion at which each piece starts, (m,)."""
-        before = np.zeros(len(self.pieces))
-        before[1:] = self.pieces.fraction[:-1]
-        return np.where(self.opens, 0.0, before)
+        return self.pieces.begun
 
     @cached_property
     def span(self) -> Array:
@@ -67,8 +58,7 @@ class WrittenPieces:
         pieces, moves = self.pieces, self.intent.moves
         start = np.empty_like(pieces.end)
         start[1:] = pieces.end[:-1]
-        opens = np.flatnonzero(self.opens)
-        put(start, opens, picked(self.start, pieces.move[opens]))
+        put(start, pieces.first, self.start)
         normal, sweep = picked(moves.normal, pieces.move), moves.sweep[pieces.move] * self.span
         arc = pieces.arc.copy()
         arc[arc] = finite(pieces.centre[arc])
@@ -253,14 +243,7 @@ def rounding_of_arcs(machine: Machine, sweep: Array) -> float:
 
 def _turns(moves: Moves, pieces: Pieces, rows: Index) -> Array:
     """By how much arcs among pieces turn, (k,) rad: each by its share of its motion."""
-    return moves.sweep[pieces.move[rows]] * (pieces.fraction[rows] - _begun(pieces)[rows])
-
-
-def _begun(pieces: Pieces) -> Array:
-    """(m,) the fraction of its motion at which each piece begins."""
-    begun = np.zeros(len(pieces))
-    begun[1:] = np.where(np.diff(pieces.move) == 0, pieces.fraction[:-1], 0.0)
-    return begun
+    return moves.sweep[pieces.move[rows]] * (pieces.fraction[rows] - pieces.begun[rows])
 
 
 def _rounding_of_turns(intent: Intent, pieces: Pieces, rows: Index) -> float:
@@ -275,7 +258,7 @@ def _rounding_of_turns(intent: Intent, pieces: Pieces, rows: Index) -> float:
         return 0.0
     most = 0.0
     for each in (on, np.minimum(on + 1, len(pieces) - 1)):  # those that end there, and those that begin there
-        move, first = pieces.move[each], _begun(pieces)[each] == 0
+        move, first = pieces.move[each], pieces.begun[each] == 0
         start = np.where(first[:, None], picked(moves.start, move), picked(pieces.end, np.maximum(each - 1, 0)))
         way = np.nan_to_num(np.abs(picked(pieces.end, each) - start))
         arm = reach(intent, move) * way[:, rotary].sum(axis=1)
