@@ -86,22 +86,26 @@ class MotionBuilder:
         self.axes = axes
         self.rotary = np.array([axis in rotary for axis in axes], dtype=np.bool_)
         self.columns = [INDEX[axis] for axis in axes]
-        self.count = 0
-        self._buffer = Buffer()
-        self._stretches: list[MotionColumns] = []
         self._styles: dict[MotionStyle, int] = {}
         self._reasons: dict[str, int] = {"": 0}
         self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
+        self._calls: dict[CycleCall, int] = {}
+        self.rolls: NDArray[np.bool_] | None = None
+        self.winding: Winding | None = None
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the motions so far; styles, reasons, frames and calls keep their numbers."""
+        self.count = 0
+        self._buffer = Buffer()
+        self._stretches: list[MotionColumns] = []
         self._arcs: dict[int, Arc] = {}
         self._circles: list[Circles] = []
         self._approaches: dict[int, list[float]] = {}
-        self._calls: dict[CycleCall, int] = {}
         self._called: dict[int, int] = {}
         self._counted: dict[int, int] = {}
         self._resting: dict[int, int] = {}
         self._measured: dict[int, int] = {}
-        self.rolls: NDArray[np.bool_] | None = None
-        self.winding: Winding | None = None
         self._directed: list[tuple[int, int, int]] = []
         self.overturned: int | None = None
         self.brought_back: int | None = None
@@ -274,13 +278,6 @@ class MotionBuilder:
             calls=tuple(self._calls),
             **styles,
         )
-
-    def clear(self) -> None:
-        """Forget the motions so far; styles, reasons, frames and calls keep their numbers."""
-        self.count, self._called = 0, {}
-        self.overturned = self.brought_back = None
-        self._directed, self._resting, self._circles, self._measured = [], {}, [], {}
-        self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
         """The columns of what styles hold, one row per motion."""

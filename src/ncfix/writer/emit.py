@@ -150,7 +150,7 @@ class _Emitter:
             self._resync(row)
             self.start[row] = self.position
             if self.pieces.unchanged[self.first_piece[row]]:
-                self._keep(row)
+                self._leave(row)
             else:
                 self._write(row)
             if self.kind[row] == MotionKind.CYCLE:
@@ -208,7 +208,7 @@ class _Emitter:
     def _written(self, row: int) -> FloatArray:
         """Write a motion by itself from its start on; the command at its end."""
         self.position, self.replaced = self.start[row], None
-        (self._keep if self.pieces.unchanged[self.first_piece[row]] else self._write)(row)
+        (self._leave if self.pieces.unchanged[self.first_piece[row]] else self._write)(row)
         return np.asarray(self.position)
 
     def _write_centres(self) -> None:
@@ -247,7 +247,7 @@ class _Emitter:
         self.position = np.where(back & ~risen, self.start[row], self.position)
         self.jumps[row + 1] &= ~(back | risen)
 
-    def _keep(self, row: int) -> None:
+    def _leave(self, row: int) -> None:
         moves = self.moves
         if self.forgets[row]:
             self.levels.forget()
@@ -255,12 +255,12 @@ class _Emitter:
         if began is not None and ended is not None:  # a departure goes on along a line that is now a corrected one
             moved = moved | (np.abs(ended[row] - began[row]) > 0)
         passed = passed_through(moves, row, self.position, self.kinematics) if began is None else None
-        self.position = np.where(moved, self._kept_end(row), self.position) if passed is None else passed
+        self.position = np.where(moved, self._unchanged_end(row), self.position) if passed is None else passed
         self.end[self.first_piece[row]] = self.position
         if self.relies[row]:
             self._check_code(row)
 
-    def _kept_end(self, row: int) -> FloatArray:
+    def _unchanged_end(self, row: int) -> FloatArray:
         moves = self.moves
         if self.reading.end is not None:
             return np.asarray(self.reading.end[row])
@@ -288,7 +288,7 @@ class _Emitter:
         layout = self._layout(block)
         if layout is None:
             self.conflicts.setdefault(block, FLOW)
-            self._keep(row)
+            self._leave(row)
             return
         rows = slice(self.first_piece[row], self.first_piece[row + 1])
         target = self._target(row, rows)

@@ -175,7 +175,7 @@ def _with(around: PartEnd | None, machine: Machine, moves: Moves, lines: Index) 
 
 UNLIKE = 0.02
 """Paths whose lengths differ by more than this share are not the same cut."""
-KEPT = 100.0
+AT_HAND = 100.0
 """mm of path before and behind a place that are at hand: enough for whatever is less than 2 mm off."""
 GROUP = 2048
 """Parabolas from which one looks together, counted from where the path begins: the same however it is read."""
@@ -266,7 +266,7 @@ class Match:
         curve, other = self.path.curve, self.other
         start, stop = self.done - self.path.dropped, len(curve)
         if not other.complete:
-            stop = int(np.searchsorted(curve.lengths + curve.ways, other.reached - self.ahead - 2 * KEPT))
+            stop = int(np.searchsorted(curve.lengths + curve.ways, other.reached - self.ahead - 2 * AT_HAND))
         if stop < len(curve) or not self.path.complete:
             stop = min(stop, len(curve) - 1)  # what goes on at its end is to be known
             stop -= (stop - start) % GROUP
@@ -304,7 +304,7 @@ class Match:
     @property
     def first_needed(self) -> float:
         """The way along the other path before which nothing of it will be looked at any more."""
-        return self.looked_at + self.ahead - 2 * KEPT
+        return self.looked_at + self.ahead - 2 * AT_HAND
 
 
 @dataclass(slots=True)

@@ -58,7 +58,8 @@ class WrittenPieces:
         pieces, moves = self.pieces, self.intent.moves
         start = np.empty_like(pieces.end)
         start[1:] = pieces.end[:-1]
-        put(start, pieces.first, self.start)
+        first = pieces.first
+        put(start, first, picked(self.start, pieces.move[first]))
         normal, sweep = picked(moves.normal, pieces.move), moves.sweep[pieces.move] * self.span
         arc = pieces.arc.copy()
         arc[arc] = finite(pieces.centre[arc])
