@@ -241,7 +241,7 @@ class Tally:
         self.largest = max(self.largest, largest)
         self.changed |= len(solution.emission.splices) > 0
         self._look_at_numbers(program, solution)
-        for finding in solution.plan.findings:
+        for finding in (*solution.plan.findings, *in_inverse_time(solution)):
             self.found.add(finding, program, solution.moves)
 
     def _look_at_numbers(self, program: Program, solution: WrittenPlan, own: Mask | bool = True) -> None:
