@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import inspect
 import math
+import pickle
 import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -324,3 +326,54 @@ def test_what_was_assumed_is_said(program: Program) -> None:
     assert ncfix.verify(program, program, "machine.toml", setup=SETUP).messages == assumed
     fixed = ncfix.read_program(text=ncfix.fix(program, "machine.toml", setup=SETUP).text, dialect="linuxcnc")
     assert ncfix.simulate(fixed, "machine.toml", setup=SETUP).messages[0].code == "NCF430"
+
+
+def test_what_is_no_value_of_the_type_is_named(shop: Path, program: Program) -> None:
+    text = "G21 G90 G54\nG0 X0.\nM30\n"
+    calls: list[Callable[[], object]] = [
+        lambda: ncfix.fix(text, "machine.toml", setup=SETUP),
+        lambda: ncfix.fix(text.encode(), "machine.toml", setup=SETUP),  # type: ignore[call-overload, arg-type]
+        lambda: ncfix.load_machine(Path("machine.toml").read_text()),
+        lambda: ncfix.fix(program, None, setup=SETUP),  # type: ignore[arg-type]
+        lambda: ncfix.fix(program, "machine.toml", setup={"work_offsets": {}}),  # type: ignore[arg-type]
+        lambda: ncfix.verify(program, ncfix.fix(program, "machine.toml", setup=SETUP), "machine.toml", setup=SETUP),  # type: ignore[arg-type]
+        lambda: ncfix.report(5),  # type: ignore[arg-type]
+    ]
+    for call in calls:
+        with pytest.raises(TypeError, match="is needed"):
+            call()
+    with pytest.raises(UsageError, match=r"Tool\(length=120.0\)"):
+        ncfix.fix(program, "machine.toml", setup=Setup(tools={1: 120.0}, assume_zero=True))  # type: ignore[dict-item]
+
+
+def test_results_are_compared_and_pickled(shop: Path, program: Program, measured: Measurement) -> None:
+    machine = ncfix.load_machine("machine.toml")
+    results: list[Any] = [
+        machine,
+        program,
+        measured,
+        ncfix.fix(program, machine, setup=SETUP),
+        ncfix.simulate(program, machine, setup=SETUP),
+        ncfix.verify(program, program.source, machine, setup=SETUP),
+        ncfix.plan(machine, count=6, effects="EXX,EYY"),
+        ncfix.export("linuxcnc", machine, tool_length=100.0),
+        ncfix.calibrate(measured, machine, effects="EXX"),
+    ]
+    for result in results:
+        again = pickle.loads(pickle.dumps(result))
+        assert type(again) is type(result)
+        assert (again == result) in (True, False)
+        assert result == result
+
+
+def test_threads_do_not_disturb_each_other(shop: Path) -> None:
+    machine = ncfix.load_machine("machine.toml")
+    lines = "".join(f"X{k % 97}.{k % 10} Y{k % 53}.5\n" for k in range(800))
+    texts = [f"G21 G90 G54\nG0 X0. Y0. Z{k}.\nG1 Z-1. F{k + 100}\n{lines}M30\n" for k in range(4)]
+
+    def fixed(text: str) -> bytes:
+        return ncfix.fix(ncfix.read_program(text=text), machine, setup=SETUP).text
+
+    alone = [fixed(text) for text in texts]
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(fixed, texts * 2)) == alone * 2

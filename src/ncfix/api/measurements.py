@@ -72,7 +72,7 @@ def plan(
     return found
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Calibrated:
     """What measurements say of the errors of a machine.
 

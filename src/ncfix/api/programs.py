@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 from ncfix.api.sources import (
     PathName,
     as_machine,
+    as_path,
     as_program,
     as_setup,
     check_writable,
@@ -116,10 +117,10 @@ def verify(
     if isinstance(fixed, bytes):
         second = read_program(text=fixed, dialect=first.dialect)
     elif isinstance(fixed, (str, os.PathLike)):
-        path = os.fspath(fixed)
+        path = as_path(fixed)
         second = read_like(read_bytes(path), path, first, known.control or "")
     else:
-        second = fixed
+        second = as_program(fixed, known)
     resolves = subprograms_of(own, first), subprograms_of(own, second, first)
     found = Compared.of_all(*side_by_side(first, second, known, own, tolerance_um, resolves))
     return replace(found, messages=(*_remark_of_stamp(first), *found.messages))
@@ -134,7 +135,7 @@ def _remark_of_stamp(program: Program) -> Iterator[Message]:
         yield stamp.remark(program.place(block))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PathErrors:
     """How far the tool tip of a machine is from where a program means it to be, n samples along the path.
 

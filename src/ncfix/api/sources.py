@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ncfix.arguments import FINITE, OFFSET_AXES, check_choice
 from ncfix.batch.programs import subprograms
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     Measured = Measurement | str | os.PathLike[str]
 
 PathName = str | os.PathLike[str]
+Value = TypeVar("Value")
 ONE_SOURCE = "a path or a text is needed, and not both"
 
 
@@ -32,7 +33,7 @@ def load_machine(source: PathName | None = None, *, text: str | None = None) -> 
     from ncfix.machine import load, loads
 
     if source is not None and text is None:
-        return load(os.fspath(source))
+        return load(as_path(source))
     if text is not None and source is None:
         return loads(text)
     raise TypeError(ONE_SOURCE)
@@ -55,7 +56,7 @@ def read_program(
     from ncfix.text.reader import read
 
     if source is not None and text is None:
-        path = os.fspath(source)
+        path = as_path(source)
         content = read_bytes(path)
     elif text is not None and source is None:
         path = "<program>"
@@ -66,9 +67,25 @@ def read_program(
     return read(content, path, chosen)
 
 
+def as_path(source: PathName) -> str:
+    """A path; raises TypeError for a text, which has several lines, and for what is no path."""
+    path = os.fspath(source)
+    if isinstance(path, bytes) or "\n" in path:
+        raise TypeError("a path is needed, and this is a text; read_program and load_machine take one as text=...")
+    return path
+
+
 def as_machine(machine: Machine | PathName) -> Machine:
-    """A machine, or that of a file."""
-    return load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
+    """A machine, or that of a file; raises TypeError for anything else."""
+    from ncfix.machine import Machine
+
+    return load_machine(machine) if isinstance(machine, (str, os.PathLike)) else _checked(machine, Machine)
+
+
+def _checked(value: Any, kind: type[Value]) -> Value:
+    if not isinstance(value, kind):
+        raise TypeError(f"a {kind.__name__} or the path of a file is needed, not {type(value).__name__}")
+    return value
 
 
 def sound_machine(machine: Machine | PathName, force: bool) -> Machine:
@@ -83,25 +100,32 @@ def sound_machine(machine: Machine | PathName, force: bool) -> Machine:
 
 
 def as_program(program: Program | PathName, machine: Machine) -> Program:
-    """A program, or that of a file, for this machine's control if it does not show its language."""
-    return read_program(program, machine=machine) if isinstance(program, (str, os.PathLike)) else program
+    """A program, or that of a file, for this machine's control if it does not show its language.
+
+    Raises TypeError for anything else.
+    """
+    from ncfix.text.tree import Program
+
+    if isinstance(program, (str, os.PathLike)):
+        return read_program(program, machine=machine)
+    return _checked(program, Program)
 
 
 def as_setup(setup: Setup | PathName | None, machine: Machine) -> Setup:
     """A set-up, or that of a file; without one nothing is given.
 
     Raises `UsageError` NCF025 for a value that is not finite and for an axis that there is not, NCF384 for work
-    offsets in the order of the machine's axes.
+    offsets in the order of the machine's axes, TypeError for what is no set-up.
     """
     if setup is None:
         return Setup()
-    if isinstance(setup, Setup):
-        _check_values(setup)
-        own = setup
-    else:
+    if isinstance(setup, (str, os.PathLike)):
         from ncfix.control.setup_file import load
 
-        own = load(os.fspath(setup))
+        own = load(as_path(setup))
+    else:
+        own = _checked(setup, Setup)
+        _check_values(own)
     check_offsets(own, machine.axis_names)
     return own
 
@@ -115,6 +139,9 @@ def _check_values(setup: Setup) -> None:
         for axis in values:
             check_choice(f"{where}: axis", axis, OFFSET_AXES)
     tools: list[tuple[object, Tool]] = [*setup.tools.items(), *setup.named_tools.items()]
+    for name, tool in tools:
+        if not isinstance(tool, Tool):
+            raise UsageError.of("NCF025", f"tools[{name!r}]={tool!r}", hint=f"Tool(length={tool!r})")
     lengths = {name: tool.length for name, tool in tools if tool.length is not None}
     radii = {name: tool.radius for name, tool in tools if tool.radius is not None}
     named: dict[str, Mapping[Any, float]] = {**by_axis, "variables": setup.variables, "inputs": setup.inputs}

@@ -240,4 +240,5 @@ def _sections(source: Machine | Diagnosis | Mapping[str, Any] | PathName) -> lis
         return list(document(source).sections)
     if isinstance(source, Mapping):
         return result_sections(dict(source), "result")
-    return machine_sections(source, source.name)
+    machine = as_machine(source)
+    return machine_sections(machine, machine.name)

@@ -120,7 +120,7 @@ class Case:
         return ~self.outlying[np.maximum(self.data.row, 0)] & (self.data.row >= 0)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Diagnosis:
     """What was found, and everything a report needs.
 

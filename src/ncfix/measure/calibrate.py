@@ -221,7 +221,7 @@ def _what(combination: Combination, held: str, names: Sequence[str]) -> str:
 # -- how well the tip is known -----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
     """The standard deviation of the predicted tip error, um, the largest of three directions at each pose.
 

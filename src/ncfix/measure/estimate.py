@@ -188,7 +188,7 @@ class Problem:
         return columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Calibration:
     """A calibrated machine and how well it is known.
 

@@ -111,7 +111,7 @@ CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
 """What a header line may say, by kind; the first is the default."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurement:
     """One measurement file.
 

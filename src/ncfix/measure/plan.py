@@ -53,7 +53,7 @@ WORTHWHILE = 5e-3
 READ = dict(zip("XYZ", ("mx", "my", "mz"), strict=True))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Planned:
     """A plan and how good it is.
 

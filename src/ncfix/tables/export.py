@@ -138,7 +138,7 @@ class ProgramWithTables:
         return {"path": self.path, **figures, "remarks": self.remarks}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Exported:
     """Files with what they leave.
 

@@ -256,7 +256,7 @@ class Template:
 # -- the program ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Program:
     """An NC program, lossless. One row per block (a line of the source, or several where the dialect continues lines).
 
