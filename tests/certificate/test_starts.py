@@ -125,3 +125,16 @@ def test_what_is_not_followed_in_klartext_is_not_proved(line: str, instead: str,
     changed = text.replace(line, instead).encode()
     proof = prove(changed, changed, machine("table"), given)
     assert reason in proof.reasons
+
+
+def test_between_a_tool_change_and_the_next_length_offset_nothing_is_called_faulty() -> None:
+    text = (
+        b"G21 G90 G17 G54\nT1 M6\nG0 X10. Y20. A0. C0.\nG43 H1 Z30.\nG1 Z5. F300.\nG0 Z30.\nT2 M6\n"
+        b"G0 X-20. Y5. A-30. C90.\nG43 H2 Z30.\nG1 X15. Y10. Z5.\nG0 Z30.\nM30\n"
+    )
+    initial = dict.fromkeys("XYZAC", 0.0)
+    setup = Setup(work_offsets={"G54": {}}, tools={1: Tool(120.0), 2: Tool(60.0)}, initial=initial)
+    given = Given(offsets={"G54": {}}, tools={1: 120.0, 2: 60.0}, initial=initial)
+    fixed = fix_program(read(text, "part", get("fanuc")), machine("table"), setup, FixOptions(verify=False)).text
+    proof = prove(text, fixed, machine("table"), given, "fanuc")
+    assert (proof.faults, proof.lines["the length of the tool is not known"]) == ([], [8])

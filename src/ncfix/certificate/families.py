@@ -278,7 +278,7 @@ class WordAddressFollower(AxisFollower):
             self.lost["H"] = "a length offset is a formula"
         if self.tcp and tcp:
             self.at.update(dict.fromkeys("XYZ", NAN))  # the same place has other numbers for another tool
-        self.tool = tool
+        self.tool, self.between = tool, False
         self.lead(tcp)
         self.new_length(self.length_of(tool))
 

@@ -74,6 +74,8 @@ class AxisFollower:
         self.next_tool: int | str = 0
         self.length: float | None = 0.0
         """The tool length that is in force in coordinates."""
+        self.between = False
+        """The length offset in force is not of the tool in the spindle: which of them counts is not sure."""
         self.tcp = given.tcp
         self.beside = False
         self.feed: float | None = None
@@ -147,13 +149,12 @@ class AxisFollower:
         klartext = self.family is Family.KLARTEXT
         if not klartext and (self.kind is None or self.kind > Kind.FEED) and lines.code[row] < 0:
             return None
-        length = self.length_of(self.tool)
         modes = ModesInForce(
             np.array([self.offset(axis) for axis in self.axes]),
             np.array([self.scale(axis) for axis in self.axes]),
             self.counting,
             self.tcp,
-            NAN if length is None else length,
+            self.tip_length(),
             self.feed_mode,
             self.unit,
             self.beside,
@@ -210,6 +211,11 @@ class AxisFollower:
         found = self.given.tools.get(tool)
         return 0.0 if found is None and self.given.assume_zero else found
 
+    def tip_length(self) -> float:
+        """How long the tool is whose tip is looked at, mm; NaN if that is not known."""
+        length = None if self.between else self.length_of(self.tool)
+        return NAN if length is None else length
+
     def lead(self, on: bool) -> None:
         """Tool-centre-point control goes on or off: the same place has other numbers."""
         if on == self.tcp:
@@ -218,8 +224,7 @@ class AxisFollower:
             self.lost["shift"] = "a shift under tool-centre-point control"
         self.tcp = on
         known = [self.at[axis] for axis in self.axes]
-        length = self.length_of(self.tool)
-        numbers = self.turned(known, NAN if length is None else length, on)
+        numbers = self.turned(known, self.tip_length(), on)
         self.at.update(zip(self.axes, numbers, strict=True))
         self.unsay("XYZ")
 
@@ -257,7 +262,6 @@ class AxisFollower:
             why = "a word is a formula"
         if not why:
             why = next(iter(self.lost.values()), "")
-        length = self.length_of(self.tool)
         step = AxisStep(
             row,
             kind,
@@ -267,7 +271,7 @@ class AxisFollower:
             named,
             why,
             self.tcp,
-            NAN if length is None else length,
+            self.tip_length(),
             self.feed,
             self.feed_mode,
             self.unit,
@@ -291,7 +295,6 @@ class AxisFollower:
             else:
                 at[name] = self.offset(name) + scaled
                 said[name] = True
-        length = self.length_of(self.tool)
         return AxisStep(
             row,
             self.kind or Kind.RAPID,
@@ -301,7 +304,7 @@ class AxisFollower:
             named,
             "",
             self.tcp,
-            NAN if length is None else length,
+            self.tip_length(),
             self.feed,
             self.feed_mode,
             self.unit,
@@ -344,6 +347,7 @@ class AxisFollower:
         """An M word."""
         match word.value:
             case 6:
+                self.between = self.family is Family.WORDS and bool(self.length) and self.next_tool != self.tool
                 self.tool = self.next_tool
                 if self.family is Family.SINUMERIK:
                     self.new_length(self.length_of(self.tool))
@@ -359,7 +363,7 @@ class AxisFollower:
 
     def new_length(self, length: float | None) -> None:
         """Another tool length is in force in coordinates."""
-        self.length = length
+        self.length, self.between = length, False
         self.unsay("XYZ")
 
 
