@@ -34,10 +34,12 @@ if TYPE_CHECKING:
     from ncfix.control.operations import ALL_AXES as ALL_AXES
     from ncfix.control.operations import Like as Like
     from ncfix.control.operations import Lose as Lose
+    from ncfix.control.operations import MakeUp as MakeUp
     from ncfix.control.operations import Operation as Operation
     from ncfix.control.operations import Rapid as Rapid
     from ncfix.control.operations import Refuse as Refuse
     from ncfix.control.operations import Resume as Resume
+    from ncfix.control.operations import SetLength as SetLength
     from ncfix.control.operations import SetTool as SetTool
     from ncfix.control.operations import Suspend as Suspend
     from ncfix.control.operations import like as like
@@ -94,7 +96,8 @@ if TYPE_CHECKING:
 HERE = ("FOREIGN", "TURNING", "CycleTable", "Dialect", "Register", "family", "hookimpl", "made_by")
 ELSEWHERE = {
     "ncfix.control.operations": (
-        *("ALL_AXES", "Like", "Lose", "Operation", "Rapid", "Refuse", "Resume", "SetTool", "Suspend"),
+        *("ALL_AXES", "Like", "Lose", "MakeUp", "Operation", "Rapid", "Refuse", "Resume", "SetLength", "SetTool"),
+        "Suspend",
         "like",
     ),
     "ncfix.diagnostics": (

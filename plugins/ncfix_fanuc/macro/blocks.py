@@ -15,28 +15,25 @@ import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from lark import Token, UnexpectedInput
+from lark import Token
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.text.build import (
     Branch,
     Node,
     Parsed,
-    TooDeepError,
     TreeBuilder,
-    build,
     check_exponents,
     check_numbers,
     edges,
     kind,
 )
 from ncfix.text.dialect import Dialect
-from ncfix.text.faults import BlockError, explain
-from ncfix.text.grammar import parse, squeeze
+from ncfix.text.grammar import squeeze
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
 from ncfix.text.tree import Binary, Expression, Item, Literal, OWordLine, Program, Template, Word
 from ncfix_iso.rs274.groups import NON_MODAL, ROTATION
-from ncfix_iso.rs274.language import check_repeats
+from ncfix_iso.rs274.language import check_repeats, parsed_words
 from ncfix_iso.rs274.order import DWELL
 
 if TYPE_CHECKING:
@@ -105,13 +102,7 @@ CALLS = frozenset({650, 660, 661})
 def parse_block(dialect: Dialect, text: str) -> Parsed:
     """One block; raises `BlockError`."""
     squeezed = squeeze(text, PIECE)
-    try:
-        parsed = build(parse(dialect, squeezed.code), text, squeezed, MacroBuilder)
-    except UnexpectedInput as error:
-        raise explain(error, text, squeezed) from None
-    except TooDeepError as error:
-        place = squeezed.places[error.position]
-        raise BlockError("NCF118", "the expression is nested too deep, or too long", place) from None
+    parsed = parsed_words(dialect, text, squeezed, MacroBuilder)
     check_numbers(parsed)
     if CALLS.isdisjoint(parsed.template.g_codes):
         check_exponents(parsed, text)

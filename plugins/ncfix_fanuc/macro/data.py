@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of
+from ncfix.control.coordinates import DEGREE, LETTERS, Z, mask_of
 from ncfix.control.expressions import Unknown, Value, nominal
-from ncfix.control.moves import Motion, MotionEnd, MotionKind
+from ncfix.control.operations import make_up
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.systems import (
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 WORK_OFFSETS = 6
 FIRST_EXTENDED, ALL_EXTENDED = 1100, 1540
-AFTER_MADE = "where the axis {} stands after motions that the control makes up is not followed"
 MADE = {
     470: "engraving of text (G47)",
     120: "a circular pocket (G12)",
@@ -84,10 +83,7 @@ def setting_error(control: RS274Control, block: Block, code: int) -> None:
 
 def made(control: RS274Control, block: Block, code: int) -> None:
     """A text or a pocket that the control mills by itself, and the way back from a reference point."""
-    led = (X, Y, Z, *control.turning) if code == SQUARE else (X, Y, Z)
-    gone = {index for index in control.machine if block.axes >> index & 1 or index in led}
-    unknown = control.unknown | dict.fromkeys(sorted(gone), AFTER_MADE)
-    control.make(Motion(MotionKind.FEED, block.axes, MotionEnd(control.position[:], unknown), 0, refusal=MADE[code]))
+    make_up(control, block, MADE[code], control.turning if code == SQUARE else ())
 
 
 def set_data(control: MacroControl, block: Block, code: int) -> None:

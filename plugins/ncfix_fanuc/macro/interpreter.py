@@ -35,7 +35,6 @@ NOT_SET = "NCF244"
 BY_ANGLE = "a line that is given by its angle (,A) is not followed"
 AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
 MODAL_CALL = "G66 calls the program O{}, which is not at hand, so the program cannot be written out flat"
-COMMAND_NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
 
 
@@ -131,7 +130,6 @@ class MacroInterpreter(RS274Interpreter):
                 self.watcher.whole(self.flow.unit, index)
             return False
         self.control.entering = False
-        self.note_command(plan)
         plan = self.without_vacant(plan)
         codes = plan.codes
         if codes is not None and codes.g.get(MACRO) and plan.fault is None:
@@ -155,14 +153,6 @@ class MacroInterpreter(RS274Interpreter):
         plane = self.control.modal.plane
         missing = [index for index in (plane.first, plane.second) if LETTERS[index] not in plan.letters]
         self.control.lose(missing, AFTER_ANGLE)
-
-    def note_command(self, plan: RS274Plan) -> None:
-        """A command of a machine's own: nobody knows what it does."""
-        for item in plan.template.items:
-            if isinstance(item, Opaque) and item.kind == "unknown command" and not self.control.refusal:
-                text = self.flow.unit.program.slice(self.flow.block - 1, item.span).strip()
-                self.control.refusal = COMMAND_NOT_KNOWN.format(text.split()[0][:30])
-                self.control.warn("NCF228", self.control.refusal, "all motions after it are refused")
 
     def without_vacant(self, plan: RS274Plan) -> RS274Plan:
         """The plan without the words whose value is a vacant variable: they count as not written."""

@@ -27,6 +27,9 @@ PASSING = frozenset(
 """Of a control: what never changes, what `lasting` looks into or a checkpoint says, and what each block sets anew."""
 
 
+LENGTH_CODE = 430
+"""G43."""
+
 POLAR = frozenset("@^")
 """Addresses that together stand for X and Y."""
 
@@ -143,6 +146,14 @@ class RS274Control(shared.ProgramControl):
             (system, own[i], tool[i], self.spatial_anchor(i) if i < len(self.rotation) else None)
             for i in range(len(LETTERS))
         ]
+
+    def take_length(self, number: int) -> None:
+        """See `ProgramControl`: as G43 with an H."""
+        from ncfix_iso.rs274.settings import tool_offset
+
+        (self.rules.steps.get(LENGTH_CODE) or tool_offset)(
+            self, Block(0, {"H": float(number)}, frozenset(), 0), LENGTH_CODE
+        )
 
     def deciding(self, function: Evaluate) -> float:
         """A value that decides where to go on; where it is known only at run time nothing after it is certain."""

@@ -64,6 +64,7 @@ POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
 COMPUTED_ALIAS = "the code {} is computed, and takes words under other addresses than the code it stands for"
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 UNREADABLE = "NCF236"
+NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
 DWELL_TIME = "PUX"
 """The words of G4 on ISO controls; beside P, X is a motion to some."""
 
@@ -135,6 +136,8 @@ class RS274Interpreter(Interpreter[RS274Unit]):
 
     def execute(self, plan: RS274Plan, unit: RS274Unit, block: int) -> bool:
         """Execute a block; True if the program ends there."""
+        if plan.unknown_text is not None:
+            self.note_unknown(plan.unknown_text)
         if plan.tape:
             if self.watcher:
                 self.watcher.whole(unit, block)
@@ -287,6 +290,13 @@ class RS274Interpreter(Interpreter[RS274Unit]):
                 lathe = letter in "UVW" and not control.rules.strict
                 control.note_foreign(letter, INCREMENTS if lathe else "")
         self.span = None
+
+    def note_unknown(self, span: Span) -> None:
+        """A command of a machine's own, or text of a plugin's grammar: nobody knows what it does."""
+        if not self.control.refusal:
+            text = self.flow.unit.program.slice(self.flow.block - 1, span).strip()
+            self.control.refusal = NOT_KNOWN.format(text.split()[0][:30])
+            self.control.warn("NCF228", self.control.refusal, "all motions after it are refused")
 
     def command(self, span: Span) -> None:
         """A command to the control itself: homing and jogging move the machine."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from functools import cached_property
 
 from ncfix.text.dialect import Dialect
+from ncfix.text.grammar import parser
 from ncfix.text.tree import Word
 from ncfix.writer.block import BlockWriter
 
@@ -18,6 +19,11 @@ NO_KEYWORD = "the correction needs a word for {}, and the language has none"
 def has_keywords(dialect: Dialect) -> bool:
     """Whether blocks of a dialect look otherwise than letters with numbers."""
     return bool(dialect.keywords or dialect.assign or dialect.signed)
+
+
+def reads_codes(dialect: Dialect) -> bool:
+    """Whether blocks of a dialect may have G codes as well as its keywords."""
+    return any(terminal.name.endswith("CODE") for terminal in parser(dialect.grammar).terminals)
 
 
 class KeywordWriter(BlockWriter):
@@ -36,6 +42,8 @@ class KeywordWriter(BlockWriter):
         if not self.program.dialect.keywords:
             return super()._cased("G") + number
         word = self.spelled.get(f"G{number}", "")
+        if not word and reads_codes(self.program.dialect):
+            return super()._cased("G") + number
         if not word:
             self.out.conflict = self.out.conflict or NO_KEYWORD.format(f"G{number}")
         return word

@@ -8,12 +8,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lark import UnexpectedInput
+from lark import Tree, UnexpectedInput
 
 from ncfix.control.interpreter import RUNTIME
 from ncfix.diagnostics import SourceError
 from ncfix.plugins import working
-from ncfix.text.build import Parsed, TooDeepError, build, check_exponents, check_numbers, start_of
+from ncfix.text.build import (
+    Branch,
+    Parsed,
+    TooDeepError,
+    TreeBuilder,
+    build,
+    check_exponents,
+    check_numbers,
+    kind,
+    start_of,
+)
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, bare_expression, explain
 from ncfix.text.grammar import UnspacedBlock, parse, squeeze
@@ -38,6 +48,8 @@ if TYPE_CHECKING:
 MAY_REPEAT = frozenset("GM")
 """The addresses that may stand several times in a block."""
 
+NO_TREE = "the grammar has to make a tree of words and values, as common.lark does, and made"
+
 PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
 """A parameter, and behind it outside brackets what a check number looks like."""
 
@@ -45,21 +57,36 @@ PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
 def parse_block(dialect: Dialect, text: str) -> Parsed:
     """One block, by the grammar and the rules that a grammar cannot say; raises `BlockError`."""
     squeezed = squeeze(text)
-    try:
-        parsed = build(parse(dialect, squeezed.code), text, squeezed, keywords=dialect.keywords)
-    except UnexpectedInput as error:
-        raise explain(error, text, squeezed) from None
-    except TooDeepError as error:
-        place = squeezed.places[error.position]
-        raise BlockError("NCF118", "the expression is nested too deep, or too long", place) from None
-    except (LookupError, AttributeError, TypeError, ValueError) as error:
-        with working("dialects", dialect.name):  # of a plugin's own grammar
-            raise ValueError(f"{Path(dialect.grammar).name}: no tree of words and values: {text.strip()!r}") from error
+    parsed = parsed_words(dialect, text, squeezed)
     check_products(squeezed)
     check_numbers(parsed)
     check_exponents(parsed, text)
     check_repeats(parsed, standby=dialect.semantics != "linuxcnc")
     return parsed
+
+
+def parsed_words(
+    dialect: Dialect, text: str, squeezed: UnspacedBlock, maker: type[TreeBuilder] | None = None
+) -> Parsed:
+    """One block, by the grammar alone; raises `BlockError`, and NCF507 where a plugin's grammar makes no such tree."""
+    try:
+        tree = parse(dialect, squeezed.code)
+    except UnexpectedInput as error:
+        raise explain(error, text, squeezed) from None
+    try:
+        return build(tree, text, squeezed, maker, dialect.keywords)
+    except TooDeepError as error:
+        place = squeezed.places[error.position]
+        raise BlockError("NCF118", "the expression is nested too deep, or too long", place) from None
+    except (AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
+        with working("dialects", dialect.name):
+            raise ValueError(f"{Path(dialect.grammar).name}: {NO_TREE} {shown(tree)}, from {text.strip()!r}") from error
+
+
+def shown(tree: Branch) -> str:
+    """A tree in one line: word(ADDRESS X, literal(NUMBER 1))."""
+    inside = (shown(each) if isinstance(each, Tree) else f"{kind(each)} {each}" for each in tree.children)
+    return f"{kind(tree)}({', '.join(inside)})"
 
 
 def check_products(squeezed: UnspacedBlock) -> None:

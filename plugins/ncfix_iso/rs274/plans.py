@@ -15,6 +15,7 @@ from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.expressions import Evaluate, Fault
 from ncfix.control.interpreter import TextUnit
 from ncfix.control.lanes.lane_tables import Lane
+from ncfix.control.operations import source
 from ncfix.control.state import NO_MOTION
 from ncfix.text.dialect import tenths
 from ncfix.text.reach import UNREAD, Deletable, deletable
@@ -59,6 +60,9 @@ MAX_M_CODES = 4
 
 AXES_TAKEN = frozenset((100, 220, 280, 300, 310, 501, 510, 511, 520, 600, 680, 682, 683, 684, 920))
 """G codes that take the axis words of their block for themselves, so that it has no motion."""
+
+HARMLESS_TEXT = frozenset({UNREAD, "checksum", "command", "control character", "output", "program name", "text word"})
+"""The terminals of the grammars, as kinds of `Opaque`, that lead no axis by themselves; any other text may."""
 
 FIRST_SYSTEM, EXTENDED_SYSTEM = 540, 541
 """G54, and what ISO controls make of it where the block has a P: G54.1 Pn."""
@@ -114,6 +118,7 @@ class RS274Plan:
     tape         the block is a `%`
     unread       the block could not be read
     command      where a command to the control itself stands (`$H` of Grbl)
+    unknown_text  where a text stands of which nobody knows what it does
     axes         bit mask of the axis words
     fault        what is wrong with the codes, raised when the block runs
     lane         set if the block may go through the fast lane
@@ -132,6 +137,7 @@ class RS274Plan:
     skip: Deletable | None = None
     tape: bool = False
     command: Span | None = None
+    unknown_text: Span | None = None
     unread: bool = False
     axes: int = 0
     letters: frozenset[str] = frozenset()
@@ -208,8 +214,8 @@ def take_aliases(plan: RS274Plan, rules: Rules) -> None:
     """Words that a code of the dialect's own gives to the code of the family that it stands for."""
     codes = [(w.address, round(10 * w.value.value)) for w in plan.template.words if isinstance(w.value, Constant)]
     for code in codes:
-        given = dict(rules.aliases[code].words) if code in rules.aliases else {}
-        family = {own: address for address, own in given.items() if isinstance(own, str)}
+        given = {address: source(own) for address, own in rules.aliases[code].words} if code in rules.aliases else {}
+        family = {own: address for address, (own, _) in given.items() if own is not None}
         untouched = plan.letters - family.keys()
         if untouched & given.keys():
             plan.fault = Fault(CONFLICT, f"{min(untouched & given.keys())} is no word of {code[0]}{code[1] / 10:g}")
@@ -217,7 +223,11 @@ def take_aliases(plan: RS274Plan, rules: Rules) -> None:
         plan.literals = tuple((family.get(address, address), slot) for address, slot in plan.literals)
         plan.pointless = tuple(family.get(address, address) for address in plan.pointless)
         plan.computed = tuple((family.get(each[0], each[0]), *each[1:]) for each in plan.computed)
-        plan.fixed |= {address: own for address, own in given.items() if not isinstance(own, str)}
+        plan.fixed |= {
+            address: number
+            for address, (own, number) in given.items()
+            if number is not None and (own is None or own not in plan.letters)
+        }
         plan.letters = untouched | {family[own] for own in plan.letters & family.keys()} | plan.fixed.keys()
 
 
@@ -230,6 +240,7 @@ def take_statements(plan: RS274Plan, rules: Rules) -> None:
     plan.tape = any(isinstance(item, Tape) for item in items)
     opaque = {item.kind: item.span for item in items if isinstance(item, Opaque)}
     plan.unread, plan.command = UNREAD in opaque, opaque.get("command")
+    plan.unknown_text = next((span for kind, span in opaque.items() if kind not in HARMLESS_TEXT), None)
 
 
 def take_codes(plan: RS274Plan, rules: Rules) -> None:
@@ -371,7 +382,9 @@ def lane_of(plan: RS274Plan) -> Lane | None:
 
 def is_plain(plan: RS274Plan) -> bool:
     """Whether a block has words of motions only, with plain numbers, and no place without a point that it needs."""
-    if plan.fixed or plan.unread or plan.command or plan.computed or not plan.letters <= LANE_LETTERS | ARC_LETTERS:
+    if plan.fixed or plan.unread or plan.command or plan.unknown_text or plan.computed:
+        return False
+    if not plan.letters <= LANE_LETTERS | ARC_LETTERS:
         return False
     points = PLACES.isdisjoint(plan.pointless)
     return points and all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)

@@ -153,6 +153,10 @@ class ProgramControl(ControlState):
         """Every motion from here on is refused; the first reason is the one that is told."""
         self.refusal = self.refusal or why
 
+    def take_length(self, number: int) -> None:
+        """The length of a tool acts from here on, see `SetLength`; for languages that take codes of a plugin's."""
+        raise NotImplementedError
+
     def suspend(self, mode: str, why: str) -> None:
         """Motions are refused until `resume` of the same mode."""
         self.suspended[mode] = why

@@ -9,6 +9,8 @@ and the account of path words hold for them as for any other code. A code is a f
         "G168": [like("G68.2", I="A", J="B", K="C", P=0)],     # a tilted plane by other addresses
         "G120": [Suspend("scaling of the fixture (G120)")],    # a mode that is not followed ...
         "G121": [Resume("scaling of the fixture (G120)")],     # ... and its end
+        "G136": [MakeUp("the arc tangent to the motion before it (G136)")],  # this block is refused, others are not
+        "M6": [SetTool("T"), SetLength()],                     # the length of the tool acts from its change on
         "M180": [],                                            # moves nothing, and changes no coordinates
     },
     cycles={"G177": CycleTable(needs="Q", returns="level")}
@@ -18,11 +20,11 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Collection, Mapping, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from ncfix.control.coordinates import INDEX, LETTERS, mask_of
+from ncfix.control.coordinates import INDEX, LETTERS, X, Y, Z, mask_of
 from ncfix.control.moves import Motion, MotionEnd, MotionKind
 from ncfix.text.dialect import NO_WORDS, is_letters
 
@@ -36,6 +38,7 @@ MOTION = re.compile(r"G0*[0-3]|G7[346]|G8[1-9]")
 LOST = "where the axis {{}} stands after {} is not known"
 NOT_FOLLOWED = "{} is in force, which ncfix does not follow"
 AFTER = "where the axis {{}} stands after {} is not followed"
+AFTER_MADE = "where the axis {} stands after motions that the control makes up is not followed"
 
 
 Destination = Callable[[], MotionEnd]
@@ -72,40 +75,61 @@ class Operation(ABC):
         """Do it."""
 
 
+Given = str | float | tuple[str, float]
+"""What a word of the family's code gets: that of another address, a number, or the first, or else the second."""
+GIVEN = "a letter for a letter, a number, or both: (letter, number where the block has no such word)"
+
+
+def source(given: Given) -> tuple[str | None, float | None]:
+    """The address from which a word of the family's code gets its value, and its number without such a word."""
+    if isinstance(given, tuple):
+        return given if len(given) == 2 else ("", None)
+    return (given, None) if isinstance(given, str) else (None, given)
+
+
 @dataclass(frozen=True, slots=True)
 class Like(Operation):
     """It does what a code of the family does. See `like`.
 
-    words  the family's address -> the own address whose word it gets, or a fixed number
+    words  the family's address -> the own address whose word it gets, or a fixed number, or both: a number for blocks
+           without that word
     """
 
     alone: ClassVar[bool] = True
 
     code: str
-    words: tuple[tuple[str, str | float], ...] = ()
+    words: tuple[tuple[str, Given], ...] = ()
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[GM]\d{1,4}(\.\d)?", self.code):
             raise ValueError(f"like({self.code!r}): no code of a family: a capital G or M and its number")
         for known, own in self.words:
-            letters = (known, own) if isinstance(own, str) else (known,)
-            if any(len(each) != 1 or not is_letters(each) for each in letters):
-                text = f"like({self.code!r}): {known}={own!r} cannot be: a letter for a letter, or a number"
-                raise ValueError(text)
+            address, default = source(own)
+            letters = (known,) if address is None else (known, address)
+            fixed = isinstance(default, int | float) or (default is None and address is not None)
+            if not fixed or any(not is_letters(each) or len(each) != 1 for each in letters):
+                raise ValueError(f"like({self.code!r}): {known}={own!r} cannot be: {GIVEN}")
         places = {*LETTERS, *"IJKR"}
-        if MOTION.fullmatch(self.code) and any(places & {known, own} for known, own in self.words):
+        if MOTION.fullmatch(self.code) and any(places & {known, source(own)[0]} for known, own in self.words):
             raise ValueError(f"like({self.code!r}): the words of a motion's place are corrected, and stay as they are")
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """The family's code stands in its place wherever blocks are read: there is nothing left to do."""
 
     def __str__(self) -> str:
-        given = (f"{own} as {known}" if isinstance(own, str) else f"{known}{own:g}" for known, own in self.words)
-        return f"as {self.code}" + "".join(f", {each}" for each in given)
+        told = []
+        for known, (address, default) in ((known, source(own)) for known, own in self.words):
+            without = "" if default is None else f"{known}{default:g}"
+            told.append(f"{address} as {known}" + (f" (else {without})" if without else "") if address else without)
+        return f"as {self.code}" + "".join(f", {each}" for each in told)
 
 
-def like(code: str, **words: str | float) -> Like:
-    """Do what the family's `code` does. `I="A"`: its I is the word A; `P=0`: its P is 0; other words stay."""
+def like(code: str, **words: Given) -> Like:
+    """Do what the family's `code` does.
+
+    `I="A"`: its I is the word A; `P=0`: its P is 0; `X=("I", 0)`: its X is the word I, and 0 in a block without I.
+    Other words stay.
+    """
     return Like(code, tuple(sorted(words.items())))
 
 
@@ -179,6 +203,64 @@ class Rapid(Operation):
 
     def __str__(self) -> str:
         return "the axes go to the words of the block in rapid"
+
+
+def make_up(control: ProgramControl, block: BlockValues, what: str, turned: Collection[int] = ()) -> None:
+    """A motion that the control makes up: it is refused, and leaves X Y Z and other axes where nobody knows.
+
+    Those are the axes of the block, and `turned` by their letters' indices.
+    """
+    led = (X, Y, Z, *turned)
+    gone = {index for index in control.machine if block.axes >> index & 1 or index in led}
+    unknown = control.unknown | dict.fromkeys(sorted(gone), AFTER_MADE)
+    control.make(Motion(MotionKind.FEED, block.axes, MotionEnd(control.position[:], unknown), 0, refusal=what))
+
+
+@dataclass(frozen=True, slots=True)
+class MakeUp(Operation):
+    """The control makes up the motion of this block, a pocket, say: it is refused, and no other is.
+
+    X, Y, Z and the axes of the block stand where nobody knows after it, as with `Lose`.
+
+    what  what it makes up, for messages: "the arc tangent to the motion before it (G8)"
+    """
+
+    takes: ClassVar[bool] = True
+
+    what: str
+
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
+        """See `Operation`."""
+        make_up(control, block, self.what)
+
+    def __str__(self) -> str:
+        return f"the control makes up its motion, which is refused: {self.what}"
+
+
+@dataclass(frozen=True, slots=True)
+class SetLength(Operation):
+    """The length of the tool acts from here on, as with G43, which many controls have no code for.
+
+    The setup says how long each tool is. Beside `SetTool` it stands behind it.
+
+    address  of the word that says which tool's length it is; without that word, or with "", of the tool in the spindle
+    """
+
+    address: str = ""
+
+    def __post_init__(self) -> None:
+        if self.address and (not is_letters(self.address, LETTERS + NO_WORDS) or len(self.address) != 1):
+            raise ValueError(f"{self.address!r} cannot be the address of a tool length: one letter, of no axis")
+
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
+        """See `Operation`."""
+        if self.address in block.unknown:
+            control.refuse_rest("a tool length is known only at run time")
+        control.take_length(round(block.values.get(self.address, control.tools.spindle)))
+
+    def __str__(self) -> str:
+        whose = f"of tool {self.address}" if self.address else "of the tool in the spindle"
+        return f"the length {whose} acts"
 
 
 @dataclass(frozen=True, slots=True)

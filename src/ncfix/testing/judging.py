@@ -16,9 +16,9 @@ from ncfix.compensate.driver import Fixed, fix_program
 from ncfix.compensate.following import follow
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup, Tool
-from ncfix.diagnostics import NcfixError
+from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Machine, loads
-from ncfix.text.dialect import Dialect
+from ncfix.text.dialect import Dialect, get
 from ncfix.text.reader import read
 from ncfix.text.stamp import find
 
@@ -26,6 +26,8 @@ SHIFT = {"X": -0.0124, "Y": 0.0213, "Z": 0.0085}
 """mm, added to commands: minus the errors of the machine."""
 STEP = 0.0011
 """mm: a word is right to its last digit."""
+CLOSE = 1e-4
+"""mm, degrees: a position that a test states is right to the digits that people write."""
 
 AXIS = """
 [axis.{0}]
@@ -56,6 +58,41 @@ def shifted_machine(share: float = 1.0) -> Machine:
         AXIS.format(axis, direction, -SHIFT[axis] * share) for axis, direction in LINEAR
     )
     return loads(text + "\n[tool]\ndirection = [0, 0, 1]\npoint = [0, 0, 0]\n")
+
+
+def check_places(
+    dialect: Dialect | str,
+    program: str,
+    places: Mapping[int, Mapping[str, float] | None],
+    setup: Setup = SETUP,
+    machine: Machine | None = None,
+) -> None:
+    """Raise AssertionError where a program is not followed as the manual has it.
+
+    places   line -> axis -> where it stands behind that line, in machine coordinates, mm and degrees; None for a line
+             whose motions are refused, or at which the program stops
+    setup    as `Statements.setup`: G54 has no offset, and tool n is 20 n mm long
+    machine  one with X, Y and Z if not given
+    """
+    dialect = get(dialect) if isinstance(dialect, str) else dialect
+    machine = shifted_machine() if machine is None else machine
+    try:
+        moves = follow(read(program.encode("latin-1"), "part", dialect), machine, setup).trace.moves
+    except SourceError as error:
+        place = error.messages[0].place
+        if place is not None and places.get(place.line, {}) is None:
+            return
+        raise AssertionError(f"{dialect.name}: {error}") from error
+    ends = np.where([axis.rotary for axis in machine.axes], np.degrees(moves.end), moves.end)
+    for line, wanted in places.items():
+        (rows,) = np.nonzero((moves.block == line - 1) & (moves.kind != MotionKind.DWELL))
+        told = f"{dialect.name}: line {line}, {program.splitlines()[line - 1]!r}"
+        assert rows.size, f"{told}: it has no motion"
+        refused = bool((moves.rule[rows] == Rule.REFUSE).any())
+        assert refused == (wanted is None), f"{told}: its motion is {'' if refused else 'not '}refused"
+        found = dict(zip(machine.axis_names, ends[rows[-1]].tolist(), strict=True))
+        for axis, value in (wanted or {}).items():
+            assert abs(found[axis] - value) < CLOSE, f"{told}: {axis} stands at {found[axis]:.6g}, not at {value:g}"
 
 
 @dataclass(frozen=True, slots=True)

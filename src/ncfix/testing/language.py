@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from itertools import combinations, product
 
 from ncfix.compensate.driver import fix_program
+from ncfix.control.coordinates import LETTERS
 from ncfix.control.operations import Like
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import SourceError
@@ -21,6 +22,7 @@ from ncfix.machine import Machine
 from ncfix.testing.judging import OPTIONS, SETUP, Judged, judged, shifted_machine
 from ncfix.text.dialect import Dialect, get
 from ncfix.text.reader import read, shapes_of, texts_of
+from ncfix.text.tree import Opaque
 
 NUMBERS: dict[str, float] = {
     "5.": 5.0,
@@ -31,6 +33,8 @@ NUMBERS: dict[str, float] = {
     "0.": 0.0,
     "12.3456": 12.3456,
     "007.": 7.0,
+    "1234.5678": 1234.5678,
+    "0.0124": 0.0124,
 }
 """Ways to write a number in G code, with what they mean."""
 WORDS_AT_ONCE = 4
@@ -74,6 +78,7 @@ class Statements:
     number    a motion with `{}` for a number of X
     numbers   how numbers may be written, with what they mean
     skip      the sign of block delete; empty where the language has none
+    unknown   lines of which the language has none like them, without axis words
     setup     offsets and tools that the programs use
     """
 
@@ -91,6 +96,7 @@ class Statements:
     places: tuple[str, ...] = ()
     numbers: dict[str, float] = field(default_factory=lambda: dict(NUMBERS))
     skip: str = "/"
+    unknown: tuple[str, ...] = ()
     setup: Setup = SETUP
 
 
@@ -147,6 +153,7 @@ def gcode_statements(dialect: Dialect) -> Statements:
             for line in ("G81 X10. Y20. Z-5. R2.", "G83 X10. Y20. Z-5. R2. Q1.", *drills.values())
         ),
         places=("G53 G0 Z100.", "G28 Z20.", "G30 Z20."),
+        unknown=("#NCFIX[1]", "#NCFIX", "NCFIX[1]", "NCFIX 1", '"1"', "G9879", "G987.6", "!1=2"),
     )
 
 
@@ -169,15 +176,19 @@ def check_language(
     count       programs at random of each sort; 0: all there are, which takes long
 
     Bytes are kept: a program is what it was read from; a machine with no error to speak of changes nothing; comments
-    stay and mean nothing; numbers mean what they say however they are written; a block means the same whatever was
-    read before it. Every statement with every subset of
-    its words, behind every mode, with block delete on and off; and frames, cutter compensation, cycles and machine
-    coordinates across one another: each line is right, passed by a rule, or refused.
+    stay and mean nothing; numbers mean what they say however they are written; what the language does not know is not
+    passed over, nor a word or a code that it does; a block means the same whatever was read before it. Every statement
+    with every subset of its words, behind every mode, with block delete on and off; and frames, cutter compensation,
+    cycles and machine coordinates across one another: each line is right, passed by a rule, or refused.
     """
     dialect = get(dialect) if isinstance(dialect, str) else dialect
     sample = gcode_statements(dialect) if statements is None else statements
-    check_bytes(dialect, sample)
-    check_numbers(dialect, sample)
+    try:
+        check_bytes(dialect, sample)
+        check_numbers(dialect, sample)
+        check_unknown(dialect, sample)
+    except SourceError as error:
+        raise AssertionError(f"{dialect.name}: {error}") from error
     chosen = random.Random(seed)
     some = (" ".join((head, *words)).strip() for _, head, words in _blocks(sample, READ_AGAIN, chosen))
     check_order(dialect, sample, (*sample.motions, *some), chosen)
@@ -266,6 +277,22 @@ def check_numbers(dialect: Dialect, sample: Statements) -> None:
     first = next(iter(places))
     for text, place in places.items():
         assert abs(place - places[first]) < 1e-9, f"{dialect.name}: {text!r} and {first!r} do not mean what they say"
+
+
+def check_unknown(dialect: Dialect, sample: Statements) -> None:
+    """Behind a line that the language does not know nothing is corrected, and no part of a known one is passed over."""
+    machine, line = shifted_machine(), len(sample.begin) + 1
+    for text in sample.unknown:
+        result = judged((*sample.begin, text, *sample.motions, *sample.end), dialect, machine, sample.setup)
+        corrected = [number for number, fate in result.lines.items() if number > line and fate == "right"]
+        stops = result.stopped is not None and result.stopped[0] == line
+        assert stops or not corrected, f"{dialect.name}: {text!r} is passed over, and motions behind it are corrected"
+    if not sample.unknown:
+        return
+    for text in (*sample.heads, *sample.words, *(f"{letter}1." for letter in LETTERS)):
+        items = _read_block(dialect, sample, text)[0]
+        seen = [item.kind for item in items if isinstance(item, Opaque)] if isinstance(items, tuple) else []
+        assert not seen, f"{dialect.name}: {text!r} is passed over, as the grammar reads it as {seen[0].upper()}"
 
 
 WRITTEN = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)")

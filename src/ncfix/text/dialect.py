@@ -73,7 +73,7 @@ tool with its offset (T0101) and no M6."""
 
 CODE = re.compile(r"[GM](0|[1-9]\d{0,3})(\.[1-9])?")
 """How a code of a dialect's own is written."""
-KEYWORD, KEYWORD_MEANING = re.compile(r"[A-Z][A-Z0-9_.]*"), re.compile(rf"{CODE.pattern}|[A-FH-LP-Z]")
+KEYWORD, KEYWORD_MEANING = re.compile(r"[#$]?[A-Z][A-Z0-9_.]*"), re.compile(rf"{CODE.pattern}|[A-FH-LP-Z]")
 """How a keyword is written, and what it may stand for: a code, or an address that takes a number."""
 FIXED = frozenset({"G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G53", "G80", "G90", "G91"})
 """Codes whose meaning the reader and the writer rely on: no dialect may give them another."""
@@ -301,7 +301,8 @@ class Dialect:
                 return f"{code!r} cannot be a code of a dialect's own: cycles are G codes"
         for keyword, meaning in self.keywords:
             if not KEYWORD.fullmatch(keyword) or not KEYWORD_MEANING.fullmatch(meaning):
-                return f"{keyword!r}: {meaning!r} cannot be a keyword: capital letters, and a code or an address"
+                rule = "capital letters (# or $ may stand before them), for a code or an address"
+                return f"{keyword!r}: {meaning!r} cannot be a keyword: {rule}"
         for code, operations in (*self.codes, *((code, ()) for code, _ in self.cycles)):
             if complaint := complaint_of_code(code, operations):
                 return complaint
