@@ -151,7 +151,7 @@ def tables(root: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 
 def one_of_many_further(place: np.ndarray, *errors: np.ndarray) -> tuple[np.ndarray, ...]:
-    """128 even points, each with what belongs to the one before it: a straight error then shows it, a curve does not."""
+    """128 even points, each with what belongs to the one before it: a straight error shows it, a curve does not."""
     nodes = np.linspace(place[0], place[-1], 128)
     even = [np.interp(nodes, place, each) for each in errors]
     return nodes, *(np.concatenate((each[:1], each[:-1])) for each in even)

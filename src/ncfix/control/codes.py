@@ -151,9 +151,9 @@ CODES: dict[str, Code] = {
         "Correct it. If it is remapped on the machine, ncfix cannot know what it does.",
     ),
     "NCF228": Code(
-        "Unknown G code, motions refused",
-        "The code is not one that ncfix knows for ISO controls. It may move axes or change coordinates, so nothing "
-        "after it is corrected.",
+        "Unknown code or command, motions refused",
+        "The code or command is not one that ncfix knows for this control. It may move axes or change coordinates, so "
+        "nothing after it is corrected.",
         "Name the dialect with --dialect, if there is one for the control. Of a code of the machine's builder that "
         'neither moves nor changes coordinates, the setup file can say so: `passed_codes = ["G131"]`; in a block with '
         "words of axes or of a length (H) it is refused all the same.",

@@ -98,7 +98,7 @@ def check_control(control: Control, settings: Mapping[str, str] | None = None, t
     _check_refusal(control, chosen, tool_length)
     sizes = {effect: 20e-6 if effect[1] in "ABC" else 0.01 for effect in _others()}
     machines = [single_error(effect, size) for effect, size in sizes.items()]
-    for machine in (*machines, _rotary_error("EBB"), _rotary_error("ECC"), _play()):
+    for machine in (_play(), _rotary_error("EBB"), _rotary_error("ECC"), *machines):
         request = _request(machine, chosen, tool_length)
         made = residual(machine, control.read(control.write(request).files), request.space, tool_length, POSES)
         left = _rms(made.after) / _rms(made.before) if made.before.any() else 1.0
