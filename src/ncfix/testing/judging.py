@@ -70,8 +70,8 @@ def check_places(
     """Raise AssertionError where a program is not followed as the manual has it.
 
     places   line -> axis -> where it stands behind that line, in machine coordinates, mm and degrees, behind a hole at
-             its bottom; under tool-centre-point control and in a tilted plane X Y Z are the tip's on the workpiece. None
-             for a line whose motions are refused, or at which the program stops
+             its bottom; under tool-centre-point control and in a tilted plane X Y Z are the tip's on the workpiece.
+             None for a line whose motions are refused, or at which the program stops
     setup    as `Statements.setup`: G54 has no offset, and tool n is 20 n mm long
     machine  one with X, Y and Z if not given
     """
