@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ncfix.control import control as shared
 from ncfix.control.coordinates import INCH, LETTERS
@@ -19,7 +20,7 @@ RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
 
 PASSING = frozenset(
     {
-        *("setup", "kinematics", "posture", "dialect", "rules", "builder", "locate"),
+        *("setup", "kinematics", "posture", "dialect", "rules", "set_length", "builder", "locate"),
         *("knowledge", "modal", "parameters", "position"),
         *("budget", "row_block", "numbers", "first"),
     }
@@ -73,6 +74,7 @@ class RS274Control(shared.ProgramControl):
     extended   additional work offsets (G54.1) that the program has set, and the name of that in force
     tip_control  tool-centre-point control (G43.4) is on, whether the plane is tilted or not
     unnamed    axes of the plane of which a rotation has gone on or off since the program named them
+    set_length what the dialect does for G43
     left_out   the block just followed has no place in a flat program
     unwritten  why a flat program cannot say what the program means; empty if it can
     saved      the modal states that M70 saved, one place for each call level
@@ -92,6 +94,7 @@ class RS274Control(shared.ProgramControl):
         self.unnamed: frozenset[int] = frozenset()
         self.left_out = False
         self.unwritten = ""
+        self.set_length: Callable[[Any, Block, int], None] = lambda _control, _block, _code: None
         if not self.rules.strict:
             self.watch_rolling()
         self.refresh()
@@ -149,11 +152,7 @@ class RS274Control(shared.ProgramControl):
 
     def take_length(self, number: int) -> None:
         """See `ProgramControl`: as G43 with an H."""
-        from ncfix_iso.rs274.settings import tool_offset
-
-        (self.rules.steps.get(LENGTH_CODE) or tool_offset)(
-            self, Block(0, {"H": float(number)}, frozenset(), 0), LENGTH_CODE
-        )
+        self.set_length(self, Block(0, {"H": float(number)}, frozenset(), 0), LENGTH_CODE)
 
     def deciding(self, function: Evaluate) -> float:
         """A value that decides where to go on; where it is known only at run time nothing after it is certain."""

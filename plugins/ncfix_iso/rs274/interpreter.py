@@ -14,7 +14,7 @@ from ncfix.control.setup import Run
 from ncfix.control.state import NO_MOTION
 from ncfix.text.tree import Comment, Constant, Program, Span, Word
 from ncfix_iso.rs274 import predefined, systems
-from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
+from ncfix_iso.rs274.control import LENGTH_CODE, POLAR, RUNTIME_BRANCH, Block, RS274Control
 from ncfix_iso.rs274.cycles import BAD_CYCLE
 from ncfix_iso.rs274.flow import OWords
 from ncfix_iso.rs274.groups import ARCS, DYNAMIC_OFFSETS, LENGTH, NON_MODAL, TURNING_CYCLES
@@ -22,7 +22,7 @@ from ncfix_iso.rs274.motion import BAD_MOTION, NO_CODE, in_machine_coordinates
 from ncfix_iso.rs274.order import DWELL, MACHINE, MOTIONS
 from ncfix_iso.rs274.parameters import number_of, whole
 from ncfix_iso.rs274.plans import Codes, RS274Plan, RS274Unit, check_words, grouped_codes, has_words
-from ncfix_iso.rs274.settings import unknown_code
+from ncfix_iso.rs274.settings import tool_offset, unknown_code
 
 if TYPE_CHECKING:
     from ncfix.text.dialect import CycleTable
@@ -80,6 +80,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
     def __init__(self, control: RS274Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
         self.axes = mask_of(control.machine)
+        control.set_length = control.rules.steps.get(LENGTH_CODE, tool_offset)
         self.main = RS274Unit(program, control.rules, self.axes)
         self.flow = self.prepared()
         systems.load_setup(control)
