@@ -31,7 +31,7 @@ from ncfix.control.coordinates import (
     Z,
     mask_of,
 )
-from ncfix.control.expressions import Unknown, Value
+from ncfix.control.expressions import Value
 from ncfix.control.frames import WORLD, Affine, FrameStack, shifted
 from ncfix.control.moves import Arc, Motion, MotionKind, Pass, Rule
 from ncfix.control.setup import Run, Tool
@@ -53,7 +53,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
 
 GEOMETRY = (X, Y, Z)
 ROUND = frozenset({20, 30, MOTIONS["cip"], MOTIONS["ct"]})
-RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
 
 RESET_OF_DIAMETER = "$MC_GCODE_RESET_VALUES[28]"
 """Machine data: which of `DIAMETERS` is in force at the start."""
@@ -158,17 +157,7 @@ class Sinumerik(ProgramControl):
         """A settable frame comes into force."""
         given = self.setup.work_offsets.get(name, {})
         stored = {INDEX[letter]: value * self.of_setup(letter) for letter, value in given.items()}
-        unknown = dict(self.frames.datum.unknown)
-        for index, letter in enumerate(LETTERS):
-            key = f"$p_uifr_{name.lower()}", (float(index),)
-            value = self.variables.shared.get(key, 0.0)
-            if key in self.variables.shared:
-                self.places.shift(1 << index)
-            if isinstance(value, Unknown) and index in self.machine:
-                unknown[index] = RUNTIME_OFFSET
-            elif letter in given:
-                unknown.pop(index, None)
-        self.frames = replace(self.frames, name=name, datum=replace(shifted(stored), unknown=unknown))
+        self.frames = replace(self.frames, name=name, datum=shifted(stored))
         self.offset_checked = False
         self.refresh()
 
