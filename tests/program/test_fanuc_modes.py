@@ -78,6 +78,7 @@ def test_after_skipping_the_code_before_it_is_in_force_again() -> None:
         ("G0X5.\nG16Y90.", "only one of radius and angle"),
         ("G0X5.\nG91G16Y90.", "only one of radius and angle"),
         ("G0X5.\nG91G92X1.\nG90X2.", "what G92 counts from in G91"),
+        ("G81X5.Y5.Z-5.R-5.F50.", "lies at the bottom of the hole"),
         ("M98P7L0\nG0X1.\nM30\nO7\nM99", "a call with L0"),
         ("G65P7L0\nG0X1.\nM30\nO7\nM99", "a call with L0"),
         ("G91G68X1.Y0R30.\nG90G0X1.Y1.", "count from in G91"),

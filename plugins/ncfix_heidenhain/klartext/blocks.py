@@ -170,7 +170,10 @@ DECIDES = "where the program goes on is decided by a line that is not understood
 HINT = "correct the line, or name the dialect with --dialect"
 
 NUMBER = r"\A\s*/?\s*\d*\s*"
-FLOW = re.compile(NUMBER + r"(LBL|CALL|FN\s*(9|1[0-2])\s*:|IF\b|.*\bGOTO\b)", re.IGNORECASE | re.DOTALL)
+FLOW = re.compile(
+    NUMBER + r"(LBL|CALL|FN\s*(9|1[0-2])\s*:|(END\s+|ELSE\s*)?(IF|WHILE|FOR)\b|(ELSE|BREAK|CONTINUE)\b|.*\bGOTO\b)",
+    re.IGNORECASE | re.DOTALL,
+)
 PARAMETER = re.compile(r"\bQ[LRS]?\d+", re.IGNORECASE)
 ASSIGNED = re.compile(NUMBER + r"(?:FN\s*\d+\s*:\s*)?Q[LRS]?\d+\s*=", re.IGNORECASE)
 FRAME = re.compile(

@@ -180,7 +180,11 @@ def set_pole(control: KlartextControl, words: MotionWords) -> None:
     old = {} if path.pole is None else {path.plane.first: path.pole[0], path.plane.second: path.pole[1]}
     keep = {} if not named else old
     values = [keep.get(i, where.inner[i]) if i not in named else where.inner[i] for i in (plane.first, plane.second)]
-    lost = [i for i in (plane.first, plane.second) if i in where.unknown and (i in named or i not in keep)]
+    lost = [
+        i
+        for i in (plane.first, plane.second)
+        if (i in where.unknown and (i in named or i not in keep)) or (named and i not in named and i not in keep)
+    ]
     path.plane, path.pole = plane, None if lost else (values[0], values[1])
     path.pole_in = pole_frame(control)
 

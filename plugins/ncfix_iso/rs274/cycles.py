@@ -22,6 +22,8 @@ AXES_SAID = "NCF245"
 ACROSS = "drilling cycles in G18 and G19 are taken to go along the axis across the plane"
 WHICH_AXIS = "check which axis the control drills along (Fanuc: parameter 5101 FXY)"
 AFTER_NONE = "where the axis {} stands after a cycle without a hole (K0, L0) differs from control to control"
+AT_RUN_TIME = "a word of the cycle is known only at run time"
+NO_DEPTH = "the retract plane (R) lies at the bottom of the hole"
 NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
 """Words without which LinuxCNC refuses to begin a cycle."""
 
@@ -139,7 +141,7 @@ def drill(
         control.warn(AXES_SAID, ACROSS, WHICH_AXIS)
     moved = block.axes | 1 << across
     unknown = hole_unknown(control, block)
-    refusal = "a word of the cycle is known only at run time" if control.modal.cycle.unknown else ""
+    refusal = AT_RUN_TIME if control.modal.cycle.unknown else NO_DEPTH if depth == r else ""
     height = control.lost_in_frame().get(across)
     if not control.modal.incremental and not unknown and not control.modal.diameter:
         program[across] = r

@@ -6,6 +6,7 @@ import pytest
 
 from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
+from ncfix.diagnostics import SourceError
 from program.klartext.tnc import KNOWN, ends, fixed, follow
 
 
@@ -213,3 +214,17 @@ def test_statements_that_move_nothing() -> None:
     moves = follow(body).moves
     assert moves.kind.tolist() == [MotionKind.RAPID]
     assert moves.rule.tolist() == [Rule.CORRECT]
+
+
+@pytest.mark.parametrize(
+    "line", ["WHILE Q1 < 5", "FOR Q1 = 1 TO 5", "IF Q1 < 5", "ELSE", "END WHILE", "BREAK", "CALL BLOCK"]
+)
+def test_lines_that_may_lead_elsewhere_and_are_not_followed_stop(line: str) -> None:
+    with pytest.raises(SourceError, match="NCF236: where the program goes on"):
+        follow(f"L X+1 Y+1 Z+1 FMAX\n{line}\nL X+2")
+
+
+def test_a_pole_with_one_coordinate_and_none_before_is_not_known() -> None:
+    assert ends("L X+5 Y+5 Z+0 FMAX\nCC X+1 Y+2\nCC X+0\nLP PR+5 PA+0 F100")[-1] == [5, 2, 0]
+    with pytest.raises(SourceError, match="NCF271"):
+        follow("L X+5 Y+5 Z+0 FMAX\nCC X+0\nLP PR+5 PA+0 F100")
