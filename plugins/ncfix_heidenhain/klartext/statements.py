@@ -88,6 +88,7 @@ SUSPENDING = {
     144: "M144: the control works the geometry of the machine into positions",
 }
 ENDING = {115: 114, 145: 144}
+DELETED = "M142: the control deletes what is in force of transformations, in part"
 CHOSEN = "M138: the control takes only some of the rotary axes into account"
 UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
 RETRACT = Passing(Pass.RETRACTION, "retract along the tool axis (M140)")
@@ -120,6 +121,8 @@ def before_motion(control: KlartextControl, step: Step) -> None:
         control.modal.feed_mode = 95
     if 128 in step.codes:
         tip_control(control, on=True)
+    if 142 in step.codes and not is_untransformed(control):
+        control.suspend("M142", DELETED)
     if 94 in step.codes:
         reduce_turns(control, step.flags)
     if 138 in step.codes:
@@ -396,11 +399,15 @@ def change_coordinates(control: KlartextControl, flow: KlartextFlow, match: re.M
     trans(control, match[0])
 
 
+def is_untransformed(control: KlartextControl) -> bool:
+    """Whether neither a transformation nor a tilted plane is in force."""
+    return is_plain(control) and not (control.plane_tilted or any(control.frames.programmable.shift))
+
+
 def select_preset(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some."""
     control.resume(PRESET)
-    plain = is_plain(control) and not (control.plane_tilted or any(control.frames.programmable.shift))
-    if match["rest"].strip() or control.doubtful or not plain:
+    if match["rest"].strip() or control.doubtful or not is_untransformed(control):
         control.suspend(PRESET, SELECTED)
         return
     control.load_preset(f"PRESET{int(match['row'])}")

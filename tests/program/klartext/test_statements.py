@@ -224,6 +224,12 @@ def test_lines_that_may_lead_elsewhere_and_are_not_followed_stop(line: str) -> N
         follow(f"L X+1 Y+1 Z+1 FMAX\n{line}\nL X+2")
 
 
+@pytest.mark.parametrize(("shift", "rule"), [("0", Rule.CORRECT), ("5", Rule.REFUSE)])
+def test_m142_deletes_transformations(shift: str, rule: Rule) -> None:
+    found = fates(f"L X+1 Y+1 Z+1 FMAX\nCYCL DEF 7.0\nCYCL DEF 7.1 X+{shift}\nL M142\nL X+2 Y+2 Z+2 FMAX")
+    assert found[-1][0] == rule
+
+
 def test_a_pole_with_one_coordinate_and_none_before_is_not_known() -> None:
     assert ends("L X+5 Y+5 Z+0 FMAX\nCC X+1 Y+2\nCC X+0\nLP PR+5 PA+0 F100")[-1] == [5, 2, 0]
     with pytest.raises(SourceError, match="NCF271"):
