@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -144,3 +145,22 @@ def test_the_certificate_says_what_it_does_not_know(ncfix: Ncfix, tmp_path: Path
     (entry,) = found.json()["files"]
     assert entry["certificate"]["verdict"] == "proved in part"
     assert "G68.2 is not known to this reader" in [each["reason"] for each in entry["certificate"]["not_proved"]]
+
+
+@pytest.mark.parametrize("part", [1 << 20, 1024])
+def test_a_fanuc_in_inches_is_proved_and_verified_by_its_own_digits(
+    part: int, ncfix: Ncfix, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """0.001 mm are 0.0001 inch there, whether the program is taken as a whole or in parts."""
+    monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
+    text = (ROOT / "examples/machines/three_axis.toml").read_text()
+    machine, program, fixed = tmp_path / "m.toml", tmp_path / "part.nc", tmp_path / "fixed.nc"
+    machine.write_text(re.sub(r"least_increment = .*", "least_increment = { linear = 0.001, rotary = 0.001 }", text))
+    lines = [f"X{k % 7}.{k % 9}Y{k % 5}.Z{k % 3}." for k in range(300)]
+    program.write_text("\n".join(["G20G90G94G17G54", "G0X0.Y0.Z3.", "G1Z0.F20.", *lines, "M30", ""]))
+    given = ("-m", machine, "--dialect", "fanuc", "--assume-zero", "-j", "1")
+    assert ncfix("fix", program, "-o", fixed, "--certificate", *given).code == 0
+    blocks = [line for line in fixed.read_text().splitlines() if not line.startswith("(")]
+    assert max(map(len, re.findall(r"\.(\d+)", "".join(blocks)))) == 4
+    assert _certificate(tmp_path / "fixed.nc.certificate.json")["faults"] == []
+    assert ncfix("verify", program, fixed, *given[:-2]).code == 0

@@ -218,7 +218,8 @@ class Expected:
     def control_digits(self, units: Array) -> NDArray[np.intp]:
         """Digits behind the point that the control resolves, in blocks with units of so many mm (n,); (n, n_axes)."""
         linear, angle = self.machine.least_increment
-        least = np.where(self.machine.rotary, angle * 180 / math.pi, linear / units[:, None])
+        counted = np.where((units > 1) & self.given.decimal_inches, 10.0, units)
+        least = np.where(self.machine.rotary, angle * 180 / math.pi, linear / counted[:, None])
         return np.maximum(0, np.ceil(-np.log10(least) - 1e-9)).astype(np.intp)
 
     def halves(self, units: Array, written: NDArray[np.intp]) -> Array:

@@ -43,6 +43,8 @@ class Given:
     """What the errors of the machine depend on besides its axes."""
     pointless: bool = False
     """Numbers without a decimal point count increments: such programs are not followed."""
+    decimal_inches: bool = False
+    """A least increment of 0.001 mm is one of 0.0001 inch in blocks in inches."""
 
 
 Turned = Callable[[Sequence[float], float, bool], Sequence[float]]

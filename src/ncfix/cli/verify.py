@@ -24,6 +24,7 @@ from ncfix.diagnostics import ExitCode, Message
 if TYPE_CHECKING:
     from ncfix.compensate.figures.comparison import RunningComparison
     from ncfix.compensate.figures.verification import Compared
+    from ncfix.text.dialect import Dialect
     from ncfix.text.tree import Program
 
 Said = tuple[Sequence[Message], ...]
@@ -51,7 +52,8 @@ class ProgramPair:
         """While they are read; raises what that does, `NotInPartsError` and `NearestNotHereError`."""
         from ncfix.compensate.figures.comparison import CutPaths
 
-        found, dialect = self._side_by_side(), dialect_in(self.following, self.original)
+        dialect = dialect_in(self.following, self.original)
+        found = self._side_by_side(dialect)
         cuts = []
         for source, beside in ((self.original, ()), (self.fixed, (self.original.path,))):
             task = task_of(self.following, source, dialect, *beside)
@@ -69,12 +71,14 @@ class ProgramPair:
         resolves = subprograms(setup, first), subprograms(setup, second, first)
         return side_by_side(meant, self._read(self.fixed, meant), machine, setup, self.tolerance_um, resolves)
 
-    def _side_by_side(self) -> RunningComparison:
+    def _side_by_side(self, dialect: Dialect) -> RunningComparison:
         from ncfix.compensate.figures.comparison import RunningComparison
+        from ncfix.compensate.following import resolving
         from ncfix.compensate.plan.written import rounding
 
         assert self.following.machine is not None
-        return RunningComparison(self.tolerance_um / 1e3, rounding(self.following.machine))
+        there = resolving(self.following.machine, dialect, self.original.head)
+        return RunningComparison(self.tolerance_um / 1e3, rounding(there))
 
     def _read(self, source: Source, like: Program | None = None) -> Program:
         """A program; one from a file in the dialect of another one, if it can be."""

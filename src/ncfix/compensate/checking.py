@@ -88,7 +88,7 @@ def survey_on(task: Task, read: Read) -> Checked:
             pass
         return _surveyed(parts, survey)
     task.check()
-    corrector, tally = PartCorrector(task, read), Tally(task.machine.least_increment[0])
+    corrector, tally = PartCorrector(task, read), Tally(task.step)
     survey = Survey(corrector.machine)
     corrector.parts.look = survey.look
     for _, done in corrector.work(WorkShare()):

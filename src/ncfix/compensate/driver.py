@@ -447,7 +447,7 @@ class Stream:
     watch: Watch | None = None
 
     def __post_init__(self) -> None:
-        self.tally = Tally(self.task.machine.least_increment[0])
+        self.tally = Tally(self.task.step)
 
     @property
     def stamped(self) -> bytes:

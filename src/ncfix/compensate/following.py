@@ -202,6 +202,11 @@ class Task:
         numbered = replace(self.dialect, block_numbers=self.options.block_numbers)
         object.__setattr__(self, "dialect", numbered)
 
+    @property
+    def step(self) -> float:
+        """What the control resolves, mm."""
+        return resolving(self.machine, self.dialect, self.head).least_increment[0]
+
     def follower(self) -> Follower:
         """What follows the program."""
         axes, rotary = self.machine.axis_names, rotary_names(self.machine)

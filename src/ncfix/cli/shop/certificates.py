@@ -15,12 +15,13 @@ if TYPE_CHECKING:
     from ncfix.cli.targets import OutputTarget
     from ncfix.control.setup import Setup
     from ncfix.machine import Machine
+    from ncfix.text.dialect import Dialect
 
 SUFFIX = ".certificate.json"
 """Of the certificate beside a corrected program."""
 
 
-def given_of(setup: Setup) -> Given:
+def given_of(setup: Setup, dialect: Dialect) -> Given:
     """What the setup says that the second reader knows of."""
     from ncfix.certificate.following import Given
 
@@ -37,6 +38,7 @@ def given_of(setup: Setup) -> Given:
         workpiece_offset=setup.workpiece_offset,
         inputs=setup.inputs,
         pointless=setup.no_point.startswith("IS"),
+        decimal_inches=dialect.decimal_inches,
     )
 
 
@@ -54,7 +56,9 @@ def certified(
 
     known = dialect_of(original[1], original[0], dialect, machine)
     machine_file = (shown(machine_path), read(machine_path))
-    return Subject(original, corrected, machine_file, machine, given_of(setup), known.name, tolerance_um).certificate()
+    return Subject(
+        original, corrected, machine_file, machine, given_of(setup, known), known.name, tolerance_um
+    ).certificate()
 
 
 def verify_certificate(

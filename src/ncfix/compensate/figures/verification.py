@@ -10,7 +10,7 @@ from ncfix.arguments import TOLERANCE_UM
 from ncfix.compensate.block_delete import SwitchSetting, in_pairs, messages_of, positions_of
 from ncfix.compensate.figures.comparison import RunningComparison, whole
 from ncfix.compensate.figures.simulation import lines_of
-from ncfix.compensate.following import Resolve, follow, placed
+from ncfix.compensate.following import Resolve, follow, placed, resolving
 from ncfix.compensate.plan.written import rounding
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message
@@ -126,6 +126,7 @@ def side_by_side(
     Raises what `follow` raises, and `UsageError` NCF025 for a tolerance that is none.
     """
     TOLERANCE_UM.check("tolerance_um", tolerance_um)
+    machine = resolving(machine, original.dialect, original.source)
 
     def positions(program: Program, resolve: Resolve | None) -> tuple[SwitchSetting, ...]:
         return positions_of(setup, lambda own: follow(program, machine, own, resolve).trace)
