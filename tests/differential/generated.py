@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from differential import corpus, locality, product, setups
@@ -18,6 +18,10 @@ SETUP = Controls(
     tools={1: (64.0, 8.0)},
 )
 MACHINES = ("three", "table", "four_a", "five_ac", "five_bc")
+
+
+DECIMAL_INCHES = {"fanuc", "haas", "mitsubishi"}
+"""Dialects in which 0.001 mm are 0.0001 inch."""
 
 
 @dataclass(slots=True)
@@ -59,7 +63,10 @@ class Study:
         if outcome.text is None:
             self.complain(seed, name, outcome.errors)
             return
-        verdict = judge(original, self.rs274(outcome.text, SETUP), model, terms_of(source, outcome, model))
+        terms = terms_of(source, outcome, model)
+        if DECIMAL_INCHES & set(self.options) and "G20" in source:
+            terms = replace(terms, step=2.54 * terms.step)
+        verdict = judge(original, self.rs274(outcome.text, SETUP), model, terms)
         self.found["motions"] += verdict.motions
         self.found["refused"] += verdict.refused
         if not verdict.right:
