@@ -325,3 +325,25 @@ def test_a_sigma_counts_in_what_was_pruned(seed: int) -> None:
     missed = np.sqrt(((error[0] - error[1])[:, :3] ** 2).mean())
     # all of it comes from one combination that hardly shows: four sigma of a single number
     assert missed < 4 * np.sqrt((deviations(found, q, state) ** 2).mean())
+
+
+def test_a_plan_is_proposed_where_more_poses_would_tell_apart():
+    """One tool shows only a sum of a shift and a tilt of the spindle; a longer one tells them."""
+    known = machine("three_axis").replace(effects=(Effect("EX0S", (0.01,)), Effect("EB0S", (3e-5,))))
+    poses = plan(known, "tcp", 60).with_header("setup", "none").with_columns({"tool_length": np.full(60, 120.0)})
+    (hint,) = hints_of_combinations(known, poses)
+    assert "plan --separate" in hint
+
+
+def test_no_plan_is_proposed_where_none_would_tell_apart():
+    """An R-test sees where one table stands over the other, whatever is measured."""
+    known = machine("wCBXFZYSt")
+    known = known.replace(effects=tuple(effect for effect in known.effects if effect.location))
+    hints = hints_of_combinations(known, plan(known, "tcp", 100))
+    assert hints
+    assert not any("plan --separate" in hint for hint in hints)
+
+
+def hints_of_combinations(known, poses) -> list[str]:
+    found = calibrate([simulate(poses, known, Faults(noise_um=1.0), 1)], perfect(known))
+    return [message.hint for message in found.remarks if message.code == "NCF631"]

@@ -33,6 +33,10 @@ def test_figures_of_two_runs_worked_out_by_hand():
     assert pytest.approx(4 * s + 3) == found.R
     assert pytest.approx(7 + 4 * s) == found.A
     assert found.runs == 2
+    # one side alone: means 4 um apart and 2 s on either end; 4 s
+    assert [found.E_up, found.E_down] == pytest.approx([4, 4])
+    assert [found.A_up, found.A_down] == pytest.approx([4 + 4 * s] * 2)
+    assert [found.R_up, found.R_down] == pytest.approx([4 * s] * 2)
 
 
 def test_the_order_that_laspas_s_tables_keep():
@@ -50,6 +54,8 @@ def test_one_run_has_no_repeatability_and_one_side_no_reversal():
     (found,) = positioning_figures(readings(np.array([[1e-6, 3e-6, 2e-6]]), np.ones((1, 3)), "EAX"))
     assert np.isnan([found.A, found.R, found.B, found.mean_reversal]).all()
     assert pytest.approx(2) == found.E
+    assert pytest.approx(2) == found.E_up
+    assert np.isnan([found.A_up, found.R_up, found.E_down]).all()
 
 
 def test_other_kinds_have_none():

@@ -43,6 +43,10 @@ if TYPE_CHECKING:
 
 FULL_TEST = 5
 """Runs of a test by ISO 230-2 of an axis of up to 2 m."""
+FIGURES = {name: name for name in ("A", "R", "E", "M", "B")}
+FIGURES |= {f"{name}_{side}": f"{name} {side}" for name in ("A", "R", "E") for side in ("up", "down")}
+FIGURES["mean_reversal"] = "mean B"
+"""Of ISO 230-2, and how they are said."""
 
 
 @click.command()
@@ -191,7 +195,7 @@ def _print(calibration: Calibration, over: Prediction) -> None:
         _say_bar(bar)
     for row in _positioning(calibration):
         unit = "urad" if row["component"][1] in "ABC" else "um"
-        known = [f"{name} {row[name]:.1f}" for name in ("A", "R", "E", "M", "B") if row[name] == row[name]]
+        known = [f"{name} {row[key]:.1f}" for key, name in FIGURES.items() if row[key] == row[key]]
         own = row["component"][1] == row["component"][-1]
         few = f" ({row['runs']} of the {FULL_TEST} runs that it asks for)" if own and row["runs"] < FULL_TEST else ""
         norm = "ISO 230-2" if own else "as in ISO 230-2"

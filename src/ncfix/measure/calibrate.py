@@ -7,20 +7,20 @@ gives what the measurements cannot tell, in words; `over_the_travels` says how w
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ncfix.arguments import KNOTS, LOSSES, PRUNE, check_choice
+from ncfix.arguments import KNOTS, LOSSES, PLANS, PRUNE, check_choice
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.error_model import signals_of
 from ncfix.measure import contradictions, mistakes
-from ncfix.measure.candidates import Room, candidates
+from ncfix.measure.candidates import Room, candidates, offered
 from ncfix.measure.estimate import Calibration, Estimate, Problem, Residuals, fit, noise_scale
-from ncfix.measure.least_squares import AUTO, Combination, Solution, orthonormal, without
+from ncfix.measure.least_squares import AUTO, Combination, Solution, orthonormal, solve, without
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Mask
 from ncfix.measure.refine import pruned, with_time_constants
@@ -34,6 +34,10 @@ NAMED = 20
 PLACES = 400
 """Poses over the travels at which the tip error is predicted."""
 UM = 1e3
+FURTHER, LONGER = 200, 100.0
+"""Poses, and mm of a tool, with which it is asked what more measurements of a kind would tell."""
+SEPARATE = "`ncfix plan --separate` finds poses that tell them apart"
+APART = "more poses of this kind do not tell them apart: another instrument may, or a set-up that is known"
 
 
 def calibrate(
@@ -82,7 +86,7 @@ def calibrate(
     found = _machine(problem, estimate, scale, {"rms_before_um": before, "rms_after_um": after, "loss": loss})
     remarks = [
         *(each for data in measurements for each in data.remarks),
-        *untold(estimate.solution, problem.selection.labels),
+        *untold(estimate.solution, problem.selection.labels, _told_by_more(problem, estimate.solution)),
         *_outliers(estimate, residuals),
         *_noise(problem, scale),
         *contradictions.conflicts(problem, estimate),
@@ -168,11 +172,34 @@ def _noise(problem: Problem, scale: float) -> Iterator[Message]:
         yield Message("NCF634", text, hint="`ncfix diagnose` looks for what is missing")
 
 
-def untold(solution: Solution, labels: Sequence[str]) -> list[Message]:
-    """What could not be told, and what was found instead."""
+def _told_by_more(problem: Problem, solution: Solution) -> frozenset[int]:
+    """Which coefficients more poses of the kinds that were measured would tell, all over the travels and with a longer
+    tool besides; nothing is asked where nothing is confounded.
+    """
+    old, more = [each.measurement for each in problem.observations], []
+    for each in old if solution.combinations else ():
+        if each.kind in PLANS and "radius" not in each.columns:
+            lengths = sorted(set(each.column("tool_length").tolist()))
+            poses = offered(problem.machine, each.kind, FURTHER, Room(tool_lengths=(*lengths, lengths[-1] + LONGER)))
+            names = [name for name in each.measured if name not in poses.columns]
+            poses = poses.with_columns({name: np.zeros(len(poses)) for name in names})
+            headers = [(name, value) for name in ("setup", "frame") if (value := each.header(name))]
+            more.append(replace(poses, headers=tuple(headers)))
+    if not more:
+        return frozenset()
+    wider = Problem.of([*old, *more], problem.machine, problem.selection)
+    seen, free = np.split(wider.columns, [wider.design.shape[1]], axis=1)
+    found = solve(seen, free, np.zeros(len(seen)), wider.limits, wider.fleeting)
+    return frozenset(found.kept.tolist())
+
+
+def untold(solution: Solution, labels: Sequence[str], told_by_more: Collection[int] = ()) -> list[Message]:
+    """What could not be told, and what was found instead; of what more poses would tell, the hint says so."""
     found = _unseen(_listed(solution.unseen, labels), "nothing that was measured depends on")
     found += _unseen(_listed(solution.set_up, labels), "the unknown set-up takes the place of")
-    found += [_combined(combination, labels) for combination in solution.combinations]
+    for each in solution.combinations:
+        helps = {each.held, *each.others} <= set(told_by_more)
+        found.append(_combined(each, labels, SEPARATE if helps else APART))
     if weak := _listed(solution.weak, labels):
         are = "is held as it is" if len(weak) == 1 else "are held as they are"
         text = f"{', '.join(weak)} {are}: these measurements would tell it to no better than what is much"
@@ -197,10 +224,9 @@ def _listed(held: Sequence[int], labels: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(name if name.split()[0] in free else name.split()[0] for name in names))
 
 
-def _combined(combination: Combination, labels: Sequence[str]) -> Message:
+def _combined(combination: Combination, labels: Sequence[str], hint: str) -> Message:
     held = labels[combination.held]
     names = [labels[k] for k in combination.others]
-    hint = "`ncfix plan --separate` finds poses that tell them apart"
     if len(names) > 4:
         text = f"{held} and {', '.join(names[:4])} and {len(names) - 4} more: only combinations; {held} is held"
         return Message("NCF631", text, hint=hint)

@@ -114,6 +114,12 @@ class Room:
                 yield f"the place of the ball {name} is not three numbers", f"--ball {name}=X,Y,Z"
 
 
+def offered(machine: Machine, kind: str, count: int, room: Room, seed: int = 0) -> Measurement:
+    """Poses of this kind, for `tcp` those of an R-test where the machine can run one. Raises `UsageError` NCF636."""
+    ball = kind == "tcp" and has_r_test(machine)
+    return r_test(machine, count, room, seed) if ball else candidates(machine, kind, count, room, seed)
+
+
 def candidates(machine: Machine, kind: str, count: int, room: Room, seed: int = 0) -> Measurement:
     """A plan of so many poses of this kind; fewer where probing cannot reach. Raises `UsageError` NCF636."""
     if kind not in PLANS:

@@ -132,7 +132,7 @@ CODES = {
         "errors that these measurements cannot tell apart",
         "Different values of these coefficients explain the measurements equally well. Some of them are held at what "
         "the machine file says; the message says which combination was found.",
-        "`ncfix plan --separate` finds poses that tell two effects apart.",
+        "`ncfix plan --separate` finds poses that tell two effects apart, where there are any: the hint says so.",
     ),
     "NCF632": Code(
         "an error that these measurements do not see",

@@ -172,6 +172,7 @@ class Positioning:
     R  repeatability: the largest band at one place, both sides; NaN with less than two runs
     E  systematic deviation: the range of all means; M the range of the means of both sides
     B  largest reversal; mean_reversal: over all places; NaN if one side only was measured
+    A_up, A_down, R_up, ...  the same of one side alone: approached in plus, in minus; NaN where that was not measured
     runs  how often each place was approached from each side, at least; ISO 230-2 asks for five
 
     Values are errors of the body along the base axes: of a table axis, whose body goes towards minus as its number
@@ -186,6 +187,12 @@ class Positioning:
     M: float
     B: float
     mean_reversal: float
+    A_up: float
+    A_down: float
+    R_up: float
+    R_down: float
+    E_up: float
+    E_down: float
     runs: int
 
 
@@ -217,26 +224,39 @@ def _series_figures(component: str, name: str, position: Array, side: Array, val
             sigma[i, j] = found.std(ddof=1) if len(found) >= RUNS else np.nan
     reversal = mean[0] - mean[1] if len(sides) == 2 else np.full(len(places), np.nan)
     centre = mean.mean(axis=0)
-    spread = np.nan_to_num(sigma)
-    accuracy = float(np.nanmax(mean + K * spread) - np.nanmin(mean - K * spread))
+    alone = {side: _bands(mean[[i]], sigma[[i]], reversal * np.nan) for i, side in enumerate(sides)}
+    A, R, E = _bands(mean, sigma, reversal)
+    (A_up, R_up, E_up), (A_down, R_down, E_down) = (alone.get(side, (float("nan"),) * 3) for side in (1.0, -1.0))
     return Positioning(
         component,
         name,
-        accuracy if np.isfinite(sigma).any() else float("nan"),
-        _repeatability(sigma, reversal),
-        float(np.nanmax(mean) - np.nanmin(mean)),
-        float(np.nanmax(centre) - np.nanmin(centre)) if np.isfinite(centre).any() else float("nan"),
-        float(np.nanmax(np.abs(reversal))) if np.isfinite(reversal).any() else float("nan"),
-        float(np.nanmean(reversal)) if np.isfinite(reversal).any() else float("nan"),
-        min(int(np.bincount(index[side == each], minlength=len(places)).min()) for each in sides),
+        A=A,
+        R=R,
+        E=E,
+        M=float(np.nanmax(centre) - np.nanmin(centre)) if np.isfinite(centre).any() else float("nan"),
+        B=float(np.nanmax(np.abs(reversal))) if np.isfinite(reversal).any() else float("nan"),
+        mean_reversal=float(np.nanmean(reversal)) if np.isfinite(reversal).any() else float("nan"),
+        A_up=A_up,
+        A_down=A_down,
+        R_up=R_up,
+        R_down=R_down,
+        E_up=E_up,
+        E_down=E_down,
+        runs=min(int(np.bincount(index[side == each], minlength=len(places)).min()) for each in sides),
     )
 
 
-def _repeatability(sigma: Array, reversal: Array) -> float:
-    """The largest of 4 s from one side and of 2 s + 2 s + |B| from both."""
+def _bands(mean: Array, sigma: Array, reversal: Array) -> tuple[float, float, float]:
+    """Accuracy, repeatability and systematic deviation of means and standard deviations (sides, places).
+
+    Repeatability is the largest of 4 s from one side and of 2 s + 2 s + |B| from both.
+    """
+    systematic = float(np.nanmax(mean) - np.nanmin(mean))
     if not np.isfinite(sigma).any():
-        return float("nan")
-    bands = [*(2 * K * each for each in sigma)]
+        return float("nan"), float("nan"), systematic
+    spread = np.nan_to_num(sigma)
+    accuracy = float(np.nanmax(mean + K * spread) - np.nanmin(mean - K * spread))
+    bands = [*(2 * K * sigma)]
     if len(sigma) == 2:
         bands.append(K * sigma.sum(axis=0) + np.abs(reversal))
-    return float(np.nanmax(np.concatenate(bands)))
+    return accuracy, float(np.nanmax(np.concatenate(bands))), systematic

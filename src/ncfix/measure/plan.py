@@ -19,7 +19,7 @@ from ncfix.arguments import POSES, SEED
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.effects import library
-from ncfix.measure.candidates import APPROACH, Room, candidates, has_r_test, r_test
+from ncfix.measure.candidates import APPROACH, Room, candidates, offered
 from ncfix.measure.instruments import observe
 from ncfix.measure.least_squares import NUISANCE_RANK, solve
 from ncfix.measure.measurement import Array, Index, Measurement, number
@@ -97,13 +97,12 @@ def plan(
     selection = select(machine, wanted)
     _can_be_set(machine, selection, room, existing)
     many = max(CANDIDATES, 3 * count)
-    ball = kind == "tcp" and has_r_test(machine)
-    offered = r_test(machine, many, room, seed) if ball else candidates(machine, kind, many, room, seed)
-    if count >= len(offered):
-        text = f"{count} poses of {len(offered)} that can be reached"
+    poses = offered(machine, kind, many, room, seed)
+    if count >= len(poses):
+        text = f"{count} poses of {len(poses)} that can be reached"
         raise UsageError.of("NCF636", text, hint="a smaller --count, or wider ranges")
     fixed = 0 if existing is None else len(existing)
-    every = offered if existing is None else joined(existing, offered)
+    every = poses if existing is None else joined(existing, poses)
     pool, kept = pool_of(observe(every, machine), machine, selection, room, separate, seed)
     chosen = choose(pool, count, fixed)
     order = np.random.default_rng(seed).permutation(chosen)
