@@ -121,6 +121,12 @@ def test_an_input_that_is_missing_is_named() -> None:
         machine.error(at(), State(inputs={"time_s": 0.0}))
     with pytest.raises(UsageError, match="'time_s'"):
         machine.actual_tip(at(), State(inputs={"temp_spindle": 0.0}))
+    with pytest.raises(UsageError) as found:
+        machine.error(at())
+    assert [message.hint.split("=")[0] for message in found.value.messages] == [
+        "--input temp_spindle",
+        "--input time_s",
+    ]
 
 
 def test_direction_of_motion() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ncfix import core
-from ncfix.diagnostics import UsageError
+from ncfix.diagnostics import Message, UsageError
 from ncfix.machine.axes import Axis
 from ncfix.machine.se3 import Array
 
@@ -96,7 +96,17 @@ def flatten(q: ArrayLike, state: State, axes: tuple[Axis, ...], names: frozenset
         raise ValueError(f"axis positions have shape {q.shape}, expected (..., {len(axes)})")
     length = np.asarray(state.tool_length, dtype=np.float64)
     direction = np.asarray(state.direction, dtype=np.float64)
-    inputs = {name: _input(state, name) for name in sorted(names)}
+    values = {**state.inputs, "tool_length": state.tool_length}
+    if missing := sorted(name for name in names if values.get(name) is None):
+        raise UsageError.collected(
+            Message(
+                "NCF340",
+                f"the machine's errors depend on {name!r}, which is not given",
+                hint=f"--input {name}=VALUE or [inputs] in the setup file; with measurements, a column of that name",
+            )
+            for name in missing
+        )
+    inputs = {name: np.asarray(values[name], dtype=np.float64) for name in sorted(names)}
     parts = {q.shape[:-1], length.shape, direction.shape[:-1], *(values.shape for values in inputs.values())}
     shape = q.shape[:-1]
     if not parts <= {shape, ()}:
@@ -110,17 +120,6 @@ def flatten(q: ArrayLike, state: State, axes: tuple[Axis, ...], names: frozenset
         _directions(direction, shape, len(axes)),
         flat,
     )
-
-
-def _input(state: State, name: str) -> Array:
-    values = state.tool_length if name == "tool_length" else state.inputs.get(name)
-    if values is None:
-        raise UsageError.of(
-            "NCF340",
-            f"the machine's errors depend on {name!r}, which is not given",
-            hint=f"--input {name}=VALUE or [inputs] in the setup file; with measurements, a column of that name",
-        )
-    return np.asarray(values, dtype=np.float64)
 
 
 def _directions(values: Array, shape: tuple[int, ...], n_axes: int) -> Array:
