@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.hidden.wrong import build, point_300
 
+import ncfix
 from measure.poses import machine, plan
 from ncfix.diagnosis.diagnosis import diagnose
 from ncfix.diagnosis.mistakes.search import find
@@ -194,3 +197,15 @@ def test_some_tables_that_changed_are_not_another_machine(known: Machine, count:
     seen = simulate(plan(known, "tcp", 200, 5), true, Faults(3.0), 5)
     wrong = find([seen], true.replace(effects=tuple(changed.get(effect.name, effect) for effect in true.effects)))
     assert wrong is None or wrong.name != "another machine"
+
+
+def test_a_point_that_does_what_a_constant_does_is_put_right(tmp_path: Path) -> None:
+    """Probing does not show whether the axis has moved, or whether only the file is wrong: the constant would harm.
+
+    The data are those of the hidden-effect benchmark, whose simulation shares nothing with ncfix.
+    """
+    handed = build(point_300, 77019)
+    for name, text in handed.files.items():
+        (tmp_path / name).write_text(text)
+    found = ncfix.diagnose(tmp_path / "measured-1.csv", tmp_path / "machine.toml")
+    assert found.findings[0].candidate.name.startswith("pivot")
