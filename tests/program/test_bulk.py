@@ -197,6 +197,42 @@ def test_arcs_many_at_a_time_as_one_by_one(seed: int, size: float, start: tuple[
     assert_same(program, moves, replace(pieces, centre=pieces.centre + shift))
 
 
+def quarters_and_lines(seed: int, count: int) -> list[str]:
+    """Quarters of circles of 10 mm and lines, words in any order, few numbers in all of them; some repeated."""
+    rng = np.random.default_rng(seed)
+    lines, x, y, repeated, between = list[str](), 0, 0, 0, str(rng.choice([" ", "", "\t"]))
+    for number in range(count):
+        right, up = (int(each) for each in rng.choice([-10, 10], size=2))
+        beside = bool(rng.random() < 0.5)  # the centre lies beside where the arc begins, or above or below it
+        code = "G2" if (right * up > 0) == beside else "G3"
+        centre = [f"I{right if beside else 0}.", f"J{0 if beside else up}."]
+        centre = [word for word in centre if word[1:] != "0." or rng.random() < 0.7]
+        words = [f"X{x + right}.", f"Y{y + up}.", *(centre if rng.random() < 0.7 else ["R10."]), "F10."]
+        if rng.random() < 0.3:
+            code, words = "G1", [f"X{x + right}.", f"Y{y + up}.", "F10."]
+        x, y = x + right, y + up
+        words = [words[k] for k in rng.permutation(len(words))]
+        if rng.random() < 0.1 and code == "G1":
+            repeated += 1
+            lines += [f"o{repeated} repeat [2]", between.join([code, *words]), f"o{repeated} endrepeat"]
+        else:
+            line = between.join([code, *words, *(["G90 G21 G17 G94"] if not number else [])])
+            lines.append(line.lower() if rng.random() < 0.2 else line)
+    return lines
+
+
+@settings(EXAMPLES, max_examples=100)
+@given(seed=st.integers(0, 10**6), size=st.sampled_from([0.0, 0.002, 0.005, 0.01, 0.05]))
+def test_arcs_whose_numbers_stand_elsewhere_too(seed: int, size: float) -> None:
+    """A radius, a centre and a feed of the same number, in any order, from the first number of the program on."""
+    program, moves = followed("\n".join([*quarters_and_lines(seed, 12), "M2\n"]).encode())
+    pieces = moved(moves, seed, size)
+    if seed % 3:
+        pieces.end[:, 2:] = moves.end[pieces.move, 2:]  # the program has not said where these stand
+    shift = (pieces.end - moves.end[pieces.move])[:, :3] * np.random.default_rng(seed).choice([0.0, 1.0, 3.0])
+    assert_same(program, moves, replace(pieces, centre=pieces.centre + shift))
+
+
 @pytest.mark.parametrize("size", [0.0003, 0.01])
 def test_arcs_whose_centres_count_from_the_origin(size: float) -> None:
     turns = np.linspace(0.5, 60, 120)
@@ -279,6 +315,16 @@ def test_an_axis_that_must_get_no_word_from_a_motion_on_gets_none() -> None:
     for text, ends in written_from(program, moves, in_one_piece_each(moves, end)):
         assert text.splitlines()[1:4] == ["X1.5 B1", "B2 Y1", "B3"]
         assert [each[0] for each in ends[1:]] == [1.5, 1.5, 1.5]
+
+
+def test_words_that_an_axis_gets_though_it_stands_there() -> None:
+    """Told to spell out Z, where it stands already, a motion is written by itself; the others are not."""
+    program, moves = followed(b"G90 G21 G94 G1 F1000 X0 Y0 Z0 B0 C0\nX1\nX2\nX3\nM2\n")
+    moves = replace(moves, spelled=np.zeros_like(moves.programmed))
+    assert moves.spelled is not None
+    moves.spelled[2, 2] = True
+    for text, _ in written_from(program, moves, in_one_piece_each(moves, moves.end.copy())):
+        assert text.splitlines()[1:4] == ["X1", "X2 Z0.000", "X3"]
 
 
 def test_arcs_and_dwells_do_not_part_a_stretch() -> None:

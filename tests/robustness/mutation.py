@@ -52,6 +52,7 @@ WRITER = (
 BULK = (
     *("program/test_bulk.py", "program/klartext/test_bulk.py", "compensate/test_plain.py", "compensate/test_idle.py"),
     *("compensate/test_wordless.py", "program/test_written_again.py", "program/test_bulk_anywhere.py"),
+    "compensate/test_stream_others.py",
 )
 STATE = (
     *("program/test_trace_motion.py", "program/test_trace_knowledge.py", "program/test_trace_offsets.py"),

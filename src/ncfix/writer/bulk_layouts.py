@@ -19,12 +19,10 @@ Bytes = NDArray[np.uint8]
 
 OPENING, CLOSING = 4, 8
 """Bytes that stand at most before and behind the axis words of a further piece."""
-
-
-NONE, BY_VECTOR = -1, -2
-"""The slots of axes that have no word, and of those that other words of the block lead to where they shall be."""
+NONE = -1
+"""The slot of an axis that has no word."""
 VECTOR_HEAD = 1
-"""The letter of these."""
+"""The letter of one that other words of the block lead to where it shall be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +31,7 @@ class Layouts:
 
     known      (s,) blocks of the shape may be written in bulk
     further    (s,) further pieces of their motions, too
-    slots      (s, n_axes) which of the block's numbers an axis has, `NONE`, or `BY_VECTOR`
+    slots      (s, n_axes) which of the block's numbers an axis has, or `NONE`
     by_place   (s, n_axes) the axes as their words stand in the block, -1 behind the last one
     by_letter  (n_axes,) the axes in the order in which programs write them
     anchors    (s, 2) slot and offset of the place where missing words go
@@ -126,7 +124,7 @@ class Layouts:
         if layout.turns_named:
             self.heads[shape, moves.rotary & (self.slots[shape] < 0), 1] = 0
         if layout.by_vector:
-            self.slots[shape, moves.rotary], self.heads[shape, moves.rotary, 1] = BY_VECTOR, VECTOR_HEAD
+            self.heads[shape, moves.rotary, 1] = VECTOR_HEAD
         if layout.lead is not None:
             self.leads[shape] = layout.lead
         for table, text in ((self.openings, layout.opening), (self.closings, layout.closing)):
