@@ -35,8 +35,8 @@ from ncfix.diagnosis.joint_fit import (
     unnamed_by_view,
     visible,
 )
-from ncfix.diagnosis.mistakes.kinds import PIVOT, Mistake
-from ncfix.diagnosis.mistakes.search import find
+from ncfix.diagnosis.mistakes.kinds import Mistake
+from ncfix.diagnosis.mistakes.search import find, is_a_point_of
 from ncfix.diagnosis.next_poses import Proposal, proposed
 from ncfix.diagnosis.noise import (
     NoiseFloor,
@@ -409,20 +409,10 @@ def diagnose(
             return _with_mistake(undone, wrong, machine)
         stretched = len(undone.data.y) * float(np.log(wrong.stretch))
         odds = undone.likelihood + stretched - wrong.paid - given.likelihood
-        if odds > 0:
-            wrong = replace(wrong, odds=odds)
-        elif not _is_a_point_of(wrong, given):
+        if odds <= 0 and not is_a_point_of(wrong, [n for f in given.findings for n in (f.candidate.name, *f.aliases)]):
             return given
+        wrong = replace(wrong, odds=odds if odds > 0 else wrong.odds)
     return _with_mistake(undone, wrong, machine)
-
-
-def _is_a_point_of(wrong: Mistake, given: Diagnosis) -> bool:
-    """Whether a constant that was found is the point of an axis that `wrong` moves: the data cannot tell the two apart.
-
-    Of these the point is put right: a constant in its place makes programs worse where the control has the right point.
-    """
-    said = {name for each in given.findings for name in (each.candidate.name, *each.aliases)}
-    return wrong.name.startswith(PIVOT) and not said.isdisjoint(wrong.aliases)
 
 
 def _changes(found: Diagnosis) -> Diagnosis:

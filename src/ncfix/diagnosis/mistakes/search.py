@@ -146,3 +146,11 @@ def _reaches_noise(mistake: Mistake, now: Misfit) -> bool:
     little = A_LITTLE_UM * little_of(mistake.machine, fixed.noise)
     floor = float(np.hypot(fixed.noise, little)) / mistake.stretch
     return still >= _weight(floor, 1.0, now) - NAMES_COST
+
+
+def is_a_point_of(wrong: Mistake, constants: Collection[str]) -> bool:
+    """Whether a mistake moves the point of an axis that one of some constants moves: data cannot tell the two apart.
+
+    Of these the point is put right: a constant in its place makes programs worse where the control has the right point.
+    """
+    return wrong.name.startswith(PIVOT) and not set(wrong.aliases).isdisjoint(constants)
