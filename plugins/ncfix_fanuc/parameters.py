@@ -161,13 +161,15 @@ def placing_assumption(name: str) -> Assumption:
     return Assumption(
         name,
         "Points are an interval apart, numbered from 1 towards plus along each axis, and a parameter for each axis "
-        "says which of them lies at its reference position: machine zero, unless --set reference says otherwise.",
+        "says which of them lies at its reference position: machine zero, unless --set reference says otherwise. "
+        "Lengths are in mm.",
         "the parameters of stored pitch error compensation (3620 to 3624) place their points so; of the grid no public "
         "text says more than that it has points, intervals and vertices",
         "machine zero is the reference position of every axis",
-        "Parameter 1240 is the machine coordinate of the reference position. With the grid on, stand at the reference "
-        "position of all axes: cnc_rdvolccomp must show the value of the point whose number the files give for it; "
-        "then move one axis by its interval towards plus: the value of the next point must show.",
+        "Parameter 1240 is the machine coordinate of the reference position, and 1001#0 (INM) is 1 on a machine in "
+        "inches. With the grid on, stand at the reference position of all axes: cnc_rdvolccomp must show the value of "
+        "the point whose number the files give for it; then move one axis by its interval towards plus: the value of "
+        "the next point must show.",
     )
 
 

@@ -87,10 +87,11 @@ class FanucPitch(Control):
         Assumption(
             "PITCH-3",
             "Parameters 3620 to 3625, punched as N..A1P..A2P.., are those of this control; its axes are counted in "
-            "the order X Y Z A B C U V W of those that the machine has.",
+            "the order X Y Z A B C U V W of those that the machine has, and lengths are in mm.",
             "B-63330EN (15i), B-63980EN",
             "so",
-            "Punch the parameters of the control and compare the form; parameter 1020 has the names of the axes.",
+            "Punch the parameters of the control and compare the form; parameter 1020 has the names of the axes, and "
+            "1001#0 (INM) is 1 on a machine in inches: the interval (3624) is in inches there.",
         ),
         Assumption(
             "PITCH-4",

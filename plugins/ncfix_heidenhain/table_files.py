@@ -261,6 +261,7 @@ def _positions(remarks: Remarks, table: TextTable, path: str) -> Array:
             remarks.refuse(len(remarks.rows), "[END] is missing: the file may have been cut short")
         nodes = _com_values(remarks, table, POSITION)
     else:
+        remarks.doubt_end()
         match = OLD_BEGIN.fullmatch(table.begin)
         step = float(match[3]) if match else 0.0
         nodes = (float(match[2]) if match else 0.0) + step * np.arange(len(table.rows), dtype=np.float64)

@@ -253,6 +253,7 @@ def read_grids(names: Sequence[str], axes: Collection[str], files: Files) -> tup
     seen: dict[str, str] = {}
     for name in names:
         found = Remarks.of(name, files[name], "//")
+        found.doubt_end()
         remarks.append(found)
         parts = _parts(found.rows)
         if not parts:

@@ -207,6 +207,7 @@ def _joint(
 
 
 def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: float) -> JointTable | None:
+    remarks.doubt_end()
     rows = np.array(list(_triples(remarks)), dtype=np.float64).reshape(-1, 3)
     if len(rows) > MOST:
         remarks.refuse(MOST + 1, f"{len(rows)} points, and LinuxCNC holds {MOST}")

@@ -151,3 +151,13 @@ def test_linuxcnc_takes_actual_positions_if_no_type_is_given() -> None:
     assert at_poses("linuxcnc", said).any()
     assert (at_poses("linuxcnc", said) == at_poses("linuxcnc", unsaid)).all()
     assert any("takes 0" in message.text for message in get_control("linuxcnc").lint(unsaid))
+
+
+@pytest.mark.parametrize(
+    ("name", "file"), [("linuxcnc", "joint_0_X.comp"), ("isg", "volcomp0.csv"), ("heidenhain-kinematics", "AXIS-C.COM")]
+)
+def test_a_file_of_which_the_end_is_gone_is_remarked_on(name: str, file: str) -> None:
+    """Nothing in such a file says that it is whole, and a number of which digits are gone is a number."""
+    control, files = fresh(name)
+    cut = {**files, file: files[file].rstrip()[:-1]}
+    assert any("was the file cut off?" in message.text for message in control.lint(cut))

@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 
 from conftest import FULL
-from ncfix.diagnostics import RefusedError
+from ncfix.diagnostics import ConfigError, RefusedError
 from ncfix.machine import Effect, Machine, State, loads
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import random_poses, random_ways, ranges_of
 from ncfix.tables.export import export
+from ncfix_siemens.settings import SIGNS, TERMS
 from tables import second_emulators as second
 
 Rng = np.random.Generator
@@ -175,3 +176,56 @@ def test_what_is_stated_is_what_a_second_emulator_leaves(name: str, seed: int) -
         np.testing.assert_allclose(np.linalg.norm(gap, axis=-1), made.left.after, atol=SAME, rtol=0)
         return
     pytest.fail("no machine was taken")
+
+
+LETTERS = ("X", "Y", "Z", "A", "C")
+AXES = {letter: f"AX{number}" for number, letter in enumerate(LETTERS, 1)}
+
+
+def table_of(rng: Rng, index: int, count: int, output: str) -> list[str]:
+    """A compensation table as anyone may write it, its lines in any order."""
+    cells, step, letter = int(rng.integers(1, 9)), float(np.round(rng.uniform(1, 90), 3)), str(rng.choice(LETTERS))
+    low, modulo = float(np.round(rng.uniform(-300, 100), 3)), letter in "AC" and rng.random() < 0.4
+    if modulo:
+        cells, step = 8, 45.0
+    values = np.round(rng.normal(size=cells + 1) * 0.01, 5)
+    values[-1] = values[0] if modulo else values[-1]
+    words = {
+        "INPUT_AXIS": f"({AXES[letter]})",
+        "OUTPUT_AXIS": f"({AXES[output]})",
+        "STEP": f"{step:.4f}",
+        "MIN": f"{low:.4f}",
+        "MAX": f"{low + cells * step:.4f}",
+        "DIRECTION": str(rng.choice([0, 0, 0, 1, -1])),
+        "MULT_BY_TABLE": str(rng.integers(1, count + 1) if rng.random() < 0.3 else 0),
+        "IS_MODULO": str(int(modulo)),
+    }
+    lines = [f"$AN_CEC[{index},{place}]={value:.5f}" for place, value in enumerate(values)]
+    lines += [f"$AN_CEC_{word}[{index}]={value}" for word, value in words.items()]
+    rng.shuffle(lines)
+    return lines
+
+
+def test_any_tables_of_siemens_do_what_a_second_emulator_does() -> None:
+    """Directions, products of any pair, itself too, repeats, and far beyond the ends; what is not public is refused."""
+    control, run = get_control("siemens"), 0
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        said = {"value_sign": str(rng.choice(SIGNS)), "product_terms": str(rng.choice(TERMS))}
+        head = " ".join(f"{key}={value}" for key, value in (said | AXES).items())
+        count, output = int(rng.integers(1, 7)), str(rng.choice(LETTERS))
+        lines = [line for index in range(count) for line in table_of(rng, index, count, output)]
+        text = "\n".join(["%_N_NC_CEC_INI", "CHANDATA(1)", f"; ncfix: {head}", *lines, "M17", ""])
+        q, ways = rng.uniform(-700, 700, (200, 5)), rng.choice([-1.0, 1.0], (200, 5))
+        units = np.array([np.pi / 180 if letter in "AC" else 1.0 for letter in LETTERS])
+        try:
+            found = control.read({"NC_CEC.INI": text.encode()}).at(LETTERS, q * units, ways) / units
+        except ConfigError as refused:
+            if all("acts one way only" in message.text for message in refused.messages):
+                continue
+            raise
+        said["axes"] = ",".join(f"{letter}:{axis}" for letter, axis in AXES.items())
+        expected = second.siemens({"NC_CEC.INI": text}, LETTERS, q, ways, said)
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+        run += 1
+    assert run > 40

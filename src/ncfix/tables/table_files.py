@@ -41,18 +41,22 @@ def as_number(text: str) -> float | None:
 
 @dataclass(slots=True)
 class Remarks:
-    """What was found in one file so far. `wrong` is what the control would not load or would misread."""
+    """What was found in one file so far. `wrong` is what the control would not load or would misread.
+
+    open_end  the last line does not end as lines do
+    """
 
     path: str
     rows: list[str] = field(default_factory=list)
     wrong: list[Message] = field(default_factory=list)
     doubtful: list[Message] = field(default_factory=list)
+    open_end: bool = False
 
     @classmethod
     def of(cls, path: str, content: bytes, comment: str = "") -> Remarks:
         """An empty list for a file; a byte that is not ASCII is noted, once: after `comment` it is only doubtful."""
         text = content.decode("latin-1")
-        remarks = cls(path, _rows(text.removeprefix(BYTE_ORDER)))
+        remarks = cls(path, _rows(text.removeprefix(BYTE_ORDER)), open_end=not text.endswith(("\n", "\r")))
         if text.startswith(BYTE_ORDER):
             remarks.doubt(1, "begins with a byte order mark", "controls read plain ASCII")
         if ALONE.search(text):
@@ -72,6 +76,11 @@ class Remarks:
     def doubt(self, line: int, text: str, hint: str = "") -> None:
         """NCF492: this is rarely meant."""
         self.doubtful.append(Message("NCF492", text, self._place(line), hint))
+
+    def doubt_end(self) -> None:
+        """Remark on an open end of a file in which nothing says that it is whole: its last number may lack digits."""
+        if self.open_end and self.rows:
+            self.doubt(len(self.rows), "the last line does not end: was the file cut off?", "a line end behind it")
 
     def check(self) -> None:
         """Raise `ConfigError` with everything that is wrong, if anything is."""
