@@ -123,6 +123,14 @@ def test_the_line_is_shown_with_what_cannot_be_in_it():
     assert place.text.startswith("1,100.0,50.0,-20.0,0.5,")
 
 
+@pytest.mark.parametrize("end", ["\n", "", "-1", "-3"])
+def test_a_number_that_lacks_digits_at_the_end_of_the_file_is_remarked_on(end):
+    text = GOOD.rstrip("\n") + "\n" + GOOD.splitlines()[-1]
+    text = text + end if end in ("\n", "") else text[: int(end)]
+    found = [message for message in reads(text.encode(), THREE).remarks if message.code == "NCF619"]
+    assert [message.place.line for message in found if message.place] == ([] if end in ("\n", "") else [6])
+
+
 @pytest.mark.parametrize("mark", [";", "\t"])
 @pytest.mark.parametrize("decimal", [",", "."])
 @pytest.mark.parametrize("coding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-be", "latin-1"])

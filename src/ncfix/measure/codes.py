@@ -85,6 +85,12 @@ CODES = {
         "Check units and signs, and which way the instrument's axes point.",
     ),
     "NCF618": Code("an instrument's file that cannot be read", "A line is not what that format has at this place."),
+    "NCF619": Code(
+        "a file that may have been cut off",
+        "The file ends within a line, and its last number has fewer decimals than all above it: it may lack digits, "
+        "and the file rows.",
+        "A line end behind the last row says that it is whole.",
+    ),
     "NCF620": Code(
         "an error that these measurements hardly see",
         "Its uncertainty would be more than what is much for such an error on any machine, so that the number found "

@@ -54,7 +54,7 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
         found = foreign.recognised(text, machine, path)
         if found is not None:
             return found
-    lines = MeasurementLines(path, text.splitlines())
+    lines = MeasurementLines(path, text.splitlines(), not text.endswith(("\n", "\r")))
     measurement = _measurement(lines, machine, plan)
     return checks.checked(measurement, machine, lines.lines)
 
@@ -87,7 +87,17 @@ def _measurement(text: MeasurementLines, machine: Machine, plan: bool) -> Measur
     text.stop()
     found = np.array([row[0].line for row in rows], dtype=np.int64)
     notes = tuple((key.text, value.text) for key, value in pairs)
-    return Measurement(kind, notes, columns, labels, found, text.path)
+    return Measurement(kind, notes, columns, labels, found, text.path, _open_end(text, [row[-1] for row in rows]))
+
+
+def _open_end(text: MeasurementLines, last: list[Cell]) -> tuple[Message, ...]:
+    """A remark if the last number of the file has fewer decimals than all above it, and no line end behind."""
+    decimals = [len(re.sub(r"^[^.,]*[.,]?", "", cell.text)) for cell in last]
+    if not text.open_end or len(last) < 2 or decimals[-1] >= min(decimals[:-1]):
+        return ()
+    place = Place(text.path, last[-1].line, last[-1].column, text.lines[last[-1].line - 1])
+    said = f"the file ends within a line, and {last[-1].text!r} has fewer decimals than the numbers above it"
+    return (Message("NCF619", said, place, "was the file cut off? A line end behind it says that it was not"),)
 
 
 @dataclass(slots=True)
@@ -96,6 +106,7 @@ class MeasurementLines:
 
     path: str
     lines: list[str]
+    open_end: bool = False
     messages: list[Message] = field(default_factory=list)
     separated: SeparatedText = field(default_factory=lambda: SeparatedText(","))
 
