@@ -40,7 +40,7 @@ SINUMERIK_CODES: dict[str, Code] = {
         "depends on its machine data (MD10602: 0 takes it out, as G500 would); here it stays.",
         "Program the work offset anew after TRAORI and TRAFOOF.",
     ),
-    "NCF258": Code(
+    "NCF259": Code(
         "Work offset after measuring",
         "A measuring cycle (CYCLE977, CYCLE978, ...) may have set the work offset. Motions behind it are refused until "
         "the program calls a work offset; that is taken to be what the setup gives.",
