@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from differential import corpus, locality, product, setups
@@ -63,9 +63,7 @@ class Study:
         if outcome.text is None:
             self.complain(seed, name, outcome.errors)
             return
-        terms = terms_of(source, outcome, model)
-        if DECIMAL_INCHES & set(self.options) and "G20" in source:
-            terms = replace(terms, step=2.54 * terms.step)
+        terms = terms_of(source, outcome, model, self.options)
         verdict = judge(original, self.rs274(outcome.text, SETUP), model, terms)
         self.found["motions"] += verdict.motions
         self.found["refused"] += verdict.refused
@@ -79,10 +77,10 @@ class Study:
         self.wrong.append(f"seed {seed} {name}: {what}")
 
 
-def terms_of(source: str, outcome: product.Outcome, model: Machine) -> Terms:
-    """By what a corrected program is judged."""
+def terms_of(source: str, outcome: product.Outcome, model: Machine, options: Iterable[str] = ()) -> Terms:
+    """By what a program is judged that was corrected with these options."""
     return Terms(
-        step=model.linear_step,
+        step=model.linear_step * (2.54 if "G20" in source and not DECIMAL_INCHES.isdisjoint(options) else 1.0),
         rotary_step=model.rotary_step,
         refused=outcome.refused,
         left=outcome.left,

@@ -134,7 +134,7 @@ class Both:
             if outcome.code in (product.FAULT, product.DONE):
                 self.wrong.append(f"seed {seed} {name}: {outcome.errors}")
             return
-        terms = terms_of(source, outcome, model)
+        terms = terms_of(source, outcome, model, self.options)
         for on, original in enumerate(originals):
             verdict = judge(original, self.rs274(outcome.text, controls[on]), model, terms)
             self.found["motions"] += verdict.motions
