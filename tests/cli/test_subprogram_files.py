@@ -57,6 +57,7 @@ def test_one_that_is_named_is_corrected_with_a_remark(ncfix: Any, machine: Path,
     assert f"{program}:5: NCF258" in done.err
 
 
+@pytest.mark.parametrize("flatten", [(), ("--flatten",)])
 @pytest.mark.parametrize(
     "text",
     [
@@ -66,11 +67,12 @@ def test_one_that_is_named_is_corrected_with_a_remark(ncfix: Any, machine: Path,
     ],
 )
 def test_a_text_in_which_nothing_moves_that_is_followed_is_refused(
-    ncfix: Any, machine: Path, tmp_path: Path, text: str
+    ncfix: Any, machine: Path, tmp_path: Path, text: str, flatten: tuple[str, ...]
 ) -> None:
+    """Written out flat it would lose all its blocks."""
     program, output = tmp_path / "part.nc", tmp_path / "out.nc"
     program.write_text(text)
-    common = ("fix", program, "-m", machine, "--assume-zero", "--dialect", "fanuc", "-o", output, "--json")
+    common = ("fix", program, "-m", machine, "--assume-zero", "--dialect", "fanuc", "-o", output, "--json", *flatten)
     refused = ncfix(*common)
     assert refused.code == 4
     assert [each["code"] for each in refused.json()["files"][0]["refused"]] == ["NCF249"]

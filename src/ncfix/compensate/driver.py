@@ -308,11 +308,12 @@ def fix_flat(
     """As `fix_program`; where that refuses motions, the program is written out flat and corrected so.
 
     A program that can be corrected as it is keeps its loops and subprograms, and the flat one is kept only if it helps.
+    One in which nothing moves would lose all its blocks: it stays, too.
     The report speaks of the lines of the original. A flat program has the numbers of one position of block delete, so a
     program that is to be right in several stays as it is. Raises what `fix_program` and `flatten` raise.
     """
     fixed = fix_program(program, machine, setup, options, resolve, seen)
-    if not fixed.report.refused:
+    if not (fixed.report.refused and fixed.report.moves):
         return fixed
     if len(fixed.report.block_delete) > 1:
         text = "not written out flat: its numbers would be those of one position of block delete"

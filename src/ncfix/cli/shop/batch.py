@@ -264,7 +264,8 @@ class FixJob:
         if self.verbose:
             console.say(f"  dialect             {fixed.dialect}")
         if refused:
-            console.say(f"  {ACCEPT if self.options.flatten else FLATTEN + ACCEPT}")
+            flat = self.options.flatten or not entry["moves"]
+            console.say(f"  {ACCEPT if flat else FLATTEN + ACCEPT}")
         code = ExitCode.REFUSED if refused else ExitCode.DONE
         if self.certify and entry["output"] is not None and (fixed.changed or not target.in_place):
             from ncfix.cli.shop.certificates import certify_output
