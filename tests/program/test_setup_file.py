@@ -244,11 +244,17 @@ def test_tool_data_of_sinumerik(tmp_path: Path) -> None:
 
 
 def test_offsets_of_fanuc_as_a_program(tmp_path: Path) -> None:
-    text = (
-        "%\nO9000(OFFSETS)\nG90G10L10P1R120.5\nG10 L11 P1 R-.02\nG10 L12 P1 R5.\nG10 L11 P2 R0\nG10L1P3R80.\nM30\n%\n"
-    )
-    found = table(tmp_path, "OFFSET.TXT", text)
-    assert found == {1: Tool(pytest.approx(120.48)), 2: Tool(0.0), 3: Tool(80.0)}
+    """A wear of zero alone gives no length."""
+    text = "%\nO9000(OFFSETS)\nG90G10L10P1R120.5\nG10 L11 P1 R-.02\nG10 L12 P1 R5.\nG10 L11 P2 R0\nM30\n%\n"
+    assert table(tmp_path, "OFFSET.TXT", text) == {1: Tool(pytest.approx(120.48))}
+
+
+@pytest.mark.parametrize("kind", ["L1", "L11"])
+def test_offsets_of_fanuc_without_a_wear(tmp_path: Path, kind: str) -> None:
+    """The whole on a control without L10, and a wear beside it."""
+    assert table(tmp_path, "OFFSET.TXT", f"%\nG10 {kind} P3 R80.\n%\n") == {3: Tool(80.0)}
+    with pytest.raises(ConfigError, match=r":3: NCF385: offset 3 has a wear \(L11\) and no length"):
+        table(tmp_path, "OFFSET.TXT", f"%\nG10 L10 P1 R120.5\nG10 {kind} P3 R80.\n%\n")
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,10 @@
   lengths along the two other axes has no known length here, and turning tools are left out: their length 1 is along
   another axis. Where a tool has a name ($TC_TP2) it is called by that. Tools with the same name take turns: which one
   is in the spindle only the control knows, and they are left out. Source: Function Manual Tools (W1, WZV).
-- Fanuc: `G10 L10 P1 R120.5`, length of offset number P; L11 (or L1) its wear, or the whole where there is no other;
-  L12 and L13 are radii or diameters, which a parameter says (5004#2), and are left out. A value without a decimal point
-  counts in increments that nobody says here, and is refused. Source: operator's manuals, "Tool compensation values".
+- Fanuc: `G10 L10 P1 R120.5`, length of offset number P; L11 (or L1) its wear, or the whole in a file without L10;
+  an offset with a wear alone is refused, and left out if that is zero. L12 and L13 are radii or diameters, which a
+  parameter says (5004#2), and are left out. A value without a decimal point counts in increments that nobody says here,
+  and is refused. Source: operator's manuals, "Tool compensation values".
 """
 
 from __future__ import annotations
@@ -103,6 +104,10 @@ def offset_rows(text: str, scale: float) -> Iterator[Row]:
             if key in found:
                 yield line, f"offset {key[0]} has two values"
             found[key] = line, float(match["value"])
+    apart = any(kind == GEOMETRY for _, kind in found)
     for number in dict.fromkeys(number for number, _ in found):
         parts = [found[number, kind] for kind in (GEOMETRY, WEAR) if (number, kind) in found]
-        yield parts[0][0], (number, Tool(sum(value for _, value in parts) * scale))
+        if not apart or (number, GEOMETRY) in found:
+            yield parts[0][0], (number, Tool(sum(value for _, value in parts) * scale))
+        elif parts[0][1]:
+            yield parts[0][0], f"offset {number} has a wear (L11) and no length (L10)"

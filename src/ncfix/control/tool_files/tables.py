@@ -21,7 +21,7 @@ from pathlib import PurePath
 from ncfix.cells import MARKS, Cell, SeparatedText, plain_text
 from ncfix.control.coordinates import INCH
 from ncfix.control.setup import Tool
-from ncfix.control.tool_files.programs import is_offsets, is_tool_data, offset_rows, tool_data_rows
+from ncfix.control.tool_files.programs import Row, is_offsets, is_tool_data, offset_rows, tool_data_rows
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
 from ncfix.inputs import MOST_SAID
@@ -38,8 +38,6 @@ LONGEST = 1e6
 """mm; a number beyond it is a slip."""
 COLUMNS = ("tool", "length", "radius", "diameter")
 UNITS = {"mm": 1.0, "inch": INCH}
-Row = tuple[int, tuple[int | str, Tool] | str]
-"""Line number, and the number or name of a tool with what it is, or what is wrong."""
 
 
 def load_tool_table(path: str, axes: Collection[str] = ASIDE, unit: str = "mm") -> dict[int | str, Tool]:
