@@ -171,7 +171,7 @@ class Corrector:
             if before is not None and (solution.reaches_back or solution.unchanged[0] != before.unchanged):
                 raise NotInPartsError("a refusal reaches back into an earlier part")
             text = self._text(part.program, joint.splices, before is None)
-            if not part.last:
+            if not part.last and readings[0] is None:
                 leave(PrecedingMotion.of(solution.rounds, np.zeros(len(solution.moves.axes), dtype=np.int8)), len(text))
             readings = self.proof.misreadings(continued, joint, text)
         self.joint = joint

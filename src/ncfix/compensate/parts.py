@@ -19,7 +19,7 @@ from ncfix.compensate.plan.arrays import Index, Mask
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs, matters
-from ncfix.compensate.solve import SelfCheckError, WrittenPlan, differences
+from ncfix.compensate.solve import Round, SelfCheckError, WrittenPlan, differences, same_rounds
 from ncfix.compensate.workers import PartCheckpoint, Read, WorkShare
 from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Setup
@@ -28,6 +28,7 @@ from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices, left_alone
+from ncfix.writer.pieces import SecondReading
 
 FRAMES = "the program takes frames or values from where the machine stands"
 MOST_PENDING = 64
@@ -338,12 +339,48 @@ class MachineParts(Parts):
         return head, direction
 
 
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """A text of a part that did not mean what was planned, its motions, and the rounds of its plan."""
+
+    text: bytes
+    again: Moves
+    rounds: tuple[Round, ...]
+
+
+def misread_pieces(solution: WrittenPlan, again: Moves, own: Mask | None = None) -> Index:
+    """The pieces that mean something else in a text than was planned; `own` (m,): those that stand in it."""
+    try:
+        wrong = np.flatnonzero(differences(solution, again, own))
+    except SelfCheckError as error:
+        raise NotInPartsError(FRAMES) from error
+    return wrong if own is None else np.flatnonzero(own)[wrong]
+
+
+def reading_of(solution: WrittenPlan, again: Moves, head: Part | None) -> SecondReading:
+    """What a part that was written means, a row for each of its motions; `head`: the first, of which it has no text."""
+    pieces = solution.plan.pieces
+    if head is None:
+        return SecondReading.of(again, pieces)
+    read = SecondReading.of(again, pieces.rows(np.flatnonzero(pieces.move > 0)))
+    assert read.start is not None
+    assert read.end is not None
+    frame, last = head.moves.frames[head.moves.frame[0]], int(pieces.last[0])
+    return SecondReading(
+        np.append(np.int32(len(read.frames)), read.frame),
+        (*read.frames, frame),
+        np.concatenate([solution.plan.start[:1], read.start]),
+        np.concatenate([solution.emission.end[last : last + 1], read.end]),
+    )
+
+
 class PartProof:
     """The proof of the parts of a program, one after the other: goes along what has been written so far."""
 
     def __init__(self, task: Task, reader: PartReader) -> None:
         self.again, self.follower = PartReader(task.path, task.dialect, task.head), task.follower()
         self.again.templates, self.again.index = reader.templates, reader.index
+        self.misread: Attempt | None = None
 
     def pass_over(self, continued: ContinuedPart, skipped: bool) -> None:
         """Go past a part of another process, as programmed; `skipped`: so was the one before."""
@@ -357,19 +394,36 @@ class PartProof:
         self.follower.follow(part.program, part.last)
 
     def misreadings(self, continued: ContinuedPart, joint: JointPlan, text: bytes) -> Readings | None:
-        """See `driver.Proof.misreadings`."""
-        (solution,), head = joint.plans, continued.head
-        if head is None:
-            self.check(continued.part, solution, text, None)
-        else:
-            own = solution.plan.pieces.move > 0
-            self.check(continued.part, solution, text, joint.splices.moved(-len(head.program.source)), own)
-        return None
+        """See `driver.Proof.misreadings`.
 
-    def check(
-        self, part: Part, solution: WrittenPlan, text: bytes, edits: Splices | None, own: Mask | None = None
-    ) -> None:
-        """Raise what `misreadings` does; `edits` make the text from the part's, if known; `own` (m,): its pieces."""
+        A motion that is left as it was may end where the one before it has moved it. It is planned once more, with what
+        has been read; the text has to come out the same, for the control goes along it only once.
+        """
+        (solution,), head, misread = joint.plans, continued.head, self.misread
+        own = None if head is None else solution.plan.pieces.move > 0
+        if misread is None:
+            edits = None if head is None else joint.splices.moved(-len(head.program.source))
+            again = self._followed(continued.part, text, edits)
+        elif misread.text == text and same_rounds(misread.rounds, solution.rounds):
+            again = misread.again
+        else:
+            raise NotInPartsError(FRAMES)
+        wrong = misread_pieces(solution, again, own)
+        if not wrong.size:
+            self.misread = None
+            return None
+        if misread is not None or not solution.plan.pieces.unchanged[wrong].all():
+            raise NotInPartsError(FRAMES)
+        self.misread = Attempt(text, again, solution.rounds)
+        return [reading_of(solution, again, head)]
+
+    def check(self, part: Part, solution: WrittenPlan, text: bytes, edits: Splices) -> None:
+        """Raise what `misreadings` does for a part of plain motions; `edits` make the text from the part's."""
+        if misread_pieces(solution, self._followed(part, text, edits)).size:
+            raise NotInPartsError(FRAMES)
+
+    def _followed(self, part: Part, text: bytes, edits: Splices | None) -> Moves:
+        """The motions of a text; `edits` make it from the part's, if known."""
         if edits is not None and core.engaged() and not left_alone(part.program.source, edits, text):
             raise SelfCheckError("more of the text has changed than was written anew")
         try:
@@ -378,12 +432,7 @@ class PartProof:
         except NcfixError as error:
             raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
         self.again.first_line += program.lines_ended
-        try:
-            right = not differences(solution, again, own).any()
-        except SelfCheckError:
-            right = False
-        if not right:
-            raise NotInPartsError(FRAMES)
+        return again
 
     def astray(self, line: int | None, errors: PathError) -> Exception:
         """See `driver.Proof.astray`."""

@@ -70,6 +70,15 @@ class Round:
         )
 
 
+def same_rounds(one: tuple[Round, ...], other: tuple[Round, ...]) -> bool:
+    """Whether a motion was the same in all rounds, to the last bit."""
+    first, second = (
+        [(each.unchanged.tobytes(), each.shift.tobytes(), each.position.tobytes()) for each in rounds]
+        for rounds in (one, other)
+    )
+    return first == second
+
+
 @dataclass(frozen=True, slots=True)
 class PrecedingMotion:
     """The last motion of the part before, with which a part begins once more.
