@@ -135,6 +135,30 @@ def test_a_mistake_is_found_by_its_odds(kind: str, data: Measurement, known: Mac
     assert wrong.after_um < 0.6 * wrong.before_um
 
 
+UNITS = [kind for kind in CASES if kind.split(":")[0] in ("unit of values", "inch", "metre", "um", "degree")]
+
+
+@pytest.mark.parametrize("repeated", [False, True])
+@pytest.mark.parametrize("kind", [*UNITS, "tool length: m"])
+def test_a_unit_of_one_of_several_files(kind: str, repeated: bool, known: Machine) -> None:
+    """Where noise comes from repeats, it is in the wrong unit, too."""
+    again = np.repeat(np.arange(0, 40, 4), 4) if repeated else []
+    rows = np.sort(np.r_[np.arange(60), again].astype(int))
+    files = [simulate(plan(known, "tcp", 60, k).rows(rows), known, Faults(2.0), k) for k in (3, 4, 5)]
+    if repeated:
+        files = [replace(each, headers=()) for each in files]
+    files = [replace(each, path=f"part{k}.csv") for k, each in enumerate(files)]
+    change = CASES.get(kind, lambda d, m: (columns(d, 1e-3, "tool_length"), m))
+    wrong = find([files[0], change(files[1], known)[0], files[2]], known)
+    assert wrong is not None
+    assert wrong.sure
+    assert wrong.name == kind.split(":")[0]
+    assert "part1.csv" in wrong.title
+    for undone, right in zip(wrong.measurements, files, strict=True):
+        for name, values in right.columns.items():
+            assert undone.columns[name] == pytest.approx(values, rel=1e-12)
+
+
 def test_a_sign_of_values_that_constants_could_explain_as_well(data: Measurement, known: Machine) -> None:
     """Six constants that all changed their signs over night explain it; one mistake is likelier."""
     constants = known.replace(effects=tuple(e for e in known.effects if is_free(e)))

@@ -35,6 +35,8 @@ SIDE = 0.3
 PIVOT, PIVOT_STEPS = "pivot", 3
 """The name of an axis point that is off; and steps in which it is moved to where the data have it."""
 INCH = 25.4
+LENGTHS, DEVIATIONS = ("dx", "dy", "dz", "value"), ("tcp", "tcp6", "axis")
+"""Columns of measured deviations in mm, and the kinds of files that have them."""
 TOOL_STEP_MM, TOOL_LEAST_MM, MOST_TOOLS, MOST_SETS, TOOL_NUMBERS = 50.0, 1.0, 4, 12, 4
 """By how much a tool is longer to see what that shows; the least error; of how many tools, and sets of rows; what is
 unknown of a tool that nothing is stated of: its length, and where its tip is."""
@@ -175,45 +177,87 @@ def _of_values(
     measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder
 ) -> Iterator[tuple[float, Mistake]]:
     """Measured values of another sign, unit or column."""
-    if any(each.kind not in ("tcp", "tcp6", "axis") for each in measurements):
-        return
     names = list(dict.fromkeys(name for each in measurements for name in each.measured))
-    lengths = [name for name in names if name in ("dx", "dy", "dz", "value")]
-    everywhere = [name for name in lengths if all(name in each.columns for each in measurements)]
-
-    def undone(name: str, title: str, columns: dict[str, tuple[str, float]], stretch: float = 1.0) -> Mistake:
-        changed = tuple(
-            each.with_columns(
-                {to: factor * each.columns[of] for to, (of, factor) in columns.items() if of in each.columns}
-            )
-            for each in measurements
-        )
-        return Mistake(name, title, "", machine, changed, stretch=stretch)
-
     offered = [
-        undone("sign of values", "wrong sign of all measured values", {name: (name, -1.0) for name in names}),
+        _changed(
+            "sign of values",
+            "wrong sign of all measured values",
+            machine,
+            measurements,
+            {name: (name, -1.0) for name in names},
+        )
     ]
     if len(names) > 1:
         offered += [
-            undone(f"sign of {name}", f"wrong sign of the measured values {name}", {name: (name, -1.0)})
+            _changed(
+                f"sign of {name}",
+                f"wrong sign of the measured values {name}",
+                machine,
+                measurements,
+                {name: (name, -1.0)},
+            )
             for name in names
         ]
+    everywhere = [name for name in names if name in LENGTHS and all(name in each.columns for each in measurements)]
     for first, second in combinations(everywhere, 2):
         columns = {first: (second, 1.0), second: (first, 1.0)}
-        offered.append(undone(f"swapped {first} {second}", f"the columns {first} and {second} are exchanged", columns))
+        title = f"the columns {first} and {second} are exchanged"
+        offered.append(_changed(f"swapped {first} {second}", title, machine, measurements, columns))
     if len(everywhere) == 3:
         for order in ((1, 2, 0), (2, 0, 1)):
             columns = {to: (everywhere[k], 1.0) for to, k in zip(everywhere, order, strict=True)}
             listed = ", ".join(everywhere[k] for k in order)
-            offered.append(undone("swapped columns", f"the measured columns are in the order {listed}", columns))
+            title = f"the measured columns are in the order {listed}"
+            offered.append(_changed("swapped columns", title, machine, measurements, columns))
+    if all(each.kind in DEVIATIONS for each in measurements):
+        for each in (*offered, *_units_of_values(measurements, machine)):
+            yield rest.left(rest.of_values(each.measurements)), each
+
+
+def _changed(
+    name: str, title: str, machine: Machine, measurements: tuple[Measurement, ...],
+    columns: dict[str, tuple[str, float]], stretch: float = 1.0,
+) -> Mistake:  # fmt: skip
+    """A mistake that is undone by columns taken from others, times a factor."""
+    changed = tuple(
+        each.with_columns({to: factor * each.columns[of] for to, (of, factor) in columns.items() if of in each.columns})
+        for each in measurements
+    )
+    return Mistake(name, title, "", machine, changed, stretch=stretch)
+
+
+def _units_of_values(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """Deviations in another unit than mm."""
     values = sum(len(each) * len(each.measured) for each in measurements)
-    share = sum(len(each) * sum(name in lengths for name in each.measured) for each in measurements) / max(values, 1)
+    share = sum(len(each) * sum(name in LENGTHS for name in each.measured) for each in measurements) / max(values, 1)
     for unit, factor in (("um", 1e-3), ("m", 1e3), ("inch", INCH)):
-        columns = {name: (name, factor) for name in lengths}
         title = f"unit of values: the measured values are in {unit}, not in mm"
-        offered.append(undone("unit of values", title, columns, factor**share))
-    for each in offered:
-        yield rest.left(rest.of_values(each.measurements)), each
+        columns = {name: (name, factor) for name in LENGTHS}
+        yield _changed("unit of values", title, machine, measurements, columns, factor**share)
+
+
+def _units_of_tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """Lengths of tools in another unit than mm."""
+    for unit, factor in (("m", 1e3), ("inch", INCH)):
+        title = f"tool length: the lengths of the tools are in {unit}, not in mm"
+        yield Mistake("tool length", title, "", machine, _times(measurements, ["tool_length"], factor))
+
+
+def _units_of_one_file(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """The same mistakes of units in one of several files."""
+    values = [len(each) * len(each.measured) for each in measurements]
+    for k, each in enumerate(measurements) if len(measurements) > 1 else ():
+        offered = [*_units((each,), machine)]
+        if each.kind in DEVIATIONS:
+            offered += _units_of_values((each,), machine)
+        if each.column("tool_length").any():
+            offered += _units_of_tools((each,), machine)
+        for wrong in offered:
+            if wrong.measurements[0] is not each:
+                changed = (*measurements[:k], *wrong.measurements, *measurements[k + 1 :])
+                title = f"{wrong.title} (in {each.path} only)"
+                stretch = wrong.stretch ** (values[k] / sum(values))
+                yield replace(wrong, title=title, measurements=changed, stretch=stretch)
 
 
 @dataclass(frozen=True, repr=False)
@@ -291,6 +335,7 @@ def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, 
     if any("radius" in each.columns for each in measurements):
         return  # circles: the bar's length says where the axes were
     yield from _units(measurements, machine)
+    yield from _units_of_one_file(measurements, machine)
     yield from _exchanged_axes(measurements, machine)
     for axis in machine.axes:
         if axis.rotary:
@@ -339,10 +384,7 @@ def _tools(
     if len(lengths) == 2:
         swapped = _lengths(measurements, lambda length: sum(lengths) - length)
         offered.append(Mistake("tool length", title, "", machine, swapped))
-    for unit, factor in (("m", 1e3), ("inch", INCH)):
-        title = f"tool length: the lengths of the tools are in {unit}, not in mm"
-        offered.append(Mistake("tool length", title, "", machine, _times(measurements, ["tool_length"], factor)))
-    for each in offered if lengths != [0.0] else ():
+    for each in (*offered, *_units_of_tools(measurements, machine)) if lengths != [0.0] else ():
         yield rest.left(rest.of_places(each.measurements)), each
     lever = (rest.of_places(_lengths(measurements, lambda x: x + TOOL_STEP_MM)) - rest.y) / TOOL_STEP_MM
     own = np.concatenate([each.column("tool_length") for each in measurements])[rest.rows]

@@ -100,15 +100,15 @@ def _judged(
     """Mistakes with their log odds, constants held within so much: the best at first sight, and all of `deep`."""
     quick = [each for each in at_first_sight(measurements, machine, now, held_um) if plain(each[1].name) not in refused]
     count, before = len(quick) + len(deep), now.left(held_um)
-    sighted = [(_odds(left, before, each, now, count), each) for left, each in quick]
+    sighted = [(_odds(left, before, each, now, now, count), each) for left, each in quick]
     sighted.sort(key=lambda pair: pair[0])
     near = [each for odds, each in sighted[-TRIED:] if odds > -FIRST_SIGHT]
     tried = [_tried(each, before, now, count, held_um) for each in (*near, *deep)]
     return [each for each in tried if np.isfinite(each.odds)]
 
 
-def _odds(left: float, before: float, mistake: Mistake, now: Misfit, count: int) -> float:
-    return _weight(left, mistake.stretch, now) - _paid(mistake, now, count) - _weight(before, 1.0, now)
+def _odds(left: float, before: float, mistake: Mistake, undone: Misfit, now: Misfit, count: int) -> float:
+    return _weight(left, mistake.stretch, undone) - _paid(mistake, now, count) - _weight(before, 1.0, now)
 
 
 def _paid(mistake: Mistake, now: Misfit, count: int) -> float:
@@ -118,17 +118,19 @@ def _paid(mistake: Mistake, now: Misfit, count: int) -> float:
 
 def _weight(left: float, stretch: float, now: Misfit) -> float:
     """Log likelihood of the values as they are in the file, where so much is left of them, um, once stretched."""
-    fit = -now.count * (float(np.log(max(left, TINY_UM))) - float(np.log(stretch)))
+    scatter = float(np.log(now.relative).mean())  # a file of another unit has other repeats, too
+    fit = -now.count * (float(np.log(max(left, TINY_UM))) + scatter - float(np.log(stretch)))
     return fit - 0.5 * (float(np.log(max(left, TINY_UM) / PLAUSIBLE_UM)) / DECADE) ** 2
 
 
 def _tried(mistake: Mistake, before: float, now: Misfit, count: int, held_um: float) -> Mistake:
     """The mistake with what undoing it leaves, constants held within so much, and its log odds."""
     try:
-        left = misfit(mistake.measurements, mistake.machine).left(held_um)
+        undone = misfit(mistake.measurements, mistake.machine)
+        left = undone.left(held_um)
     except (NcfixError, np.linalg.LinAlgError, ValueError):
         return replace(mistake, odds=-np.inf)
-    paid, odds = _paid(mistake, now, count), _odds(left, before, mistake, now, count)
+    paid, odds = _paid(mistake, now, count), _odds(left, before, mistake, undone, now, count)
     odds = odds if mistake.gained is None else mistake.gained - paid
     return replace(mistake, before_um=before, after_um=left, odds=odds, paid=paid)
 
@@ -142,10 +144,10 @@ def _stands(mistake: Mistake) -> bool:
 def _reaches_noise(mistake: Mistake, now: Misfit) -> bool:
     """Whether the file as it stands, its constants not fitted, is at the noise once the mistake is undone."""
     fixed = misfit(mistake.measurements, mistake.machine)
-    still = _weight(max(mistake.after_um, fixed.left(AS_IT_STANDS_UM)), mistake.stretch, now) - mistake.paid
+    still = _weight(max(mistake.after_um, fixed.left(AS_IT_STANDS_UM)), mistake.stretch, fixed) - mistake.paid
     little = A_LITTLE_UM * little_of(mistake.machine, fixed.noise)
     floor = float(np.hypot(fixed.noise, little)) / mistake.stretch
-    return still >= _weight(floor, 1.0, now) - NAMES_COST
+    return still >= _weight(floor, 1.0, fixed) - NAMES_COST
 
 
 def is_a_point_of(wrong: Mistake, constants: Collection[str]) -> bool:
