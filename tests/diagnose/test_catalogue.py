@@ -7,7 +7,6 @@ import pytest
 
 from diagnose.worlds import World
 from ncfix.diagnosis.diagnosis import diagnose
-from ncfix.diagnosis.selection import TOLD_APART, act_alike
 from ncfix.machine import Effect
 from ncfix.machine.basis import Fourier
 from ncfix.measure.least_squares import orthonormal, without
@@ -70,20 +69,19 @@ def test_waves_of_a_worm_are_no_encoder(world: World) -> None:
     )  # 8 columns, 60 poses; less than 2e-3 with orders up to 8
 
 
-def test_names_are_alike_if_either_shows_what_the_other_does() -> None:
-    random = np.random.default_rng(2)
-    own = random.normal(size=(60, 4))
-    turned, richer = own @ random.normal(size=(4, 4)), np.concatenate([own, 3 * random.normal(size=(60, 4))], axis=1)
-    shown = own @ np.ones(4)
-    assert act_alike(own, shown, turned, 24.0)
-    assert not act_alike(own, shown, richer, 24.0)  # which shows more than this: nine tenths of its squares
-    apart = turned + 0.3 * random.normal(size=turned.shape)
-    assert ((without(orthonormal(apart), shown[:, None])) ** 2).sum() > TOLD_APART
-    assert not act_alike(own, shown, apart, 24.0)  # the data tell them
-    basis = orthonormal(own)
-    assert act_alike(own, shown, basis, 24.0)
-    last_had_to_be_8_mm = basis * [1.0, 1.0, 1.0, 1e-3]
-    assert not act_alike(own, shown, last_had_to_be_8_mm, 24.0)
+WAVES = [("wCBXFZYSt", 1, 12.0), ("wCBXFZYSt", 3, 6.0), ("wCAYFXZSt", 4, 20.0)]
+
+
+@pytest.mark.parametrize(("name", "seed", "size_um"), WAVES)
+def test_a_name_that_another_covers_is_never_sure(name: str, seed: int, size_um: float) -> None:
+    """One wave of EZC a turn is a sag and a face run-out: a run-out may have more waves, a sag grows with the load."""
+    world, random = World.of(name, seed, 100), np.random.default_rng(seed)
+    turned = world.data.q[:, world.machine.axis_names.index("C")][world.data.row]
+    wave = world.data.design([Effect("EZC", (0.0,))])[:, 0] * np.cos(turned - 0.7)
+    shown = world.data.rms(wave)
+    data = world.measured(wave * size_um / shown + world.clutter(random, 0.7), random)
+    (first,) = diagnose([data], world.machine).findings
+    assert {first.candidate.name, *first.aliases} == {"gravity sag C", "axial C"}
 
 
 def test_a_spindle_that_grows_may_be_a_frame_that_drifts_where_no_tool_turns() -> None:

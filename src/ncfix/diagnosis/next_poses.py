@@ -110,7 +110,7 @@ def proposed(scale: Comparison, selected: Selected, sigma: float) -> Proposal | 
     sides = [_side(scale, others, each) for each in (name, *near[:RIVALS_MOST])]
     found = propose(evidence, sides, sigma)
     if found.plan is None:
-        return found
+        return found if aliases(selected, name) else None
     new = seen_at(evidence.background.data, found.plan)
     return replace(found, chance=prospect(scale, selected, (name, *near), new, sigma).chance)
 

@@ -114,12 +114,11 @@ def held(diagnosis: Diagnosis) -> list[str]:
 def silence(diagnosis: Diagnosis) -> list[str]:
     """What it means that nothing was found."""
     count = len(diagnosis.case.considered)
-    lines = (
-        ["these data can show hardly anything"]
-        if shows_hardly_anything(diagnosis.findable, count, diagnosis.data.sizes)
-        else []
-    )
-    return [*lines, findable_in_words(diagnosis.findable, count, diagnosis.data.sizes)]
+    few = shows_hardly_anything(diagnosis.findable, diagnosis.data.sizes)
+    return [
+        *(["these data can show hardly anything"] if few else []),
+        findable_in_words(diagnosis.findable, count, diagnosis.data.sizes),
+    ]
 
 
 def constant(moved: MovedConstant) -> str:

@@ -1,4 +1,4 @@
-"""Names that act in the same way in these data: what the one shows, the other can show, and the other way about.
+"""Names that act in the same way in these data: what the one shows, the other can show, whatever else it might.
 
 A spindle that grows and a frame that drifts along a tool that never turns differ in the course that is assumed of them,
 a bed and a ram that sag in the power of their curve. Odds between such names are odds of what is assumed.
@@ -27,8 +27,6 @@ from ncfix.diagnosis.evidence import Comparison, Evidence, Member, Members, entr
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
 
-SAME = 0.8
-"""Share of what either may show, its squares beside what is free, that the other must be able to show."""
 OVERLAP = 0.25
 """Share of what a name shows that another must be able to show to be an alias, however likely it is in its place."""
 TOLD_APART = 6.0
@@ -54,24 +52,17 @@ HELPS = 0.1
 CONSTANT_UM = 300.0
 """How far they may be off while they are free, on a machining centre."""
 FEW_SHOWN = 0.5
-"""Share of all names that data must be able to show at the largest size, to show more than hardly anything."""
-
-
-def _acts_alike(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> bool:
-    """Whether a name has a form that can do what `own`, one of the members, does in these data."""
-    share = evidence.share(members)
-    first = _white(evidence, own.group, share)
-    shown = first @ evidence.numbers(members, share)[list(members).index(own)]
-    largest = evidence.background.data.sizes[-1]
-    return any(act_alike(first, shown, _white(evidence, form, share), largest) for form in evidence.forms[other])
+"""Share of the names that these poses can show which must be found at the largest size: else it is hardly anything."""
 
 
 def untold(scale: Comparison, selected: Selected, name: str, other: str) -> float:
     """Squared noise units of what a member shows that another name cannot, with its best form."""
-    evidence, members = scale.evidence, scale.all(selected.members)
-    share, own = evidence.share(members), selected.members[name]
-    shown = _white(evidence, own.group, share) @ evidence.numbers(members, share)[members.index(own)]
-    largest = evidence.background.data.sizes[-1]
+    return _untold(scale.evidence, scale.all(selected.members), selected.members[name], other)
+
+
+def _untold(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> float:
+    share, largest = evidence.share(members), evidence.background.data.sizes[-1]
+    shown = _white(evidence, own.group, share) @ evidence.numbers(members, share)[list(members).index(own)]
     return min(_unexplained(shown, largest * _white(evidence, form, share)) for form in evidence.forms[other])
 
 
@@ -86,14 +77,6 @@ def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: 
 def _white(evidence: Evidence, group: int, share: float) -> Array:
     """The columns of a form in units of noise and background, (n, p)."""
     return evidence.columns[:, evidence.part(group)] / np.sqrt(evidence.background.variance(share))[:, None]
-
-
-def act_alike(first: Array, shown: Array, second: Array, largest_um: float) -> bool:
-    """Whether the second columns can show what is shown, and either what the other may show."""
-    return (
-        _unexplained(shown, largest_um * second) < TOLD_APART
-        and min(_shared(first, second), _shared(second, first)) > SAME
-    )
 
 
 def _unexplained(shown: Array, sized: Array) -> float:
@@ -242,7 +225,9 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
         for other in [each for each in near if not _overlap(evidence, there, members[name], each)]:
             del runners_up[name][other]
         acting_alike[name] = frozenset(
-            each for each in near if each in runners_up[name] and _acts_alike(evidence, there, members[name], each)
+            each
+            for each in near
+            if each in runners_up[name] and _untold(evidence, there, members[name], each) < TOLD_APART
         )
     ranked = {name: members[name] for name in sorted(members, key=lambda name: -odds[name])}
     return Selected(ranked, odds, runners_up, frozenset(evidence.alternatives), acting_alike)
@@ -328,9 +313,9 @@ def mean_odds(shown: Array) -> float:
     return 0.5 * float((shown - np.log1p(shown)).sum())
 
 
-def shows_hardly_anything(findable: Mapping[str, float], count: int, sizes: Sequence[float]) -> bool:
-    """Whether the data can show hardly any of so many effects."""
-    return sum(size <= sizes[-1] for size in findable.values()) < FEW_SHOWN * count
+def shows_hardly_anything(findable: Mapping[str, float], sizes: Sequence[float]) -> bool:
+    """Whether few of the names that the poses can show would be found. A laser shows one error, but that one well."""
+    return sum(size <= sizes[-1] for size in findable.values()) < FEW_SHOWN * max(len(findable), 1)
 
 
 def findable_in_words(findable: Mapping[str, float], count: int, sizes: Sequence[float]) -> str:
