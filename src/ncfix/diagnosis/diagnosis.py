@@ -35,7 +35,7 @@ from ncfix.diagnosis.joint_fit import (
     unnamed_by_view,
     visible,
 )
-from ncfix.diagnosis.mistakes.kinds import Mistake
+from ncfix.diagnosis.mistakes.mistake import Mistake
 from ncfix.diagnosis.mistakes.search import find, is_a_point_of
 from ncfix.diagnosis.next_poses import Proposal, proposed
 from ncfix.diagnosis.noise import (

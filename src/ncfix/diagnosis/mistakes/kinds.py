@@ -13,7 +13,16 @@ from itertools import combinations
 import numpy as np
 
 from ncfix.diagnosis.mistakes.foreign_tables import without_foreign_tables
+from ncfix.diagnosis.mistakes.mistake import Mistake, times, undone_by_columns
 from ncfix.diagnosis.mistakes.stale_tables import shifted_tables
+from ncfix.diagnosis.mistakes.units import (
+    DEVIATIONS,
+    LENGTHS,
+    units,
+    units_of_one_file,
+    units_of_tools,
+    units_of_values,
+)
 from ncfix.diagnosis.residual_data import TIGHT_UM, Misfit, is_free, misfit, rows_of
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
@@ -22,9 +31,6 @@ from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index, Measurement
 
-LARGE_RAD = 2e-4
-"""An angle above this may have been typed in degrees."""
-TURN_RAD = 6.6
 DOUBTED, OFF = 0.3, 3.0
 """Times what is much of a machine of its size and kind: an axis point that is further off may be wrong in the file
 only; from the second on it was measured wrongly, no axis moves so far."""
@@ -34,49 +40,11 @@ SIDE = 0.3
 """Share of its way from which on a direction in which the point of an axis moved is named."""
 PIVOT, PIVOT_STEPS = "pivot", 3
 """The name of an axis point that is off; and steps in which it is moved to where the data have it."""
-INCH = 25.4
-LENGTHS, DEVIATIONS = ("dx", "dy", "dz", "value"), ("tcp", "tcp6", "axis")
-"""Columns of measured deviations in mm, and the kinds of files that have them."""
 TOOL_STEP_MM, TOOL_LEAST_MM, MOST_TOOLS, MOST_SETS, TOOL_NUMBERS = 50.0, 1.0, 4, 12, 4
 """By how much a tool is longer to see what that shows; the least error; of how many tools, and sets of rows; what is
 unknown of a tool that nothing is stated of: its length, and where its tip is."""
 WARM_STEP_K, WARM_LEAST_K, STEEL = 20.0, 8.0, 11.5e-6
 """The same for the temperature of a workpiece, and the growth of steel per kelvin."""
-
-
-@dataclass(frozen=True, repr=False)
-class Mistake:
-    """A mistake, and machine and measurements as they are without it.
-
-    before_um, after_um  misfit with it and without it
-    likely               the file itself looks like it
-    aliases              mistakes of its kind that explain the data as well
-    stretch              values of the file are to be multiplied with this: densities are stretched by as much
-    fitted               how many numbers were fitted to undo it
-    replaces             the constants of the file are other ones, too: taken where its own do not agree with the data
-    given_um             rms of the lengths that the file as given leaves
-    odds, paid           log odds against the file as given, after what the mistake pays
-    sure                 it reaches the noise: no names do better
-    gained               log odds before it pays, where it is sure though the noise is not reached
-    """
-
-    name: str
-    title: str
-    axis: str
-    machine: Machine
-    measurements: tuple[Measurement, ...]
-    before_um: float = 0.0
-    after_um: float = 0.0
-    likely: bool = False
-    aliases: tuple[str, ...] = ()
-    stretch: float = 1.0
-    fitted: int = 0
-    replaces: bool = False
-    given_um: float = 0.0
-    odds: float = 0.0
-    paid: float = 0.0
-    sure: bool = False
-    gained: float | None = None
 
 
 def at_first_sight(
@@ -179,7 +147,7 @@ def _of_values(
     """Measured values of another sign, unit or column."""
     names = list(dict.fromkeys(name for each in measurements for name in each.measured))
     offered = [
-        _changed(
+        undone_by_columns(
             "sign of values",
             "wrong sign of all measured values",
             machine,
@@ -189,7 +157,7 @@ def _of_values(
     ]
     if len(names) > 1:
         offered += [
-            _changed(
+            undone_by_columns(
                 f"sign of {name}",
                 f"wrong sign of the measured values {name}",
                 machine,
@@ -202,62 +170,16 @@ def _of_values(
     for first, second in combinations(everywhere, 2):
         columns = {first: (second, 1.0), second: (first, 1.0)}
         title = f"the columns {first} and {second} are exchanged"
-        offered.append(_changed(f"swapped {first} {second}", title, machine, measurements, columns))
+        offered.append(undone_by_columns(f"swapped {first} {second}", title, machine, measurements, columns))
     if len(everywhere) == 3:
         for order in ((1, 2, 0), (2, 0, 1)):
             columns = {to: (everywhere[k], 1.0) for to, k in zip(everywhere, order, strict=True)}
             listed = ", ".join(everywhere[k] for k in order)
             title = f"the measured columns are in the order {listed}"
-            offered.append(_changed("swapped columns", title, machine, measurements, columns))
+            offered.append(undone_by_columns("swapped columns", title, machine, measurements, columns))
     if all(each.kind in DEVIATIONS for each in measurements):
-        for each in (*offered, *_units_of_values(measurements, machine)):
+        for each in (*offered, *units_of_values(measurements, machine)):
             yield rest.left(rest.of_values(each.measurements)), each
-
-
-def _changed(
-    name: str, title: str, machine: Machine, measurements: tuple[Measurement, ...],
-    columns: dict[str, tuple[str, float]], stretch: float = 1.0,
-) -> Mistake:  # fmt: skip
-    """A mistake that is undone by columns taken from others, times a factor."""
-    changed = tuple(
-        each.with_columns({to: factor * each.columns[of] for to, (of, factor) in columns.items() if of in each.columns})
-        for each in measurements
-    )
-    return Mistake(name, title, "", machine, changed, stretch=stretch)
-
-
-def _units_of_values(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Deviations in another unit than mm."""
-    values = sum(len(each) * len(each.measured) for each in measurements)
-    share = sum(len(each) * sum(name in LENGTHS for name in each.measured) for each in measurements) / max(values, 1)
-    for unit, factor in (("um", 1e-3), ("m", 1e3), ("inch", INCH)):
-        title = f"unit of values: the measured values are in {unit}, not in mm"
-        columns = {name: (name, factor) for name in LENGTHS}
-        yield _changed("unit of values", title, machine, measurements, columns, factor**share)
-
-
-def _units_of_tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Lengths of tools in another unit than mm."""
-    for unit, factor in (("m", 1e3), ("inch", INCH)):
-        title = f"tool length: the lengths of the tools are in {unit}, not in mm"
-        yield Mistake("tool length", title, "", machine, _times(measurements, ["tool_length"], factor))
-
-
-def _units_of_one_file(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """The same mistakes of units in one of several files."""
-    values = [len(each) * len(each.measured) for each in measurements]
-    for k, each in enumerate(measurements) if len(measurements) > 1 else ():
-        offered = [*_units((each,), machine)]
-        if each.kind in DEVIATIONS:
-            offered += _units_of_values((each,), machine)
-        if each.column("tool_length").any():
-            offered += _units_of_tools((each,), machine)
-        for wrong in offered:
-            if wrong.measurements[0] is not each:
-                changed = (*measurements[:k], *wrong.measurements, *measurements[k + 1 :])
-                title = f"{wrong.title} (in {each.path} only)"
-                stretch = wrong.stretch ** (values[k] / sum(values))
-                yield replace(wrong, title=title, measurements=changed, stretch=stretch)
 
 
 @dataclass(frozen=True, repr=False)
@@ -334,8 +256,8 @@ def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, 
     yield from points_of_axes(measurements, machine, now)
     if any("radius" in each.columns for each in measurements):
         return  # circles: the bar's length says where the axes were
-    yield from _units(measurements, machine)
-    yield from _units_of_one_file(measurements, machine)
+    yield from units(measurements, machine)
+    yield from units_of_one_file(measurements, machine)
     yield from _exchanged_axes(measurements, machine)
     for axis in machine.axes:
         if axis.rotary:
@@ -349,7 +271,7 @@ def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, 
                 title,
                 axis.name,
                 machine,
-                _times(measurements, [axis.name], -1.0),
+                times(measurements, [axis.name], -1.0),
             )
     yield from _unstated_tools(measurements, machine)
     yield from _other_machine(measurements, machine, now)
@@ -384,7 +306,7 @@ def _tools(
     if len(lengths) == 2:
         swapped = _lengths(measurements, lambda length: sum(lengths) - length)
         offered.append(Mistake("tool length", title, "", machine, swapped))
-    for each in (*offered, *_units_of_tools(measurements, machine)) if lengths != [0.0] else ():
+    for each in (*offered, *units_of_tools(measurements, machine)) if lengths != [0.0] else ():
         yield rest.left(rest.of_places(each.measurements)), each
     lever = (rest.of_places(_lengths(measurements, lambda x: x + TOOL_STEP_MM)) - rest.y) / TOOL_STEP_MM
     own = np.concatenate([each.column("tool_length") for each in measurements])[rest.rows]
@@ -452,49 +374,6 @@ def _grown(measurements: tuple[Measurement, ...], machine: Machine, kelvin: floa
             )
         )
     return tuple(found)
-
-
-def _units(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    linear = [axis.name for axis in machine.axes if not axis.rotary]
-    for name, said, factor in (("inch", "inches", INCH), ("metre", "metres", 1e3), ("um", "micrometres", 1e-3)):
-        changed = _times(measurements, linear, factor)
-        title = f"{name}: positions of the linear axes are in {said}"
-        yield Mistake(name, title, "", machine, changed, stretch=_stretch(measurements, linear, factor))
-    rotary = [axis.name for axis in machine.axes if axis.rotary]
-    if rotary and max(float(np.abs(each.column(a)).max()) for each in measurements for a in rotary) < TURN_RAD:
-        title = "radian: angles in the measurement are in radians instead of degrees"
-        yield Mistake("degree", title, "", machine, _times(measurements, rotary, 180 / np.pi))
-    for index, effect in enumerate(machine.effects):
-        if looks_typed(effect):
-            title = f"degree: {effect.name} of the machine file was typed in degrees instead of radians"
-            yield Mistake("degree", title, effect.joint, _in_radians(machine, index), measurements, likely=True)
-
-
-def looks_typed(effect: Effect) -> bool:
-    """Whether an angle is so large that it may have been typed in degrees."""
-    return effect.rotational and max(map(abs, effect.coefficients), default=0.0) > LARGE_RAD
-
-
-def _in_radians(machine: Machine, index: int) -> Machine:
-    effects = list(machine.effects)
-    values = tuple(c * np.pi / 180 for c in effects[index].coefficients)
-    effects[index] = replace(effects[index], coefficients=values)
-    return machine.replace(effects=tuple(effects))
-
-
-def _times(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> tuple[Measurement, ...]:
-    names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
-    return tuple(
-        each.with_columns({name: factor * values for name, values in each.columns.items() if name in names})
-        for each in measurements
-    )
-
-
-def _stretch(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> float:
-    """By how much the readings are stretched: those of a probe are positions of axes."""
-    names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
-    shares = [len(names & set(each.measured)) / max(len(each.measured), 1) for each in measurements]
-    return float(factor ** np.mean(shares))
 
 
 def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) -> Mistake | None:

@@ -16,12 +16,12 @@ from ncfix.diagnosis.catalogue import plain
 from ncfix.diagnosis.evidence import SURE
 from ncfix.diagnosis.mistakes.kinds import (
     PIVOT,
-    Mistake,
     at_first_sight,
-    looks_typed,
     not_of_first_order,
     points_of_axes,
 )
+from ncfix.diagnosis.mistakes.mistake import Mistake
+from ncfix.diagnosis.mistakes.units import looks_typed
 from ncfix.diagnosis.residual_data import (
     AS_IT_STANDS_UM,
     TIGHT_UM,

@@ -1,0 +1,89 @@
+"""Mistakes of units: of measured values, positions, angles and tools, in all files or in one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ncfix.diagnosis.mistakes.mistake import Mistake, times, undone_by_columns
+from ncfix.machine import Effect, Machine
+from ncfix.measure.measurement import Measurement
+
+LARGE_RAD = 2e-4
+"""An angle above this may have been typed in degrees."""
+TURN_RAD = 6.6
+INCH = 25.4
+LENGTHS, DEVIATIONS = ("dx", "dy", "dz", "value"), ("tcp", "tcp6", "axis")
+"""Columns of measured deviations in mm, and the kinds of files that have them."""
+
+
+def units_of_values(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """Deviations in another unit than mm."""
+    values = sum(len(each) * len(each.measured) for each in measurements)
+    share = sum(len(each) * sum(name in LENGTHS for name in each.measured) for each in measurements) / max(values, 1)
+    for unit, factor in (("um", 1e-3), ("m", 1e3), ("inch", INCH)):
+        title = f"unit of values: the measured values are in {unit}, not in mm"
+        columns = {name: (name, factor) for name in LENGTHS}
+        yield undone_by_columns("unit of values", title, machine, measurements, columns, factor**share)
+
+
+def units_of_tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """Lengths of tools in another unit than mm."""
+    for unit, factor in (("m", 1e3), ("inch", INCH)):
+        title = f"tool length: the lengths of the tools are in {unit}, not in mm"
+        yield Mistake("tool length", title, "", machine, times(measurements, ["tool_length"], factor))
+
+
+def units_of_one_file(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """The same mistakes of units in one of several files."""
+    values = [len(each) * len(each.measured) for each in measurements]
+    for k, each in enumerate(measurements) if len(measurements) > 1 else ():
+        offered = [*units((each,), machine)]
+        if each.kind in DEVIATIONS:
+            offered += units_of_values((each,), machine)
+        if each.column("tool_length").any():
+            offered += units_of_tools((each,), machine)
+        for wrong in offered:
+            if wrong.measurements[0] is not each:
+                changed = (*measurements[:k], *wrong.measurements, *measurements[k + 1 :])
+                title = f"{wrong.title} (in {each.path} only)"
+                stretch = wrong.stretch ** (values[k] / sum(values))
+                yield replace(wrong, title=title, measurements=changed, stretch=stretch)
+
+
+def units(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
+    """Positions in another unit than mm and degree, and angles of the machine file that were typed in degrees."""
+    linear = [axis.name for axis in machine.axes if not axis.rotary]
+    for name, said, factor in (("inch", "inches", INCH), ("metre", "metres", 1e3), ("um", "micrometres", 1e-3)):
+        changed = times(measurements, linear, factor)
+        title = f"{name}: positions of the linear axes are in {said}"
+        yield Mistake(name, title, "", machine, changed, stretch=_stretch(measurements, linear, factor))
+    rotary = [axis.name for axis in machine.axes if axis.rotary]
+    if rotary and max(float(np.abs(each.column(a)).max()) for each in measurements for a in rotary) < TURN_RAD:
+        title = "radian: angles in the measurement are in radians instead of degrees"
+        yield Mistake("degree", title, "", machine, times(measurements, rotary, 180 / np.pi))
+    for index, effect in enumerate(machine.effects):
+        if looks_typed(effect):
+            title = f"degree: {effect.name} of the machine file was typed in degrees instead of radians"
+            yield Mistake("degree", title, effect.joint, _in_radians(machine, index), measurements, likely=True)
+
+
+def looks_typed(effect: Effect) -> bool:
+    """Whether an angle is so large that it may have been typed in degrees."""
+    return effect.rotational and max(map(abs, effect.coefficients), default=0.0) > LARGE_RAD
+
+
+def _in_radians(machine: Machine, index: int) -> Machine:
+    effects = list(machine.effects)
+    values = tuple(c * np.pi / 180 for c in effects[index].coefficients)
+    effects[index] = replace(effects[index], coefficients=values)
+    return machine.replace(effects=tuple(effects))
+
+
+def _stretch(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> float:
+    """By how much the readings are stretched: those of a probe are positions of axes."""
+    names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
+    shares = [len(names & set(each.measured)) / max(len(each.measured), 1) for each in measurements]
+    return float(factor ** np.mean(shares))
