@@ -80,15 +80,14 @@ def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
 
 def increments_beyond_travel(machine: Machine, moves: Moves, pieces: Pieces, start: Array, state: State) -> Index:
     """Increments that are left as they are, and that leave the range of an axis because of where they begin."""
-    rows = np.flatnonzero(moves.incremental)
-    if not rows.size or not pieces.unchanged.any():
-        return rows[:0]
-    unchanged = pieces.unchanged[pieces.first]
+    rows = np.flatnonzero(moves.incremental & pieces.unchanged[pieces.first])
+    if not rows.size:
+        return rows
     written = WrittenPieces(Intent(machine, moves, state), pieces, start)
     beyond = _corrected_excess(written)
     if (beyond > FUZZ).any():
         beyond[programmed_excess(written) > FUZZ] = -np.inf
-    return rows[unchanged[rows] & (beyond[rows] > FUZZ).any(axis=1)]
+    return rows[(beyond[rows] > FUZZ).any(axis=1)]
 
 
 def _begun_beyond(written: WrittenPieces, corrected: Array) -> Array:
@@ -176,19 +175,26 @@ def excess(machine: Machine, joints: Joints, motion: Index, curved: Mask, ends: 
 
 
 def _highest(function: Callable[[Index, Array], Array], low: Array, high: Array) -> Array:
-    """The largest value of functions with one maximum between `low` and `high` (k,).
+    """The largest value of functions with one maximum between `low` and `high` (k,); where it is negative, a lower one.
 
     function  gives the values of functions (j,) at places (j,): many at a time, since few calls are what counts here
     """
-    each = np.arange(len(low))
+    highest, searched = np.full(len(low), -np.inf), np.arange(len(low))
     inner = np.arange(1, PLACES + 1)
-    for _ in range(STEPS if len(low) else 0):
+    for _ in range(STEPS):
+        if not searched.size:
+            return highest
         step = (high - low) / (PLACES + 1)
         places = low[:, None] + inner * step[:, None]
-        found = function(np.repeat(each, PLACES), places.ravel()).reshape(places.shape)
-        best = places[each, found.argmax(axis=1)]
-        low, high = best - step, best + step
-    return function(each, (low + high) / 2) if len(low) else low
+        found = function(np.repeat(searched, PLACES), places.ravel()).reshape(places.shape)
+        rows, best = np.arange(len(found)), found.argmax(axis=1)
+        highest[searched] = np.maximum(highest[searched], found[rows, best])
+        rise = 2 * np.abs(np.diff(found, axis=1)).max(axis=1)  # between two places, with some to spare
+        may = ~(highest[searched] + rise < 0)
+        middle, step, searched = places[rows, best][may], step[may], searched[may]
+        low, high = middle - step, middle + step
+    highest[searched] = function(searched, (low + high) / 2)
+    return highest
 
 
 def _beyond(machine: Machine, q: Array) -> Array:
