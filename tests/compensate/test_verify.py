@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -160,6 +161,17 @@ def test_a_cut_that_begins_where_a_rapid_has_left_axes(root: Path, first: str, l
     assert report.error_after_um["max"] == pytest.approx(left_um, abs=0.01)
     assert report.error_after_um["where"] == 3
     assert {"NCF416", "NCF439"} <= {message.code for message in report.warnings}
+
+
+def test_errors_that_grow_because_digits_are_coarse_are_said(root: Path) -> None:
+    """X is 0.5 um off at its start, which becomes a step of 1 um; finer digits are better."""
+    program = read(b"G21 G90 G94\nG0 X0 Y0 Z5\nG1 X10 Y2.5 F500\nM2\n", "a.ngc", "linuxcnc")
+    machine = load(str(root / "examples/machines/three_axis.toml"))
+    for step, grows in ((0.001, True), (0.00001, False)):
+        finer = replace(machine, least_increment=(step, step))
+        report = fix_program(program, finer, Setup(assume_zero=True)).report
+        assert ("NCF418" in {message.code for message in report.warnings}) == grows
+        assert (report.error_after_um["max"] > report.error_before_um["max"]) == grows
 
 
 def test_of_equal_errors_the_first_on_the_path_is_named() -> None:

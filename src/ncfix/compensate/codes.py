@@ -106,6 +106,13 @@ CODES = {
         "thousands of turns, or of many times the travel, would take more looks at it than ncfix has; it is refused.",
         "Make several motions of it, or check its number of turns.",
     ),
+    "NCF418": Code(
+        "the errors grow",
+        "The program was corrected, and the simulation says that its tool tip is farther off than before, at most and "
+        "on average. That happens where the machine's errors are smaller than a step of the control's digits: every "
+        "number that is written anew is rounded, and between two of them the path follows the rounded ends.",
+        "Leave the program as it is. Or set `least_increment` in the machine file, if the control resolves more.",
+    ),
     "NCF420": Code(
         "the corrected program does not follow the original",
         "The motions of the two programs cannot be put side by side: somewhere the second does not come to where the "

@@ -127,17 +127,30 @@ class FixReport:
         }
 
     def with_what_is_left(self, tolerance_um: float) -> FixReport:
-        """The report with a warning (NCF416) if more is left at the tool tip than tolerance and rounding allow."""
-        left, line = self.error_after_um.get("max"), self.error_after_um.get("where")
-        if left is None or left <= tolerance_um + self.rounding_um + SEEN_UM:
+        """The report with a warning if more is left at the tool tip than tolerance and rounding allow (NCF416).
+
+        And with one if more is left than there was (NCF418).
+        """
+        left, line, found = self.error_after_um.get("max"), self.error_after_um.get("where"), list[Message]()
+        if left is None:
             return self
-        text = (
-            f"{left:.2f} um are left here at the tool tip, more than the tolerance of {tolerance_um:g} um "
-            f"and the {self.rounding_um:.2f} um of the control's digits"
-        )
-        hint = "the reason is a motion near it that is not corrected, or that the control works out by itself"
-        warning = Message("NCF416", text, Place(self.path, int(line or 0)), hint)
-        return replace(self, warnings=(*self.warnings, warning))
+        if left > tolerance_um + self.rounding_um + SEEN_UM:
+            text = (
+                f"{left:.2f} um are left here at the tool tip, more than the tolerance of {tolerance_um:g} um "
+                f"and the {self.rounding_um:.2f} um of the control's digits"
+            )
+            hint = "the reason is a motion near it that is not corrected, or that the control works out by itself"
+            found.append(Message("NCF416", text, Place(self.path, int(line or 0)), hint))
+        sides = [(self.error_before_um[figure] or 0.0, self.error_after_um[figure] or 0.0) for figure in ("max", "rms")]
+        if self.changed and all(after > before + SEEN_UM for before, after in sides):
+            (max_before, max_after), (rms_before, rms_after) = sides
+            text = (
+                f"the tip errors of this program grow: max {max_before:.2f} um and rms {rms_before:.2f} um before, "
+                f"max {max_after:.2f} um and rms {rms_after:.2f} um when it is corrected"
+            )
+            hint = "leave this program as it is, or set a smaller least_increment if the control resolves more"
+            found.append(Message("NCF418", text, Place(self.path), hint))
+        return replace(self, warnings=(*self.warnings, *found))
 
 
 @dataclass(slots=True)
