@@ -10,6 +10,7 @@ import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions
+from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.plan import deviation
 from ncfix.compensate.plan.deviation import path_error
@@ -163,13 +164,13 @@ def test_a_cut_that_begins_where_a_rapid_has_left_axes(root: Path, first: str, l
     assert {"NCF416", "NCF439"} <= {message.code for message in report.warnings}
 
 
-def test_errors_that_grow_because_digits_are_coarse_are_said(root: Path) -> None:
-    """X is 0.5 um off at its start, which becomes a step of 1 um; finer digits are better."""
+def test_errors_that_grow_below_the_tolerance_are_said(root: Path) -> None:
+    """X is 0.5 um off at both ends of a cut, and as much to the other side between them, which is within 1 um."""
     program = read(b"G21 G90 G94\nG0 X0 Y0 Z5\nG1 X10 Y2.5 F500\nM2\n", "a.ngc", "linuxcnc")
     machine = load(str(root / "examples/machines/three_axis.toml"))
-    for step, grows in ((0.001, True), (0.00001, False)):
-        finer = replace(machine, least_increment=(step, step))
-        report = fix_program(program, finer, Setup(assume_zero=True)).report
+    finer = replace(machine, least_increment=(0.0001, 0.0001))
+    for tolerance, each, grows in ((1.0, machine, True), (1.0, finer, True), (0.2, finer, False)):
+        report = fix_program(program, each, Setup(assume_zero=True), FixOptions(tolerance_um=tolerance)).report
         assert ("NCF418" in {message.code for message in report.warnings}) == grows
         assert (report.error_after_um["max"] > report.error_before_um["max"]) == grows
 

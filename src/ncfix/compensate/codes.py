@@ -109,9 +109,10 @@ CODES = {
     "NCF418": Code(
         "the errors grow",
         "The program was corrected, and the simulation says that its tool tip is farther off than before, at most and "
-        "on average. That happens where the machine's errors are smaller than a step of the control's digits: every "
-        "number that is written anew is rounded, and between two of them the path follows the rounded ends.",
-        "Leave the program as it is. Or set `least_increment` in the machine file, if the control resolves more.",
+        "on average. That happens where the machine's errors are smaller than `--tolerance-um`, so that no block is "
+        "split to follow them between its ends, or smaller than a step of the control's digits.",
+        "Ask for a tolerance below the errors of the machine, or leave the program as it is. Set `least_increment` in "
+        "the machine file if the control resolves more.",
     ),
     "NCF420": Code(
         "the corrected program does not follow the original",

@@ -148,7 +148,7 @@ class FixReport:
                 f"the tip errors of this program grow: max {max_before:.2f} um and rms {rms_before:.2f} um before, "
                 f"max {max_after:.2f} um and rms {rms_after:.2f} um when it is corrected"
             )
-            hint = "leave this program as it is, or set a smaller least_increment if the control resolves more"
+            hint = "ask for a smaller --tolerance-um, or leave this program as it is"
             found.append(Message("NCF418", text, Place(self.path), hint))
         return replace(self, warnings=(*self.warnings, *found))
 
