@@ -16,8 +16,8 @@ from ncfix.control.arcs import CLOCKWISE, COUNTER
 from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.interpreter import TextUnit
-from ncfix.control.lanes import lane_tables as shared
-from ncfix.control.lanes.lane_tables import Lane
+from ncfix.control.lanes import block_rows as shared
+from ncfix.control.lanes.block_rows import Lane
 from ncfix.text.tree import Constant, Literal, Program, Template
 from ncfix_heidenhain.klartext.arcs import IN_PLANE
 from ncfix_heidenhain.klartext.plans import LETTERS, KlartextPlan, plan_of

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from ncfix.control.expressions import Evaluate
-from ncfix.control.operations import Like
 from ncfix.text.dialect import CodeOperation, CycleTable, tenths
 from ncfix.text.tree import Expression
 from ncfix_iso.rs274.parameters import compiled
 
 if TYPE_CHECKING:
+    from ncfix.control.operations import Like
     from ncfix.text.dialect import Dialect
 
 
@@ -212,8 +212,8 @@ def with_own_codes(rules: Rules, dialect: Dialect) -> Rules:
     """The rules of a dialect: those of its family, and what it adds."""
     for name, operations in dialect.codes:
         letter, code = name[0], tenths(name)
-        if len(operations) == 1 and isinstance(operations[0], Like):
-            rules = replace(rules, aliases={**rules.aliases, (letter, code): operations[0]})
+        if len(operations) == 1 and operations[0].alone:
+            rules = replace(rules, aliases={**rules.aliases, (letter, code): cast("Like", operations[0])})
         elif letter == "M":
             rules = with_m_code(rules, code, operations)
         else:

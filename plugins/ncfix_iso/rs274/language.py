@@ -1,10 +1,15 @@
-"""The RS274 family as a `WrittenLanguage`: LinuxCNC, plain ISO code and their like."""
+"""The RS274 family as a `WrittenLanguage`: LinuxCNC, plain ISO code and their like.
+
+Some of their like say the codes of this family in words: MOVE X=10 FEED=500 for G1 X10 F500. They are read by their
+own grammar, with `Dialect.keywords`. Every line that is put in says its motion, as they have no motion in force.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,20 +31,19 @@ from ncfix.text.build import (
 )
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, bare_expression, explain
-from ncfix.text.grammar import UnspacedBlock, parse, squeeze
+from ncfix.text.grammar import UnspacedBlock, parse, parser, squeeze
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
 from ncfix.text.reach import tape_end
 from ncfix.text.shapes import scan, split_blocks
 from ncfix.text.spelling import Spelling
-from ncfix.text.tree import Program
+from ncfix.text.tree import Program, Word
 from ncfix.writer.block import BlockWriter
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.target import Target
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.groups import RULES, TOOL_CHANGE
 from ncfix_iso.rs274.interpreter import RS274Interpreter
-from ncfix_iso.rs274.keywords import KeywordWriter, has_keywords
 
 if TYPE_CHECKING:
     from ncfix.control.interpreter import FlatLine
@@ -48,6 +52,7 @@ if TYPE_CHECKING:
 MAY_REPEAT = frozenset("GM")
 """The addresses that may stand several times in a block."""
 
+NO_KEYWORD = "the correction needs a word for {}, and the language has none"
 NO_TREE = "the grammar has to make a tree of words and values, as common.lark does, and made"
 
 PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
@@ -113,6 +118,59 @@ def writable(program: Program, block: int) -> Layout | None:
 def plain(program: Program) -> Spelling:
     """Numbers as they come, with a point in the place of formulas."""
     return Spelling(signed=program.dialect.signed)
+
+
+def has_keywords(dialect: Dialect) -> bool:
+    """Whether blocks of a dialect look otherwise than letters with numbers."""
+    return bool(dialect.keywords or dialect.assign or dialect.signed)
+
+
+def reads_codes(dialect: Dialect) -> bool:
+    """Whether blocks of a dialect may have G codes as well as its keywords."""
+    return any(terminal.name.endswith("CODE") for terminal in parser(dialect.grammar).terminals)
+
+
+class KeywordWriter(BlockWriter):
+    """Writes one motion into one block, with the keywords of the dialect for codes and addresses."""
+
+    @cached_property
+    def spelled(self) -> dict[str, str]:
+        """Code or address -> its keyword; the first of several."""
+        return {meaning: word for word, meaning in reversed(self.program.dialect.keywords)}
+
+    def _cased(self, address: str) -> str:
+        return super()._cased(self.spelled.get(address, address)) + self.program.dialect.assign
+
+    def _code(self, number: str) -> str:
+        """A G code as the language says it; a conflict where it has no word for that."""
+        if not self.program.dialect.keywords:
+            return super()._cased("G") + number
+        word = self.spelled.get(f"G{number}", "")
+        if not word and reads_codes(self.program.dialect):
+            return super()._cased("G") + number
+        if not word:
+            self.out.conflict = self.out.conflict or NO_KEYWORD.format(f"G{number}")
+        return word
+
+    def _restate(self, word: Word, number: str) -> None:
+        if self.program.dialect.keywords:
+            self.out.edits.append((*self.program.span(self.block, word.span), self._code(number)))
+        else:
+            super()._restate(word, number)
+
+    def _opening(self, wanted: int) -> list[str]:
+        """What a further line begins with: the motion, as nothing is in force there."""
+        if not self.program.dialect.keywords:
+            return super()._opening(wanted)
+        self.code = self.code if self.target.arcs is None else wanted
+        return [self._code(f"{self.code // 10}")]
+
+    def _feed_mode(self, number: str) -> None:
+        word = self.layout.feed_mode
+        if word is None or not self.program.dialect.keywords:
+            super()._feed_mode(number)
+        else:
+            self._restate(word, number)
 
 
 def writer_of(program: Program, block: int, layout: Layout, target: Target, spelling: Spelling) -> BlockWriter:

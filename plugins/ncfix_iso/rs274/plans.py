@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.expressions import Evaluate, Fault
 from ncfix.control.interpreter import TextUnit
-from ncfix.control.lanes.lane_tables import Lane
-from ncfix.control.operations import source
+from ncfix.control.lanes.block_rows import Lane
 from ncfix.control.state import NO_MOTION
 from ncfix.text.dialect import tenths
 from ncfix.text.reach import UNREAD, Deletable, deletable
@@ -214,7 +213,7 @@ def take_aliases(plan: RS274Plan, rules: Rules) -> None:
     """Words that a code of the dialect's own gives to the code of the family that it stands for."""
     codes = [(w.address, round(10 * w.value.value)) for w in plan.template.words if isinstance(w.value, Constant)]
     for code in codes:
-        given = {address: source(own) for address, own in rules.aliases[code].words} if code in rules.aliases else {}
+        given = rules.aliases[code].given if code in rules.aliases else {}
         family = {own: address for address, (own, _) in given.items() if own is not None}
         untouched = plan.letters - family.keys()
         if untouched & given.keys():

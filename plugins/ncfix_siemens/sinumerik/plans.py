@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
 from ncfix.control.expressions import Evaluate, left_out
-from ncfix.control.lanes.lane_tables import Lane
+from ncfix.control.lanes.block_rows import Lane
 from ncfix.text.reach import Deletable, deletable
 from ncfix.text.tree import (
     Assignment,

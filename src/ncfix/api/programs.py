@@ -26,8 +26,7 @@ from ncfix.files import read_bytes
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ncfix.compensate import FixOptions
-    from ncfix.compensate.driver import Fixed, Seen
+    from ncfix.compensate.driver import Fixed
     from ncfix.compensate.figures.verification import Compared
     from ncfix.compensate.following import Resolve
     from ncfix.machine import Machine
@@ -65,32 +64,19 @@ def fix(
     resolve        gives the text of a subprogram by its name; None: files beside the program, if that is one
     """
     from ncfix.compensate import FixOptions
+    from ncfix.compensate.driver import fix_flat, fix_program
 
     options = FixOptions(strategy, tolerance_um, allow_refused, force, split_rapids, flatten, block_numbers, figures)
     check_writable(output, force, program, machine, setup)
     known = sound_machine(machine, force)
     own = as_setup(setup, known)
     read = as_program(program, known)
-    found = fixed(read, known, own, options, resolve or subprograms_of(own, read))
+    correct = fix_flat if flatten else fix_program
+    found = correct(read, known, own, options, resolve or subprograms_of(own, read))
     if output is not None and found.report.refused and not allow_refused:
         raise RefusedError.collected(found.report.refusals)
     write_output(output, found.text, force)
     return found
-
-
-def fixed(
-    program: Program,
-    machine: Machine,
-    setup: Setup,
-    options: FixOptions,
-    resolve: Resolve | None,
-    seen: Seen | None = None,
-) -> Fixed:
-    """A program corrected with these options, flat where they say so; `seen` as `fix_program` has it."""
-    from ncfix.compensate.driver import fix_flat, fix_program
-
-    looks = (seen,) if seen else ()
-    return (fix_flat if options.flatten else fix_program)(program, machine, setup, options, resolve, *looks)
 
 
 def verify(

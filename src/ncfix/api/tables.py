@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ncfix.api.programs import fixed
 from ncfix.api.sources import (
     PathName,
     as_machine,
@@ -171,6 +170,7 @@ def with_program(
     import numpy as np
 
     from ncfix.compensate import FixOptions
+    from ncfix.compensate.driver import fix_program
     from ncfix.compensate.figures.simulation import SimulatedErrors, refuse_corrected, tip_errors_of, tip_with
     from ncfix.compensate.following import follow
     from ncfix.tables.export import SIDE_FILE, ProgramWithTables, read_manifest
@@ -184,7 +184,7 @@ def with_program(
     before = SimulatedErrors.of(tip_errors_of(program, followed)).figures()
     if control.rewrites:
         options = FixOptions(manifest.settings["strategy"], float(manifest.settings["tolerance_um"]))
-        found = fixed(program, machine, setup, options, resolve)
+        found = fix_program(program, machine, setup, options, resolve)
         if rewrite and found.report.refused:
             raise RefusedError.collected(found.report.refusals)
         files = {**made.files, os.path.basename(program.path): found.text} if rewrite else made.files

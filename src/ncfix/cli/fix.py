@@ -25,7 +25,6 @@ from ncfix.cli.options import (
     tolerance_option,
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.shop.pages import Pages
 from ncfix.cli.shop.projects import (
     ProjectCommand,
     after_next_groups,
@@ -41,6 +40,7 @@ from ncfix.plugins import registry
 if TYPE_CHECKING:
     from ncfix.batch.work import ExecutorMaker
     from ncfix.cli.shop.batch import Batch, FixJob
+    from ncfix.cli.shop.pages import Pages
 
 BATCHES = "ncfix.batches"
 """Where a context keeps the batches of the groups of programs before this one."""
@@ -229,7 +229,11 @@ def fix(
     outputs = _outputs(context, programs, Outputs(output, in_place, force, resume))
     wanted = [] if looks else _targets(context, programs, outputs, (machine_path, *given.files), as_json or json_lines)
     many = len(programs) > 1 or any(map(os.path.isdir, programs))
-    pages = Pages.of(page, plot, many, force, wanted, (machine_path, *given.files))
+    pages: Pages | None = None
+    if page is not None or plot is not None:
+        from ncfix.cli.shop.pages import Pages
+
+        pages = Pages.of(page, plot, many, force, wanted, (machine_path, *given.files))
     from ncfix.compensate import FixOptions
 
     if choices.pop("thesis"):

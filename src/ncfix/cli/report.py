@@ -116,7 +116,6 @@ def _report_program(
         raise UsageError.of("NCF001", "with -m there is one program on a page", hint=hint)
     target = OutputTarget(sources[0], output)
     pages = Pages.of(output, plot, False, force, [OutputTarget(sources[0], STREAM)], (machine_path, *given.files))
-    assert pages is not None
     machine = sound(load_machine(machine_path), machine_path, force)
     dialect = options.pop("dialect")
     job = FixJob(machine, given.load(machine), dialect, FixOptions(**options, force=force), pages=pages)

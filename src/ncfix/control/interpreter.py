@@ -26,10 +26,8 @@ from numpy.typing import NDArray
 from ncfix.control.control import ProgramControl
 from ncfix.control.expressions import Fault
 from ncfix.control.flow import ENDLESS, NEVER_ENDS, Recurrence
-from ncfix.control.lanes.arc_lane import turned
-from ncfix.control.lanes.block_rows import Lookahead
-from ncfix.control.lanes.lane import run_lane
-from ncfix.control.lanes.lane_tables import LaneTables
+from ncfix.control.lanes.block_rows import LaneTables, Lookahead
+from ncfix.control.lanes.lane import run_lane, turned
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Run
 from ncfix.diagnostics import Message, Place, SourceError

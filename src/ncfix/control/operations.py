@@ -113,12 +113,17 @@ class Like(Operation):
         if MOTION.fullmatch(self.code) and any(places & {known, source(own)[0]} for known, own in self.words):
             raise ValueError(f"like({self.code!r}): the words of a motion's place are corrected, and stay as they are")
 
+    @property
+    def given(self) -> dict[str, tuple[str | None, float | None]]:
+        """Where the words of the family's code come from, by their addresses: see `source`."""
+        return {known: source(own) for known, own in self.words}
+
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """The family's code stands in its place wherever blocks are read: there is nothing left to do."""
 
     def __str__(self) -> str:
         told = []
-        for known, (address, default) in ((known, source(own)) for known, own in self.words):
+        for known, (address, default) in self.given.items():
             without = "" if default is None else f"{known}{default:g}"
             told.append(f"{address} as {known}" + (f" (else {without})" if without else "") if address else without)
         return f"as {self.code}" + "".join(f", {each}" for each in told)

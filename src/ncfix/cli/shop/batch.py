@@ -177,14 +177,15 @@ class FixJob:
                 yield self._in_parts(source, stream, outlet, find, dialect)
 
     def _whole(self, source: Source, text: bytes, find: Find) -> FixedText:
-        from ncfix.api.programs import fixed
+        from ncfix.compensate.driver import fix_flat, fix_program
         from ncfix.text.reader import read
 
         path = shown(source.path)
         program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
         seen: list[tuple[Program, Corrector]] = []
-        look = (lambda *each: seen.append(each)) if self.pages else None
-        found = fixed(program, self.machine, self.setup, self.options, find, look)
+        look = [lambda *each: seen.append(each)] if self.pages else []
+        correct = fix_flat if self.options.flatten else fix_program
+        found = correct(program, self.machine, self.setup, self.options, find, *look)
         report = self._remarked(found.report, program.dialect)
         page = self._page(_recorded(seen, found), report, text) if self.pages else None
         return FixedText(found.text, found.changed, report, program.dialect.name, page)

@@ -45,14 +45,12 @@ class Pages:
         force: bool,
         targets: Sequence[OutputTarget],
         read: Sequence[str | None],
-    ) -> Pages | None:
-        """Those that are asked for; None if none are. Raises `UsageError` if they cannot be, before anything is done.
+    ) -> Pages:
+        """Those that are asked for. Raises `UsageError` if they cannot be, before anything is done.
 
         targets  where the programs come from and go to
         read     other inputs
         """
-        if page is None and plot is None:
-            return None
         if plot is not None and many:
             raise UsageError.of("NCF001", "--plot is a picture of one program", hint="--report has pages of many")
         found = cls(page, plot, many, force)
