@@ -307,6 +307,9 @@ def test_a_range_of_tables_is_two_numbers(shop: Path) -> None:
 def test_names_of_effects_are_a_list_and_those_that_do_not_exist_are_said(measured: Measurement) -> None:
     assert code_of(lambda: ncfix.diagnose(measured, "machine.toml", without="EXX")) == "NCF025"
     assert code_of(lambda: ncfix.plan("machine.toml", separate="EXX")) == "NCF025"
+    one_text: Any = ["EXX"]
+    assert code_of(lambda: ncfix.plan("machine.toml", effects=one_text)) == "NCF025"
+    assert code_of(lambda: ncfix.calibrate(measured, "machine.toml", effects=one_text)) == "NCF025"
     assert code_of(lambda: ncfix.plan("machine.toml", existing=[measured, measured.with_columns({})])) == "NCF025"
     found = ncfix.diagnose(measured, "machine.toml", without=["no such name"])
     assert "NCF657" in [message.code for message in found.messages]

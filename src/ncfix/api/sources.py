@@ -165,6 +165,12 @@ def as_names(argument: str, given: Sequence[str]) -> tuple[str, ...]:
     return tuple(given)
 
 
+def check_list(argument: str, given: str | None) -> None:
+    """Raises `UsageError` NCF025 for names that are not one text, with commas between them."""
+    if given is not None and not isinstance(given, str):
+        raise UsageError.of("NCF025", f"{argument}={given!r}", hint=f"{argument}='EC0Y,E?X', one text")
+
+
 def as_measurements(measured: Measured | Sequence[Measured], machine: Machine) -> list[Measurement]:
     """One measurement or several, or those of files; raises `UsageError` NCF020 for one twice, NCF025 for none."""
     from ncfix.measure.measurement import Measurement
