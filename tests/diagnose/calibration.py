@@ -20,8 +20,8 @@ from diagnose.study import FAMILIES, Scene, drawn
 from diagnose.tables import put
 from diagnose.worlds import World
 from ncfix.diagnosis import diagnosis, evidence, joint_fit
-from ncfix.diagnosis.diagnosis import Diagnosis, concluded, diagnose
-from ncfix.diagnosis.evidence import Comparison, Members
+from ncfix.diagnosis.diagnosis import Case, Diagnosis, concluded, weighed
+from ncfix.diagnosis.evidence import Comparison, Evidence, Members
 from ncfix.diagnosis.joint_fit import passing
 from ncfix.diagnosis.selection import Selected, select, with_alternatives, with_constants, with_constants_free
 
@@ -39,7 +39,8 @@ ASKED = ("clutter", "single", "two", "deleted", "foreign")
 class Again:
     """A scene that was diagnosed once, to be judged again with other constants."""
 
-    found: Diagnosis
+    case: Case
+    evidence: Evidence
     members: Members = field(init=False)
     scale: Comparison = field(init=False)
 
@@ -49,15 +50,14 @@ class Again:
 
     def weigh(self) -> None:
         """Which effects are there, from the start."""
-        evidence = self.found.case.evidence
-        freed = with_constants_free(evidence)
-        self.scale = Comparison(evidence)
-        self.members = with_constants(self.scale, select(freed, (*freed.names, *evidence.alternatives)))
+        freed = with_constants_free(self.evidence)
+        self.scale = Comparison(self.evidence)
+        self.members = with_constants(self.scale, select(freed, (*freed.names, *self.evidence.alternatives)))
 
     def concluded(self) -> Diagnosis:
         """What is said of them."""
         selected: Selected = passing(self.scale, with_alternatives(self.scale, self.members))
-        return concluded(self.found.case, self.scale, selected)
+        return concluded(self.case, self.scale, selected)
 
 
 @contextmanager
@@ -73,7 +73,8 @@ def at(module: ModuleType, name: str, value: float) -> Iterator[None]:
 
 def answers(world: World, scene: Scene, random: np.random.Generator, stated: bool) -> Iterator[tuple[str, Diagnosis]]:
     """What is said with the constants as they are, and with each at other values."""
-    again = Again(diagnose([world.measured(scene.shown, random, stated)], world.machine, scene.refused))
+    case, scale = weighed([world.measured(scene.shown, random, stated)], world.machine, scene.refused)
+    again = Again(case, scale.evidence)
     yield "as they are", again.concluded()
     for name, module, values in TRIED[1:]:
         for value in values:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -71,6 +72,12 @@ def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
     assert found["effects"][0]["plausible"]["is"]
     assert found["effects"][0]["targets"] == ["fix", *(f"export {name}" for name in ALONG)]
     assert with_provenance(backlash).provenance["added"] == "backlash X"
+
+
+def test_a_diagnosis_keeps_the_result_and_not_the_workings(backlash: Diagnosis) -> None:
+    again = pickle.dumps(backlash)
+    assert len(again) < 1e6  # bytes; with all candidates and covariances some tens of millions
+    assert text(pickle.loads(again)) == text(backlash)
 
 
 def test_constants_that_the_data_do_not_ask_to_change_stay(known: Machine, backlash: Diagnosis) -> None:

@@ -17,7 +17,6 @@ from ncfix.diagnosis.constants import ConstantsVerdict, FileLikelihood, MovedCon
 from ncfix.diagnosis.evidence import SHARES, Comparison, Evidence, Member, entry_price
 from ncfix.diagnosis.forms import (
     CHANGE,
-    VisibleForms,
     changes,
     file_constants,
     scaled_axes,
@@ -26,6 +25,7 @@ from ncfix.diagnosis.forms import (
 )
 from ncfix.diagnosis.joint_fit import (
     RATHER,
+    Gap,
     JointFit,
     fitted,
     held_out,
@@ -82,37 +82,20 @@ CLEAR = float(np.log(1e6))
 NO_PATTERN = "something that follows no pattern that was looked for"
 
 
-@dataclass(frozen=True)
-class Gap:
-    """Root mean square of residual lengths, um: before, after, the noise floor, and the first two on held-out poses.
-
-    given, holdout_given  with the machine file as it stands: only the set-up is fitted
-    """
-
-    before: float
-    after: float
-    floor: float
-    holdout_before: float
-    holdout_after: float
-    given: float = float("nan")
-    holdout_given: float = float("nan")
-
-
 @dataclass(frozen=True, repr=False)
 class Case:
-    """What is asked: the data, the candidates, and what compares them.
+    """What was asked.
 
-    considered  all candidates; `unheard_of` names that were refused and do not exist
-    gathered    those that the data can show, and those that they cannot
+    considered  how many names; `unheard_of` those that were refused and do not exist
+    invisible   names that the data cannot show, with the share that is left of them
     outlying    (rows,) what was put aside
     """
 
     data: ResidualData
-    considered: tuple[Candidate, ...]
+    considered: int
     unheard_of: tuple[str, ...]
-    visible: VisibleForms
+    invisible: tuple[tuple[str, float], ...]
     outlying: NDArray[np.bool_]
-    evidence: Evidence
 
     @property
     def kept(self) -> NDArray[np.bool_]:
@@ -238,7 +221,7 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
 
     Names are fitted without what has none: that shall explain only what they leave (Plumlee 2017).
     """
-    evidence, data, keep = case.evidence, case.data, case.kept
+    evidence, data, keep = scale.evidence, case.data, case.kept
     every, told = list(selected.members.values()), [selected.members[name] for name in selected.named]
     share = evidence.share(every)
     joint = fitted(evidence, told, share)
@@ -248,14 +231,14 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
     noise = floor.sigma_um * data.relative
     constants = judged_constants(evidence, told, share)
     machine, added = machine_with(evidence, told, fitted(evidence, told, share, constants.stay))
-    named = _findings(case, selected, joint, added)
+    named = _findings(case, evidence, selected, joint, added)
     off = _off(case, constants, machine, max((each.size_um for each in named), default=0.0))
     findings = (*off, *named) if named and off and off[0].size_um > named[0].size_um else (*named, *off)
     findings = compound(data, findings, constants.moved)
     places = scaled_axes(data)
     sets: list[dict[str, Member]] = [{}, {name: selected.members[name] for name in selected.named}, selected.members]
     weights = [scale.weight(each) for each in sets]
-    rest = _rest(case, selected, joint, floor, noise, weights[2] - weights[1])
+    rest = _rest(case, evidence, selected, joint, floor, noise, weights[2] - weights[1])
     return Diagnosis(
         case=case,
         verdict=verdict_of(
@@ -263,7 +246,7 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
         ),
         findings=findings,
         rest=rest,
-        gap=_gap(case, told, joint, share, data.rms(noise, keep)),
+        gap=_gap(case, evidence, told, joint, share, data.rms(noise, keep)),
         floor=floor,
         machine=machine if any(added) or off else None,
         selected=selected,
@@ -284,12 +267,12 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
 
 
 def _findings(
-    case: Case, selected: Selected, joint: JointFit, added: Sequence[tuple[Effect, ...]]
+    case: Case, evidence: Evidence, selected: Selected, joint: JointFit, added: Sequence[tuple[Effect, ...]]
 ) -> tuple[EffectFinding, ...]:
     """The names with what they show and add."""
     found = []
     for name, effects, shown in zip(selected.named, added, joint.shown, strict=True):
-        owner = case.evidence.groups[selected.members[name].group].owner
+        owner = evidence.groups[selected.members[name].group].owner
         size, judgement = case.data.size(shown, case.kept), plausibility(case.data, owner, effects)
         alike = tuple(aliases(selected, name))
         found.append(
@@ -341,9 +324,11 @@ def _owners(data: ResidualData, machine: Machine) -> list[Effect]:
     return [replace(effect, covariance=None) for effect in free for _ in range(effect.basis.size)]
 
 
-def _rest(case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, noise: Array, odds: float) -> Unexplained:
+def _rest(
+    case: Case, evidence: Evidence, selected: Selected, joint: JointFit, floor: NoiseFloor, noise: Array, odds: float
+) -> Unexplained:
     """What has no name."""
-    evidence, keep = case.evidence, case.kept
+    keep = case.kept
     every = list(selected.members.values())
     whole = fitted(evidence, every, evidence.share(every))
     parameters = _constants(case) + sum(map(len, joint.numbers)) / 2
@@ -356,11 +341,11 @@ def _rest(case: Case, selected: Selected, joint: JointFit, floor: NoiseFloor, no
     )
 
 
-def _gap(case: Case, told: Sequence[Member], joint: JointFit, share: float, noise_um: float) -> Gap:
+def _gap(case: Case, evidence: Evidence, told: Sequence[Member], joint: JointFit, share: float, noise_um: float) -> Gap:
     data, keep = case.data, case.kept
-    held = held_out(case.evidence, told, share)
-    asked = FileLikelihood(case.evidence, told, share)
-    predicted = held_out_as_given(case.evidence, asked.from_file, asked.setup, share)
+    held = held_out(evidence, told, share)
+    asked = FileLikelihood(evidence, told, share)
+    predicted = held_out_as_given(evidence, asked.from_file, asked.setup, share)
     known = np.isfinite(held.without) & np.isfinite(held.with_all) & np.isfinite(predicted) & keep
     basis = orthonormal(asked.setup / data.relative[:, None])
     given = without_base(basis, (asked.from_file / data.relative)[:, None])[:, 0] * data.relative
@@ -393,7 +378,7 @@ def diagnose(
     if since:
         if len(measurements) < 2:
             raise UsageError.of("NCF650", "one file: what changed since takes one of each date")
-        return _changes(_explained(measurements, machine, refused, len(measurements) - 1))
+        return _explained(measurements, machine, refused, len(measurements) - 1)
     wrong = find(measurements, machine, refused)
     if wrong is None:
         checks.sensible(measurements, machine)
@@ -415,11 +400,11 @@ def diagnose(
     return _with_mistake(undone, wrong, machine)
 
 
-def _changes(found: Diagnosis) -> Diagnosis:
+def _changes(found: Diagnosis, evidence: Evidence) -> Diagnosis:
     """Of a diagnosis of two dates: what came between them is found, what was there before is steady."""
     new = tuple(each for each in found.findings if each.candidate.name.startswith(CHANGE))
     steady = tuple(each.candidate.name for each in found.findings if each not in new)
-    evidence, members = found.case.evidence, found.selected.members
+    members = found.selected.members
     every = list(members.values())
     shown = zip(members, fitted(evidence, every, evidence.share(every)).shown, strict=True)
     unnamed = {name: own for name, own in shown if name in found.selected.unnamed and name.startswith(CHANGE)}
@@ -447,6 +432,21 @@ def _explained(
 
     Raises `UsageError` NCF650, NCF656.
     """
+    case, scale = weighed(measurements, machine, refused, since)
+    selected = _selected(scale)
+    evidence = scale.evidence
+    while evidence.most > 1 and _everything_um(evidence, selected) > PLAUSIBLE_UM * case.data.large:
+        evidence.most = SHARES.index(evidence.share(list(selected.members.values())))
+        scale = Comparison(evidence)
+        selected = _selected(scale)
+    found = concluded(case, scale, selected)
+    return _changes(found, evidence) if since else found
+
+
+def weighed(
+    measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = (), since: int = 0
+) -> tuple[Case, Comparison]:
+    """What is asked, and the scale on which sets of effects are compared. Raises `UsageError` NCF650."""
     seen = residual_data(measurements, machine)
     checks.enough(seen)
     candidates, unheard_of = without(catalogue(seen.measured), refused)
@@ -458,14 +458,9 @@ def _explained(
     everything, groups = everything_covariance(seen, named), (*named, *unnamed)
     relative, outlying = downweighted(seen, everything, groups)
     background = estimated_background(seen, everything, relative, named)
-    evidence = Evidence(background, groups, len(named))
-    case, scale = Case(seen, candidates, unheard_of, visible, outlying, evidence), Comparison(evidence)
-    selected = _selected(scale)
-    while evidence.most > 1 and _everything_um(evidence, selected) > PLAUSIBLE_UM * seen.large:
-        evidence.most = SHARES.index(evidence.share(list(selected.members.values())))
-        scale = Comparison(evidence)
-        selected = _selected(scale)
-    return concluded(case, scale, selected)
+    invisible = tuple((candidate.name, share) for candidate, share in visible.invisible)
+    case = Case(seen, len(candidates), unheard_of, invisible, outlying)
+    return case, Comparison(Evidence(background, groups, len(named)))
 
 
 def _everything_um(evidence: Evidence, selected: Selected) -> float:

@@ -187,6 +187,22 @@ def _folds(data: ResidualData) -> tuple[Index, list[NDArray[np.bool_]]]:
     return cell, [(cell % FOLDS == fold) & (data.row >= 0) for fold in range(FOLDS)]
 
 
+@dataclass(frozen=True)
+class Gap:
+    """Root mean square of residual lengths, um: before, after, the noise floor, and the first two on held-out poses.
+
+    given, holdout_given  with the machine file as it stands: only the set-up is fitted
+    """
+
+    before: float
+    after: float
+    floor: float
+    holdout_before: float
+    holdout_after: float
+    given: float = float("nan")
+    holdout_given: float = float("nan")
+
+
 def held_out(evidence: Evidence, members: Sequence[Member], share: float) -> HeldOut:
     """Predict each region from the others: without members, with all, and with all but each one."""
     background = evidence.background

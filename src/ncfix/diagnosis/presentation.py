@@ -113,7 +113,7 @@ def held(diagnosis: Diagnosis) -> list[str]:
 
 def silence(diagnosis: Diagnosis) -> list[str]:
     """What it means that nothing was found."""
-    count = len(diagnosis.case.considered)
+    count = diagnosis.case.considered
     few = shows_hardly_anything(diagnosis.findable, diagnosis.data.sizes)
     return [
         *(["these data can show hardly anything"] if few else []),
@@ -224,7 +224,7 @@ def why(diagnosis: Diagnosis, finding: EffectFinding) -> str:
     best = max(runners_up, key=lambda each: runners_up[each])
     less = finding.odds - runners_up[best]
     beside = f"{abs(less):.0f} {'less' if less >= 0 else 'more'}"
-    return f"{said}; next best of {len(diagnosis.case.considered)}: {best}, {beside}"
+    return f"{said}; next best of {diagnosis.case.considered}: {best}, {beside}"
 
 
 def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:
@@ -258,9 +258,9 @@ def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:
             "freedom": diagnosis.floor.freedom,
         },
         "lack_of_fit": {"before": diagnosis.p_lack, "after": diagnosis.p_left},
-        "invisible": [{"name": c.name, "visible_share": share} for c, share in diagnosis.case.visible.invisible],
+        "invisible": [{"name": name, "visible_share": share} for name, share in diagnosis.case.invisible],
         "findable_um": {name: size if np.isfinite(size) else None for name, size in diagnosis.findable.items()},
-        "considered": len(diagnosis.case.considered),
+        "considered": diagnosis.case.considered,
         "outliers": _outliers(diagnosis),
         "constants": [
             {

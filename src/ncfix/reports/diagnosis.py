@@ -229,9 +229,7 @@ def _runners(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
     if runners_up:
         best = sorted(runners_up, key=lambda each: -runners_up[each])[:RUNNERS]
         rows = [(finding.candidate.name, f"{finding.odds:.1f}"), *((each, f"{runners_up[each]:.1f}") for each in best)]
-        yield Paragraph(
-            f"Evidence, log odds, best of {len(diagnosis.case.considered)} (3 less is 20 times less likely):"
-        )
+        yield Paragraph(f"Evidence, log odds, best of {diagnosis.case.considered} (3 less is 20 times less likely):")
         yield Table(("name", "log odds"), rows)
 
 
@@ -350,7 +348,7 @@ def _next(diagnosis: Diagnosis) -> ReportSection:
 
 
 def _unseen(diagnosis: Diagnosis) -> ReportSection:
-    names = ", ".join(candidate.name for candidate, _ in diagnosis.case.visible.invisible)
+    names = ", ".join(name for name, _ in diagnosis.case.invisible)
     count = int(diagnosis.case.outlying.sum())
     parts = [Paragraph(f"Not visible with these poses: {names}.")] if names else []
     if count:
