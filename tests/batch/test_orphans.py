@@ -1,4 +1,4 @@
-"""Whatever ends ncfix, nothing of it goes on: no process, no open pipe, no half of an output.
+"""Whatever ends ncfix, nothing of it goes on: no process, no open pipe, no half of an output; `--resume` does the rest.
 
 `NCFIX_MOMENTS=25` kills each kind of run so many times, spread over all that it does; else once.
 """
@@ -60,13 +60,13 @@ def ground(title: str) -> Path:
     return folder
 
 
-def started(title: str, out: Path, mark: str) -> subprocess.Popen[bytes]:
+def started(title: str, out: Path, mark: str, *more: str) -> subprocess.Popen[bytes]:
     folder, kind = ground(title), KINDS[title]
     command = [sys.executable, "-m", "ncfix", "fix", "in", "-m", "machine.toml", "--assume-zero", "--no-figures"]
     environment = {**os.environ, **kind.environment, "NCFIX_MARK": mark}
-    out.mkdir()
+    out.mkdir(exist_ok=True)
     return subprocess.Popen(
-        [*command, "-o", str(out / "out"), "--jobs", "3"],
+        [*command, "-o", str(out / "out"), "--jobs", "3", *more],
         cwd=folder,
         env=environment,
         stdout=subprocess.PIPE,
@@ -85,7 +85,9 @@ def whole(title: str) -> tuple[dict[str, bytes], float]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()} if folder.exists() else {}
+    """The files of a folder, but what a batch notes for itself."""
+    files = (path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
+    return {path.name: path.read_bytes() for path in files}
 
 
 def alive(mark: str) -> Iterator[int]:
@@ -123,6 +125,9 @@ def test_nothing_is_left(title: str, how: signal.Signals, moment: int) -> None:
         running.communicate(timeout=PATIENCE_S)  # until the pipe is closed by all who have it
     finally:
         gone(mark, begun + PATIENCE_S)
-    found = contents(out / "out")
-    assert {name: found[name] for name in found if not name.startswith(".")}.items() <= expected.items()
-    assert not [name for name in found if name.endswith(".tmp")]
+    assert contents(out / "out").items() <= expected.items()
+    again = started(title, out, mark, "--resume")
+    said, _ = again.communicate(timeout=300)
+    assert again.returncode == 0, said.decode()
+    assert contents(out / "out") == expected
+    gone(mark, time.monotonic() + PATIENCE_S)

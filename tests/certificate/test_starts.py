@@ -114,9 +114,10 @@ def test_what_cam_systems_write_in_klartext_is_followed(words: dict[str, str]) -
     ("line", "instead", "reason"),
     [
         ("Q339=+1", "Q339=+Q5", "where an axis stands is not known"),
-        ("S8000", "S8000 DL+0.1", "a tool call without a tool that this reader knows, or with an oversize"),
+        ("S8000", "S8000 DL+QL1", "a tool call without a tool or an oversize that this reader knows"),
+        ("S8000", "S8000 DL+0.1\nTOOL CALL S9000", "a tool call without a tool or an oversize that this reader knows"),
+        ("M120 LA20", "TOOL CALL DL+0.1", "another tool while the tip is led (M128, TCPM)"),
         ("C+20 FQ1", "C+220 FQ1", "a rotary axis goes the shorter way (M126)"),
-        ("PATHCTRL AXIS", "PATHCTRL VECTOR", "FUNCTION is not known to this reader"),
     ],
 )
 def test_what_is_not_followed_in_klartext_is_not_proved(line: str, instead: str, reason: str) -> None:
@@ -125,6 +126,53 @@ def test_what_is_not_followed_in_klartext_is_not_proved(line: str, instead: str,
     changed = text.replace(line, instead).encode()
     proof = prove(changed, changed, machine("table"), given)
     assert reason in proof.reasons
+
+
+def test_a_tool_that_turns_in_a_plane_is_proved_where_it_does_not_turn_and_at_the_ends() -> None:
+    text = KLARTEXT.format(on="FUNCTION TCPM F TCP AXIS POS PATHCTRL VECTOR", off="FUNCTION RESET TCPM")
+    proof = klartext_proof(text)
+    ways = {"the way of a motion in which the tool turns in a plane (PATHCTRL VECTOR)": 2}
+    assert (proof.faults, dict(proof.reasons), proof.proved_motions) == ([], ways, 3)
+    assert klartext_proof(text, ("A-14", "A-14.01")).faults
+
+
+def test_an_oversize_is_added_to_the_length_of_the_tool() -> None:
+    text = KLARTEXT.format(**TIP).replace("S8000", "S8000 DL-0.25 DR+0.1")
+    proof = klartext_proof(text)
+    assert (proof.faults, dict(proof.reasons), proof.proved_motions) == ([], {}, 5)
+    assert klartext_proof(text, ("DL-0.25", "DL-0.26")).faults
+
+
+SIEMENS = """N10 DEF REAL _X_HOME, _Z_HOME
+N20 _X_HOME=0 _Z_HOME=300
+N30 G17 G71 G94 G90
+N40 SUPA G0 Z=_Z_HOME D0
+N50 SUPA X=_X_HOME Y=0
+N60 T1 D1 M6
+N70 G54
+N80 CYCLE800()
+N90 G0 X16 Y11 Z60 A0 C0
+N100 TRAORI
+N110 G1 X0 Y30 Z20 A0 C0 F100
+N120 X-50 A-70 C{c}
+N130 TRAFOOF
+N140 SUPA G0 Z=_Z_HOME D0
+N150 M30
+"""
+
+
+@pytest.mark.parametrize("c", [-120, -200])
+def test_what_posts_of_sinumerik_write_is_followed_and_half_turns_need_not_be_split(c: int) -> None:
+    known, start = machine("table"), dict.fromkeys("XYZAC", 0.0)
+    setup = Setup(work_offsets={"G54": {}}, tools={1: Tool(80.0)}, initial=start, assume_zero=True)
+    text = SIEMENS.format(c=c).encode()
+    options = FixOptions(verify=False, allow_refused=True)
+    fixed = fix_program(read(text, "part", get("siemens")), known, setup, options).text
+    given = Given(offsets={"G54": {}}, tools={1: 80.0}, initial=start, assume_zero=True)
+    proof = prove(text, fixed, known, given, "siemens")
+    rolls = {"a rotary axis may go the other way round": 1} if c < -180 else {}
+    assert (proof.faults, dict(proof.reasons), proof.motions) == ([], rolls, 6)
+    assert prove(text, fixed.replace(b"Z=_Z_HOME", b"Z=_X_HOME", 1), known, given, "siemens").faults
 
 
 def test_between_a_tool_change_and_the_next_length_offset_nothing_is_called_faulty() -> None:
@@ -137,4 +185,4 @@ def test_between_a_tool_change_and_the_next_length_offset_nothing_is_called_faul
     given = Given(offsets={"G54": {}}, tools={1: 120.0, 2: 60.0}, initial=initial)
     fixed = fix_program(read(text, "part", get("fanuc")), machine("table"), setup, FixOptions(verify=False)).text
     proof = prove(text, fixed, machine("table"), given, "fanuc")
-    assert (proof.faults, proof.lines["the length of the tool is not known"]) == ([], [8])
+    assert (proof.faults, proof.lines("the length of the tool is not known")) == ([], [8])

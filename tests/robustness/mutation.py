@@ -90,7 +90,7 @@ MODULES: dict[str, tuple[str, ...]] = {
         *("program/test_numbers.py", "program/test_reader.py", "program/test_shapes.py", "program/test_bulk.py"),
     ),
     "src/ncfix/text/spelling.py": ("program/test_number_style.py", "program/test_bulk.py", "program/test_numbers.py"),
-    "src/ncfix/core/words.py": ("core/test_forms.py", "program/test_bulk.py"),
+    "src/ncfix/core/words.py": ("core/test_words.py", "core/test_forms.py", "program/test_bulk.py"),
     "src/ncfix/core/motions.py": ("core/test_forms.py", "program/test_trace_lane.py", "compensate/test_plain.py"),
 }
 """Module -> the tests that are about it."""

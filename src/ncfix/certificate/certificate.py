@@ -58,7 +58,7 @@ class Subject:
             "proved_motions": proof.proved_motions,
             "faulty": len(proof.faulty) + sum(1 for fault in proof.faults if not fault.original),
             "not_proved": [
-                {"reason": reason, "blocks": count, "lines": proof.lines[reason]}
+                {"reason": reason, "blocks": count, "lines": proof.lines(reason)}
                 for reason, count in proof.reasons.most_common()
             ],
             "faults": [

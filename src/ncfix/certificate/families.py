@@ -25,16 +25,24 @@ QUIET = frozenset((51, 80, 90, 150, 501, 600, 610, 611, 620, 640, 690, 800, 911,
 )
 """G codes in tenths that move nothing and change no coordinates, or whose use is seen to elsewhere."""
 WORDS_QUIET = re.compile(
-    r"DEF|REAL|INT|BOOL|MSG|ORI(WKS|MKS|AXES|VECT|VIRT1)|SOFT|BRISK|DRIVE|FFWO(N|F)|COMP(OF|CAD|ON)|CFC|CFTCP|CFIN|"
+    r"MSG|SETMS|ORI(WKS|MKS|AXES|VECT|VIRT1)|SOFT|BRISK|DRIVE|FFWO(N|F)|COMP(OF|CAD|ON)|CFC|CFTCP|CFIN|"
     r"FNORM|FLIN|SUPA|ADIS|ADISPOS|CYCLE832|WALIMO(N|F)|STOPRE|PTP|CP|UPATH|SPOS|KONT|NORM"
 )
 """Words of SINUMERIK that move nothing and change no coordinates."""
+DECLARES = frozenset(("DEF", "EXTERN"))
 SINGLE = frozenset("NFSTDMHPLEQO")
 """Letters whose words are seen to, or mean nothing here."""
 
 
 class WordAddressFollower(AxisFollower):
-    """Follows word addresses and SINUMERIK."""
+    """Follows word addresses and SINUMERIK.
+
+    variables  of SINUMERIK, with plain numbers that the program gave them
+    """
+
+    def __init__(self, axes: Sequence[str], family: Family, given: Given, turned: Turned) -> None:
+        super().__init__(axes, family, given, turned)
+        self.variables: dict[str, float | None] = {}
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
@@ -138,9 +146,9 @@ class WordAddressFollower(AxisFollower):
             value = 0.0 if word is None or word.value is None else word.value * self.unit
             absolute = word is not None and word.counted == "="
             centre[axis] = (self.offset(axis) if absolute else start[axis]) + value
-        if line.code("P") is not None or any(
-            word.name in ("AR", "AP", "RP", "I1", "J1", "K1", "TURN") for word in line.path
-        ):
+        if line.code("P") is not None:
+            step.why, step.foreign = UNKNOWN_WORDS, True
+        elif any(word.name in ("AR", "AP", "RP", "I1", "J1", "K1", "TURN") for word in line.path):
             step.why = UNKNOWN_WORDS
         elif radius is None and not any(word.name in "IJK" for word in line.path):
             step.why = NO_CENTRE
@@ -230,6 +238,8 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _other_words(self, line: TextLine) -> None:
+        if any(word.name in DECLARES for word in line.codes):
+            return
         for word in line.codes:
             name = word.name
             if name == "F":
@@ -247,6 +257,8 @@ class WordAddressFollower(AxisFollower):
                 self.unsay()
             elif name == "G" and word.value is None:
                 self.lost["G"] = "a G code is a formula"
+            elif name == "CYCLE800()" and not any(self.shifts.values()):
+                pass  # no plane is swivelled that it could take back
             elif name == "MCALL":
                 if len(line.codes) - sum(each.name == "N" for each in line.codes) == 1:
                     self.lost = {key: why for key, why in self.lost.items() if not re.match("MCALL|CYCLE|HOLES", key)}
@@ -254,6 +266,7 @@ class WordAddressFollower(AxisFollower):
                 else:
                     self.lost[name] = "a modal call"
             elif len(name) > 1 and self.family is Family.SINUMERIK:
+                self.variables[name] = word.value
                 plain = name.partition("(")[0].strip()
                 if not WORDS_QUIET.fullmatch(plain) and not word.number and not name.startswith(("%", "_N_", "$")):
                     self.lost[plain] = f"{plain} is not known to this reader"
@@ -284,7 +297,7 @@ class WordAddressFollower(AxisFollower):
 
     def _fixed(self, row: int, line: TextLine, words: Mapping[str, TextWord], codes: Sequence[int]) -> AxisStep:
         """A motion in machine coordinates, or to a reference point."""
-        named = {axis: word for axis, word in words.items() if axis in self.at}
+        named = {axis: self._settled(word) for axis, word in words.items() if axis in self.at}
         if 280 in codes or 300 in codes:
             point = self.given.references.get("G28" if 280 in codes else "G30", {})
             end = dict(self.at)
@@ -295,6 +308,10 @@ class WordAddressFollower(AxisFollower):
         step = self.step(row, Kind.FIXED, end, line)
         self.unsay(tuple(named) or self.axes)
         return step
+
+    def _settled(self, word: TextWord) -> TextWord:
+        """A word whose value is that of a variable, if this is known."""
+        return word if word.value is not None else word._replace(value=self.variables.get(word.number.upper()))
 
     def _hole(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
         """A drilling cycle at a place: in G17, with absolute words."""

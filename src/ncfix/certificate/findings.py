@@ -6,7 +6,9 @@ Lines are counted from one, those of the corrected program and those of the orig
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Set
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import NamedTuple
 
 from ncfix.certificate.text import StampFound
@@ -26,15 +28,14 @@ class BlockProof:
 
     blocks   lines of the original that are not empty; `motions` of them move something
     proved, unproved   how many of each; the rest is faulty
-    reasons  of what is not proved: how many blocks, and the lines of the first few
+    left     why blocks are not proved, by their lines
     """
 
     blocks: int = 0
     motions: int = 0
     proved: int = 0
     proved_motions: int = 0
-    reasons: Counter[str] = field(default_factory=Counter)
-    lines: dict[str, list[int]] = field(default_factory=dict)
+    left: dict[int, str] = field(default_factory=dict)
     faults: list[BlockFault] = field(default_factory=list)
     faulty: set[int] = field(default_factory=set)
     largest_um: float = 0.0
@@ -46,7 +47,16 @@ class BlockProof:
     @property
     def unproved(self) -> int:
         """Blocks that are neither proved nor faulty."""
-        return sum(self.reasons.values())
+        return len(self.left)
+
+    @property
+    def reasons(self) -> Counter[str]:
+        """How many blocks are not proved, by the reason."""
+        return Counter(self.left.values())
+
+    def lines(self, why: str, most: int = 5) -> list[int]:
+        """The lines of the first few blocks that are not proved for a reason."""
+        return list(islice((line for line, reason in self.left.items() if reason == why), most))
 
     def fault(self, text: str, line: int, original: int) -> None:
         """Something is wrong."""
@@ -56,7 +66,18 @@ class BlockProof:
 
     def leave(self, why: str, line: int) -> None:
         """A block is not proved."""
-        self.reasons[why] += 1
-        self.lines.setdefault(why, [])
-        if len(self.lines[why]) < 5:
-            self.lines[why].append(line)
+        self.left.setdefault(line, why)
+
+    def join(self, other: BlockProof, moving: Set[int]) -> None:
+        """Take in what was found of the same programs in another position of block delete.
+
+        moving  the lines of the original that move something
+        """
+        worse = (other.left.keys() | other.faulty) - self.left.keys() - self.faulty
+        self.proved -= len(worse)
+        self.proved_motions -= len(worse & moving)
+        self.faults = sorted({*self.faults, *other.faults}, key=lambda fault: (fault.line, fault.original, fault.text))
+        self.faulty |= other.faulty
+        self.left = {line: why for line, why in {**other.left, **self.left}.items() if line not in self.faulty}
+        self.largest_um = max(self.largest_um, other.largest_um)
+        self.farthest_um = max(self.farthest_um, other.farthest_um)

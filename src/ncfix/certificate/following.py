@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ class Given:
     """What a program cannot know: offsets, tool lengths, start and reference points by axis letter, mm and degree.
 
     tools  by number, or by name in upper case
-    skip   whether blocks with `/` are skipped; None: either way
+    skip   which switches of block delete are on, or all or none; None: `prove` looks at every position
     """
 
     offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -37,7 +38,7 @@ class Given:
     references: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     tcp: bool = False
     assume_zero: bool = False
-    skip: bool | None = None
+    skip: bool | frozenset[int] | None = None
     workpiece_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     inputs: Mapping[str, float] = field(default_factory=dict)
     """What the errors of the machine depend on besides its axes."""
@@ -47,19 +48,44 @@ class Given:
     """A least increment of 0.001 mm is one of 0.0001 inch in blocks in inches."""
 
 
+def skips(switches: bool | frozenset[int] | None, line: TextLine) -> bool:
+    """Whether a line is skipped where these switches of block delete are on, or all or none; None is none."""
+    on = line.skipped in switches if isinstance(switches, frozenset) else bool(switches)
+    return bool(line.skipped) and on and not line.odd
+
+
+def positions(text: Text, given: Given) -> list[Given]:
+    """What is given in each position of the switches of block delete that a program asks, all of them off first."""
+    asked = sorted({line.skipped for line in text.lines} - {0}) if given.skip is None else []
+    if not asked or len(asked) > MOST_SWITCHES:
+        return [given]
+    every = (on for count in range(len(asked) + 1) for on in combinations(asked, count))
+    return [replace(given, skip=frozenset(on)) for on in every]
+
+
 Turned = Callable[[Sequence[float], float, bool], Sequence[float]]
 """A command (mm, degree), the tool length, and whether tool-centre-point control goes on: the same as it is then."""
 
+MOST_SWITCHES = 4
+"""Of block delete, as many as `fix` looks at."""
 LEAST = 6
 """So many straight lines one behind the other are followed in columns."""
-REWRITTEN = re.compile(r"jumps|skip|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
+REWRITTEN = re.compile(r"jumps|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
 """What a program uses, and is not followed behind; a correction may write further lines another way."""
 UNKNOWN_WORDS = "words that this reader does not know here"
+ROUND = 179.0
+"""Degrees from which on the shorter way may be the other one: half a turn, less what a correction may be."""
 NO_POLE, NO_CENTRE, NO_CIRCLE = "the pole is not known", "an arc without a centre", "an arc that does not close"
 
 
 class AxisFollower:
-    """A control that knows a few codes. One for each program; `run` gives its steps."""
+    """A control that knows a few codes. One for each program; `run` gives its steps.
+
+    shortest   M126: rotary axes go the shorter way, which is another one from half a turn on
+    by_vector  under tool-centre-point control the tool turns in a plane, not its axes at even rates
+    """
+
+    shortest = by_vector = False
 
     def __init__(self, axes: Sequence[str], family: Family, given: Given, turned: Turned) -> None:
         self.axes, self.family, self.given, self.turned = tuple(axes), family, given, turned
@@ -122,14 +148,9 @@ class AxisFollower:
         """Follow one line."""
         if line.odd or (self.lost and any(map(REWRITTEN.match, self.lost))):
             self.foreign.add(row)
-        if line.skipped and self.given.skip is None and (line.path or line.codes):
-            self._perhaps(line)
-            if line.path:
-                step = self.step(row, Kind.FEED, dict(self.at), line, "blocks with / may be skipped")
-                step.foreign = True
-                log.append(step)
-            return
-        if line.skipped and self.given.skip:
+        if line.skipped and self.given.skip is None:
+            self.lost["switches"] = "the program has too many switches of block delete"
+        if skips(self.given.skip, line):
             return
         found = self.block(row, line)
         if found is not None:
@@ -160,10 +181,13 @@ class AxisFollower:
             self.feed_mode,
             self.unit,
             self.beside,
+            self.by_vector and self.tcp,
         )
         at, said = list(self.at.values()), list(self.said.values())
         before = (at, said, self.kind == Kind.RAPID, NAN if self.feed is None else self.feed)
         run = StraightRun.of(lines, (row, stop), before, modes, klartext)
+        if run is not None and self.shortest and self._goes_round(np.vstack([at, run.end])):
+            return None
         if run is not None:
             self.at = dict(zip(self.axes, run.end[-1].tolist(), strict=True))
             self.said = dict(zip(self.axes, run.said[-1].tolist(), strict=True))
@@ -172,17 +196,16 @@ class AxisFollower:
             self.feed = None if math.isnan(feed) else feed
         return run
 
+    def _goes_round(self, places: NDArray[np.float64]) -> bool:
+        """Whether a rotary axis goes half a turn or more from one of places (n, n_axes) to the next."""
+        turns = [column for column, axis in enumerate(self.axes) if axis in "ABC"]
+        return bool((np.abs(np.diff(places[:, turns], axis=0)) >= ROUND).any())
+
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
         raise NotImplementedError
 
     # -- what all families share --------------------------------------------------------------------------------------
-
-    def _perhaps(self, line: TextLine) -> None:
-        self.forget()
-        self.kind = None
-        if any(word.name not in "NFSM" and not (word.name == "G" and (word.value or 0) < 4) for word in line.codes):
-            self.lost["skip"] = "blocks with / may change the state of the control"
 
     def forget(self) -> None:
         """Nothing is known of where axes stand."""
@@ -260,10 +283,12 @@ class AxisFollower:
             why = line.odd
         if not why and (twice := line.doubled()):
             why = f"two words {twice}"
-        if not why and any(word.value is None for word in line.path):
+        if not why and kind is not Kind.FIXED and any(word.value is None for word in line.path):
             why = "a word is a formula"
         if not why:
             why = next(iter(self.lost.values()), "")
+        if not why and self.shortest and self._goes_round(np.array([[*self.at.values()], [*end.values()]])):
+            why = "a rotary axis goes the shorter way (M126)"
         step = AxisStep(
             row,
             kind,
@@ -279,6 +304,7 @@ class AxisFollower:
             self.unit,
             foreign=foreign,
             unsteady=self.beside,
+            by_vector=self.by_vector and self.tcp,
         )
         self.at = end
         return step
@@ -311,6 +337,7 @@ class AxisFollower:
             self.feed_mode,
             self.unit,
             unsteady=self.beside,
+            by_vector=self.by_vector and self.tcp,
         )
 
     def circle(self, step: AxisStep, centre: Mapping[str, float], clockwise: bool, radius: float | None) -> AxisStep:

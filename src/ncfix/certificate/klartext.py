@@ -6,13 +6,9 @@ import math
 import re
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ncfix.certificate.following import INCH, NO_POLE, AxisFollower
 from ncfix.certificate.reading import AXES, RETRACTS, TextLine, TextWord
-from ncfix.certificate.steps import NAN, AxisStep, Kind, StraightRun
-from ncfix.certificate.text import StraightLines
+from ncfix.certificate.steps import NAN, AxisStep, Kind
 
 FRAMES = re.compile(r"CYCL DEF (?:7|8|9|10|11|13|19|26)\b|PLANE|TRANS|FUNCTION")
 """Lines of Klartext that this reader does not follow, behind which blocks keep their form."""
@@ -23,23 +19,23 @@ DATUM = re.compile(r"Q339 ?= ?\+?(\d+)[ \t]*(?:[;~]|$)")
 TOOL = re.compile(r'TOOL CALL (?:(\d+)|"([^"]*)")')
 SPEED = re.compile(r"TOOL CALL (?:Z )?[SF][\d ]")
 """TOOL CALL without a tool: another speed or feed."""
-ROUND = 179.0
-"""Degrees from which on the shorter way may be the other one: half a turn, less what a correction may be."""
-OVERSIZE = re.compile(r"\bD[LR]2? ?[+-]?[\d.]*[1-9Q]")
+OVERSIZE = re.compile(r"\bDL ?(?:([+-]?[\d.,]+)|[+-]?Q)")
+"""What TOOL CALL adds to the length of the tool."""
 
 
 class KlartextFollower(AxisFollower):
     """Follows Klartext.
 
-    shortest  M126: rotary axes go the shorter way, which is another one from half a turn on
     datum     CYCL DEF 247 has begun, and its number is still to come
+    oversize  mm, what the last tool call adds to the length of the tool (DL)
     """
 
-    shortest = datum = False
+    datum = False
+    oversize = 0.0
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
-        if line.plain and line.path and not self.lost and self._leads_straight(line):
+        if line.plain and line.path and not self.lost and not self.shortest and self._leads_straight(line):
             return self.straight(row, line)
         lead = line.codes[0].name if line.codes else ""
         if not line.odd and self._took_statement(lead):
@@ -71,27 +67,36 @@ class KlartextFollower(AxisFollower):
         elif lead.startswith(("CYCL DEF 247", "Q339")):
             self._set_datum(lead)
         elif lead.startswith("FUNCTION TCPM F"):
+            self.by_vector = "VECTOR" in lead
             self.lead(True)
         elif lead.startswith("FUNCTION RESET TCPM"):
             self.lead(False)
         elif lead.startswith("BEGIN PGM"):
             self.unit = INCH if lead.endswith("INCH") else 1.0
         elif lead in ("M128", "M129"):
+            self.by_vector = False
             self.lead(lead == "M128")
         else:
             return lead.startswith(("BLK FORM", "END PGM", "TOOL DEF", "LBL ", "CYCL DEF 32", "FN", "Q"))
         return True
 
     def _call_tool(self, lead: str) -> None:
-        found = TOOL.match(lead)
-        if OVERSIZE.search(lead) or not (found or SPEED.match(lead)):
-            self.lost["tool"] = "a tool call without a tool that this reader knows, or with an oversize"
-        elif found:
-            self.tool = int(found[1]) if found[1] else found[2]
+        found, more = TOOL.match(lead), OVERSIZE.search(lead)
+        if (more and more[1] is None) or not (found or more or (SPEED.match(lead) and not self.oversize)):
+            self.lost["tool"] = "a tool call without a tool or an oversize that this reader knows"
+        elif found or more:
+            if found:
+                self.tool = int(found[1]) if found[1] else found[2]
             if self.tcp:
-                self.lead(False)
+                self.lost["tool"] = "another tool while the tip is led (M128, TCPM)"
+            self.oversize = float(more[1].replace(",", ".")) * self.unit if more else 0.0
             self.new_length(self.length_of(self.tool))
             self.unsay()
+
+    def length_of(self, tool: int | str) -> float | None:
+        """The length of a tool with its oversize, mm, if it is given."""
+        length = super().length_of(tool)
+        return None if length is None else length + self.oversize
 
     def _set_datum(self, lead: str) -> None:
         """CYCL DEF 247 with its number, which may stand in the next line; until it does the datum is not known."""
@@ -112,8 +117,6 @@ class KlartextFollower(AxisFollower):
             end |= self._turned_about_pole(turn)
         step = self.step(row, self.kind, end, line)
         step.said = [self.said[axis] for axis in self.axes]
-        if self.shortest and self._goes_round(np.array([step.start, step.end])):
-            step.why = step.why or "a rotary axis goes the shorter way (M126)"
         if lead == "L" or step.why:
             return step
         if keys.isdisjoint(("DR+", "DR-")):
@@ -132,25 +135,10 @@ class KlartextFollower(AxisFollower):
                 step.why = step.why or ("a helix of more than a turn" if abs(turn.value) > 360.0 else "")
         return step
 
-    def _goes_round(self, places: NDArray[np.float64]) -> bool:
-        """Whether a rotary axis goes half a turn or more from one of places (n, n_axes) to the next."""
-        turns = [column for column, axis in enumerate(self.axes) if axis in "ABC"]
-        return bool((np.abs(np.diff(places[:, turns], axis=0)) >= ROUND).any())
-
-    def straight_run(self, lines: StraightLines, row: int, stop: int) -> StraightRun | None:
-        """As that of all families; none where a rotary axis goes the shorter way round."""
-        before = list(self.at.values())
-        kept = dict(self.at), dict(self.said), self.kind, self.feed
-        run = super().straight_run(lines, row, stop)
-        if run is None or not (self.shortest and self._goes_round(np.vstack([before, run.end]))):
-            return run
-        self.at, self.said, self.kind, self.feed = kept
-        return None
-
     def _leads_straight(self, line: TextLine) -> bool:
         """Whether a line only brings axes straight to places; takes in its motion and feed if so."""
         for name, *_ in line.path:
-            if name not in self.at or self.shortest:
+            if name not in self.at:
                 return False
         kind, feed = Kind.FEED, self.feed
         for name, _, value, _ in line.codes[1:]:
@@ -187,6 +175,7 @@ class KlartextFollower(AxisFollower):
             elif word.name == "M":
                 match word.value:
                     case 128 | 129:
+                        self.by_vector = False
                         self.lead(word.value == 128)
                     case 126 | 127:
                         self.shortest = word.value == 126

@@ -17,6 +17,8 @@ Mask = NDArray[np.bool_]
 FLAT = 1e-6
 LEVER = 100.0
 """mm; what a turn counts beside lengths where the nearest place of a motion is looked for, as of a table that large."""
+PROBE = 100.0
+"""mm; the tip of a tool that is so much longer is that much farther along it."""
 SHORT_MM, SHORT_RAD = 2.0, 0.02
 """Straight motions that lead no axis farther are short."""
 
@@ -97,6 +99,24 @@ class TipModel:
         result = begin.copy()
         result[:, self.columns] = np.where(np.asarray(found.arrived)[:, None], found.place, np.nan)
         return self.commands(result, tcp, length)
+
+    def strays(self, ways: Ways, length: Array) -> Array:
+        """How far the tool is from where an even turn in a plane has it at most, (n,) rad; 0 where it does not turn."""
+        axes = self.machine.rotary
+        found = np.zeros(len(ways.start))
+        turns = np.flatnonzero((ways.start[:, axes] != ways.end[:, axes]).any(axis=1))
+        shares = np.linspace(0.0, 1.0, 9)
+        row, share = np.repeat(turns, len(shares)), np.tile(shares, len(turns))
+        q, tool = ways.at(row, share), length[row]
+        points = (self.machine.tip(q, tool + PROBE) - self.machine.tip(q, tool)).reshape(-1, len(shares), 3) / -PROBE
+        first, last = points[:, 0], points[:, -1]
+        whole = np.linalg.norm(np.cross(first, last), axis=1)
+        angle = np.arctan2(whole, (first * last).sum(axis=1))
+        side = (last - np.cos(angle)[:, None] * first) / np.maximum(whole, 1e-12)[:, None]
+        turned = shares * angle[:, None]
+        even = np.cos(turned)[:, :, None] * first[:, None] + np.sin(turned)[:, :, None] * side[:, None]
+        found[turns] = np.linalg.norm(points - even, axis=2).max(axis=1)
+        return found
 
     def gaps(self, meant: Array, done: Array, tcp: Mask, length: Array, direction: Array) -> Array:
         """How far the real tip with commands `done` is from where `meant` wants it, (n,) mm."""

@@ -29,8 +29,10 @@ MOTION = {
     Family.KLARTEXT: re.compile(r"[ \t]*(?<![\w.])(?:L|CC|CP|CR|C|DR[+-])(?![\w.+-])", re.IGNORECASE),
 }
 STOPS = re.compile(r"[ \t]*\bM[ \t]*0*(?:0|1|2|30|60)(?![\d.])", re.IGNORECASE)
+SKIP = re.compile(r"[ \t]*/\d?")
 PACE = re.compile(
-    r"[ \t]*(?:\bF(?:[ \t]*=)?[ \t]*(?:[\d.]+|MAX)|\bG9[34](?![\d.])|(?<![\w.])R[0LR](?![\w.]))", re.IGNORECASE
+    r"[ \t]*(?:\bF(?:[ \t]*=)?[ \t]*(?:[\d.]+|MAX)|\bG9[34](?![\d.])|\bP[ \t]*\d+(?![\d.])|(?<![\w.])R[0LR](?![\w.]))",
+    re.IGNORECASE,
 )
 
 
@@ -106,7 +108,8 @@ class Pairing:
         if line.plain and line.path and not line.rest:
             return None
         motion = MOTION.get(self.original.family, MOTION[Family.WORDS])
-        bare = motion.sub("", STOPS.sub("", line.rest)) if line.path else line.rest
+        rest = SKIP.sub("", line.rest, 1) if line.skipped else line.rest
+        bare = motion.sub("", STOPS.sub("", rest)) if line.path else line.rest
         if not PACE.sub("", bare).strip() and (line.path or PACE.search(line.rest)):
             return None
         return PACE.sub("", bare) if line.path else bare
@@ -222,6 +225,8 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
         if len(head.path) >= len(line.path) and all(one.name == other.name for one, other in ours_first):
             return []
     found: list[str] = []
+    if any(piece.skipped != line.skipped for piece in pieces):
+        found.append("a line of the block has another mark of block delete")
     twice = "" if line.doubled() else next((piece.doubled() for piece in pieces if piece.doubled()), "")
     if line.path and twice:
         found.append(f"two words {twice} in a block")

@@ -11,13 +11,14 @@ from __future__ import annotations
 import gc
 import math
 from collections.abc import Sequence, Set
+from dataclasses import replace
 
 import numpy as np
 
 from ncfix.certificate.deviations import FEW, MANY, Deviations, Moved
 from ncfix.certificate.expected import SLACK, WHOLE_TURN
 from ncfix.certificate.findings import BlockFault, BlockProof
-from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, Given
+from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, Given, positions, skips
 from ncfix.certificate.model import Array, Mask, Ways
 from ncfix.certificate.pairing import LinePair, Pairing, text_faults
 from ncfix.certificate.reading import Family, TextLine
@@ -33,6 +34,11 @@ AS_IF = 4e-4
 OFF = "{} ends {} from where the correction belongs"
 UNSAID = "the program has not said where an axis stands"
 UNSURE = "which added lines belong to which block is not known"
+BY_VECTOR = "the way of a motion in which the tool turns in a plane (PATHCTRL VECTOR)"
+ASIDE = math.radians(0.09)
+"""From here on even turns of axes lead the tool out of its plane, and `fix` may leave a motion in one piece."""
+HALF_TURN = 179.5
+"""Degrees; a correction may make half a turn of as much."""
 LEFT = "left as it was programmed"
 
 
@@ -56,7 +62,18 @@ def prove(
         first, second = Text.of(original, family), Text.of(corrected, family)
         if second.is_renumbered and second.block_numbers != first.block_numbers:
             first, second = first.without_block_numbers(), second.without_block_numbers()
-        return Prover(first, second, machine, given, tolerance_um).run()
+        settings = positions(first, given) if b"/" in original else [given]
+        prover, *others = (Prover(first, second, machine, each, tolerance_um) for each in settings)
+        pairing = prover.paired()
+        for each in others:
+            prover.begin_apart |= {row for row in each.ours if prover.ours[row].start != each.ours[row].start}
+        proof = prover.run(pairing)
+        for each in others:
+            each.begin_apart = prover.begin_apart
+            pairs = [pair for pair in pairing.pairs if not skips(each.given.skip, first.lines[pair.row])]
+            joint = each.run(replace(pairing, pairs=pairs, faults=[]))
+            proof.join(joint, {first.lines[row].number for row in prover.ours})
+        return proof
     finally:
         if collects:
             gc.enable()
@@ -73,13 +90,20 @@ class Prover(Deviations):
         if second.family is Family.KLARTEXT:
             self.polar = {row for row, line in enumerate(second.lines) if line.word("PA")}
         """Lines of the corrected program whose digits are those of an angle about a pole."""
+        self.begin_apart: set[int] = set()
+        """Motions that begin elsewhere in another position of block delete: `fix` does not split them, and rapids may
+        leave axes without a word where they stand."""
 
-    def run(self) -> BlockProof:
-        """Compare all blocks."""
-        self._stamps()
+    def paired(self) -> Pairing:
+        """Which lines stand for which."""
         moves, nearness = self.ours.__contains__, (self.leads_there, self.lead_there)
         pairing = Pairing(self.first, self.second, *nearness, moves, self.is_followed, self._is_foreign)
         pairing.run()
+        return pairing
+
+    def run(self, pairing: Pairing) -> BlockProof:
+        """Compare all blocks."""
+        self._stamps()
         for fault in pairing.faults:
             if self._foreign_near(fault, pairing):
                 self.proof.leave(UNSURE, fault.original or fault.line)
@@ -347,6 +371,8 @@ class Prover(Deviations):
             expected = self.model.aimed(meant[None], tcp, length, side, done[None])[0]
             expected = np.where(rotary, done, expected)
         said = np.array(step.said) | (rotary if not full else False)  # no other strategy turns rotary axes
+        if step.kind == Kind.RAPID and pair.row in self.begin_apart:
+            said &= [name in step.named for name in self.machine.axis_names]
         off = np.where(said, np.abs(done - expected), 0.0)
         loose = full or any(row in self.polar for row in range(pair.first, pair.last + 1))
         loose = loose or abs(step.sweep) > WHOLE_TURN
@@ -443,6 +469,12 @@ class Prover(Deviations):
         for k in np.flatnonzero(~(gap <= allowed)).tolist():
             text = f"the tip leaves the intended way by {1e3 * gap[k]:.2f} um between the ends of the block"
             bad.setdefault(int(owner[k]), text)
+        by_vector, aside = self.ours.by_vector[cutting.ours], np.zeros(len(cutting.row))
+        if by_vector.any():
+            some = np.flatnonzero(by_vector)
+            aside[some] = self.model.strays(Ways.of(self.model, self.ours, cutting.ours[some]), length[some])
+        for k in np.flatnonzero(aside > ASIDE).tolist():
+            bad[k] = ""
         good = ~np.isin(owner, list(bad))
         if good.any():
             self.proof.farthest_um = max(self.proof.farthest_um, 1e3 * float(gap[good].max()))
@@ -451,14 +483,33 @@ class Prover(Deviations):
             self.proof.proved -= 1
             self.proof.proved_motions -= 1
             number = self.first.lines[pair.row].number
-            if not self._changed(pair):
-                self.proof.leave(LEFT, number)
-                continue
-            if self.strategy == "full" or self.machine.depends_on_direction:
-                why = "play" if self.machine.depends_on_direction else "rotary axes that are corrected, too"
-                self.proof.leave(f"the way of a motion, because of {why}", number)
-                continue
-            self.proof.fault(text, self.second.lines[pair.first].number, number)
+            if why := self._excuse(pair, float(aside[k])):
+                self.proof.leave(why, number)
+            else:
+                self.proof.fault(text, self.second.lines[pair.first].number, number)
+
+    def _excuse(self, pair: LinePair, aside: float) -> str:
+        """Why a way beyond the tolerance is not called faulty; empty if it is.
+
+        aside  rad, how far even turns of axes lead the tool out of the plane in which the control turns it
+        """
+        if aside > ASIDE:
+            return BY_VECTOR
+        if not self._changed(pair):
+            return LEFT
+        if pair.first == pair.last:
+            step, (low, high) = self.ours[pair.row], self.machine.ranges.T
+            turn = np.abs(np.subtract(step.end, step.start))
+            if aside:
+                return BY_VECTOR
+            if pair.row in self.begin_apart:
+                return "the way of a motion that begins elsewhere with block delete"
+            if (turn >= HALF_TURN)[self.machine.rotary & (high - low >= 2 * math.pi)].any():
+                return "a rotary axis may go the other way round"
+        if self.strategy == "full" or self.machine.depends_on_direction:
+            why = "play" if self.machine.depends_on_direction else "rotary axes that are corrected, too"
+            return f"the way of a motion, because of {why}"
+        return ""
 
 
 def same(line: TextLine, other: TextLine) -> bool:

@@ -35,7 +35,7 @@ class Family(Enum):
 
 
 class TextWord(NamedTuple):
-    """A word: its name, its number as written, and its value.
+    """A word: its name, its number or formula as written, and its value.
 
     value    None for a formula
     counted  "" as the mode says, "+" an increment, "=" absolute, whatever the mode
@@ -62,7 +62,7 @@ class TextLine:
     rest     the text without the words of `path` and the blanks before them; Klartext: without the block number
     block    number of the block, Klartext only
     odd      why the line cannot be taken apart; empty if it could be
-    skipped  it begins with `/`
+    skipped  the switch of block delete that it asks, 1 for `/`; 0: none
     plain    all words are letters with numbers, no word of `path` twice, and those are axes
     """
 
@@ -72,7 +72,7 @@ class TextLine:
     rest: str = ""
     block: str = ""
     odd: str = ""
-    skipped: bool = False
+    skipped: int = 0
     plain: bool = False
 
     def word(self, name: str) -> TextWord | None:
@@ -123,19 +123,28 @@ def _piece(text: str, start: int) -> str:
     return (text[start:].split() or [text[start]])[0]
 
 
+SKIPPED = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?/(\d?)", re.IGNORECASE)
+"""The mark of block delete with its switch: it begins a line, or follows the number."""
+
+
+def _marked(number: int, text: str) -> tuple[TextLine, int]:
+    """A line that knows its switch of block delete, and where the digit of that ends."""
+    mark = SKIPPED.match(text)
+    return (TextLine(number), 0) if mark is None else (TextLine(number, skipped=int(mark[1] or 1)), mark.end())
+
+
 def _word_address(number: int, text: str) -> TextLine:
-    line = TextLine(number)
-    line.skipped = text.lstrip(" \t").startswith("/")
+    line, marked = _marked(number, text)
     rest = _Rest(text)
     for found in WORD_ADDRESS.finditer(text):
         start, end = found.span()
         letter = found[2]
         if letter is None:
-            if found[5] is not None and found[5] not in "/*:":
+            if found[5] is not None and found[5] not in "/*:" and start >= marked:
                 line.odd = line.odd or f"{_piece(text, start)!r} is no plain word"
         else:
             name, digits = letter.upper(), found[3]
-            word = TextWord(name, digits or "", float(digits) if digits else None)
+            word = TextWord(name, digits or found[4], float(digits) if digits else None)
             if name in PATH_WORDS:
                 rest.cut(start, end)
                 line.path.append(word)
@@ -168,8 +177,7 @@ SINUMERIK_FLOW = re.compile(
 
 
 def _sinumerik(number: int, text: str) -> TextLine:
-    line = TextLine(number)
-    line.skipped = text.lstrip(" \t").startswith("/")
+    line, marked = _marked(number, text)
     rest = _Rest(text)
     for found in SINUMERIK_WORD.finditer(text):
         start, end = found.span()
@@ -179,12 +187,13 @@ def _sinumerik(number: int, text: str) -> TextLine:
             digits = found[4] or found[5] or found[8] or ""
             kind = (found[3] or "").upper()
             counted = "+" if kind == "IC" else "=" if kind == "AC" else ""
-            word = TextWord(name, digits, float(digits) if digits and kind in ("", "IC", "AC") else None, counted)
+            value = float(digits) if digits and kind in ("", "IC", "AC") else None
+            word = TextWord(name, digits or found[6] or "", value, counted)
             if name in SINUMERIK_PATH:
                 rest.cut(start, end)
                 line.path.append(word)
                 continue
-            line.codes.append(TextWord(name, digits or (found[6] or ""), word.value))
+            line.codes.append(word)
         elif (key := found[9]) is not None:
             key = key.upper()
             line.codes.append(TextWord(key, "", None))
@@ -194,7 +203,7 @@ def _sinumerik(number: int, text: str) -> TextLine:
                 line.odd = line.odd or f"{key!r} is no plain word"
             elif "(" in key:
                 line.odd = line.odd or f"{key.partition('(')[0].strip()} is not known to this reader"
-        elif found[10] is not None and found[10] not in "/%:":
+        elif found[10] is not None and found[10] not in "/%:" and start >= marked:
             line.odd = line.odd or f"{_piece(text, start)!r} is no plain word"
     line.rest = str(rest)
     return line
@@ -209,7 +218,7 @@ KLARTEXT_WORD = re.compile(
 KLARTEXT_LEAD = frozenset(("L", "C", "CC", "CP", "CR", "M", "STOP"))
 KLARTEXT_STATEMENT = re.compile(
     r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$|CYCL DEF (?:32|247)\b|FN ?[0-8]\b"
-    r"|Q[LRS]?\d+ ?=|FUNCTION (?:TCPM F (?:TCP|CONT) AXIS POS PATHCTRL AXIS|RESET TCPM)[ \t]*(?:;|$)"
+    r"|Q[LRS]?\d+ ?=|FUNCTION (?:TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (?:AXIS|VECTOR)|RESET TCPM)[ \t]*(?:;|$)"
 )
 """Blocks of Klartext that say something and lead no axis, as the follower knows them."""
 KLARTEXT_FLOW = re.compile(r"^(?:CALL (?:LBL|PGM)|FN ?(?:9|1[0-2])\b|SEL PGM|CALL SELECTED|PATTERN|CYCL CALL)")
@@ -222,8 +231,8 @@ def _klartext(number: int, text: str) -> TextLine:
     if head:
         line.block = head[2]
         body = text[head.end() :]
-    body_upper = body.strip().upper()
-    line.skipped = "/" in text[: head.end()] if head else body_upper.startswith("/")
+    line.skipped = int("/" in text[: head.end()] if head else body.lstrip().startswith("/"))
+    body_upper = (body if head else body.lstrip(" \t/")).strip().upper()
     first = body_upper.split(None, 1)[0] if body_upper else ""
     if body_upper.startswith("*"):
         line.rest = body

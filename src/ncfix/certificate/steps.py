@@ -64,6 +64,8 @@ class AxisStep:
     """It is because of what the program uses before, or in this line, that a correction may rewrite otherwise."""
     unsteady: bool = False
     """Cutter radius compensation is on: the control offsets the contour."""
+    by_vector: bool = False
+    """The tool turns in a plane, not its axes at even rates."""
 
 
 class ModesInForce(NamedTuple):
@@ -77,6 +79,7 @@ class ModesInForce(NamedTuple):
     feed_mode: int
     unit: float
     unsteady: bool
+    by_vector: bool
 
 
 class StraightRun(NamedTuple):
@@ -170,7 +173,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         self.start, self.end, self.said = np.empty((n, axes)), np.empty((n, axes)), np.empty((n, axes), dtype=bool)
         self.followed, self.foreign = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
         self.unsaid = np.zeros(n, dtype=bool)
-        self.tcp, self.unsteady = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        self.tcp, self.unsteady, self.by_vector = (np.zeros(n, dtype=bool) for _ in range(3))
         self.length, self.feed, self.unit = np.empty(n), np.empty(n), np.empty(n)
         self.feed_mode, self.across = np.empty(n, dtype=np.intp), np.full(n, 2, dtype=np.intp)
         self.centre, self.sweep = np.full((n, 3), NAN), np.zeros(n)
@@ -197,7 +200,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         self.unsaid[at] = run.unsaid
         modes = run.modes
         self.tcp[at], self.length[at], self.unit[at] = modes.tcp, modes.length, modes.unit
-        self.feed_mode[at], self.unsteady[at] = modes.feed_mode, modes.unsteady
+        self.feed_mode[at], self.unsteady[at], self.by_vector[at] = modes.feed_mode, modes.unsteady, modes.by_vector
 
     def _enter_each(self, at: Indices, steps: Sequence[AxisStep]) -> None:
         self.rows[at] = [step.row for step in steps]
@@ -210,6 +213,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         self.unsaid[at] = [not all(step.said[self._names.index(name)] for name in step.named) for step in steps]
         self.tcp[at] = [step.tcp for step in steps]
         self.unsteady[at] = [step.unsteady for step in steps]
+        self.by_vector[at] = [step.by_vector for step in steps]
         self.length[at] = [step.length for step in steps]
         self.feed[at] = [NAN if step.feed is None else step.feed for step in steps]
         self.unit[at] = [step.unit for step in steps]
@@ -257,6 +261,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
             int(self.feed_mode[at]),
             float(self.unit[at]),
             unsteady=bool(self.unsteady[at]),
+            by_vector=bool(self.by_vector[at]),
         )
 
     def decimals(self, at: Indices, least: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -34,7 +34,7 @@ def given_of(setup: Setup, dialect: Dialect) -> Given:
         references=setup.references,
         tcp=setup.tcp,
         assume_zero=setup.assume_zero,
-        skip=setup.block_skip if isinstance(setup.block_skip, bool) else None,
+        skip=setup.block_skip,
         workpiece_offset=setup.workpiece_offset,
         inputs=setup.inputs,
         pointless=setup.no_point.startswith("IS"),
