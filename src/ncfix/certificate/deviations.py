@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -15,6 +16,10 @@ from ncfix.certificate.steps import Indices, Kind
 
 MANY, FEW = 11, 3
 """At so many places on a motion, or a piece of one, its way is looked at: on long and on short ones."""
+ASIDE = math.radians(0.09)
+"""From here on even turns of axes lead the tool out of its plane, and `fix` may leave a motion in one piece."""
+HALF_TURN = 179.5
+"""Degrees; a correction may make half a turn of as much."""
 WIDER = 1.05
 """Of the tolerance: a way farther out is beyond it for sure."""
 
@@ -104,3 +109,18 @@ class Deviations(Expected):
             square = np.maximum(np.einsum("ij,ij,j->i", way, way, weight), 1e-12)
             share = np.clip(share + np.einsum("ij,ij,j->i", off, way, weight) / square, 0.0, 1.0)
         return share
+
+    def aside(self, at: Indices) -> Array:
+        """How far even turns of axes lead the tool out of the plane in which it is to turn, of steps (m,), rad."""
+        found, some = np.zeros(len(at)), np.flatnonzero(self.ours.by_vector[at])
+        if some.size and self.model is not None:
+            ways = Ways.of(self.model, self.ours, at[some])
+            found[some] = self.model.strays(ways, np.nan_to_num(self.ours.length[at[some]]))
+        return found
+
+    def worst(self, off: Array, allowed: Array) -> tuple[str, str]:
+        """The axis that is farthest off, and by how much."""
+        worst = int(np.argmax(off / allowed))
+        amount = float(off[worst])
+        size = f"{math.degrees(amount):.4f} degree" if self.machine.rotary[worst] else f"{1e3 * amount:.2f} um"
+        return self.machine.axis_names[worst], size

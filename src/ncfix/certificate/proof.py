@@ -15,13 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.certificate.deviations import FEW, MANY, Deviations, Moved
+from ncfix.certificate.deviations import ASIDE, FEW, HALF_TURN, MANY, Deviations, Moved
 from ncfix.certificate.expected import SLACK, WHOLE_TURN
 from ncfix.certificate.findings import BlockFault, BlockProof
 from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, Given, positions, skips
-from ncfix.certificate.model import Array, Mask, Ways
+from ncfix.certificate.model import Mask, Ways
 from ncfix.certificate.pairing import LinePair, Pairing, text_faults
-from ncfix.certificate.reading import Family, TextLine
+from ncfix.certificate.reading import Family
 from ncfix.certificate.steps import AxisStep, Indices, Kind
 from ncfix.certificate.text import Text, same_but_axes
 from ncfix.machine import Machine
@@ -35,10 +35,6 @@ OFF = "{} ends {} from where the correction belongs"
 UNSAID = "the program has not said where an axis stands"
 UNSURE = "which added lines belong to which block is not known"
 BY_VECTOR = "the way of a motion in which the tool turns in a plane (PATHCTRL VECTOR)"
-ASIDE = math.radians(0.09)
-"""From here on even turns of axes lead the tool out of its plane, and `fix` may leave a motion in one piece."""
-HALF_TURN = 179.5
-"""Degrees; a correction may make half a turn of as much."""
 LEFT = "left as it was programmed"
 
 
@@ -206,7 +202,7 @@ class Prover(Deviations):
 
     def _changed(self, pair: LinePair) -> bool:
         """Whether anything of a line has changed."""
-        return pair.first != pair.last or not same(self.first.lines[pair.row], self.second.lines[pair.first])
+        return pair.first != pair.last or not self.first.lines[pair.row].says(self.second.lines[pair.first])
 
     # -- what this reader can follow ----------------------------------------------------------------------------------
 
@@ -378,7 +374,7 @@ class Prover(Deviations):
         loose = loose or abs(step.sweep) > WHOLE_TURN
         if not said.all() and self._changed(pair):
             most = self.half_steps(step, True) + np.where(rotary, TURNED, AS_IF)
-            return (UNSAID, True) if loose or (off <= most).all() else (OFF.format(*self._worst(off, most)), False)
+            return (UNSAID, True) if loose or (off <= most).all() else (OFF.format(*self.worst(off, most)), False)
         anew = self.first.family is Family.KLARTEXT and step.kind is Kind.ARC  # a C or CP may have become a CR
         halves = self.half_steps(step, anew or len(pieces) > 1)
         if len(pieces) == 1:  # less than a digit of the control is left out
@@ -391,7 +387,7 @@ class Prover(Deviations):
         if (off > allowed).any():
             if not self._changed(pair):
                 return LEFT, True
-            return OFF.format(*self._worst(off, allowed)), False
+            return OFF.format(*self.worst(off, allowed)), False
         if (added > self.machine.max_correction[0] + self.half_steps(step, True)).any():
             return "a correction is larger than the machine file allows", False
         low, high = self.machine.ranges.T
@@ -403,13 +399,6 @@ class Prover(Deviations):
             return "the corrected motion leaves the travel of an axis", False
         self.proof.largest_um = max(self.proof.largest_um, 1e3 * float(added.max()))
         return (UNSAID, True) if not said.all() else ("", False)
-
-    def _worst(self, off: Array, allowed: Array) -> tuple[str, str]:
-        """The axis that is farthest off, and by how much."""
-        worst = int(np.argmax(off / allowed))
-        amount = float(off[worst])
-        size = f"{math.degrees(amount):.4f} degree" if self.machine.rotary[worst] else f"{1e3 * amount:.2f} um"
-        return self.machine.axis_names[worst], size
 
     def _pace(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
         """What is wrong with the feed; turns of rotary axes alone get another one."""
@@ -469,10 +458,7 @@ class Prover(Deviations):
         for k in np.flatnonzero(~(gap <= allowed)).tolist():
             text = f"the tip leaves the intended way by {1e3 * gap[k]:.2f} um between the ends of the block"
             bad.setdefault(int(owner[k]), text)
-        by_vector, aside = self.ours.by_vector[cutting.ours], np.zeros(len(cutting.row))
-        if by_vector.any():
-            some = np.flatnonzero(by_vector)
-            aside[some] = self.model.strays(Ways.of(self.model, self.ours, cutting.ours[some]), length[some])
+        aside = self.aside(cutting.ours)
         for k in np.flatnonzero(aside > ASIDE).tolist():
             bad[k] = ""
         good = ~np.isin(owner, list(bad))
@@ -510,8 +496,3 @@ class Prover(Deviations):
             why = "play" if self.machine.depends_on_direction else "rotary axes that are corrected, too"
             return f"the way of a motion, because of {why}"
         return ""
-
-
-def same(line: TextLine, other: TextLine) -> bool:
-    """Whether two lines say the same."""
-    return line.rest == other.rest and line.path == other.path and line.block == other.block

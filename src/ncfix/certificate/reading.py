@@ -83,6 +83,10 @@ class TextLine:
         """The value of the last of the other words with this name."""
         return next((word.value for word in reversed(self.codes) if word.name == name), None)
 
+    def says(self, other: TextLine) -> bool:
+        """Whether two lines say the same."""
+        return (self.rest, self.path, self.block) == (other.rest, other.path, other.block)
+
     def doubled(self) -> str:
         """The name of an axis or centre that has two words; empty if there is none."""
         if self.plain:
