@@ -319,7 +319,7 @@ def check_order(dialect: Dialect, sample: Statements, blocks: Iterable[str], cho
 
 def _read_block(dialect: Dialect, sample: Statements, text: str) -> tuple[object, ...]:
     """What a block is read as: its items and the places of its numbers, or the code of the error."""
-    lines = (sample.begin[0], text, *sample.end)
+    lines = (sample.begin[0], text, sample.end[-1])
     try:
         program = read("\n".join(lines).encode("latin-1"), "part", dialect)
     except SourceError as error:
