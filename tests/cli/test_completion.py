@@ -16,7 +16,7 @@ import click
 import pytest
 
 from conftest import missing
-from ncfix.cli.main import VERBS, cli
+from ncfix.cli.main import VERBS, cli, run
 
 FILES = re.compile(r"\b(FILE|DIR|TABLEDIR|PROGRAM|MACHINE)\b")
 NAMED = {"file", "program", "original", "fixed", "measured", "programs", "sources", "folder", "output"}
@@ -51,15 +51,17 @@ def test_whatever_is_a_file_is_completed_by_the_shell(words: str, param: click.P
     assert param.name != "measured" or kinds == {"file"}
 
 
+def asking(shell: str, *words: str) -> dict[str, str]:
+    """What the script of a shell sets in the environment; the last word is to be completed."""
+    place = words[-1] if shell == "fish" else str(len(words) - 1)
+    return {"COMP_WORDS": " ".join(words), "COMP_CWORD": place, "_NCFIX_COMPLETE": f"{shell}_complete"}
+
+
 def completed(shell: str, *words: str) -> list[str]:
-    """The answer of `ncfix` to the script of a shell; the last word is to be completed."""
-    given = " ".join(words)
-    environment = {"COMP_WORDS": given, "COMP_CWORD": str(len(words) - 1), "_NCFIX_COMPLETE": f"{shell}_complete"}
-    if shell == "fish":
-        environment |= {"COMP_CWORD": words[-1]}
+    """The answer of `ncfix` to the script of a shell."""
     done = subprocess.run(
         [sys.executable, "-c", "import sys; sys.argv[0] = 'ncfix'; from ncfix.__main__ import main; main()"],
-        env={**os.environ, **environment},
+        env={**os.environ, **asking(shell, *words)},
         capture_output=True,
         text=True,
         check=False,
@@ -94,8 +96,14 @@ def test_files_in_the_words_of_each_shell(shell: str) -> None:
         (("ncfix", "completion", "z"), {"zsh"}),
     ],
 )
-def test_names_of_what_there_is(words: tuple[str, ...], there: set[str]) -> None:
-    found = {line.removeprefix("plain,").split("\t")[0] for line in completed("bash", *words)}
+def test_names_of_what_there_is(
+    words: tuple[str, ...], there: set[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, value in asking("bash", *words).items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(SystemExit):
+        run([])
+    found = {line.removeprefix("plain,").split("\t")[0] for line in capsys.readouterr().out.splitlines()}
     assert there <= found
     assert all(name.lower().startswith(words[-1].lower()) for name in found)
 

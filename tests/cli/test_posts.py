@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from conftest import missing
+from ncfix.cli.main import run
 
 PROGRAM = "shop/bracket.nc"
 
@@ -25,12 +26,13 @@ def recipes(root: Path) -> dict[str, str]:
 
 
 @pytest.fixture
-def yard(root: Path, tmp_path: Path) -> Path:
+def yard(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The example of the guide with a project, before anything is posted."""
     folder = tmp_path / "mill"
     shutil.copytree(root / "examples/guide", folder)
     (folder / PROGRAM).rename(folder / "to-be-posted")
-    called(["ncfix", "init", "-m", "mill.toml", "--setup", "setup.toml", "-o", "corrected"], folder)
+    monkeypatch.chdir(folder)
+    assert run(["init", "-m", "mill.toml", "--setup", "setup.toml", "-o", "corrected"]) == 0
     return folder
 
 

@@ -3,8 +3,8 @@
 A wrong sign would double the error. What a format cannot say is left as it is, or refused (NCF490), and never made
 worse; what it can say goes. How much a format can say is worked out apart from the tables: the correction is taken
 apart into what each set of axes changes together, and the sets that the format has no table for are what must be left.
-`NCFIX_SIGNS=all` takes all axes and locations, otherwise X, C and some locations; of controls whose tables take long to
-find, each component once, in turn of X and C (`NCFIX_FULL=1`: all of these).
+Each component once, in turn of X and C, and some locations; `NCFIX_FULL=1`: all components of X and C;
+`NCFIX_SIGNS=all`: of all axes, and all locations.
 """
 
 from __future__ import annotations
@@ -45,8 +45,6 @@ POSITIONING = {"fanuc-pitch", "linuxcnc"}
 FROM_ZERO = {"fanuc-pitch"}
 """What they say is zero at the reference position, whatever the error is there (ECC is not zero)."""
 SUMS = {"heidenhain"}
-SLOW = {"siemens", "fanuc-rotary", "heidenhain"}
-"""Seconds for each error."""
 PAIRS = {"siemens"}
 AT_REST = {"fanuc"}
 """Everything that the linear axes are corrected by with rotary axes at zero, and nothing of the rest."""
@@ -85,10 +83,10 @@ def machine(name: str) -> Machine:
     return loads(AXES.format(name=name, basis=basis, coefficients=coefficients))
 
 
-def errors(control: str) -> Iterator[str]:
+def errors() -> Iterator[str]:
     """Every error motion of every axis, and the locations of those axes that can be wrongly placed."""
     everything = os.environ.get("NCFIX_SIGNS") == "all"
-    if control in SLOW and not everything and not FULL:
+    if not everything and not FULL:
         yield from ("EXX", "EYC", "EZX", "EAC", "EBX", "ECC")
     else:
         yield from (f"E{component}{axis}" for axis in ("XYZAC" if everything else "XC") for component in "XYZABC")
@@ -168,7 +166,7 @@ def test_every_single_error_of_every_axis(control: str, figures: Callable[[str],
     shares: dict[str, str] = {}
     worse: dict[str, float] = {}
     late: dict[str, str] = {}
-    for name in errors(control):
+    for name in errors():
         single = machine(name)
         space = ranges_of(single)
         error = float(residual(single, Compensation(()), space, LENGTH, POSES).before.max())
@@ -181,7 +179,7 @@ def test_every_single_error_of_every_axis(control: str, figures: Callable[[str],
             worse[name] = after / before
         if after > ABOVE * possible + WITHIN * TARGET:
             late[name] = f"{1e3 * after:.2f} um rms, {1e3 * possible:.2f} must be left"
-    assert len(shares) >= (7 if control in SLOW else 12)
+    assert len(shares) >= (12 if FULL else 7)
     figures(f"{control}, left of what must be: " + ", ".join(f"{name} {share}" for name, share in shares.items()))
     assert not worse, f"{control} makes worse: {worse}"
     assert not late, f"{control} takes off too little: {late}"
