@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -12,8 +13,28 @@ import hypothesis
 import pytest
 
 from ncfix import core
+from ncfix.__main__ import YOUNG
 
-hypothesis.settings.register_profile("same every time", deadline=None, derandomize=True)
+gc.set_threshold(YOUNG)
+
+
+def pytest_collection_finish() -> None:
+    """What the tests are made of stays: it need not be gone through for cycles."""
+    gc.freeze()
+
+
+FULL = os.environ.get("NCFIX_FULL", "") not in ("", "0")
+"""Whether grids of cases are taken whole (`make full`): where cases prove one rule, a usual run takes some of them."""
+
+
+def some(cases: int) -> int:
+    """Of so many cases that are drawn at random to prove one rule: how many this run takes, a third or all."""
+    return cases if FULL else -(-cases // 3)
+
+
+hypothesis.settings.register_profile(
+    "same every time", deadline=None, derandomize=True, max_examples=some(hypothesis.settings.default.max_examples)
+)
 hypothesis.settings.register_profile("searching", deadline=None)
 hypothesis.settings.register_profile(  # that a test fails is enough: no smaller example is looked for
     "mutant", deadline=None, derandomize=True, phases=(hypothesis.Phase.explicit, hypothesis.Phase.generate)
@@ -25,8 +46,6 @@ hypothesis.settings.load_profile(
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES = "figures"
-FULL = os.environ.get("NCFIX_FULL", "") not in ("", "0")
-"""Whether grids of cases are taken whole (`make full`): where cases prove one rule, a usual run takes some of them."""
 PATIENCE_S = 60.0
 """How long something is waited for that takes a second or two, on a computer that does much else."""
 

@@ -10,11 +10,12 @@ import os
 import pytest
 
 from classes.statements import KLARTEXT, SIEMENS, Family
+from conftest import some
 from ncfix.testing import Statements, check_language, check_strategy
 from ncfix.testing.judging import SETUP
 from ncfix.testing.language import Pair
 
-COUNT = int(os.environ.get("NCFIX_LANGUAGES", "6"))
+COUNT = int(os.environ.get("NCFIX_LANGUAGES") or some(6))
 SEED = int(os.environ.get("NCFIX_SEED", "1"))
 
 

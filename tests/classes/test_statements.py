@@ -11,8 +11,9 @@ from collections import Counter
 import pytest
 
 from classes.statements import FAMILIES, Family, outcome
+from conftest import some
 
-COUNT = int(os.environ.get("NCFIX_STATEMENTS", "40"))
+COUNT = int(os.environ.get("NCFIX_STATEMENTS") or some(40))
 SEED = int(os.environ.get("NCFIX_STATEMENTS_SEED", "1"))
 
 

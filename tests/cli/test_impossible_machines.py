@@ -11,11 +11,12 @@ import pytest
 from tests.hidden.model import machine_toml
 from tests.hidden.workshop import TOPOLOGIES, draw_machine, draw_model
 
+from conftest import some
 from ncfix.diagnostics import ExitCode
 from ncfix.machine import load, loads
 from ncfix.machine.plausible import doubts
 
-HONEST = int(os.environ.get("NCFIX_HONEST", "12"))
+HONEST = int(os.environ.get("NCFIX_HONEST") or some(12))
 """How many machines of each kind are drawn."""
 
 FIVE = """

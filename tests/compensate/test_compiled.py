@@ -10,7 +10,7 @@ import pytest
 
 from compensate.motions import motions
 from compensate.test_stream import OPTIONS, program, whole
-from conftest import require_core
+from conftest import require_core, some
 from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, arc_lengths
 from ncfix.compensate.figures.nearest import Search
@@ -42,7 +42,7 @@ def grid(rng: np.random.Generator, motions: int, most: int = 200) -> PathNodes:
 
 
 @pytest.mark.parametrize("most", [200, 5 * STRETCH])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(some(6)))
 def test_fewest_pieces(seed: int, most: int) -> None:
     require_core()
     nodes = grid(np.random.default_rng(seed), 40, most)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from compensate.cycles_at_random import LANGUAGES
+from conftest import some
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
@@ -24,7 +25,7 @@ from ncfix.diagnostics import NcfixError
 from ncfix.machine import load
 from ncfix.text.reader import read
 
-PROGRAMS = int(os.environ.get("NCFIX_CYCLES", "12"))
+PROGRAMS = int(os.environ.get("NCFIX_CYCLES") or some(12))
 SETUP = Setup(
     tools={1: Tool(80.0, 3.0)},
     initial={"X": 0.0, "Y": 0.0, "Z": 250.0, "A": 0.0, "C": 0.0},

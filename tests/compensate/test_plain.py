@@ -15,7 +15,7 @@ import pytest
 from compensate import streaming
 from compensate import test_stream_others as others
 from compensate.test_stream import OPTIONS, streamed
-from conftest import require_core, use_form
+from conftest import require_core, some, use_form
 from ncfix import core
 from ncfix.compensate import FixOptions, driver, plain
 from ncfix.compensate.parts import ContinuedPart
@@ -103,7 +103,7 @@ def test_as_by_the_long_way(
 
 
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(some(6)))
 def test_arcs_and_dwells_among_plain_motions(seed: int, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     options = replace(OPTIONS, split_rapids=seed % 2 == 0)
     source = winding(seed, 600, 0.02, AMONG)

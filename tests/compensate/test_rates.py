@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from ncfix.compensate.plan.strategies import PoseSequence, limited
 
 RATE = 0.01
@@ -24,7 +25,7 @@ def path(
     return PoseSequence(np.zeros(n), np.full(n, step), start, pinned, decided)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=some(200), deadline=None)
 @given(wanted)
 def test_no_step_is_above_the_rate(values: list[float]) -> None:
     result = limited(np.array(values)[:, None], path(len(values)), 0.0, RATE)
@@ -33,7 +34,7 @@ def test_no_step_is_above_the_rate(values: list[float]) -> None:
     assert result.max() <= max(values) + FUZZ
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=some(100), deadline=None)
 @given(wanted)
 def test_what_keeps_the_rate_stays_as_it_is(values: list[float]) -> None:
     slow = np.cumsum(np.array(values) * RATE * 0.01 / 1e-3)[:, None]

@@ -12,6 +12,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from compensate.streaming import run
+from conftest import some
 from ncfix import core
 from ncfix.compensate import FixOptions
 from ncfix.compensate.checking import check_on
@@ -255,7 +256,7 @@ LINES = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=some(60), deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate))
 @given(st.lists(LINES, min_size=4, max_size=14), st.sampled_from(["rotary-then-linear", "full"]))
 def test_every_added_word_names_an_axis_that_the_program_has_brought_there(lines: list[str], strategy: str) -> None:
     body = [line for each in lines for line in ([each, "G90"] if each.startswith("G91") else [each])]
@@ -276,7 +277,7 @@ def begins_like(line: str, original: str) -> bool:
     return line.split()[:1] == original.split()[:1] and ("G" in line or "T" in line or "M" in line)
 
 
-@settings(max_examples=15, deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=some(15), deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate))
 @given(st.lists(LINES, min_size=20, max_size=60))
 def test_part_by_part_and_compiled_make_the_same_bytes(lines: list[str]) -> None:
     body = [line for each in lines for line in ([each, "G90"] if each.startswith("G91") else [each])]

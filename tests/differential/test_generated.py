@@ -7,12 +7,13 @@ import random
 from collections.abc import Callable
 from pathlib import Path
 
+from conftest import some
 from differential.canon import Canon
 from differential.errors import Machine
 from differential.generated import Study
 from differential.generator import Generator
 
-CASES = int(os.environ.get("NCFIX_GENERATED", "12"))
+CASES = int(os.environ.get("NCFIX_GENERATED") or some(12))
 REFUSED_SHARE = 0.02
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conftest import some
 from differential import errors
 from differential.tnc import Floats, Tnc, Way
 from differential.tnc_programs import Maker
@@ -43,7 +44,7 @@ ALONG = 1e-3 + np.sqrt(3) * HALF + 2e-4
 WINDOW = 6.0
 """mm of path within which the nearest point is looked for."""
 
-SEEDS = range(8)
+SEEDS = range(some(8))
 
 
 def control() -> Tnc:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conftest import require_core
+from conftest import require_core, some
 from machine import chains
 from ncfix import core
 from ncfix.machine import Effect, Machine, State, load, loads
@@ -109,7 +109,7 @@ def test_compiled_and_plain(root: Path) -> None:
         assert plain[1].arrived.sum() == 999
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(some(12)))
 def test_routes_of_random_chains(seed: int) -> None:
     """With reference points off the axes, errors of 50 um or of 15 mm; without a route they go along the chain."""
     rng = np.random.default_rng(seed)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conftest import some
 from machine import chains
 from ncfix.machine import Axis, Effect, GaugeLine, Machine, State, load
 from ncfix.machine.basis import Backlash, Basis, ConstantBasis, Fourier, Periodic, Polynomial
@@ -62,7 +63,7 @@ def test_bounds_with_kinks_and_directions() -> None:
     assert Truncated((0.0,)).bounds((1.0, 1.0, 1.0), -1, 1) is None
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(some(8)))
 def test_any_chain_with_smooth_errors(seed: int) -> None:
     """Polynomials in all error motions of random chains, location errors of every joint."""
     rng = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from machine import chains
 from machine.files import GOOD, changed
 from ncfix.machine import Axis, Effect, GaugeLine, Machine, dumps, loads
@@ -107,7 +108,7 @@ def test_every_basis_and_option_comes_back() -> None:
     assert loads(dumps(machine)) == machine
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=some(40), deadline=None)
 @given(seed=st.integers(0, 10**6), low=st.integers(-36000, 0), high=st.integers(1, 36000))
 def test_any_machine_comes_back(seed: int, low: int, high: int) -> None:
     """Ranges of rotary axes in hundredths of a degree; everything else any number."""

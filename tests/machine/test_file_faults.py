@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from machine.files import GOOD, changed, faults
 from ncfix.diagnostics import ConfigError
 from ncfix.machine import dumps, load, loads
@@ -184,7 +185,7 @@ JUNK = [
 ]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=some(200), deadline=None)
 @given(data=st.data())
 def test_whatever_is_in_the_file_the_answer_is_a_machine_or_messages(data: st.DataObject) -> None:
     """Lines dropped, doubled or with junk for a value: never another exception."""

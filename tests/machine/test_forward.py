@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from machine import chains, oracle
 from ncfix.machine import Axis, Effect, GaugeLine, Machine, State, se3
 from ncfix.machine.state import CHUNK
@@ -16,7 +17,7 @@ EXACT = 1e-12
 """Relative to a working volume of about 1 m: the rounding of a dozen products in double precision."""
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(60), deadline=None)
 @given(seed=st.integers(0, 10**6), joints=st.integers(2, 7))
 def test_nominal_chain_of_any_joints(seed: int, joints: int) -> None:
     rng = np.random.default_rng(seed)
@@ -27,7 +28,7 @@ def test_nominal_chain_of_any_joints(seed: int, joints: int) -> None:
     np.testing.assert_allclose(machine.tip(q, length), expected[:, :3, 3], rtol=0, atol=1000 * EXACT)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(60), deadline=None)
 @given(seed=st.integers(0, 10**6), joints=st.integers(1, 7), size=st.sampled_from([1.0, 300.0]))
 def test_actual_chain_of_any_joints_and_errors(seed: int, joints: int, size: float) -> None:
     """Errors of 50 um and 100 urad, and of 15 mm and 30 mrad: the composition is exact, not of first order."""

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from ncfix.diagnostics import ConfigError
 from ncfix.tables.table_files import Remarks
 from ncfix_siemens.assignments import parsed, written
@@ -103,7 +104,7 @@ def test_good_files_are_not_remarked_on(content: bytes) -> None:
     assert not CONTROL.lint({"a.INI": content})
 
 
-@settings(derandomize=True, max_examples=200, deadline=None)
+@settings(derandomize=True, max_examples=some(200), deadline=None)
 @given(st.text())
 def test_any_text_is_written_again_as_it_was_read(text: str) -> None:
     assert written(parsed(text)) == text
@@ -112,7 +113,7 @@ def test_any_text_is_written_again_as_it_was_read(text: str) -> None:
 SLIPS = [b"", b"0", b"1e999", b"-", b"1e-300", b"$", b"[", b"]", b"=", b"\n", b";", b",", b"AX3", b"7"]
 
 
-@settings(derandomize=True, max_examples=300, deadline=None)
+@settings(derandomize=True, max_examples=some(300), deadline=None)
 @given(st.sampled_from([GOOD, PAIR, EEC]), st.data())
 def test_damaged_files_are_refused_or_run_but_nothing_breaks(content: bytes, data: st.DataObject) -> None:
     start = data.draw(st.integers(0, len(content)))

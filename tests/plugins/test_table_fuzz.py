@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from conftest import some
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, loads
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
@@ -60,7 +61,7 @@ WORDS = (
     b"[",
     b"=",
 )
-ROUNDS = 120
+ROUNDS = some(120)
 Damage = Callable[[random.Random, bytes], bytes]
 
 

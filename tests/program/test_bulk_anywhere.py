@@ -17,7 +17,7 @@ from unittest import mock
 import pytest
 
 from compensate.streaming import OPTIONS, streamed
-from conftest import require_core
+from conftest import require_core, some
 from goldens.programs import Program, generated
 from ncfix import core
 from ncfix.compensate.driver import fix_program
@@ -31,7 +31,7 @@ from ncfix.text.language import language_of
 from ncfix.text.reader import read
 from ncfix.writer.language import WrittenLanguage
 
-COUNT = int(os.environ.get("NCFIX_MUTATED", "40"))
+COUNT = int(os.environ.get("NCFIX_MUTATED") or some(40))
 SEED = os.environ.get("NCFIX_SEED", "0")
 SIZE = 1000
 """Bytes of a part."""

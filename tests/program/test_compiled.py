@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from ncfix import core
 from ncfix.text.shapes import Scan, scan, split_blocks
 
@@ -43,14 +44,14 @@ def assert_same(source: bytes, pointless: bool = False) -> None:
     assert np.array_equal(np.signbit(plain.values), np.signbit(compiled.values))
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(derandomize=True, deadline=None, max_examples=some(200))
 @given(LINES, st.sampled_from(["\n", "\r\n"]), st.booleans())
 def test_generated_texts(lines: list[str], end: str, pointless: bool) -> None:
     source = end.join([*lines, "M2", ""]).encode("latin-1")
     assert_same(source, pointless)
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, deadline=None, max_examples=some(300))
 @given(
     st.from_regex(r"\A(N[0-9]{1,3} )?G1( ?[XYZ] ?-?[0-9]{1,3}(\.[0-9]{0,5})?){1,3}( ?-5)?( ?\([A-Z 0-9]{0,5}\))?\Z"),
     st.lists(st.tuples(st.integers(0, 40), st.integers(0, 2), st.sampled_from("GX0123456789..+-- ()[;\x01"))),

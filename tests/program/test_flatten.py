@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from conftest import some
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.control.flatten import flatten
@@ -138,7 +139,7 @@ def test_what_can_be_corrected_keeps_its_form(root: Path) -> None:
     assert b"#1=4." in fixed.text
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(some(12)))
 def test_generated_programs_of_linuxcnc_mean_the_same(seed: int) -> None:
     """`flatten` compares the motions itself; here it must not fail for want of a case."""
     axes, rotary = ("X", "Y", "Z", "A", "B", "C"), frozenset("ABC")

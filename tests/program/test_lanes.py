@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.lark import from_lark
 
+from conftest import some
 from ncfix.diagnostics import SourceError
 from ncfix.text.dialect import Dialect, check_content, get
 from ncfix.text.faults import BlockError
@@ -52,7 +53,7 @@ def is_legal(dialect: Dialect, text: str) -> bool:
 
 
 @pytest.mark.parametrize("name", ["iso", "linuxcnc"])
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=some(100), deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data(), seed=st.integers(0, 2**32))
 def test_generated_blocks_mean_what_the_grammar_says(name: str, data: st.DataObject, seed: int) -> None:
     dialect, random = get(name), Random(seed)
@@ -88,7 +89,7 @@ LINES = (
 
 
 @pytest.mark.parametrize("name", ["iso", "linuxcnc"])
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=some(300), deadline=None)
 @given(line=st.sampled_from(LINES), data=st.data())
 def test_a_damaged_block_is_read_by_the_grammar_or_refused_with_its_place(
     name: str, line: str, data: st.DataObject

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
@@ -129,7 +130,7 @@ LINES = (
 )
 
 
-@settings(max_examples=80, derandomize=True, deadline=None)
+@settings(max_examples=some(80), derandomize=True, deadline=None)
 @given(st.lists(st.sampled_from(LINES), min_size=2, max_size=14), st.integers(0, 2**14 - 1))
 def test_refused_arcs_close_whatever_is_before_them(lines: list[str], refused: int) -> None:
     try:

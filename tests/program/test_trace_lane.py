@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from ncfix import core
 from ncfix.control.lanes import lane
 from ncfix.control.moves import MotionKind, Moves, Rule
@@ -104,7 +105,7 @@ LEADING_ELSEWHERE = {
 """What stands before and behind blocks that are come to more than once, or passed over."""
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=some(150), deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from(["linuxcnc", "iso", "fanuc"]))
 def test_both_lanes_are_the_same(seed: int, dialect: str) -> None:
     random = Random(seed)
@@ -126,7 +127,7 @@ def without_a_word(random: Random, block: str) -> str:
     return " ".join(words)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=some(200), deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from(["linuxcnc", "iso", "fanuc", "haas", "mitsubishi"]))
 def test_both_lanes_make_the_same_arcs(seed: int, dialect: str) -> None:
     random = Random(seed)
@@ -142,7 +143,7 @@ SIEMENS = ["G91", "G90", "G70", "G71", "G55", "G94 F50", "G41 D1", "G40", "M5", 
 TANGENT = ["CT X9.5 Y3.25 Z1", "MIRROR Y0", "DIAMON", "DIAMOF", "G3 X1 Y9 CR=-30", "G2 X1 Y1 AR=90", "TRAORI", "R1=2"]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=some(150), deadline=None)
 @given(st.integers(0, 2**32))
 def test_both_lanes_make_the_same_arcs_of_sinumerik(seed: int) -> None:
     random = Random(seed)

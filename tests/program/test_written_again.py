@@ -9,6 +9,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from conftest import some
 from ncfix.compensate.following import kinematics_of, rotary_names
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
 from ncfix.control.setup import Setup, Tool
@@ -30,7 +31,7 @@ SAME, ROUND = 1e-9, 1e-4
 """mm and rad: rounding of the arithmetic; and how much of it an R near half the chord makes."""
 HALF = 0.51 * np.sqrt(3) * STEP
 """Half an output step of each axis, or of three where a frame is turned."""
-PROGRAMS = 10
+PROGRAMS = some(10)
 HEAD = ["G90 G94 F1000.", "G0 X0. Y0. Z0. B0. C0."]
 COMMON = {
     "inch": (["G20 F40."], ["G21 F1000."]),

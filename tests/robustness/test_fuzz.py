@@ -8,13 +8,14 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
+from conftest import some
 from differential import corpus, product
 from differential.canon import Canon
 from differential.errors import Machine
 from differential.judge import Terms, judge
 
-CASES = int(os.environ.get("NCFIX_FUZZ", "120"))
-JUDGED = 60
+CASES = int(os.environ.get("NCFIX_FUZZ") or some(120))
+JUDGED = some(60)
 HEAD = b"G21 G90 G17 G94 G54\nG0 X10 Y5 Z20\nF300\n"
 PIECES = (
     b"G0", b"G1", b"G2", b"G3", b"G91", b"G90", b"G53", b"G28", b"G92", b"G93", b"G81", b"G80", b"G41", b"G20", b"X1",

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from robustness import readers
 
-CASES = int(os.environ.get("NCFIX_FUZZ_READERS", "12"))
+CASES = int(os.environ.get("NCFIX_FUZZ_READERS") or some(12))
 
 
 @pytest.mark.parametrize("path", readers.kept(), ids=lambda path: path.stem)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from ncfix.tables.scheme import PartSelection, needed
 from ncfix.tables.separable import (
     Separation,
@@ -63,7 +64,7 @@ def test_the_fewest_tables(values: np.ndarray, tables: int) -> None:
 coefficient = st.floats(-2, 2, allow_nan=False).map(lambda value: round(value, 3))
 
 
-@settings(derandomize=True, max_examples=40, deadline=None)
+@settings(derandomize=True, max_examples=some(40), deadline=None)
 @given(st.lists(coefficient, min_size=8, max_size=8))
 def test_any_sum_of_pairs_stays_the_same_function(c: list[float]) -> None:
     values = c[0] + c[1] * GX + c[2] * GY**2 + c[3] * np.sin(GA) + c[4] * GX * GY + c[5] * GX * np.cos(GA)

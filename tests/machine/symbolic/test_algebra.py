@@ -8,6 +8,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from ncfix.machine.symbolic.algebra import Algebra
 from ncfix.machine.symbolic.identification import PolynomialColumns, independent_columns
 
@@ -23,7 +24,7 @@ def polynomials(draw: st.DrawFn) -> sp.Expr:
     return sp.Add(*(sp.Mul(*factors) for factors in products))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(60), deadline=None)
 @given(expression=polynomials(), numbers=st.tuples(*[st.floats(-3, 3) for _ in range(4)]))
 def test_what_is_written_is_what_was_meant(expression: sp.Expr, numbers: tuple[float, ...]) -> None:
     algebra = Algebra([expression])

@@ -9,6 +9,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from conftest import some
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
@@ -41,7 +42,7 @@ OTHERS = (
 )
 ODD_NUMBERS = ("0", "+0.0", "-.25", ".5", "007.5", "-012", "+5.00000", "+ 2.5", "359.9999", "+360", "-0.0")
 DWELL = "CYCL DEF 9.0\nCYCL DEF 9.1 V.ZEIT 0.5"
-MANY = 24
+MANY = some(24)
 """Programs of each kind."""
 
 

@@ -9,6 +9,7 @@ import random
 import numpy as np
 import pytest
 
+from conftest import some
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_flat
 from ncfix.control.moves import MotionKind, Rule
@@ -66,7 +67,7 @@ def check(elements: list[Element], start: complex, heading: complex | None, legs
         at, heading = leg.end, leg.heading
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(some(40)))
 def test_lines_touch_the_circles_that_they_lead_between(seed: int) -> None:
     dice = random.Random(seed)
     first, second, third = (dice.choice([1, -1]) for _ in range(3))

@@ -10,6 +10,7 @@ from random import Random
 import numpy as np
 import pytest
 
+from conftest import some
 from ncfix import core
 from ncfix.control.builder import Circles
 from ncfix.control.moves import Moves
@@ -22,7 +23,7 @@ from program.arcs import full_of_klartext_arcs
 from program.klartext.tnc import KNOWN, follow
 
 ALWAYS, NEVER, COMPILED = 1, 10**9, -1
-MANY = 30
+MANY = some(30)
 """Programs of each kind."""
 
 OTHERS = (
@@ -142,7 +143,7 @@ def test_both_ways_give_the_same(odd: float) -> None:
 
 
 def test_nothing_is_known_at_the_start() -> None:
-    for seed in range(20):
+    for seed in range(some(20)):
         assert_same(body(seed, 0.1), Setup(assume_zero=True))
         assert_same(body(seed, 0.1), Setup())
 

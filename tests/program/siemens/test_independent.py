@@ -16,12 +16,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from conftest import missing
+from conftest import missing, some
 from ncfix.control.trace import trace
 from ncfix.text.reader import read
 from program.siemens.following import KNOWN
 
-PROGRAMS = 80
+PROGRAMS = some(80)
 TOLERANCE = 2e-7
 """Relative to the largest number: single precision has 6e-8."""
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conftest import some
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import kinematics_of
@@ -32,7 +33,7 @@ MCALL CYCLE81(50,0,2,-20)|MCALL|HOLES1(1,2)|AP=30 RP=10|G111 X1 Y1|CIP X10 I1=5 
 R1=R1+1|IF R1>2 GOTOF DOWN|DOWN: X5|IF NOBODY==1 GOTOF DOWN|X=NOBODY|DEF REAL QQ=5|X=QQ|POS[X]=5|RND=2 X5|G4 F1|SUB1
 RNDM=2|HOLES2(1,2,9,0,0,5)|TURN=1 I5 J0|X10..5|=|MSG("x")|OTHER "x" 5|%|/X7|N10|;|BSPLINE X5|G64"""
 CHOICE = [block for line in BLOCKS.split("\n") for block in line.split("|")]
-SEEDS = 150
+SEEDS = some(150)
 
 
 def text_of(seed: int) -> str:
@@ -69,14 +70,14 @@ def test_what_may_be_corrected_is_known(machine: Machine) -> None:
 def test_what_is_written_is_read_as_meant(machine: Machine, strategy: str) -> None:
     """The product reads its own text again and would raise a fault of its own if it meant something else."""
     fixed = 0
-    for seed in range(SEEDS, SEEDS + 40):
+    for seed in range(SEEDS, SEEDS + some(40)):
         try:
             program = read(text_of(seed).encode(), "part.mpf", "siemens")
             fix_program(program, machine, SETUP, FixOptions(strategy=strategy, verify=False))
         except NcfixError:
             continue
         fixed += 1
-    assert fixed > 10
+    assert fixed > some(40) / 4
 
 
 ODD = {
