@@ -1,7 +1,10 @@
-"""TOML files as people write them: decoded, parsed, written; and where a key stands, which the parser does not say.
+"""TOML files as people write them: decoded, parsed, read with all their faults, written.
 
-Paths are tuples of keys and indices, `("effect", 2, "degree")`. Only keys that stand at the start of a line are
-found; for others the line of the table that holds them is good enough.
+Where a key stands the parser does not say. Paths are tuples of keys and indices, `("effect", 2, "degree")`. Only keys
+that stand at the start of a line are found; for others the line of the table that holds them is good enough.
+
+A `TomlTable` is one table. Its readers return the value, or None if it is missing or wrong: then there is a message,
+and the reading goes on. `close` notes the keys that nobody asked for.
 """
 
 from __future__ import annotations
@@ -11,10 +14,12 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any, NamedTuple, TypeGuard
 
-from ncfix.diagnostics import ConfigError, Place
+from ncfix.diagnostics import ConfigError, Message, Place
 
 Path = tuple[str | int, ...]
 BARE = r"[A-Za-z0-9_-]+"
@@ -30,6 +35,8 @@ OTHERS = {
 """How files begin that are named where TOML is meant."""
 WIDTH = 120
 """Characters in a line that is written."""
+LARGEST = 1e12
+"""No quantity of a machine has a larger number, in whatever unit; beyond it arithmetic goes wrong."""
 
 
 def decoded(source: bytes, path: str, code: str) -> str:
@@ -120,6 +127,243 @@ def _opened(keys: Path, repeated: bool, counts: dict[Path, int]) -> Path:
 
 def _keys(dotted: str) -> Path:
     return tuple(key.strip("\"'") for key in re.findall(KEY, dotted))
+
+
+# -- tables, key by key ------------------------------------------------------------------------------------------------
+
+
+class KeyCodes(NamedTuple):
+    """Message codes of the faults that any key may have, see `Report`."""
+
+    unknown: str
+    missing: str
+    kind: str
+    number: str
+    range: str
+
+
+MACHINE_FILE = KeyCodes("NCF302", "NCF303", "NCF304", "NCF305", "NCF308")
+
+
+@dataclass(slots=True)
+class Report:
+    """The faults found so far, with their places in the text.
+
+    top    keys that stand above all tables: one that stands below a header is in that table
+    codes  of faults of a key: it is unknown, missing, of another kind, a number that cannot be, a range that is none
+    """
+
+    path: str
+    text: str
+    lines: Mapping[Path, int]
+    messages: list[Message] = field(default_factory=list)
+    top: set[str] = field(default_factory=set)
+    codes: KeyCodes = MACHINE_FILE
+
+    def note(self, code: str, where: Path, text: str, hint: str = "") -> None:
+        """Note a fault of the value at `where`."""
+        place = place_of(line_of(where, self.lines), self.text, self.path)
+        head = f"{dotted(where)}: " if where else ""
+        self.messages.append(Message(code, head + text, place, hint))
+
+
+@dataclass(slots=True)
+class TomlTable:
+    """One table of the file, at `path`."""
+
+    values: Mapping[str, Any]
+    path: Path
+    report: Report
+    asked: set[str] = field(default_factory=set)
+
+    def note(self, code: str, key: str, text: str, hint: str = "") -> None:
+        """Note a fault of one key."""
+        self.report.note(code, (*self.path, key), text, hint)
+
+    def has(self, key: str) -> bool:
+        """Whether the key is there."""
+        self.asked.add(key)
+        return key in self.values
+
+    def get(self, key: str, required: bool = False) -> Any:
+        """The raw value, or None; a required key that is missing is noted."""
+        if not self.has(key):
+            if required:
+                hint = did_you_mean(key, [each for each in self.values if each not in self.asked])
+                self.report.note(self.report.codes.missing, self.path, f"key {key!r} is missing", hint)
+            return None
+        return self.values[key]
+
+    def text(self, key: str, required: bool = False) -> str | None:
+        """A string."""
+        value = self.get(key, required)
+        if value is None or isinstance(value, str):
+            return value
+        self._wrong(key, "a string", value)
+        return None
+
+    def flag(self, key: str) -> bool:
+        """true or false; false if missing."""
+        value = self.get(key)
+        if value is not None and not isinstance(value, bool):
+            self._wrong(key, "true or false", value)
+        return value is True
+
+    def number(self, key: str, required: bool = False) -> float | None:
+        """A finite number."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        return float(value) if self._finite(key, value, "a number") else None
+
+    def positive(self, key: str) -> float | None:
+        """A number above zero; one that is not is noted, and returned."""
+        value = self.number(key)
+        if value is not None and value <= 0:
+            self.note(self.report.codes.number, key, f"{value:g} is not positive")
+        return value
+
+    def range(self, key: str, hint: str = "") -> tuple[float, float] | None:
+        """Two numbers, the lower one first; `hint` is for those that are not."""
+        values = self.numbers(key, count=2)
+        if values is None:
+            return None
+        low, high = values
+        if low >= high:
+            self.note(self.report.codes.range, key, f"empty range: {low:g} is not below {high:g}", hint)
+        return low, high
+
+    def choice(self, key: str, *options: str, required: bool = False, hint: str | None = None) -> str | None:
+        """One of two words; without a `hint` the nearer one is named."""
+        value = self.text(key, required)
+        if value is not None and value not in options:
+            meant = did_you_mean(value, options) if hint is None else hint
+            self.note(self.report.codes.kind, key, f"{value!r} is neither {' nor '.join(options)}", meant)
+        return value
+
+    def integer(self, key: str, required: bool = False) -> int | None:
+        """A whole number."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        if _is_integer(value):
+            return value
+        self._wrong(key, "a whole number", value)
+        return None
+
+    def numbers(self, key: str, required: bool = False, count: int | None = None) -> tuple[float, ...] | None:
+        """A list of finite numbers, `count` of them if given."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        wanted = f"a list of {count} numbers" if count is not None else "a list of numbers"
+        if not isinstance(value, list) or (count is not None and len(value) != count):
+            self._wrong(key, wanted, value)
+            return None
+        good = [self._finite(key, item, wanted) for item in value]
+        return tuple(float(item) for item in value) if all(good) else None
+
+    def integers(self, key: str, required: bool = False) -> tuple[int, ...] | None:
+        """A list of whole numbers."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        if isinstance(value, list) and all(_is_integer(item) for item in value):
+            return tuple(value)
+        odd = next((item for item in value if not _is_integer(item)), value) if isinstance(value, list) else value
+        self._wrong(key, "a list of whole numbers", odd)
+        return None
+
+    def rows(self, key: str, shape: tuple[int, int]) -> tuple[tuple[float, ...], ...] | None:
+        """A matrix as a list of rows."""
+        value = self.get(key)
+        if value is None:
+            return None
+        wanted = f"{shape[0]} rows of {shape[1]} numbers"
+        ragged = not isinstance(value, list) or any(not isinstance(row, list) or len(row) != shape[1] for row in value)
+        if ragged or len(value) != shape[0]:
+            self._wrong(key, wanted, value)
+            return None
+        good = [self._finite(key, item, wanted) for row in value for item in row]
+        return tuple(tuple(float(item) for item in row) for row in value) if all(good) else None
+
+    def table(self, key: str, required: bool = False) -> TomlTable | None:
+        """A table in this one."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            self._wrong(key, f"a table [{dotted((*self.path, key))}]", value)
+            return None
+        return TomlTable(value, (*self.path, key), self.report)
+
+    def tables(self, key: str) -> Iterator[TomlTable]:
+        """The tables of an array [[key]]."""
+        value = self.get(key)
+        if value is None:
+            return
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            self._wrong(key, f"tables [[{dotted((*self.path, key))}]]", value)
+            return
+        for index, item in enumerate(value):
+            yield TomlTable(item, (*self.path, key, index), self.report)
+
+    def close(self) -> None:
+        """Note the keys that nobody asked for."""
+        for key in self.values:
+            if key in self.asked:
+                continue
+            if self.path and key in self.report.top:
+                meant = f"it belongs above the first table; here it is a key of {dotted(self.path)}"
+            else:
+                meant = did_you_mean(key, self.asked - self.values.keys()) or did_you_mean(key, self.asked)
+            self.note(self.report.codes.unknown, key, f"unknown key {key!r}", meant)
+
+    def _finite(self, key: str, value: object, wanted: str) -> bool:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            self._wrong(key, wanted, value)
+            return False
+        if isinstance(value, float) and not math.isfinite(value):
+            self.note(self.report.codes.number, key, f"{value} is not a finite number")
+            return False
+        if abs(value) > LARGEST:
+            self.note(
+                self.report.codes.number, key, f"more than anything that a machine has, which is {LARGEST:g} at most"
+            )
+            return False
+        return True
+
+    def _wrong(self, key: str, wanted: str, value: object) -> None:
+        self.note(self.report.codes.kind, key, f"expected {wanted}, found {shown(value)}")
+
+
+def dotted(path: Path) -> str:
+    """A path as people write it: effect[2].degree, entries counted from 0."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")
+
+
+def shown(value: object) -> str:
+    """A value in a message: what it is, not all of it."""
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    if isinstance(value, dict):
+        return "a table"
+    return f"{str(value).lower() if isinstance(value, bool) else repr(value)}"
+
+
+def _is_integer(value: object) -> TypeGuard[int]:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def did_you_mean(word: str, words: Iterable[str]) -> str:
+    """A hint with the nearest of the words, whatever their case; empty if none is near."""
+    small = {each.lower(): each for each in words}
+    close = get_close_matches(word.lower(), small, 1, 0.6)
+    return f"did you mean {small[close[0]]!r}?" if close else ""
+
+
+# -- written -----------------------------------------------------------------------------------------------------------
 
 
 def written(header: str, table: Mapping[str, Any]) -> str:

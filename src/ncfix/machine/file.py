@@ -39,11 +39,10 @@ from ncfix.machine.axes import (
 )
 from ncfix.machine.basis import Basis, check_shapes
 from ncfix.machine.effects import PhysicalEffect, at_the_ends, kinds, library
-from ncfix.machine.fields import Report, TomlTable, did_you_mean
 from ncfix.machine.machine import DEFAULT_CORRECTION, DEFAULT_INCREMENT, Machine
 from ncfix.machine.state import SUM
 from ncfix.plugins import working
-from ncfix.toml_text import decoded, key_lines, parsed
+from ncfix.toml_text import Report, TomlTable, decoded, did_you_mean, key_lines, parsed
 
 SCHEMA = 1
 TOP = ("ncfix", "name", "topology", "control", "least_increment", "max_correction", "workpiece_offset")

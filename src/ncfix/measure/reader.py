@@ -17,9 +17,9 @@ from ncfix import files
 from ncfix.cells import MARKS, Cell, SeparatedText, plain_text
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Machine
-from ncfix.machine.fields import LARGEST, did_you_mean
 from ncfix.measure import checks, foreign
 from ncfix.measure.measurement import CENTRE, CHOICES, COMMON, ENDS, KINDS, STATES, Array, Measurement, MeasurementKind
+from ncfix.toml_text import LARGEST, did_you_mean
 
 SHOWN = 25
 """Faults that are named one by one; a file with more has a fault of another sort."""

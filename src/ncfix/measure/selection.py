@@ -22,8 +22,8 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import COMPONENTS, NAME, SPINDLE, Axis, is_arm
 from ncfix.machine.basis import Backlash, Basis, ConstantBasis, Fourier, Polynomial
 from ncfix.machine.effects import library
-from ncfix.machine.fields import did_you_mean
 from ncfix.machine.piecewise import Truncated
+from ncfix.toml_text import did_you_mean
 
 ALL = "all"
 TERM = re.compile(r"([XYZABC][A-Z])(\d|b)(?:-(\d))?")

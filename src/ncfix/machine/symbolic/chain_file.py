@@ -16,9 +16,8 @@ import sympy as sp
 
 from ncfix.diagnostics import ConfigError, NcfixError, Place
 from ncfix.inputs import MOST_SAID, taken
-from ncfix.machine.fields import Report, TomlTable, did_you_mean
 from ncfix.machine.symbolic.chain import UNITS, Chain, Expr, Rotation, Size, Step, Translation, Variable
-from ncfix.toml_text import decoded, key_lines, parsed
+from ncfix.toml_text import Report, TomlTable, decoded, did_you_mean, key_lines, parsed
 
 SCHEMA = 1
 OPERATORS: Mapping[type, Callable[..., Expr]] = {
