@@ -19,6 +19,8 @@ INFO = (".dist-info", ".egg-info")
 """How the folder of a distribution ends."""
 METADATA = ("METADATA", "PKG-INFO", "")
 """The files of such a folder that may say name and version; an egg-info may be that file itself."""
+PATH_FINDER = "_frozen_importlib_external"
+"""The module of Python's own finder, which looks into the folders of the path."""
 
 
 class EntryPoint(Protocol):
@@ -76,7 +78,8 @@ class InstalledEntryPoint:
 
 def entry_points(group: str) -> list[EntryPoint]:
     """The entry points of a group; of distributions of one name, the first one on the path counts."""
-    if any(hasattr(finder, "find_distributions") and not _standard(finder) for finder in sys.meta_path) or any(
+    others = (finder for finder in sys.meta_path if getattr(finder, "__module__", "") != PATH_FINDER)
+    if any(hasattr(finder, "find_distributions") for finder in others) or any(
         os.path.isfile(folder) or folder.endswith(".egg") for folder in sys.path
     ):
         from importlib.metadata import entry_points as all_entry_points
@@ -89,11 +92,6 @@ def entry_points(group: str) -> list[EntryPoint]:
             if name not in found:
                 found[name] = list(_of_group(InstalledDistribution(os.path.join(folder, info)), group))
     return [point for points in found.values() for point in points]
-
-
-def _standard(finder: Any) -> bool:
-    """Whether a finder is Python's own, which looks into the folders of the path."""
-    return getattr(finder, "__module__", "") == "_frozen_importlib_external"
 
 
 def _distributions(folder: str) -> list[str]:

@@ -183,7 +183,11 @@ def collect(points: Iterable[EntryPoint]) -> Plugins:
 
 def load_one(point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
     """Import one plugin and let it register everything, which nobody sees unless all goes well."""
-    module = import_plugin(point)
+    try:
+        module = point.load()
+    except (Exception, SystemExit) as error:
+        why = f"cannot be imported: {describe(error)}{_where(point.module, error.__traceback__, only=True)}"
+        raise left_out("NCF501", point, why, import_hint(error)) from error
     things = registrations(point, hooks_of(point, module))
     for plugin in earlier:
         for kind, named in things.items():
@@ -191,15 +195,6 @@ def load_one(point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
                 if name in plugin.things.get(kind, ()):
                     raise PluginError((taken(point.name, kind, name, f"plugin {plugin.name!r}"),))
     return Plugin(point.name, point.value, *described(point.dist), things)
-
-
-def import_plugin(point: EntryPoint) -> object:
-    """The module or object that the entry point names."""
-    try:
-        return point.load()
-    except (Exception, SystemExit) as error:
-        why = f"cannot be imported: {describe(error)}{_where(point.module, error.__traceback__, only=True)}"
-        raise left_out("NCF501", point, why, import_hint(error)) from error
 
 
 def import_hint(error: BaseException) -> str:
@@ -376,7 +371,7 @@ def blamed(error: BaseException) -> PluginError | None:
     except NcfixError:  # strict mode: nothing came in, so nothing of it was at work
         return None
     for plugin in plugins:
-        if not _own(plugin) and _top(plugin.module) in at_work:
+        if plugin.distribution != OWN and _top(plugin.module) in at_work:
             made = _failed(plugin, "", error)
             made.__cause__ = error
             return made
@@ -406,11 +401,7 @@ def _where(module: str, trace: TracebackType | None, only: bool = False) -> str:
 def _owner(kind: str, name: str) -> Plugin | None:
     """The plugin of somebody else that registered this name."""
     plugin = load_plugins().owner(kind, name)
-    return None if plugin is None or _own(plugin) else plugin
-
-
-def _own(plugin: Plugin) -> bool:
-    return plugin.distribution == OWN
+    return None if plugin is None or plugin.distribution == OWN else plugin
 
 
 def _top(module: str) -> str:

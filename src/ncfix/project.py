@@ -23,6 +23,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
+from pathlib import PurePath
 from typing import Any
 
 from ncfix.diagnostics import ConfigError, Message
@@ -60,7 +61,7 @@ class Project:
         else:
             start = os.path.abspath(program)
             start = start if os.path.isdir(start) else os.path.dirname(start)
-        for folder in _upwards(start):
+        for folder in (start, *map(str, PurePath(start).parents)):
             path = os.path.join(folder, NAME)
             if os.path.isfile(path):
                 return cls.load(_near(path))
@@ -156,13 +157,6 @@ def way_below(folder: str, path: str) -> str:
     except ValueError:  # another disk, on Windows
         return ""
     return "" if path == "-" or way.split(os.sep, 1)[0] == os.pardir else way
-
-
-def _upwards(folder: str) -> Iterator[str]:
-    yield folder
-    while (above := os.path.dirname(folder)) != folder:
-        yield above
-        folder = above
 
 
 def _near(path: str) -> str:

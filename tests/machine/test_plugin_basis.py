@@ -64,7 +64,7 @@ def test_a_foreign_basis_is_as_good_as_a_native_one() -> None:
     machine = loads(TEXT)
     assert loads(dumps(machine)) == machine
     np.testing.assert_allclose(machine.error([[120.0], [130.0]])[:, 1], [0.004, 0.004 / np.e])
-    assert machine.feature_lengths() == [2.5]
+    assert machine.feature_lengths == [2.5]
     assert machine.design([130.0]).shape == (6, 1)
 
 

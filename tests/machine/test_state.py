@@ -200,14 +200,14 @@ def test_feature_lengths_are_the_smallest_of_each_axis() -> None:
         Effect("EZB", (1.0, 0.0), Fourier((3,))),
         Effect("EZS", (1.0,), Polynomial((5,)), input="temp_spindle"),
     )
-    lengths = MACHINE.replace(effects=effects).feature_lengths()
+    lengths = MACHINE.replace(effects=effects).feature_lengths
     np.testing.assert_allclose(lengths, [np.inf, np.deg2rad(15), 20.0, 600 / 4, 600 / 4])
-    assert np.isinf(MACHINE.feature_lengths()).all()
+    assert np.isinf(MACHINE.feature_lengths).all()
 
 
 def test_an_endless_axis_has_a_turn_as_its_range() -> None:
     machine = MACHINE.replace(effects=(Effect("EZC", (1.0,), Polynomial((2,))),))
-    assert machine.feature_lengths()[0] == pytest.approx(2 * np.pi / 8)
+    assert machine.feature_lengths[0] == pytest.approx(2 * np.pi / 8)
 
 
 def test_breakpoints_are_in_internal_units_and_sorted() -> None:

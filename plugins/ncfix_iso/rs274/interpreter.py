@@ -25,7 +25,6 @@ from ncfix_iso.rs274.plans import Codes, RS274Plan, RS274Unit, check_words, grou
 from ncfix_iso.rs274.settings import tool_offset, unknown_code
 
 if TYPE_CHECKING:
-    from ncfix.text.dialect import CycleTable
     from ncfix_iso.rs274.flatten import RS274Flattener
 
 
@@ -334,7 +333,10 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             in_machine_coordinates(self.control, block, motion)
         else:
             table, before = self.control.rules.tables.get(motion), self.control.modal.motion
-            self.check_needs(table, block, codes)
+            missing = [] if table is None or codes.motion is None else [x for x in table.needs if x not in block.values]
+            if missing:
+                name = f"G{(codes.motion or 0) / 10:g}"
+                raise Fault(BAD_CYCLE, f"{missing[0]} is missing: {name} cannot begin without it")
             code = motion if table is None else DRILLING
             step = self.control.rules.steps.get(code) or MOTIONS[code]
             with self.polar_words(block):
@@ -343,13 +345,6 @@ class RS274Interpreter(Interpreter[RS274Unit]):
                 self.control.modal.motion, self.control.modal.cycle.initial = before, None
         if motion not in self.control.rules.cycles:
             self.control.modal.cycle.initial = None
-
-    def check_needs(self, table: CycleTable | None, block: Block, codes: Codes) -> None:
-        """Raise `Fault` where a cycle of the dialect's own begins without a word that it needs."""
-        missing = [] if table is None or codes.motion is None else [x for x in table.needs if x not in block.values]
-        if missing:
-            code = f"G{(codes.motion or 0) / 10:g}"
-            raise Fault(BAD_CYCLE, f"{missing[0]} is missing: {code} cannot begin without it")
 
     def after(self, codes: Codes, block: Block) -> bool:
         """What a block does last: M2, M30, M98, M99. True if the program ends."""

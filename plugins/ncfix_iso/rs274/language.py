@@ -56,14 +56,18 @@ NO_KEYWORD = "the correction needs a word for {}, and the language has none"
 NO_TREE = "the grammar has to make a tree of words and values, as common.lark does, and made"
 
 PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
-"""A parameter, and behind it outside brackets what a check number looks like."""
+"""A parameter, and behind it outside brackets what a check number looks like.
+
+`X#1*2` would be read as X#1 and a check number, which no program with parameters has: it is refused.
+"""
 
 
 def parse_block(dialect: Dialect, text: str) -> Parsed:
     """One block, by the grammar and the rules that a grammar cannot say; raises `BlockError`."""
     squeezed = squeeze(text)
     parsed = parsed_words(dialect, text, squeezed)
-    check_products(squeezed)
+    if product := PRODUCT.search(squeezed.code):
+        raise bare_expression(squeezed.places[product.start("operator")])
     check_numbers(parsed)
     check_exponents(parsed, text)
     check_repeats(parsed, standby=dialect.semantics != "linuxcnc")
@@ -92,12 +96,6 @@ def shown(tree: Branch) -> str:
     """A tree in one line: word(ADDRESS X, literal(NUMBER 1))."""
     inside = (shown(each) if isinstance(each, Tree) else f"{kind(each)} {each}" for each in tree.children)
     return f"{kind(tree)}({', '.join(inside)})"
-
-
-def check_products(squeezed: UnspacedBlock) -> None:
-    """Refuse `X#1*2`: it would be read as X#1 and a check number, which no program with parameters has."""
-    if found := PRODUCT.search(squeezed.code):
-        raise bare_expression(squeezed.places[found.start("operator")])
 
 
 def check_repeats(parsed: Parsed, standby: bool = True) -> None:

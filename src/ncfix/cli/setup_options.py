@@ -242,6 +242,7 @@ class SetupOptions:
         tools |= {int(key): tool for key, tool in given.items() if key.isdecimal()}
         named |= {key: tool for key, tool in given.items() if not key.isdecimal()}
         probed = {axis: value for given in self.probed for axis, value in given.items()}
+        stated = self.block_skip
         whole = replace(
             setup,
             work_offsets={**setup.work_offsets, **dict(self.offsets)},
@@ -253,17 +254,11 @@ class SetupOptions:
             assume_zero=setup.assume_zero or self.assume_zero,
             subprograms=(*self.subprograms, *setup.subprograms),
             probed={**(setup.probed or {}), **probed} if self.probed else setup.probed,
-            block_skip=self._block_skip(setup),
+            block_skip=setup.block_skip if stated is None else None if isinstance(stated, str) else stated,
         )
         if machine is not None:
             check_offsets(whole, machine.axis_names)
         return whole
-
-    def _block_skip(self, setup: Setup) -> bool | frozenset[int] | None:
-        """How the switches of block delete stand; None: in every position."""
-        if self.block_skip is None:
-            return setup.block_skip
-        return None if isinstance(self.block_skip, str) else self.block_skip
 
 
 def setup_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING
@@ -112,17 +112,14 @@ class Source:
                them to tell what the text is
         """
         from ncfix.text.dialect import PROBE_BYTES
+        from ncfix.text.stamp import SIGN
 
         many = long_bytes()
         self.head = self._read(many if named and self.spool is not None else max(many, PROBE_BYTES))
-        self.stamp = self._stamp(self.head[:PROBE_BYTES].splitlines())
+        lines = enumerate((line.decode("latin-1") for line in self.head[:PROBE_BYTES].splitlines()), start=1)
+        stamps = (Place(shown(self.path), number, 0, line) for number, line in lines if SIGN.search(line))
+        self.stamp = next(stamps, None)
         return len(self.head) >= many
-
-    def _stamp(self, first: Sequence[bytes]) -> Place | None:
-        from ncfix.text.stamp import SIGN
-
-        lines = enumerate((line.decode("latin-1") for line in first), start=1)
-        return next((Place(shown(self.path), number, 0, line) for number, line in lines if SIGN.search(line)), None)
 
     @property
     def first_lines(self) -> bytes:

@@ -232,8 +232,13 @@ class ProgramControl(ControlState):
             self._ask_for_start(motion)
         if self.composed.unknown:
             self.places.lose(mask_of(self.composed.unknown))
-        placed = self._placed_by(motion)
-        unplaced = self._unplaced(placed) | self.still_beside(motion.axes)
+        placed = motion.axes if motion.placed is None else motion.placed
+        if motion.placed is None and (motion.passing or self.modal.incremental):
+            placed = 0
+        unplaced = self.places.unplaced & ~placed
+        if self.is_rotated and unplaced & (turned := self._turned()):
+            unplaced |= turned  # turned axes go together
+        unplaced |= self.still_beside(motion.axes)
         if not motion.passing and placed & motion.axes != (0 if self.modal.incremental else motion.axes):
             self.builder.counted(motion.axes & ~placed)  # some words count otherwise than the distance mode says
         fate = self._fate(motion, unplaced)
@@ -266,12 +271,6 @@ class ProgramControl(ControlState):
                     unknown[index] = self.unknown[index]
                 else:
                     del unknown[index]
-
-    def _placed_by(self, motion: Motion) -> int:
-        """The axes whose words say where they stand behind the motion."""
-        if motion.placed is not None:
-            return motion.placed
-        return 0 if motion.passing or self.modal.incremental else motion.axes
 
     def _keep_places(self, motion: Motion, placed: int) -> None:
         """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
@@ -327,14 +326,6 @@ class ProgramControl(ControlState):
         before = {*self.unknown.values(), *self.lost_in_frame().values()}
         named = any(rapid.axes >> index & 1 for index in self._lost_at_end(rapid))
         return before.issuperset(rapid.end.unknown.values()) and not named
-
-    def _unplaced(self, placed: int) -> int:
-        """Axes that must get no word in a motion that brings `placed` to their places; turned axes go together."""
-        unplaced = self.places.unplaced & ~placed
-        if unplaced and self.is_rotated:
-            turned = self._turned()
-            unplaced |= turned if unplaced & turned else 0
-        return unplaced
 
     def still_beside(self, axes: int) -> int:
         """Axes of the plane that get no word in a motion across it."""

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
@@ -232,10 +231,11 @@ class Interpreter(ABC, Generic[U]):
         """
         if self.behind is None:
             return
-        if 0 < self.behind <= len(program) and self._goes_back(program, self.behind - 1):
-            self.control.messages[AS_PROGRAM] = Message(
-                SUBPROGRAM, AS_PROGRAM, program.place(self.behind - 1), BY_ITSELF
-            )
+        if 0 < self.behind <= len(program):
+            start, stop = program.blocks[self.behind - 1].tolist()
+            if goes_back(program.source[start:stop], self.dialect):
+                place = program.place(self.behind - 1)
+                self.control.messages[AS_PROGRAM] = Message(SUBPROGRAM, AS_PROGRAM, place, BY_ITSELF)
         jumped = sorted((first, min(stop, self.behind)) for first, stop in self.jumped)
         behind = [(self.behind, len(program))] if self.behind < len(program) else []
         if not (behind or jumped):
@@ -247,10 +247,6 @@ class Interpreter(ABC, Generic[U]):
         text = "the program jumps over blocks that name axes, and never goes through them"
         hint = "they stay as they are: when it is to go through them, correct the original anew"
         self._note_first(program, executed, jumped, text, hint)
-
-    def _goes_back(self, program: Program, block: int) -> bool:
-        start, stop = program.blocks[block].tolist()
-        return goes_back(program.source[start:stop], self.dialect)
 
     def _note_first(
         self, program: Program, executed: set[int], spans: Iterable[tuple[int, int]], text: str, hint: str
@@ -299,19 +295,13 @@ class Interpreter(ABC, Generic[U]):
 
     # -- the walk -----------------------------------------------------------------------------------------------------
 
-    @contextmanager
-    def stopping(self) -> Iterator[None]:
-        """What the control stops at is a SourceError with its place."""
+    def run(self) -> None:
+        """Follow the program, or the part, to its end; raises SourceError where the control would stop."""
         try:
-            yield
+            self.ended = self.walk() or self.last
         except Fault as fault:
             self.span = fault.span or self.span
             raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
-
-    def run(self) -> None:
-        """Follow the program, or the part, to its end; raises SourceError where the control would stop."""
-        with self.stopping():
-            self.ended = self.walk() or self.last
 
     def next_part(self, program: Program, blocks: int) -> None:
         """Take the next part; so many blocks may be executed."""

@@ -143,17 +143,16 @@ class Machine:
         """Whether the error of the tip depends on the length of the tool."""
         return any(error_model.needs_tool_length(self.axes, effect) for effect in self.effects if effect.active)
 
+    @cached_property
     def feature_lengths(self) -> Array:
         """The smallest distance over which the errors may bend as each axis moves, shape (n_axes,), mm or rad.
 
         Spacing of knots or table entries, an eighth of a period, range / (4 degree) of a polynomial; inf for an axis
         on which nothing depends.
         """
-        return self._feature_lengths.copy()
-
-    @cached_property
-    def _feature_lengths(self) -> Array:
-        return error_model.feature_lengths(self.axes, self.effects)
+        lengths = error_model.feature_lengths(self.axes, self.effects)
+        lengths.flags.writeable = False
+        return lengths
 
     def breakpoints(self, axis: str) -> Array:
         """Positions of an axis at which an error has a kink or a jump, ascending, shape (k,), mm or rad.

@@ -201,7 +201,7 @@ class Route:
         """The tip (3, n), and the largest squared angle of a small motion at each pose (n,); `turns` if known."""
         turns = turns or self.turns(poses)
         n = poses.positions.shape[1]
-        if _are_many(n):
+        if core.engaged() and n > 1:
             from ncfix.core import chain
 
             batch, out = batch_of(poses, turns, self.terms.given(poses), self), np.empty((4, n))
@@ -232,7 +232,7 @@ class Route:
 
         back  (3, 3) what takes a way of the tip to one of the axes: the inverse of `ways_together`
         """
-        if _are_many(target.shape[1]):
+        if core.engaged() and target.shape[1] > 1:
             from ncfix.core import aim
 
             batch, out = batch_of(poses, self.turns(poses), [], self), np.empty(target.shape)
@@ -287,10 +287,6 @@ def batch_of(poses: Poses, turns: Turns, given: Sequence[Array], *routes: Route)
     begin = -(memory.ctypes.data // memory.itemsize) % CACHE_LINE
     work = memory[begin : begin + rows * BATCH].reshape(rows, BATCH)
     return chain.PoseBatch(q, sine, versine, others, length, work, functions, small)
-
-
-def _are_many(n: int) -> bool:
-    return core.engaged() and n > 1
 
 
 @dataclass(frozen=True)

@@ -416,7 +416,7 @@ def lines_of(task: SchemeTask) -> tuple[AxisPositions, ...]:
     Over a turn and a part of one they do not: the control would repeat them with a period that is no turn.
     """
     found = []
-    features = task.machine.feature_lengths().tolist()
+    features = task.machine.feature_lengths.tolist()
     for axis, (low, high), feature in zip(task.machine.axes, task.space.tolist(), features, strict=True):
         turns = (high - low) / (2 * np.pi)
         turn = axis.endless and turns > 0.5 and abs(turns - round(turns)) < 1e-9

@@ -100,20 +100,15 @@ class BlockWords:
         """The places behind and before some words, and what stands before the last of them: a blank or nothing."""
         last = max(words, key=lambda word: self.program.position(self.block, word.span.stop))
         first = min(words, key=lambda word: self.program.position(self.block, word.span.start))
-        return last.span.stop, first.span.start, self._separator(last)
+        at = self.program.position(self.block, last.span.start)
+        before = b" " if at == self.program.blocks[self.block, 0] else self.program.source[at - 1 : at]
+        return last.span.stop, first.span.start, before.decode("latin-1") if before in (b" ", b"\t") else ""
 
     def _code(self, word: Word) -> float | None:
         if isinstance(word.value, Constant):
             return word.value.value
         values = self.program.values_of(self.block)
         return float(values[word.value.slot]) if isinstance(word.value, Literal) else None
-
-    def _separator(self, word: Word) -> str:
-        at = self.program.position(self.block, word.span.start)
-        if at == int(self.program.blocks[self.block, 0]):
-            return " "
-        before = self.program.source[at - 1 : at]
-        return before.decode("latin-1") if before in (b" ", b"\t") else ""
 
 
 def layout_of(program: Program, block: int) -> Layout:

@@ -28,7 +28,7 @@ BISECTIONS = 40
 
 def features(machine: Machine) -> Array:
     """The way of each axis (n_axes,) over which the tip's error in the workpiece may bend, mm and rad."""
-    return np.where(machine.rotary, np.minimum(machine.feature_lengths(), EIGHTH), machine.feature_lengths())
+    return np.where(machine.rotary, np.minimum(machine.feature_lengths, EIGHTH), machine.feature_lengths)
 
 
 def bends(intent: Intent, rows: Index) -> Array:
