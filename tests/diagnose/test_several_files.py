@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, plan
+from ncfix.diagnosis.checks import MOST_VALUES, bounded
 from ncfix.diagnosis.diagnosis import FOUND, NOTHING, UNKNOWN, diagnose
 from ncfix.diagnosis.ladder import NOISE, UNEXPLAINED, ladder
 from ncfix.diagnosis.presentation import text
@@ -50,6 +51,23 @@ def test_an_effect_is_as_large_beside_many_rows_that_cannot_show_it(known: Machi
         assert [each.candidate.name for each in found.findings] == ["axial C"]
     # from the same poses; how much of it the constants take differs with what is taken for a little of everything
     assert beside.findings[0].size_um == pytest.approx(alone.findings[0].size_um, rel=0.1)
+
+
+@pytest.mark.parametrize(("rows", "again"), [((40, 900), 1), ((900, 700), 3), ((700, 10, 1000), 1)])
+def test_of_very_many_rows_some_are_drawn(known: Machine, rows: tuple[int, ...], again: int) -> None:
+    """Small files stay whole, repeats together, rows in their order; and it is said of which files."""
+    files = [plan(known, "tcp", each // again, k) for k, each in enumerate(rows)]
+    files = [each.rows(np.repeat(np.arange(len(each)), again)) for each in files]
+    files = [each.with_columns({name: np.arange(len(each)) * 1.0 for name in ("dx", "dy", "dz")}) for each in files]
+    drawn = bounded(files)
+    assert sum(3 * len(each) for each in drawn) == pytest.approx(MOST_VALUES, abs=3 * again * len(files))
+    for given, kept in zip(files, drawn, strict=True):
+        numbers = kept.columns["dx"].astype(int)
+        assert (np.diff(numbers) > 0).all()
+        assert (np.bincount(numbers // again)[numbers // again] == again).all()
+        assert [each.code for each in kept.remarks] == ["NCF660"] * (len(kept) < len(given))
+        assert len(kept) == len(given) or len(given) >= max(map(len, drawn))
+        assert kept.columns["X"] == pytest.approx(given.columns["X"][numbers], abs=0)
 
 
 def test_angles_count_by_what_they_move_and_are_said_in_their_unit(known: Machine) -> None:

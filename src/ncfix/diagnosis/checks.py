@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtrc
 
-from ncfix.diagnosis.noise import ENOUGH_REPEATS, repeat_scatter
+from ncfix.diagnosis.noise import ENOUGH_REPEATS, repeat_scatter, states
 from ncfix.diagnosis.residual_data import ResidualData, misfit
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
@@ -22,9 +23,36 @@ NEIGHBOURS = 60
 """Rows from which on neighbouring poses tell the noise."""
 STRANGE = 3e3
 """Residuals, rms um, that no machine has, per mm of what is much of where an axis lies (an arm errs more)."""
+MOST_VALUES = 1800
+"""Values that are weighed together: work grows with their third power, memory with the second."""
 CONTRADICTION = 1e-6
 MISSTATED = 2.0
 """Times by which repeats may scatter more or less than the noise that is stated."""
+
+
+def bounded(measurements: Sequence[Measurement]) -> list[Measurement]:
+    """No more rows than can be weighed together: of the largest files some drawn at random, repeats together (NCF660).
+
+    Small files stay whole beside large ones. Evenly spaced rows might be all of one direction.
+    """
+    left, most = MOST_VALUES, {}
+    sizes = [len(each) * len(each.measured) for each in measurements]
+    for done, k in enumerate(sorted(range(len(sizes)), key=lambda k: sizes[k])):
+        most[k] = min(sizes[k], left // (len(sizes) - done))
+        left -= most[k]
+    return [_drawn(each, most[k]) if most[k] < sizes[k] else each for k, each in enumerate(measurements)]
+
+
+def _drawn(measurement: Measurement, most: int) -> Measurement:
+    """About so many values of it."""
+    state = np.asarray(states([measurement]))
+    counts = np.bincount(state) * len(measurement.measured)
+    order = np.random.default_rng(0).permutation(len(counts))
+    chosen = np.zeros(len(counts), dtype=bool)
+    chosen[order] = np.cumsum(counts[order]) - counts[order] < most
+    rows = measurement.rows(chosen[state])
+    text = f"{measurement.path}: of {len(measurement)} rows {len(rows)} were drawn, more cannot be weighed together"
+    return replace(rows, remarks=(*measurement.remarks, Message("NCF660", text)))
 
 
 def before(measurements: Sequence[Measurement], machine: Machine) -> None:
@@ -110,5 +138,6 @@ def remarks(data: ResidualData, unheard_of: Sequence[str]) -> list[Message]:
         text = f"{', '.join(fixed)} came from one side only: backlash and play of {'it' if len(fixed) == 1 else 'them'}"
         found.append(Message("NCF653", f"{text} cannot show"))
     found += _misstated(data)
+    found += [each for of in data.measurements for each in of.remarks if each.code == "NCF660"]
     found += [Message("NCF657", f"there is no effect {name!r} in the catalogue of this machine") for name in unheard_of]
     return found

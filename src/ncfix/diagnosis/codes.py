@@ -55,4 +55,10 @@ CODES = {
         "than half of it. The repeats are believed where there are enough; the header is wrong, or a unit is.",
         "Correct the line `# noise_um:`, or the unit of the values.",
     ),
+    "NCF660": Code(
+        "not all rows were weighed",
+        "Names are weighed over all values at once, and memory grows with the square of their number. Of files with "
+        "very many rows some are drawn at random, repeats of a pose together; small files stay whole.",
+        "Nothing need be done: so many rows tell more than enough. Other rows can be diagnosed as a file of their own.",
+    ),
 }

@@ -374,7 +374,7 @@ def diagnose(
     Raises `UsageError` NCF630, NCF637 and NCF650 ... NCF659 where the data cannot carry a diagnosis.
     """
     checks.before(measurements, machine)
-    measurements = [with_motion(each, machine) for each in measurements]
+    measurements = checks.bounded([with_motion(each, machine) for each in measurements])
     if since:
         if len(measurements) < 2:
             raise UsageError.of("NCF650", "one file: what changed since takes one of each date")

@@ -35,7 +35,7 @@ from ncfix.diagnosis.forms import (
 )
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse, orthonormal
-from ncfix.measure.measurement import Array, groups
+from ncfix.measure.measurement import Array, Measurement, groups
 
 DRIFT_TIME = 900.0
 """s: how long an instrument's wandering lasts."""
@@ -400,7 +400,7 @@ def repeat_scatter(data: ResidualData, keep: NDArray[np.bool_]) -> tuple[float, 
     """Sum of squares of plain values about the means of those taken at one commanded state one after another, um^2, and
     its freedom.
     """
-    same = states(data)
+    same = states(data.measurements)
     keys = [
         f"{same[row]} {name}" for row, name, kept in zip(data.row, data.names, keep, strict=True) if row >= 0 and kept
     ]
@@ -422,11 +422,11 @@ def repeat_scatter(data: ResidualData, keep: NDArray[np.bool_]) -> tuple[float, 
     return float(((values - mean[index])[kept] ** 2).sum()), int(np.maximum(counts - 1, 0).sum())
 
 
-def states(data: ResidualData) -> list[int]:
+def states(measurements: Sequence[Measurement]) -> list[int]:
     """Number of the commanded state of each row; rows of one state follow one another."""
     seen: list[int] = []
     number, before = -1, None
-    for each in data.measurements:
+    for each in measurements:
         names = [name for name in each.columns if name not in each.measured and not varying(name)]
         labels = [value for name, value in each.labels.items() if name != "repeat"]
         for i in range(len(each)):
