@@ -56,6 +56,7 @@ SIEMENS = Dialect(
         "blocks executed from several states, without --flatten",
     ),
     language="ncfix_siemens.sinumerik.language:SINUMERIK",
+    most_inverse_time=999999.999,
 )
 
 

@@ -59,4 +59,10 @@ SINUMERIK_CODES: dict[str, Code] = {
         "once, or a text that looks like one stands in the program.",
         "Leave out `--block-numbers renumber`, or jump to labels.",
     ),
+    "NCF282": Code(
+        "G500 with an offset",
+        "The setup gives G500 an offset, and the program calls another work offset. If that of G500 is a basic offset, "
+        "the control adds it to every other one, too; here each is taken to be all that acts.",
+        "In the setup file give the work offset as the sum of both.",
+    ),
 }

@@ -145,9 +145,15 @@ def test_a_rapid_from_which_a_cut_begins_is_refused(machine: Machine) -> None:
     assert [each.line for each in fixed(text, machine).report.refused if each.code == "NCF451"] == [5]
 
 
-def test_a_rapid_whose_own_words_differ_is_refused(machine: Machine) -> None:
-    text = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 Y0 F500\n/G55\nG0 X20 Y25 Z80\nM2\n"
-    assert [each.code for each in fixed(text, machine).report.refused] == ["NCF451"]
+def test_a_rapid_whose_own_words_differ_stays_as_it_is(machine: Machine) -> None:
+    text = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 Y0 F500\n/G55\nG0 X20 Y25 Z80\n{}G54\nG0 X20 Y25 Z80\nG1 X30 F500\nM2\n"
+    done = fixed(text.format(""), machine)
+    assert done.report.refused == ()
+    assert b"\n/G55\nG0 X20 Y25 Z80\nG54\n" in done.text
+    assert done.report.passed_by_rule["rapid behind a block with /"] == 1
+    refused = fixed(text.format("G1 X21\n"), machine).report.refused
+    assert refused[0].code == "NCF451"
+    assert refused[0].line == 5, "a cut begins there"
 
 
 def test_in_turned_coordinates_such_a_rapid_is_refused(machine: Machine) -> None:

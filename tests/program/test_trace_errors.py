@@ -28,7 +28,7 @@ GOLDEN = {
     "F1 G2 X10 I6 J0": (
         "part.ngc:1: NCF220: the arc does not close: its radius is 6.0000 mm at the start and 4.0000 mm at the end"
         " (2.0000 apart, 0.0283 allowed)\n    F1 G2 X10 I6 J0\n"
-        "  hint: check the centre words and whether they are meant incrementally (G91.1) or absolutely (G90.1)"
+        "  hint: check the centre words, and whether they count from the start of the arc or from the zero point"
     ),
     "X1": ("part.ngc:1: NCF221: axis words, and no motion code is in force\n    X1\n  hint: G0 or G1 is missing"),
     "G1 X1": "part.ngc:1: NCF225: a motion at feed, and no feed (F) is set\n    G1 X1",

@@ -171,7 +171,7 @@ def test_modes_can_be_read() -> None:
 
 @pytest.mark.parametrize("position", ["#5420", "#<_x>"])
 def test_a_position_that_is_read_is_another_one_in_the_corrected_program(position: str) -> None:
-    found = follow(f"G0 X12 Y3 Z1\n#1={position}\nG0 X[#1+1] Y5\nG0 X3")
+    found = follow(f"G21 G0 X12 Y3 Z1\n#1={position}\nG0 X[#1+1] Y5\nG0 X3")
     assert found.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT]
     assert [message.code for message in found.messages] == ["NCF241"]
     waits = follow(f"G91\no1 while [{position} LT 40]\nG0 X1\no1 endwhile").moves

@@ -139,8 +139,8 @@ def codes_of(source: bytes, dialect: str = "linuxcnc") -> list[str]:
 
 def test_the_end_is_m2_m30_m99_or_tape() -> None:
     for end in (b"M2", b"M30", b"G0 X2 M30"):
-        assert codes_of(b"G0 X1\n" + end + b"\nS900\n") == []
-    assert codes_of(b"%\nG0 X1\n%\nnot looked at\n") == []
+        assert codes_of(b"G21 G0 X1\n" + end + b"\nS900\n") == []
+    assert codes_of(b"%\nG21 G0 X1\n%\nnot looked at\n") == []
 
 
 @pytest.mark.parametrize(
@@ -182,14 +182,14 @@ def test_motions_that_the_program_never_goes_through_are_a_remark(dialect: str, 
 
 
 def test_a_missing_end_is_a_remark() -> None:
-    assert codes_of(b"G0 X1\n") == ["NCF234"]
-    assert codes_of(b"%\nG0 X1\n") == ["NCF234"]
+    assert codes_of(b"G21 G0 X1\n") == ["NCF234"]
+    assert codes_of(b"%\nG21 G0 X1\n") == ["NCF234"]
 
 
 def test_block_skip_is_executed_unless_the_setup_says_otherwise() -> None:
     assert xs("G0 X1\n/G0 X2\nG0 X3") == [1.0, 2.0, 3.0]
     assert xs("G0 X1\n/G0 X2\nG0 X3", block_skip=True) == [1.0, 3.0]
-    assert codes_of(b"/G0 X1\n/G0 X2\nM2\n") == ["NCF235"]
+    assert codes_of(b"G21\n/G0 X1\n/G0 X2\nM2\n") == ["NCF235"]
 
 
 # -- flow that breaks -------------------------------------------------------------------------------------------------
@@ -245,7 +245,7 @@ def test_a_program_is_not_endless_for_being_long() -> None:
 
 
 def test_a_line_that_cannot_be_read_is_an_error_only_where_the_control_gets_to_it() -> None:
-    assert codes_of(b"G0 X1\nM2\nwhat is this?\n") == []
+    assert codes_of(b"G21 G0 X1\nM2\nwhat is this?\n") == []
     with pytest.raises(SourceError) as caught:
         codes_of(b"o1 call\nM2\no1 sub\nwhat is this?\no1 endsub\n")
     assert caught.value.code == "NCF236"

@@ -141,7 +141,7 @@ def test_u_v_w_may_be_increments_to_controls_of_lathes(dialect: str, also: str) 
 
 
 def test_what_is_assumed_is_zero_and_listed_once() -> None:
-    followed = follow("T4 M6 G43\nG0 X1 Y1\nG55 X2\nG54 X1\nG28", "XYZ", NOTHING, assume_zero=True)
+    followed = follow("G21 T4 M6 G43\nG0 X1 Y1\nG55 X2\nG54 X1\nG28", "XYZ", NOTHING, assume_zero=True)
     assert followed.assumed == (
         "length of tool 4",
         "work offset G54",
@@ -226,7 +226,7 @@ def test_an_arc_about_a_probed_centre() -> None:
 
 
 def test_harmless_codes_are_passed_over_and_unknown_ones_make_motions_refused() -> None:
-    followed = follow("G5 P10000\nG8 P1\nG9 G1 X1 F1\nG187 P2\nM88\nX2\nG234 H1\nX3", dialect="iso")
+    followed = follow("G21 G5 P10000\nG8 P1\nG9 G1 X1 F1\nG187 P2\nM88\nX2\nG234 H1\nX3", dialect="iso")
     assert rules(followed) == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]
     assert reasons(followed)[-1] == "G234 is not known, and may move axes or change coordinates"
     assert [message.code for message in followed.messages] == ["NCF228"]

@@ -44,6 +44,7 @@ class MacroControl(RS274Control):
     coming         gives the shapes of the blocks that follow in the text
     defining, definition  P of the tilted plane that is being defined, and its blocks so far by their Q
     dynamic        the work offset turns with the tables (G254 of Haas)
+    posture_control  the tool turns in a plane (G43.4 P1), not its axes evenly
     vectors        the direction of the tool is given by I J K (G43.5)
     entering       the blocks that follow are data of tools (G10 L3)
     outside        number of the program that the block has called, if that is in the control and not at hand
@@ -61,7 +62,7 @@ class MacroControl(RS274Control):
         self.defining = 0
         self.definition: dict[int, Block] = {}
         self.dynamic = False
-        self.vectors = False
+        self.vectors = self.posture_control = False
         self.entering = False
         self.outside = ""
 
@@ -72,6 +73,11 @@ class MacroControl(RS274Control):
         """As of all controls of RS274; the angle of a line, and the direction of the tool (G43.5)."""
         own = (ANGLE, *COMPONENTS) if self.vectors else (ANGLE,)
         return next((word for word in own if word in words), super().path_word(words))
+
+    @property
+    def turns_in_plane(self) -> bool:
+        """As of every control."""
+        return self.tcp and self.posture_control
 
     @property
     def probes_nominally(self) -> bool:

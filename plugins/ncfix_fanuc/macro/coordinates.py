@@ -20,7 +20,7 @@ from ncfix.control.frames import WORLD, handed, mirrored, turned_about
 from ncfix_fanuc.macro.control import MacroControl, Scaling
 from ncfix_iso.rs274.cycles import AXES_SAID
 from ncfix_iso.rs274.groups import CONTROL, CUTTER, DISTANCE, FEED_MODE, MOTION, PLANE, RETRACT, SPINDLE_MODE
-from ncfix_iso.rs274.systems import is_turned, turned_back, unfollowed, words_of
+from ncfix_iso.rs274.systems import AFTER_UNFOLLOWED, is_turned, turned_back, unfollowed, words_of
 
 if TYPE_CHECKING:
     from ncfix_iso.rs274.control import Block
@@ -33,7 +33,7 @@ TOGETHER = "what {} does while scaling (G51) is in force is not certain"
 ALIKE = "scaling (G51) is taken to act on X, Y and Z alike"
 AT_PEACE = frozenset((MOTION, PLANE, DISTANCE, FEED_MODE, CUTTER, CONTROL, RETRACT, SPINDLE_MODE))
 """Groups of codes that scaling has nothing to do with."""
-MIRROR_OFF = 501
+MIRROR, MIRROR_OFF, HAAS_MIRROR = 511, 501, 1010
 SPATIAL = (X, Y, Z)
 
 
@@ -112,6 +112,22 @@ def mirror(control: MacroControl, block: Block, code: int) -> None:
         control.mirrored |= {index: control.scale[index] * block.values[LETTERS[index]] for index in named}
     if not elsewhere:
         put_up(control)
+
+
+def mirror_about_zero(control: MacroControl, block: Block, code: int) -> None:
+    """G101 and G100 of Haas: the axes named run the other way, from the zero point; another value is not followed."""
+    if code == HAAS_MIRROR and any(block.values[LETTERS[index]] for index in words_of(block)):
+        unfollowed(control, block, MIRROR)
+    else:
+        mirror(control, block, MIRROR if code == HAAS_MIRROR else MIRROR_OFF)
+
+
+def map_on_cylinder(control: MacroControl, block: Block, code: int) -> None:
+    """G107 of Haas: with axes on, without any off."""
+    if block.axes:
+        control.suspend("cylinder", "an axis is led round a cylinder (G107), which ncfix does not follow")
+    elif control.resume("cylinder"):
+        control.lose(control.machine, AFTER_UNFOLLOWED)
 
 
 def turned(control: MacroControl) -> bool:

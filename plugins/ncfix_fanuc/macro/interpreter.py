@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z, mask_of
+from ncfix.control.coordinates import LETTERS, PLANES, Z, mask_of
 from ncfix.control.expressions import Fault, Unknown, Value, nominal
 from ncfix.control.interpreter import RUNTIME
 from ncfix.control.setup import Run
@@ -22,16 +22,15 @@ from ncfix_fanuc.macro.lengths import LENGTH_IN_STEPS, lone_number
 from ncfix_fanuc.macro.rules import MACRO
 from ncfix_fanuc.macro.variables import is_system, is_vacant, variable_number
 from ncfix_iso.rs274.control import Block
-from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, RS274Interpreter
+from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, RS274Interpreter, calls_of
 from ncfix_iso.rs274.order import MACHINE
 from ncfix_iso.rs274.parameters import Store, whole
 from ncfix_iso.rs274.plans import Codes, RS274Plan, plan_of
+from ncfix_iso.rs274.settings import units
 
 G20, G21, G90, G91 = 200, 210, 900, 910
 G65, G66_1, G67 = 650, 661, 670
 SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
-NO_UNIT = "NCF215"
-NOT_SET = "NCF244"
 BY_ANGLE = "a line that is given by its angle (,A) is not followed"
 AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
 MODAL_CALL = "G66 calls the program O{}, which is not at hand, so the program cannot be written out flat"
@@ -66,7 +65,6 @@ class MacroInterpreter(RS274Interpreter):
         self.reduced: dict[tuple[int, frozenset[Span]], RS274Plan] = {}
         self.moved = False
         self.cornered = False
-        self.unit_said = False
 
     def prepared(self) -> MacroFlow:
         """Give the control its own variables; where execution begins."""
@@ -108,11 +106,6 @@ class MacroInterpreter(RS274Interpreter):
     def position_read(self, number: int) -> None:
         """The program reads where the machine stands, which compensation changes."""
         self.control.position_is_read(f"#{number}")
-
-    def not_set(self, number: int) -> None:
-        """The program reads a variable that somebody else may have set."""
-        text = f"the program reads #{number}, which it has not set: what is in it is known only at run time"
-        self.control.warn(NOT_SET, text, f'variables."#{number}" in the setup file')
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
@@ -198,9 +191,7 @@ class MacroInterpreter(RS274Interpreter):
         """Unit, plane, G90 and G91 of a block already say what its own numbers mean."""
         modal = self.control.modal
         if codes & {G20, G21}:
-            self.unit_said = True
-            modal.unit = INCH if G20 in codes else 1.0
-            self.control.refresh()
+            units(self.control, None, G20 if G20 in codes else G21)
         if codes & {G90, G91}:
             modal.incremental = G91 in codes
         for code in codes & PLANES.keys():
@@ -249,9 +240,6 @@ class MacroInterpreter(RS274Interpreter):
         else:
             super().move(block, codes, motion)
         self.moved = self.control.builder.count > before
-        if self.moved and not self.unit_said:
-            text = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
-            self.control.warn(NO_UNIT, text, "put G20 or G21 at its beginning")
 
     def calls_behind(self, block: Block, codes: Codes) -> bool:
         """See `RS274Interpreter`; G66 calls a macro behind every motion."""
@@ -295,7 +283,7 @@ class MacroInterpreter(RS274Interpreter):
         """M98 Pn Ln Qn; the repeats may stand before four digits of the number, Q is the block to begin at."""
         if "H" in block.values:
             raise Fault(BAD_JUMP, "M98 with H means other things on other controls", "split the subprogram in two")
-        name, times = self.named_program(), whole(block.get("L", 1.0), "L of M98")
+        name, times = self.named_program(), calls_of(block)
         if not name:
             number = whole(block.get("P"), "P of M98")
             if "L" not in block.values and number > LAST_PROGRAM and not self.is_there(str(number)):

@@ -32,6 +32,7 @@ TURNED_TEXT = (
     "rotary axes stand turned where G43.4 is switched on; X Y Z are taken to ride on the workpiece as it lies with all"
     " of them at zero (parameters 19696 WKP, 19754 RPS)"
 )
+KIND_OF_TIP_CONTROL = "which tool-centre-point control P of G{:g} P{:g} selects is not known"
 BY_ANGLE, BY_VECTOR = 434, 435
 HAAS_TIP = 2340
 TIP_CONTROL = (BY_ANGLE, BY_VECTOR)
@@ -69,8 +70,15 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
 
 
 def direct(control: MacroControl, block: Block, code: int) -> None:
-    """G43.5 takes the direction of the tool from I J K; its Q would lean the tool away from them."""
+    """G43.5 takes the direction of the tool from I J K; its Q would lean the tool away from them.
+
+    P1 of both turns the tool in a plane.
+    """
     control.resume(INCLINED)
+    kind = block.get("P") if code in TIP_CONTROL else 0.0
+    control.posture_control = kind != 0.0
+    if kind not in (0.0, 1.0):
+        control.suspend(INCLINED, KIND_OF_TIP_CONTROL.format(code / 10, kind))
     control.vectors = code == BY_VECTOR
     if control.vectors:
         control.places.lose(mask_of(control.turning))
@@ -116,7 +124,9 @@ def lone_number(control: MacroControl, block: Block, codes: Codes) -> None:
         return
     if control.length_code:
         inclined = {key: why for key, why in control.suspended.items() if key == INCLINED}
+        kept = control.posture_control
         tool_offset(control, block, control.length_code)
         control.suspended |= inclined
+        control.posture_control = kept
     else:
         control.length_number = whole(block.values["H"], "H")

@@ -143,6 +143,7 @@ FANUC = Rules(
         **dict.fromkeys(ALL_CYCLES, cycle),
     },
     cycles=ALL_CYCLES,
+    radius_first=True,
     takes=frozenset({40, 100, 270, 290, 531, 536, 650, 660, 661, 670, 921}),
     system=is_system,
     lasting=is_lasting,
@@ -157,25 +158,31 @@ HAAS_MADE = (120, 130, 470, 700, 710, 720, 1500, data.SQUARE)
 HAAS_FEATURE = (2680, 2690)
 """A feature coordinate system: G268 to G269."""
 
+HAAS_MIRRORS, HAAS_CYLINDER = (1000, coordinates.HAAS_MIRROR), 1070
+"""Mirror images about the zero point, G101 and G100, and G107, with which an axis goes round a cylinder."""
+
 HAAS_JUMP, BY_INPUT = 960, "which blocks are executed after M96 is for an input of the machine"
 HAAS = replace(
     FANUC,
     g_groups=FANUC_G
     | dict.fromkeys(HAAS_MADE, groups.NON_MODAL)
     | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM)
-    | dict.fromkeys(HAAS_FEATURE, groups.UNFOLLOWED)
+    | dict.fromkeys((*HAAS_FEATURE, *HAAS_MIRRORS, HAAS_CYLINDER), groups.UNFOLLOWED)
     | {lengths.HAAS_TIP: groups.LENGTH, tilt.DYNAMIC_ON: groups.ROTATION, tilt.DYNAMIC_OFF: groups.ROTATION},
     steps={
         **FANUC.steps,
         **dict.fromkeys(HAAS_MADE, data.made),
         **dict.fromkeys(HAAS_OFFSETS, data.extended),
         **dict.fromkeys(HAAS_FEATURE, unfollowed),
+        **dict.fromkeys(HAAS_MIRRORS, coordinates.mirror_about_zero),
+        HAAS_CYLINDER: coordinates.map_on_cylinder,
         **dict.fromkeys((tilt.DYNAMIC_ON, tilt.DYNAMIC_OFF), tilt.dynamic_offset),
         lengths.HAAS_TIP: lengths.tool_offset,
         280: references.cancelling,
     },
-    takes=FANUC.takes | {*HAAS_MADE, *HAAS_FEATURE},
+    takes=FANUC.takes | {*HAAS_MADE, *HAAS_FEATURE, *HAAS_MIRRORS, HAAS_CYLINDER},
     repeats="L",
+    radius_first=False,
     adds_rotations=True,
 )
 HAAS = groups.with_m_code(HAAS, HAAS_JUMP, (Refuse(BY_INPUT),))

@@ -196,12 +196,10 @@ class MacroVariables(NumberedParameters):
 
     scopes    the local variables of each call level, the main program's first
     position  called when the program reads where the machine stands
-    unset     called with the number of a common variable, or one that a caller gives, that is read and was never set
     inherits  the program is called by another one: so are its local variables set
     """
 
     position: Callable[[int], None] = lambda index: None
-    unset: Callable[[int], None] = lambda index: None
     inherits: bool = False
 
     def numbered(self, index: int) -> Value:
@@ -214,8 +212,7 @@ class MacroVariables(NumberedParameters):
         if index in self.live:
             return self.from_control(index)
         if index not in store and self.is_left_over(index):
-            self.unset(index)
-            return Unknown(f"#{index}")
+            return self.unset(index)
         return store.get(index, Unknown(f"#{index}") if is_system(index) else VACANT)
 
     def is_left_over(self, index: int) -> bool:

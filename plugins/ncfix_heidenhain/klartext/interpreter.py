@@ -157,7 +157,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             raise SourceError.of(fault.code, fault.text, control.locate(), fault.hint) from None
         self.flow = KlartextFlow(control, self.main, self.find)
         control.locate = self.place
-        control.modal.unit = self.main.mm
+        control.modal.unit, control.unit_said = self.main.mm, True
         control.recompose()
 
     def spellings(self, name: str) -> Iterable[str]:

@@ -71,7 +71,7 @@ def check_words(control: RS274Control, block: Block, plane: Plane) -> None:
         raise Fault(ARC_FAULT, "there are no arcs in the planes G17.1, G18.1 and G19.1")
     centre = [letter for letter in CENTRE_LETTERS if letter in block.values]
     if "R" in block.values:
-        if centre:
+        if centre and not control.rules.radius_first:
             raise Fault(ARC_FAULT, f"the arc has both R and {centre[0]}")
         if not block.axes & plane.axes:
             raise Fault(ARC_FAULT, "an arc given by R needs an end point in its plane")

@@ -170,6 +170,7 @@ class Rules:
     cycles      G codes of canned cycles
     repeats     addresses that say how often a canned cycle drills
     takes       G codes that take the axis words of their block for themselves, besides those of `plans`
+    radius_first  where an arc has R and a centre, R counts; elsewhere that is an error
     length_by_h_alone  H without G43 in its block may be another length, or none, as the control has it
     adds_rotations  in G91 the angle of G68 is added to that in force
     scales_named  scaling (G51) acts on the axes only that its block names
@@ -190,6 +191,7 @@ class Rules:
     cycles: frozenset[int] = frozenset(CYCLES)
     repeats: str = "LK"
     takes: frozenset[int] = frozenset()
+    radius_first: bool = False
     length_by_h_alone: bool = False
     adds_rotations: bool = False
     scales_named: bool = False

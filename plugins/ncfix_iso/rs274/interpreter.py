@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS, mask_of
-from ncfix.control.expressions import Fault, Unknown, nominal
+from ncfix.control.expressions import Fault, Unknown, Value, nominal
 from ncfix.control.flow import NEVER_ENDS, WAITS, ProgramFlow
 from ncfix.control.interpreter import NO_END, Interpreter
 from ncfix.control.setup import Run
@@ -63,11 +64,23 @@ POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
 COMPUTED_ALIAS = "the code {} is computed, and takes words under other addresses than the code it stands for"
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 UNREADABLE = "NCF236"
+NOT_SET = "NCF244"
+BAD_CALL = "NCF242"
+REPEATS = "whether K beside M98 repeats the call differs from control to control"
+HARMLESS_COMMAND = re.compile(r"\$(?:[$#GINX]?|N\d*=.*|\d{1,2}=.*|\w+\.MIN%?)(?=[;(]|$)")
+"""Grbl's `$$`, `$X`, `$10=3`: none changes a place, as steps to the mm (`$100=`) do. And the head of Okuma's files."""
 NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
 DWELL_TIME = "PUX"
 """The words of G4 on ISO controls; beside P, X is a motion to some."""
 
 INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not followed"
+
+
+def calls_of(block: Block) -> int:
+    """How often M98 calls."""
+    if "K" in block.values:
+        raise Fault(BAD_CALL, REPEATS, "write how often in L")
+    return whole(block.get("L", 1.0), "L of M98")
 
 
 class RS274Interpreter(Interpreter[RS274Unit]):
@@ -89,8 +102,16 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         control = self.control
         flow = OWords(control, self.main, self.find)
         control.parameters.persistent = lambda number: systems.before_persistent(control, number)
+        if not control.rules.strict:
+            control.parameters.unset = self.not_set
         predefined.install(control, flow)
         return flow
+
+    def not_set(self, number: int) -> Value:
+        """The program reads a variable that somebody else may have set, and whose value without that may be none."""
+        text = f"the program reads #{number}, which it has not set: what is in it is known only at run time"
+        self.control.warn(NOT_SET, text, f'variables."#{number}" in the setup file')
+        return Unknown(f"#{number}")
 
     @property
     def to_the_last(self) -> bool:
@@ -299,10 +320,12 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             self.control.warn("NCF228", self.control.refusal, "all motions after it are refused")
 
     def command(self, span: Span) -> None:
-        """A command to the control itself: homing and jogging move the machine."""
+        """A command to Grbl itself: homing and jogging move the machine, and what is none of its may do anything."""
         text = self.flow.unit.program.slice(self.flow.block - 1, span).upper().replace(" ", "")
-        if text.startswith(("$H", "$J")):
+        if text.startswith(("$H", "$J=")):
             self.control.lose(self.control.machine, MACHINE_MOVED)
+        elif not HARMLESS_COMMAND.match(text):
+            self.note_unknown(span)
 
     @contextmanager
     def polar_words(self, block: Block) -> Iterator[None]:
@@ -351,7 +374,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         if codes.stop in PROGRAM_ENDS:
             return True
         if codes.call == CALL:
-            number, times = whole(block.get("P"), "P of M98"), whole(block.get("L", 1.0), "L of M98")
+            number, times = whole(block.get("P"), "P of M98"), calls_of(block)
             if not self.control.rules.strict and "L" not in block.values and number > LAST_PROGRAM:
                 times, number = divmod(number, LAST_PROGRAM + 1)
             self.flow.call_by_code(str(number), times)

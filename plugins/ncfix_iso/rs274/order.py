@@ -40,6 +40,7 @@ from ncfix_iso.rs274.settings import (
     diameter,
     distance,
     lone_length,
+    path_mode,
     plane,
     retract,
     select_radius,
@@ -87,6 +88,7 @@ G_STEPS: tuple[tuple[str, Step], ...] = (
     (groups.DISTANCE, distance),
     (groups.ARC_DISTANCE, arc_distance),
     (groups.RETRACT, retract),
+    (groups.CONTROL, path_mode),
     (groups.UNFOLLOWED, unfollowed),
     (groups.ROTATION, rotate_system),
 )

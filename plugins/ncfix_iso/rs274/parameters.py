@@ -152,11 +152,12 @@ Store = dict[Key, Value]
 class NumberedParameters:
     """All parameters.
 
-    numbers     numbered parameters that have been set; others are 0
+    numbers     numbered parameters that have been set
     scopes      named parameters: the program's own and global ones first, then those of each call
     live        numbered parameters that the control computes when they are read
     predefined  named parameters of that kind
     persistent  called with the number before a parameter between 5161 and 5390 is read: it may be lacking
+    unset       the value of another parameter that the program has not set
     returned    value of the last `return`, and whether it gave one
     inputs      a pin of the machine or an input (M66) has been read: what is computed may depend on it
     changes     how often a parameter has got another value, or one has been read that the control computes
@@ -167,6 +168,7 @@ class NumberedParameters:
     live: Mapping[int, Callable[[], Value]] = field(default_factory=dict)
     predefined: Mapping[str, Callable[[], Value]] = field(default_factory=dict)
     persistent: Callable[[int], None] = lambda index: None
+    unset: Callable[[int], Value] = lambda index: 0.0
     returned: tuple[Value, bool] = (0.0, False)
     inputs: bool = False
     changes: int = 0
@@ -183,6 +185,8 @@ class NumberedParameters:
         if 5161 <= index <= 5390:
             self.changes += 1
             self.persistent(index)
+        elif index not in self.numbers:
+            return self.unset(index)
         return self.numbers.get(index, 0.0)
 
     def named(self, name: str) -> Value:

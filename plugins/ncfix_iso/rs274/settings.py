@@ -37,8 +37,9 @@ def plane(control: RS274Control, block: Block, code: int) -> None:
     control.modal.plane = PLANES[code]
 
 
-def units(control: RS274Control, block: Block, code: int) -> None:
+def units(control: RS274Control, block: Block | None, code: int) -> None:
     """G20 and G21."""
+    control.unit_said = True
     control.modal.unit = INCH if code == 200 else 1.0
     control.refresh()
 
@@ -57,6 +58,11 @@ def distance(control: RS274Control, block: Block, code: int) -> None:
 def arc_distance(control: RS274Control, block: Block, code: int) -> None:
     """G90.1 and G91.1."""
     control.modal.arc_absolute = code == 901
+
+
+def path_mode(control: RS274Control, block: Block, code: int) -> None:
+    """G61, which is exact stop on ISO controls, G61.1, which is so in LinuxCNC, G63 and G64."""
+    control.modal.exact_stop = code == (611 if control.rules.strict else 610)
 
 
 def retract(control: RS274Control, block: Block, code: int) -> None:

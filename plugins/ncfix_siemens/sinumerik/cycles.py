@@ -259,10 +259,13 @@ def at_height(control: Sinumerik, over: MotionEnd, height: float) -> MotionEnd:
 
 
 def measure(control: Sinumerik, block: int, step: Calling) -> None:
-    """A cycle that measures: it may set the work offset, unless its second argument (S_KNUM) is zero."""
+    """A cycle that measures: it may set the work offset, unless its second argument (S_KNUM) is zero or left out."""
     name = step.name.upper()
     made(control, block, passing=Passing(Pass.PROBING, f"measuring ({name})"))
-    sets = number(step.arguments[1](control) if len(step.arguments) > 1 else control.variables.value("_knum"))
+    if len(step.arguments) > 1:
+        sets = number(step.arguments[1](control)) if step.written[1] is not None else 0.0
+    else:
+        sets = number(control.variables.value("_knum"))
     if sets != 0.0 and step.name not in CALIBRATING:
         control.suspend("measured", MEASURES.format(name))
 

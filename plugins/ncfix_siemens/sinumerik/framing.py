@@ -11,7 +11,7 @@ from dataclasses import replace
 from ncfix.control.coordinates import INCH, INDEX, LETTERS, PLANES, Vector, mask_of, zeros
 from ncfix.control.expressions import Unknown
 from ncfix.control.frames import WORLD, ZEROS, Affine, mirrored, shifted, turned, turned_in
-from ncfix_siemens.sinumerik.state import RESET_OF_DIAMETER, Sinumerik
+from ncfix_siemens.sinumerik.state import NO_SYSTEM, RESET_OF_DIAMETER, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import BlockWordValues
 
 FRAME_AT_RUNTIME = "a frame ({}) is known only at run time"
@@ -30,6 +30,8 @@ FINE_STAYS = "{} after G59: whether what G59 has set stays is not certain"
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
 CARRIED = "NCF255"
 MEASURED = "NCF259"
+BASIC = "NCF282"
+ADDED = "G500 has an offset in the setup, which a control adds to {0} if it is a basic offset: {0} is taken as given"
 LIKE_IT = "give about what the probe finds: tenths of a millimetre matter little"
 LENGTH_ACROSS = "$sc_tool_length_const"
 PLANE_LENGTH = (
@@ -161,6 +163,7 @@ def plane(control: Sinumerik, code: int) -> None:
 
 def units(control: Sinumerik, code: int) -> None:
     """G70, G71, G700, G710."""
+    control.unit_said = True
     control.modal.unit = INCH if code in (700, 7000) else 1.0
     control.refresh()
 
@@ -171,6 +174,8 @@ def settable(control: Sinumerik, code: int) -> None:
     control.modes.carried = ""
     if control.resume("measured"):
         control.warn(MEASURED, f"{name} after measuring is taken to be what the setup gives", LIKE_IT)
+    if name != NO_SYSTEM and any(control.setup.work_offsets.get(NO_SYSTEM, {}).values()):
+        control.warn(BASIC, ADDED.format(name), f"give {name} with all that acts, and G500 what acts without it")
     control.select(name)
 
 
@@ -192,6 +197,11 @@ def feed_mode(control: Sinumerik, code: int) -> None:
     control.modal.feed_mode = mode
     if code in (960, 9610, 9620) and not control.modes.said:
         control.suspend("diameter", UNSAID)
+
+
+def path_mode(control: Sinumerik, code: int) -> None:
+    """G60, G64, G641 to G645."""
+    control.modal.exact_stop = code == 600
 
 
 def compensation(control: Sinumerik, code: int) -> None:

@@ -74,6 +74,8 @@ TAKEN_ALONG = ("by machine coordinates",)
 Footing = tuple[tuple[object, ...], tuple[object, ...]]
 """What the numbers of an axis count from: by its frame, and by the tool."""
 
+IN_PLANE = frozenset({"orivect", "oriplane"})
+
 NO_SYSTEM = "G500"
 """The name under which the setup may give what is in force while no settable frame is."""
 
@@ -100,6 +102,7 @@ class Sinumerik(ProgramControl):
     """
 
     frame_order = ("datum", "plane", "programmable")
+    unit_codes = "G70 or G71"
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
         super().__init__(run, dialect)
@@ -146,6 +149,11 @@ class Sinumerik(ProgramControl):
             (frames.name, frames.datum.shift[i], frames.plane.shift[i], tool[i], self.spatial_anchor(i))
             for i in range(len(LETTERS))
         ]
+
+    @property
+    def turns_in_plane(self) -> bool:
+        """As of every control."""
+        return self.modes.transformed and self.modes.orientation in IN_PLANE
 
     def spatial_anchor(self, index: int) -> Hashable:
         """Whether these are coordinates of the tip, and the edge that is in force across the plane."""

@@ -48,6 +48,7 @@ WHERE_IT_IS = "if it is a subprogram, say where its file is: --subprograms DIR"
 TRANSFORMING = ("traori", "transmit", "tracyl", "traang", "tracon", "trafoo")
 """How names of transformations by kinematic chains begin, `TRANSMIT_K`."""
 
+SECTION = "a section of a program is called (CALL BLOCK), which is not followed"
 CALLED_BY_TEXT = frozenset({"call", "extcall"})
 FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF))?$", re.IGNORECASE)
 """A program named in a text, perhaps with a path."""
@@ -149,8 +150,7 @@ AFTER_ADDITIVE = "where the axis {} stands after an additive tool offset (DL) is
 RETURNS_ELSEWHERE = "a subprogram leads back to another block than that behind its call (RET), which is not followed"
 AFTER_RESET = "where the axis {} stands after ORIRESET is for machine data"
 _PASSED = """
-    G9 G60 G62 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
-    G972 G973 G290 G471 G472
+    G9 G62 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G972 G973 G290 G471 G472
 """
 PASSED = frozenset(10 * int(code[1:]) for code in _PASSED.split())
 """G codes that change nothing of where axes go."""
@@ -161,6 +161,7 @@ SETTINGS: dict[int, Handler] = {
     **dict.fromkeys((700, 710, 7000, 7100), framing.units),
     **dict.fromkeys((930, 940, 950, 960, 9610, 9620, 970, 9710), framing.feed_mode),
     **dict.fromkeys((400, 410, 420), framing.compensation),
+    **dict.fromkeys((600, 640, 6410, 6420, 6430, 6440, 6450), framing.path_mode),
     **dict.fromkeys((540, 550, 560, 570, 5000, *range(5050, 6000, 10)), framing.settable),
 }
 ANGLE_KINDS = frozenset({"orieuler", "orirpy", "orirpy2", "orivirt1", "orivirt2"})
@@ -218,7 +219,12 @@ class Turn:
 def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     """Do what a name says, as far as it does not wait for the words of the block."""
     name = step.name
-    if name in SPECIAL:
+    if {"call", "block"} <= turn.plan.names:
+        if name == "call":
+            control.refuse_rest(SECTION)
+            control.refuse_here(SECTION)
+            control.warn(UNKNOWN_CYCLE, SECTION, "motions after it are refused: write the section as a subprogram")
+    elif name in SPECIAL:
         SPECIAL[name](control, turn, step)
     elif name in framing.PROGRAMMABLE:
         turn.frame = name
@@ -234,6 +240,8 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         control.suspend(name, f"{UNFOLLOWED[name]} is in force, which ncfix does not follow")
     elif name in ("orimks", "oriwks"):
         control.modes.orientation_in_machine = name == "orimks"
+        if name == "oriwks" and not control.modes.orientation:
+            control.modes.orientation = "orivect"  # unless machine data leave that to ORIAXES and its like
     elif name in ANGLE_KINDS:
         control.modes.angles = name
     elif name in TURNS_OF_THE_TOOL:

@@ -29,7 +29,7 @@ from ncfix.compensate.solve import (
     plan_and_write,
 )
 from ncfix.control.interpreter import NEVER
-from ncfix.control.moves import MotionKind, Moves, Rule, Trace
+from ncfix.control.moves import MotionKind, Moves, Pass, Rule, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.state import BLOCK_DELETE, named_switches
 from ncfix.diagnostics import Message, NcfixError, Place, RefusedError, SourceError, UsageError
@@ -237,7 +237,7 @@ def plan_and_write_all(
         solution = plan_and_write(program, moves[0], machine, options, readings[0], before, first)
         return JointPlan((solution,), solution.emission.splices, solution.emission.added_blocks)
     refused, whole = dict[int, Reason](), _starting_elsewhere(moves)
-    spelled, resting, tried = dict[int, Mask](), set[int](), set[int]()
+    spelled, resting, left, tried = dict[int, Mask](), set[int](), set[int](), set[int]()
     while True:
         found: list[WrittenPlan] = []
         for k, own in enumerate(moves):
@@ -245,11 +245,8 @@ def plan_and_write_all(
             if twin is not None:
                 found.append(found[twin])
                 continue
-            found.append(
-                plan_and_write(
-                    program, _held(own, whole, spelled, resting), machine, options, readings[k], refused=refused
-                )
-            )
+            held = _left(_held(own, whole, spelled, resting), left)
+            found.append(plan_and_write(program, held, machine, options, readings[k], refused=refused))
         more = {block: why for each in found for block, why in each.reasons.items()}
         if more.keys() > refused.keys():
             refused = more
@@ -264,9 +261,10 @@ def plan_and_write_all(
             spelled[block] = _named(found, block)
             whole.add(block)
             differing.remove(block)
-        rapids = {block for block in differing - tried if all(map(_only_rapids, moves, repeat(block)))}
+        rapids = {block for block in differing - left if all(map(_only_rapids, moves, repeat(block)))}
+        left |= rapids & tried
+        resting = resting - differing | rapids - tried
         tried |= rapids
-        resting = resting - differing | rapids
         differing -= rapids
         deletable = np.array([any(isinstance(item, Skip) for item in each.items) for each in program.templates])
         for block in differing:  # because of the nearest block with a `/` before it, or of that block itself
@@ -292,13 +290,24 @@ def _held(moves: Moves, whole: set[int], spelled: Mapping[int, Mask], resting: s
     return replace(moves, spelled=named & ~moves.programmed)
 
 
+def _left(moves: Moves, blocks: set[int]) -> Moves:
+    """The motions, rapids of these blocks left as they are: where their words lead depends on what is skipped."""
+    if not blocks:
+        return moves
+    rows = np.isin(moves.block, list(blocks)) & (moves.rule == Rule.CORRECT)
+    passing = np.zeros(len(moves), dtype=np.int8) if moves.passing is None else moves.passing
+    return replace(
+        moves, rule=np.where(rows, Rule.PASS, moves.rule), passing=np.where(rows, Pass.SKIPPED, passing).astype(np.int8)
+    )
+
+
 def _only_rapids(moves: Moves, block: int) -> bool:
-    """Whether a block does nothing but lead axes, each by its own word, in rapids that are corrected.
+    """Whether a block does nothing but lead axes, each by its own word, in rapids that are corrected, or pass.
 
     Nor may a cut begin where it ends.
     """
     own = moves.block == block
-    rapid = (moves.kind == MotionKind.RAPID) & (moves.rule == Rule.CORRECT) & ~moves.incremental
+    rapid = (moves.kind == MotionKind.RAPID) & (moves.rule != Rule.REFUSE) & ~moves.incremental
     turned = (np.count_nonzero(moves.frames[k].rotation, axis=1).max() > 1 for k in set(moves.frame[own].tolist()))
     moving = np.flatnonzero(moves.kind != MotionKind.DWELL)
     begun = moving[:-1][moves.cutting[moving[1:]]]

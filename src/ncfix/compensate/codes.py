@@ -221,6 +221,12 @@ CODES = {
         "contour is left as it is.",
         "Let the CAM system compensate the cutter radius, or ask for a larger tolerance.",
     ),
+    "NCF283": Code(
+        "pieces under exact stop",
+        "G60 or G61 is in force, with which the control comes to a stop at the end of every block. Where a motion is "
+        "split to hold the tolerance it stops at the end of each piece, too, and the tool may leave a mark there.",
+        "Program continuous path mode (G64) where no exact stop is needed, or ask for a larger tolerance.",
+    ),
     "NCF456": Code(
         "turns of rotary axes get inverse time",
         "F of a block that turns rotary axes alone is degrees per minute. Where its correction moves a linear axis, "

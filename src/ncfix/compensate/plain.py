@@ -35,7 +35,7 @@ from ncfix.compensate.plan.segments import Segments, accelerations, arcs_within,
 from ncfix.compensate.plan.splitting import Split
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding
-from ncfix.compensate.solve import WrittenPlan, accepted_plan
+from ncfix.compensate.solve import WrittenPlan, accepted_plan, closure_of
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
 from ncfix.control.trace import taken
 from ncfix.control.turns import turns_alone
@@ -140,7 +140,7 @@ def arcs_and_dwells(
     if (real.start[dwells] != real.end[dwells]).any() or full_circles(intent, arcs).any():
         return None
     if arcs.size:
-        fit = fitted(intent, real, arcs, Closure(dialect.closure_mm, dialect.closure_relative), rounding)
+        fit = fitted(intent, real, arcs, closure_of(dialect, moves), rounding)
         centre, sweep = real.centre.copy(), real.sweep.copy()
         centre[arcs], sweep[arcs] = fit.centre, fit.sweep
         real = replace(real, centre=centre, sweep=sweep)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 TIMED = "this turn of rotary axes alone, and others whose correction moves linear axes, get inverse time (G93)"
 HAS_G93 = "check that the control has G93"
+STOPS = "this motion, and others under exact stop (G60, G61), are split: the control stops at the end of every piece"
+MARKS = "continuous path mode (G64) in the program, if a stop may leave marks"
 SEEN_UM = 0.001
 """By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""
 
@@ -179,10 +181,13 @@ SUMS = ("blocks", "moves", "compensated", "passed", "unseen", "samples", "insert
 """What of a tally is added up."""
 
 
-def in_inverse_time(solution: WrittenPlan) -> tuple[Finding, ...]:
-    """The turns that get inverse time."""
-    rows = np.array(solution.emission.timed, dtype=np.intp)
-    return (Finding.of("NCF456", rows, TIMED, HAS_G93),) if len(rows) else ()
+def as_written(solution: WrittenPlan) -> Iterator[Finding]:
+    """The turns that get inverse time, and pieces at whose ends the control stops."""
+    if timed := solution.emission.timed:
+        yield Finding.of("NCF456", np.array(timed, dtype=np.intp), TIMED, HAS_G93)
+    stops, pieces = solution.moves.exact_stop, solution.plan.pieces
+    if stops is not None and (rows := np.flatnonzero(stops & (np.bincount(pieces.move) > 1))).size:
+        yield Finding.of("NCF283", rows, STOPS, MARKS)
 
 
 @dataclass(slots=True)
@@ -229,7 +234,7 @@ class Tally:
             self.rounding = max(self.rounding, rounding_along(intent, plan.pieces, plan.corners, own))
             self.largest = max(self.largest, largest_correction(moves, solution, own))
             unseen |= without_figure(moves, solution.unchanged, lack.axes if lack else None, own)
-            for finding in (*found, *in_inverse_time(solution)):
+            for finding in (*found, *as_written(solution)):
                 self.found.add(finding, program, moves, own, k)
         self.unseen += unseen
         theirs = set() if own is None else set(every[0].moves.block[~own].tolist())
@@ -254,7 +259,7 @@ class Tally:
         self.largest = max(self.largest, largest)
         self.changed |= len(solution.emission.splices) > 0
         self._look_at_numbers(program, solution)
-        for finding in (*solution.plan.findings, *in_inverse_time(solution)):
+        for finding in (*solution.plan.findings, *as_written(solution)):
             self.found.add(finding, program, solution.moves)
 
     def _look_at_numbers(self, program: Program, solution: WrittenPlan, own: Mask | bool = True) -> None:

@@ -31,6 +31,7 @@ from ncfix.compensate.plan.limits import findings, increments_beyond_travel
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding, without_idle
+from ncfix.control.coordinates import INCH
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.text.dialect import Dialect
@@ -201,6 +202,13 @@ class AcceptedPlan:
         return Round(np.array(unchanged), np.array(shift), position.copy())
 
 
+def closure_of(dialect: Dialect, moves: Moves) -> Closure:
+    """What the control accepts as an arc; where 0.001 mm is 0.0001 inch its tolerance in inches goes by tenths, too."""
+    frames = np.unique(moves.frame[moves.kind == MotionKind.ARC]).tolist() if dialect.decimal_inches else []
+    inches = bool(frames) and all(moves.frames[frame].unit > 1.0 for frame in frames)
+    return Closure(dialect.closure_mm * (INCH / 10 if inches else 1.0), dialect.closure_relative)
+
+
 def plan_and_write(
     program: Program,
     moves: Moves,
@@ -281,7 +289,7 @@ def accepted_plan(
             moves,
             get_strategy(options.strategy),
             options.tolerance_mm,
-            Closure(dialect.closure_mm, dialect.closure_relative),
+            closure_of(dialect, moves),
             unchanged,
             rounding_mm=rounding(machine),
             split_rapids=options.split_rapids,

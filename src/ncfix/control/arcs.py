@@ -47,7 +47,7 @@ def check_closure(centre: Point, end: Point, absolute: float, relative: float) -
             ARC_FAULT,
             f"the arc does not close: its radius is {start_radius:.4f} mm at the start and {end_radius:.4f} mm"
             f" at the end ({gap:.4f} apart, {absolute:.4f} allowed)",
-            "check the centre words and whether they are meant incrementally (G91.1) or absolutely (G90.1)",
+            "check the centre words, and whether they count from the start of the arc or from the zero point",
         )
 
 

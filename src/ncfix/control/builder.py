@@ -40,6 +40,7 @@ class MotionStyle(NamedTuple):
     beside: float = 0.0
     across: int = 2
     tcp_length: float = math.nan
+    exact_stop: bool = False
 
 
 DTYPES: dict[str, type[np.generic]] = {
@@ -238,8 +239,9 @@ class MotionBuilder:
         start, end = _joined_ends(parts, self.columns)
         named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
         styles: dict[str, Any] = self._style_columns(style)
-        if not styles["passing"].any():
-            styles["passing"] = None
+        for name in ("passing", "exact_stop"):
+            if not styles[name].any():
+                styles[name] = None
         if not styles["beside"].any():
             styles["beside"] = styles["across"] = None
         if np.isnan(styles["tcp_length"]).all():

@@ -82,9 +82,10 @@ CODES: dict[str, Code] = {
     ),
     "NCF215": Code(
         "No unit",
-        "The program moves and has said neither G20 nor G21. What holds then is set on the control; ncfix takes "
-        "millimetres. If it is inches, positions are 25.4 times as large, and the corrections are for another place.",
-        "Put G20 or G21 at the beginning of the program.",
+        "The program moves and has said neither G20 nor G21 (SINUMERIK: G70, G71, G700, G710). What holds then is set "
+        "on the control; ncfix takes millimetres. If it is inches, positions are 25.4 times as large, and the "
+        "corrections are for another place.",
+        "Put such a code at the beginning of the program.",
     ),
     "NCF216": Code(
         "Alarm of the program",
@@ -113,7 +114,7 @@ CODES: dict[str, Code] = {
     "NCF220": Code(
         "Impossible arc",
         "The control would refuse the arc: it does not close, has no radius or no centre, or cannot reach its end.",
-        "Check end point, centre or radius, the plane, and whether centres are incremental (G91.1) or not (G90.1).",
+        "Check end point, centre or radius, the plane, and whether centres count from the start of the arc.",
     ),
     "NCF221": Code(
         "Impossible command",

@@ -37,6 +37,7 @@ from ncfix.control.moves import (
     blanked,
     first_reason,
 )
+from ncfix.control.posture import FAR
 from ncfix.control.setup import Run
 from ncfix.control.state import TOOL_AT_RUN_TIME, ControlState
 from ncfix.control.tcp import in_machine
@@ -60,6 +61,8 @@ NOT_ACCOUNTED = "nothing is known that the control would make of the word {} in 
 AFTER_THAT = "where the axis {{}} stands is not known after this: {}"
 FOLLOWED_IN_VAIN = 5000
 """Blocks that are followed for what else is not given, once the program has moved an axis that the machine lacks."""
+NO_UNIT = "NCF215"
+NO_UNIT_SAID = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
 NO_WAY = 1e-9
 """mm"""
 ALONG = 1 - 1e-12
@@ -70,6 +73,7 @@ class ProgramControl(ControlState):
     """What every control keeps while it follows a program, whatever its language; its motions go to `builder`.
 
     budget     how much may still be executed
+    unit_said  the program has said whether it is in inches or millimetres, by `unit_codes`
     needs_feed a motion at feed is an error where no feed is set
     refusal    why every motion from here on is refused; empty while all is well
     suspended  the same, for as long as a code is in force: what suspends them -> why
@@ -86,11 +90,13 @@ class ProgramControl(ControlState):
     block_words  the addresses of the block that is executed, as long as it has made no motion and no setting took them
     """
 
+    unit_codes = "G20 or G21"
+
     def __init__(self, run: Run, dialect: Dialect) -> None:
         super().__init__(run, dialect)
         self.builder = MotionBuilder(run.axes, run.rotary)
         self.budget = BlockBudget(run.setup.most_blocks, run.setup.most_blocks)
-        self.needs_feed = False
+        self.unit_said = self.needs_feed = False
         self.refusal = ""
         self.suspended: dict[str, str] = {}
         self.foreign: dict[str, Message] = {}
@@ -126,6 +132,11 @@ class ProgramControl(ControlState):
     def closure_mm(self) -> float:
         """By how much the radii at both ends of an arc may differ, mm."""
         return self.dialect.closure_mm
+
+    @property
+    def turns_in_plane(self) -> bool:
+        """Whether the tool turns in the plane of the directions at both ends of a cut, and its axes not evenly."""
+        return False
 
     @property
     def takes_zero_across(self) -> bool:
@@ -230,6 +241,8 @@ class ProgramControl(ControlState):
         """Make a motion, and keep the book of what is known behind it. All motions that come singly come by here."""
         if not motion.passing:
             self._ask_for_start(motion)
+            if not self.unit_said:
+                self.warn(NO_UNIT, NO_UNIT_SAID, f"put {self.unit_codes} at its beginning")
         if self.composed.unknown:
             self.places.lose(mask_of(self.composed.unknown))
         placed = motion.axes if motion.placed is None else motion.placed
@@ -375,9 +388,9 @@ class ProgramControl(ControlState):
         self.whole = whole
 
     def _style_of(self, motion: Motion) -> int:
-        """The style of a motion; behind a contour the one that leads off stays whole."""
+        """The style of a motion; one that leads off a contour stays whole, and one in which the tool would stray."""
         passing, whole = motion.passing, self.whole
-        self.whole = whole or bool(self.beside & motion.axes)
+        self.whole = whole or bool(self.beside & motion.axes) or self._strays(motion)
         if passing is not None and motion.kind in PASS_RULES[passing.rule].kinds:
             style = self._style(motion.kind, Rule.PASS, passing.words, motion.code, passing.rule)
         else:
@@ -385,6 +398,15 @@ class ProgramControl(ControlState):
             style = self.style_of(motion.kind, motion.code, motion.end.unknown, wrong)
         self.whole = whole
         return style
+
+    def _strays(self, motion: Motion) -> bool:
+        """Whether axes that turn evenly, as in pieces of the motion, would lead the tool out of its plane."""
+        pointing = self.posture.pointing if self.turns_in_plane and motion.kind != MotionKind.RAPID else None
+        if pointing is None:
+            return False
+        first, second = (self.machine[column] for column in pointing.columns)
+        here, there = ((place[first], place[second]) for place in (self.position, motion.end.target))
+        return pointing.stray(here, there) > FAR
 
     def style_of(self, kind: MotionKind, code: int, unknown: UnknownAxes | None = None, refusal: str = "") -> int:
         """The style of a motion that does not pass: corrected, or refused where there is a reason.
@@ -432,6 +454,7 @@ class ProgramControl(ControlState):
                 self._beside(),
                 modal.plane.across if modal.compensated else 2,
                 math.nan if not self.tcp or self.length_under_tcp == length else self.length_under_tcp,
+                modal.exact_stop,
             )
         )
 

@@ -182,6 +182,7 @@ class Moves:
     spelled      (n, n_axes) axes that get a word even if they stand where it would lead them. None: none
     tcp_length   (n,) mm, the length by which the control leads X Y Z under TCP, where that is not the tool's: zero
                  while none is in force, so that it leads the spindle reference, not the tip; else NaN. None: nowhere
+    exact_stop   (n,) the control comes to a stop at the end of every motion (G60, G61). None: nowhere
     """
 
     axes: tuple[str, ...]
@@ -224,6 +225,7 @@ class Moves:
     calls: tuple[CycleCall, ...] = ()
     spelled: NDArray[np.bool_] | None = None
     tcp_length: NDArray[np.float64] | None = None
+    exact_stop: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.block)
@@ -315,6 +317,7 @@ class Pass(IntEnum):
     ROTARY_ALONE = 8
     RETRACTION = 9
     DEPARTURE = 10
+    SKIPPED = 11
 
 
 class PassRule(NamedTuple):
@@ -362,6 +365,13 @@ PASS_RULES: Mapping[Pass, PassRule] = {
         False,
         "Its correction would need a word for an axis of which nobody has said where it stands. It cuts nothing, and "
         "the first block that names the axis is corrected.",
+    ),
+    Pass.SKIPPED: PassRule(
+        "rapid behind a block with /",
+        RAPIDS,
+        False,
+        "It needs another correction where that block is skipped than where it is executed. It cuts nothing, and no "
+        "cut begins where it ends.",
     ),
     Pass.LED: PassRule(
         "rapid from where the control has led the tool",

@@ -80,6 +80,7 @@ class Modal:
     system        1..9: G54..G59.3
     tool_code     430 while a tool length offset is in force, 490 without
     spindle       3, 4 or 5
+    exact_stop    the control comes to a stop at the end of every motion
     """
 
     motion: int = NO_MOTION
@@ -98,6 +99,7 @@ class Modal:
     system: int = 1
     tool_code: int = 490
     spindle: int = 5
+    exact_stop: bool = False
     cycle: Cycle = field(default_factory=Cycle)
 
 

@@ -167,6 +167,7 @@ LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
     "beside": lambda moves: np.zeros(len(moves)),
     "across": lambda moves: np.full(len(moves), 2, dtype=np.int8),
     "tcp_length": lambda moves: np.full(len(moves), np.nan),
+    "exact_stop": lambda moves: np.zeros(len(moves), dtype=np.bool_),
     "fixed_centre": lambda moves: np.zeros(len(moves), dtype=np.bool_),
     "call": lambda moves: np.full(len(moves), -1, dtype=np.int32),
     "counted": lambda moves: np.repeat(moves.incremental[:, None], len(moves.axes), axis=1),

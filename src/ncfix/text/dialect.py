@@ -348,19 +348,19 @@ def get(name: str) -> Dialect:
 
 
 def detect(source: bytes, path: str, control: str = "") -> Dialect:
-    """The dialect of a text: by its content, else that of the machine's control, else by its file suffix, else ISO."""
+    """The dialect of a text: by its content, a suffix that only one language has, the machine's control; else ISO."""
     known: dict[str, Dialect] = registry("dialects")
     head = beginning_without_comments(source)
     ranks = {name: rank for name, dialect in known.items() if (rank := signature_rank(dialect, head)) is not None}
     if ranks:
         shown = known[min(ranks, key=lambda name: (ranks[name], name))]
-        family = known[control].variant_of if control in known else ""
-        return known[control] if family and family in (shown.name, shown.variant_of) else shown
-    if control in known:
-        return known[control]
-    suffix = PurePath(path).suffix.lower()
-    by_suffix = [name for name, dialect in sorted(known.items()) if suffix in dialect.suffixes]
-    return known[by_suffix[0]] if by_suffix else get(DEFAULT)
+    else:
+        suffix = PurePath(path).suffix.lower()
+        shown = next((known[name] for name in sorted(known) if suffix in known[name].suffixes), get(DEFAULT))
+        if control in known and shown.name == DEFAULT:
+            return known[control]
+    family = known[control].variant_of if control in known else ""
+    return known[control] if family and family in (shown.name, shown.variant_of) else shown
 
 
 def other_control(dialect: Dialect, control: str, path: str) -> Message | None:

@@ -151,10 +151,10 @@ def bulk_layout(program: Program, block: int, layout: Layout) -> BulkLayout | No
 
 
 def arc_layout(program: Program, block: int, layout: Layout) -> ArcLayout | None:
-    """The same of the words of an arc; None if one of them is no plain number."""
+    """The same of the words of an arc; None if one of them is no plain number, or R stands beside a centre."""
     slots = {letter: word.value.slot for letter, word in layout.centre.items() if isinstance(word.value, Literal)}
     word = layout.radius
-    if len(slots) < len(layout.centre) or not (word is None or isinstance(word.value, Literal)):
+    if len(slots) < len(layout.centre) or (word is not None and (slots or not isinstance(word.value, Literal))):
         return None
     if word is None or not isinstance(word.value, Literal):
         return ArcLayout(slots)

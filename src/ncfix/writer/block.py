@@ -263,7 +263,7 @@ class BlockWriter(BlockText):
         if not whole:
             self._remove(self.layout.turns)
         if word is not None:
-            meant = self._centre_by_radius(word, start, end) if whole else None
+            meant = self._centre_by_radius(word, start, end) if whole and not self.layout.centre else None
             if meant is not None:
                 self.out.centre = meant
                 return
@@ -275,7 +275,7 @@ class BlockWriter(BlockText):
 
     def _has_centre(self) -> bool:
         """Whether the arc has its centre in words, of which one that is left out is zero."""
-        return self.layout.radius is None
+        return self.layout.radius is None or bool(self.layout.centre)
 
     def _centre_word(self, index: int, begin: float) -> float:
         target, letter, had_centre = self.target, CENTRE_LETTERS[index], self._has_centre()

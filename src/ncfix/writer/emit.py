@@ -32,7 +32,7 @@ NOWHERE = np.full(3, np.nan)
 SEVERAL_STATES = "the block is executed from several states that need different corrections"
 FLOW = "the block is more than words"
 TOO_LONG = "the corrected line would have {} characters, and the control takes {}"
-MODE_LOST = "a kept block that follows relies on its motion code"
+MODE_LOST = "written as lines it would leave G1 in force, and a block behind it that stays as it was has no G code"
 
 
 @dataclass(frozen=True, slots=True)

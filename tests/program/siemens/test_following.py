@@ -153,13 +153,13 @@ def test_comparisons_without_brackets_are_not_guessed() -> None:
 
 
 def test_a_block_that_nobody_understands_refuses_what_follows() -> None:
-    followed = follow('G0 X1\nCGTECH_MACRO "x" 5\nG0 X2')
+    followed = follow('G71 G0 X1\nCGTECH_MACRO "x" 5\nG0 X2')
     assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE]
     assert [message.code for message in followed.messages] == ["NCF250"]
 
 
 def test_a_cycle_that_nobody_knows_leaves_axes_anywhere() -> None:
-    followed = follow("G0 X1 Y1 Z1\nHEAD_CLEAN\nG0 X2\nG0 Y2 Z2\nG1 X3 F100")
+    followed = follow("G71 G0 X1 Y1 Z1\nHEAD_CLEAN\nG0 X2\nG0 Y2 Z2\nG1 X3 F100")
     assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.PASS, Rule.CORRECT, Rule.CORRECT]
     assert [message.code for message in followed.messages] == ["NCF252"]
 

@@ -53,7 +53,7 @@ def test_only_rotary_axes_have_a_sense() -> None:
 
 @pytest.mark.parametrize("call", ['EXTCALL("PART.MPF")', 'CALL "PART"', "EXTCALL(NAME)"])
 def test_a_program_that_is_not_at_hand_is_said(call: str) -> None:
-    assert [message.code for message in follow(f"G0 X1\n{call}").messages] == ["NCF252"]
+    assert [message.code for message in follow(f"G71 G0 X1\n{call}").messages] == ["NCF252"]
 
 
 @pytest.mark.parametrize("name", ["$P_ISTEST", "$P_SIM", "$P_SEARCH", "$P_DRYRUN"])

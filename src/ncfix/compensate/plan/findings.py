@@ -82,10 +82,10 @@ def pose_error(code: str, text: str, rows: Mask, hint: str = "") -> PoseError:
 
 ORDER = (
     *("NCF408", "NCF405", "NCF404", "NCF406", "NCF407"),
-    *("NCF414", "NCF402", "NCF403", "NCF415", "NCF454", "NCF413", "NCF455", "NCF456", "NCF409", "NCF410"),
+    *("NCF414", "NCF402", "NCF403", "NCF415", "NCF454", "NCF413", "NCF455", "NCF456", "NCF283", "NCF409", "NCF410"),
 )
 """Findings in the order in which they are reported: those of limits, then those of a plan."""
-ONCE = frozenset({"NCF409", "NCF456"})
+ONCE = frozenset({"NCF409", "NCF456", "NCF283"})
 """Findings that hold for the whole program, and are told of its first motion only."""
 
 

@@ -19,7 +19,7 @@ from ncfix import core
 from ncfix.control.arcs import CLOCKWISE, COUNTER, FUZZ, ZERO_RADIUS, centre_from_radius, check_closure
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.control import ProgramControl
-from ncfix.control.coordinates import IDENTITY, X
+from ncfix.control.coordinates import IDENTITY, X, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.lanes.block_rows import (
     BlockRows,
@@ -82,6 +82,8 @@ def run_lane(
         return 0
     stage = unit.ahead.stretch(control, unit, block, stop)
     count, circles = min(before_placing(control, stage.mask, 0), count_allowed(control, stage)), None
+    if control.turns_in_plane and (turning := stage.mask[:count] & mask_of(control.turning)).any():
+        count = int(np.argmax(turning != 0))
     if turned is not None and stage.turns is not None and count >= SHORTEST:
         circles, count = turned(block, stage.rows(0, count))
     unit.ahead.note(count, stop - block)
