@@ -10,7 +10,7 @@ from compensate.motions import motions
 from ncfix.compensate.plan import ends
 from ncfix.compensate.plan.findings import PoseError
 from ncfix.compensate.plan.path import plan
-from ncfix.compensate.plan.strategies import RotaryThenLinear, Strategy, get_strategy, parted, strategies
+from ncfix.compensate.plan.strategies import Strategy, get_strategy, strategies
 from ncfix.control.moves import MotionKind
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine, State
@@ -69,24 +69,6 @@ def test_rotary_words_stay_as_they_are(name: str) -> None:
     q = poses(machine, rng)
     corrected = get_strategy(name).correct(machine, q, State(50.0))
     assert (corrected[:, machine.rotary] == q[:, machine.rotary]).all()
-
-
-def test_one_pass_leaves_products_of_errors_and_gradients() -> None:
-    """What iterating brings: one pass leaves fractions of a micrometre, up to over one, of 100 um errors."""
-    rng = np.random.default_rng(5)
-    left = []
-    for topology in TOPOLOGIES.values():
-        machine = random_machine(rng, topology)
-        q, state = poses(machine, rng), State(100.0)
-        left.append(off(machine, RotaryThenLinear(passes=1).correct(machine, q, state), q, state).max())
-    assert 1e-4 < max(left) < 5e-3
-
-
-def test_the_parts_of_a_machine_make_up_the_whole() -> None:
-    machine = random_machine(np.random.default_rng(6), TOPOLOGIES["table-head"])
-    turning, rest = parted(machine)
-    assert {effect.joint for effect in turning.effects} == {"B", "C"}
-    assert len(turning.effects) + len(rest.effects) == len(machine.effects)
 
 
 def test_poses_with_numbers_missing_are_not_converged_and_do_no_harm() -> None:

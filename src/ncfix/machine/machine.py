@@ -130,13 +130,13 @@ class Machine:
 
     def known_from(self, notes: Mapping[str, Any]) -> Machine:
         """With further provenance. Where its errors came from before stays under `earlier`, the newest last."""
-        kept = dict(self.provenance)
-        earlier = kept.pop("earlier", [])
+        before = dict(self.provenance)
+        earlier = before.pop("earlier", [])
         earlier = list(earlier) if isinstance(earlier, (list, tuple)) else [earlier]
-        if "source" in kept and kept["source"] != notes.get("source"):
-            earlier.append(" ".join(str(kept[key]) for key in ("date", "source") if key in kept))
+        if "source" in before and before["source"] != notes.get("source"):
+            earlier.append(" ".join(str(before[key]) for key in ("date", "source") if key in before))
         history = {"earlier": earlier} if earlier else {}
-        return self.replace(provenance={**kept, **notes, **history})
+        return self.replace(provenance={**before, **notes, **history})
 
     @cached_property
     def depends_on_tool_length(self) -> bool:

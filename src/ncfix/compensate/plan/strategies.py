@@ -18,7 +18,6 @@ from ncfix.compensate.plan.kinematics import (
     Correction,
     affine_tip,
     linear_columns,
-    moved,
     regular,
     rows_of,
     solve,
@@ -130,40 +129,15 @@ class PositionStrategy(Strategy):
 class RotaryThenLinear(PositionStrategy):
     """Ellingsdalen's order: the error of the rotary axes first, then the linear axes' error where that leads.
 
-    S. H. Ellingsdalen (NTNU, 2021), sections 3.5 and 3.6, with its signs put right. Pass 1: X Y Z are moved so that a
-    machine with the errors of its rotary axes only brings the tip to the intended point; the errors of all other
-    joints are read there and taken off. Later passes take off what the whole machine still leaves, until that is below
-    1 nm: the linear errors are then those at the commanded coordinates, and products of rotary and linear errors are
-    in. `passes = 1` stops after the first. Where later passes follow it does not matter how the first one began, so
-    they begin at the program's position. Works on any chain: it does not matter which side a rotary axis is on.
+    S. H. Ellingsdalen (NTNU, 2021), sections 3.5 and 3.6, with its signs put right and repeated. A single pass moves
+    X Y Z so that a machine with the errors of its rotary axes only brings the tip to the intended point, reads the
+    errors of all other joints there and takes them off. Further passes take off what the whole machine still leaves,
+    until that is below 1 nm: the linear errors are then those at the commanded coordinates, and products of rotary and
+    linear errors are in. It does not matter then how the first one began, so they begin at the program's position.
+    Works on any chain: it does not matter which side a rotary axis is on.
     """
 
     name = "rotary-then-linear"
-
-    def __init__(self, passes: int | None = None) -> None:
-        self.passes = passes
-
-    def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
-        """See `Strategy.solve`."""
-        if machine.is_perfect or self.passes != 1:
-            return super().solve(machine, q, state, path)
-        columns = linear_columns(machine)
-        turning, rest = parted(machine)
-        target = machine.tip(q, state.tool_length)
-        maps, fine = regular(affine_tip(machine, q, state.tool_length)[0])
-        shift = -solve(maps, turning.actual_tip(q, state) - target)
-        shifted = moved(q, columns, shift)
-        nominal = target + np.einsum("...ij,...j->...i", maps, shift)
-        first = moved(shifted, columns, -solve(maps, rest.actual_tip(shifted, state) - nominal))
-        return Correction(first, np.isfinite(first.sum(axis=1)) & fine, np.zeros(len(q), dtype=bool))
-
-
-def parted(machine: Machine) -> tuple[Machine, Machine]:
-    """The machine with the errors of its rotary axes only, and with all others (linear axes and spindle)."""
-    rotary = {axis.name for axis in machine.axes if axis.rotary}
-    turning = tuple(effect for effect in machine.effects if effect.joint in rotary)
-    rest = tuple(effect for effect in machine.effects if effect.joint not in rotary)
-    return machine.replace(effects=turning), machine.replace(effects=rest)
 
 
 def untouched(q: Array) -> Correction:
