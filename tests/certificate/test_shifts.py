@@ -40,7 +40,8 @@ def shifted(rng: random.Random, dialect: str) -> bytes:
     for _ in range(rng.randint(5, 15)):
         code = rng.choice(SHIFTS[dialect])
         alone = code == "G92.1" or (code == "TRANS" and rng.random() < 0.4)
-        lines.append(code if alone else f"{code} {words(rng)}")
+        tool = " T1 S900" if dialect in ("iso", "linuxcnc") and rng.random() < 0.3 else ""
+        lines.append(code if alone else f"{code} {words(rng)}{tool}")
         lines += [f"{rng.choice(('G0', 'G1'))} {words(rng)} F500." for _ in range(rng.randint(1, 4))]
         lines += [rng.choice(("G54", "G55"))] if rng.random() < 0.2 else []
     body = "\n".join([*lines, "M30", ""])

@@ -87,9 +87,10 @@ class WordAddressFollower(AxisFollower):
         return (codes == [51] and "Q" in own) or (codes in ([50], [1870]) and not line.path)
 
     def _shifted(self, line: TextLine, codes: Sequence[int]) -> bool:
-        """Take in a shift by G52, G92, G92.1, TRANS or ATRANS that stands alone in its line; False if it is none."""
-        names = [word.name for word in line.codes if word.name != "N"]
-        if self.family is Family.WORDS:
+        """Take in a shift by G52, G92, G92.1, TRANS or ATRANS without other G or M codes; False if it is none."""
+        words = self.family is Family.WORDS
+        names = [word.name for word in line.codes if word.name not in ("NTSF" if words else "N")]
+        if words:
             how = codes[0] if names == ["G"] and codes in ([520], [920], [921]) else 0
         else:
             how = {"TRANS": 1, "ATRANS": 2}.get(" ".join(names), 0)
@@ -117,6 +118,8 @@ class WordAddressFollower(AxisFollower):
                     self.shifts[axis] = self.shifts.get(axis, 0.0) + value
             case _:
                 return False
+        if words:
+            self._other_words(line)
         return True
 
     def _leads_straight(self, line: TextLine) -> bool:
