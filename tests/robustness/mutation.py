@@ -371,6 +371,7 @@ class Trials:
         """Try a mutant of functions; the test that finds it, "stopped", or "survived"."""
 
         def run() -> str:
+            gc.unfreeze()  # tests freeze what they import
             functions = [f for f in gc.get_objects() if type(f) is FunctionType and f.__code__ in changed]
             if not functions:
                 return UNSEEN
