@@ -10,9 +10,11 @@ import pytest
 from compensate.machines_at_random import STROKE, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, interpolated, motions
 from ncfix.compensate.plan.findings import Finding, Notes
+from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.limits import FUZZ, findings, increments_beyond_travel
 from ncfix.compensate.plan.path import Plan, plan
 from ncfix.compensate.plan.strategies import get_strategy
+from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.control.moves import Moves
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash, Polynomial
@@ -257,7 +259,10 @@ def test_increments_are_led_astray_where_they_stay_and_begin_elsewhere() -> None
         moves = changed(moves, incremental=rng.random(12) < 0.6)
         beyond = [(np.maximum(low - places, places - high) > FUZZ) for places in (pieces.end, moves.end)]
         expected = np.flatnonzero(moves.incremental & pieces.unchanged & (beyond[0] & ~beyond[1]).any(axis=1))
-        assert increments_beyond_travel(machine, moves, pieces, start, State()).tolist() == expected.tolist()
+        assert (
+            increments_beyond_travel(WrittenPieces(Intent(machine, moves, State()), pieces, start)).tolist()
+            == expected.tolist()
+        )
         count += len(expected)
     assert count > 10
 

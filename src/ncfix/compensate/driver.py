@@ -50,10 +50,11 @@ from ncfix.compensate.parts import ContinuedPart, MachineParts, PartProof
 from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.plain_figures import figures, largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
-from ncfix.compensate.plan.deviation import path_error
+from ncfix.compensate.plan.deviation import error_of
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.offset import is_offset
+from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.compensate.report import FixReport, Tally, in_lines
 from ncfix.compensate.solve import AcceptedPlan, PrecedingMotion, WrittenPlan, accepted_plan, increments
 from ncfix.compensate.workers import OpenFiles, Read, WorkShare, worker_pool
@@ -62,7 +63,7 @@ from ncfix.control.setup import Setup
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Message, Place
 from ncfix.files import put_at
-from ncfix.machine import Machine, State
+from ncfix.machine import Machine
 from ncfix.text import stamp
 from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
@@ -181,7 +182,7 @@ class Corrector:
             own[:1] = False
         tally.add(part.program, joint, own, self.machine)
         if task.options.verify:
-            errors = [(each.moves, self._tip_errors(each, own, continued)) for each in joint.plans]
+            errors = [(each.moves, self._tip_errors(each, own)) for each in joint.plans]
             self.note(tally, part.program, *errors)
         if self.watch is not None:
             self.watch(
@@ -202,18 +203,12 @@ class Corrector:
         self.stamped = edit.text
         return spliced(program.source, Splices.joined([splices, Splices.of([edit])]))
 
-    def _tip_errors(self, solution: WrittenPlan, own: Mask | None, continued: ContinuedPart) -> PathError:
+    def _tip_errors(self, solution: WrittenPlan, own: Mask | None) -> PathError:
         """Tip errors before and after, with the numbers as the control will understand them; of motions `own` (n,)."""
         emission, shown = solution.emission, solution.shown(self.task.options.split_rapids)
-        return path_error(
-            self.machine,
-            solution.moves,
-            replace(solution.plan.pieces, end=emission.end, centre=emission.centre),
-            emission.start,
-            state=State() if continued.head is None else State(direction=continued.direction),
-            rows=shown if own is None else own & shown,
-            known=solution.plan.known,
-        )
+        pieces = replace(solution.plan.pieces, end=emission.end, centre=emission.centre)
+        written = WrittenPieces(solution.intent, pieces, emission.start)
+        return error_of(written, shown if own is None else own & shown, solution.plan.known)
 
     def note(self, tally: Tally, program: Program, *errors: tuple[Moves, PathError]) -> None:
         """Take in the tip errors of a part, in each position of block delete."""

@@ -219,7 +219,7 @@ class PlainPlan:
         moves = self.part.moves
         untold = np.zeros(len(moves)), np.ones(len(moves), dtype=bool)
         plan = Plan(self.pieces, self.real.start, *untold, self.findings)
-        return WrittenPlan(moves, plan, emission, moves.kind == MotionKind.DWELL, {}, reaches_back=False)
+        return WrittenPlan(self.intent, plan, emission, moves.kind == MotionKind.DWELL, {}, reaches_back=False)
 
     def last(self, of_pieces: Array) -> Array:
         """Of what all pieces (m, k) have that of the last piece of each motion, (n, k)."""

@@ -32,7 +32,7 @@ from ncfix.compensate.solve import WrittenPlan, increments
 from ncfix.control.interpreter import NEVER
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
-from ncfix.machine import Machine, State
+from ncfix.machine import Machine
 from ncfix.text.tree import Program
 
 if TYPE_CHECKING:
@@ -143,8 +143,11 @@ class FixReport:
             )
             hint = "the reason is a motion near it that is not corrected, or that the control works out by itself"
             found.append(Message("NCF416", text, Place(self.path, int(line or 0)), hint))
-        sides = [(self.error_before_um[figure] or 0.0, self.error_after_um[figure] or 0.0) for figure in ("max", "rms")]
-        if self.changed and all(after > before + SEEN_UM for before, after in sides):
+        sides = [
+            (self.error_before_um.get(figure) or 0.0, self.error_after_um.get(figure) or 0.0)
+            for figure in ("max", "rms")
+        ]
+        if self.changed and self.error_before_um and all(after > before + SEEN_UM for before, after in sides):
             (max_before, max_after), (rms_before, rms_after) = sides
             text = (
                 f"the tip errors of this program grow: max {max_before:.2f} um and rms {rms_before:.2f} um before, "
@@ -230,7 +233,7 @@ class Tally:
         account = Account.together([Account.of(each.moves, each.unchanged, each.reasons) for each in every])
         unseen = Counter[str]()
         for k, (solution, lack, found) in enumerate(zip(every, lacking, worst_findings(every), strict=True)):
-            moves, plan, intent = solution.moves, solution.plan, Intent(machine, solution.moves, State())
+            moves, plan, intent = solution.moves, solution.plan, solution.intent
             self.rounding = max(self.rounding, rounding_along(intent, plan.pieces, plan.corners, own))
             self.largest = max(self.largest, largest_correction(moves, solution, own))
             unseen |= without_figure(moves, solution.unchanged, lack.axes if lack else None, own)

@@ -27,10 +27,10 @@ from ncfix.compensate.plan.arcs import Closure, across
 from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs
-from ncfix.compensate.plan.limits import findings, increments_beyond_travel
-from ncfix.compensate.plan.path import Plan, plan
+from ncfix.compensate.plan.limits import findings_of, increments_beyond_travel
+from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements, plan_of
 from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.plan.written import on_digits, rounding, without_idle
+from ncfix.compensate.plan.written import WrittenPieces, on_digits, rounding, without_idle
 from ncfix.control.coordinates import INCH
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
@@ -134,20 +134,25 @@ class SelfCheckError(Exception):
 class WrittenPlan:
     """A plan that can be written, and its text.
 
-    moves      the motions as programmed
+    intent     the motions on the machine
     unchanged  (n,) those left as they were
     reasons    block -> why it was refused
     reaches_back  a refusal needs something before the first motion as it was
     rounds     what the last motion was in each round that plan and emitter took
     """
 
-    moves: Moves
+    intent: Intent
     plan: Plan
     emission: Emission
     unchanged: Mask
     reasons: dict[int, Reason]
     reaches_back: bool
     rounds: tuple[Round, ...] = ()
+
+    @property
+    def moves(self) -> Moves:
+        """The motions as programmed."""
+        return self.intent.moves
 
     def shown(self, rapids: bool) -> Mask:
         """(n,) motions that figures are of: corrected ones that cut, and `rapids` if the tolerance holds along them.
@@ -184,12 +189,14 @@ class WrittenPlan:
 class AcceptedPlan:
     """A plan that nothing speaks against but, perhaps, its text.
 
+    intent     the motions on the machine
     unchanged  (n,) motions left as they were
     reasons    block -> why it was refused
     reaches_back  a refusal needs something before the first motion as it was
     history    in each plan on the way here, whether the last motion was left as it was, and how far off its start was
     """
 
+    intent: Intent
     plan: Plan
     unchanged: Mask
     reasons: dict[int, Reason]
@@ -239,7 +246,7 @@ def plan_and_write(
             rounds.append(accepted.round(emission.end[-1]))
         if not emission.conflicts and (before is None or len(rounds) >= len(before.rounds)):
             return WrittenPlan(
-                moves,
+                accepted.intent,
                 accepted.plan,
                 emission,
                 accepted.unchanged,
@@ -275,7 +282,15 @@ def accepted_plan(
     )
     reasons = {**refused, **_by_rule(moves)} if earlier is None else earlier.reasons
     head = None if before is None else before.in_round(number)
-    state, history = State() if before is None else State(direction=before.direction), list[tuple[bool, Array]]()
+    if earlier is not None:
+        intent = earlier.intent
+    else:
+        intent = Intent(machine, moves, State() if before is None else State(direction=before.direction))
+    strategy, closure = get_strategy(options.strategy), closure_of(dialect, moves)
+    tolerance = PathTolerance(options.tolerance_mm, rounding(machine))
+    arc_pieces = language_of(dialect, WrittenLanguage).arc_pieces
+    demands = Requirements(tolerance, closure, options.split_rapids, arc_pieces)
+    history = list[tuple[bool, Array]]()
     bound = np.zeros(len(moves), dtype=bool)
     while True:
         shift = None
@@ -284,31 +299,20 @@ def accepted_plan(
             unchanged[0] |= head.unchanged[at]
             shift = head.shift[at]
         unchanged, reaches_back = _with_what_they_need(moves, unchanged, bound, reasons)
-        planned = plan(
-            machine,
-            moves,
-            get_strategy(options.strategy),
-            options.tolerance_mm,
-            closure_of(dialect, moves),
-            unchanged,
-            rounding_mm=rounding(machine),
-            split_rapids=options.split_rapids,
-            state=state,
-            before=shift,
-            arc_pieces=language_of(dialect, WrittenLanguage).arc_pieces,
-        )
+        planned = plan_of(intent, strategy, demands, unchanged, shift)
         if len(moves):  # of the last one
             off = planned.start[-1] - moves.start[-1]
             history.append((bool(planned.pieces.unchanged[-1]), np.where(np.isfinite(off), off, 0.0)))
-        planned = replace(planned, pieces=on_digits(Intent(machine, moves, state), planned.pieces))
-        against = findings(machine, moves, planned.pieces, planned.start, state)
+        planned = replace(planned, pieces=on_digits(intent, planned.pieces))
+        written = WrittenPieces(intent, planned.pieces, planned.start)
+        against = findings_of(written)
         stays = planned.pieces.unchanged[planned.pieces.first] & ~unchanged
         for finding in against:
             stays[finding.moves] = True
-        beyond = increments_beyond_travel(machine, moves, planned.pieces, planned.start, state)
+        beyond = increments_beyond_travel(written)
         waiting = head is not None and len(history) < len(head.unchanged)
         if not (stays.any() or (~bound[beyond]).any() or waiting):
-            return AcceptedPlan(planned, unchanged, reasons, reaches_back, tuple(history))
+            return AcceptedPlan(intent, planned, unchanged, reasons, reaches_back, tuple(history))
         for finding in (*against, *planned.findings):
             for k, row in enumerate(finding.moves.tolist()):
                 if stays[row]:

@@ -120,7 +120,7 @@ def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: DeviationBo
     """As `bounds`, of motions under tool-centre-point control."""
     machine, longest = intent.machine, float(np.abs(intent.lengths(rows)).max())
     commands = picked(real.start, rows), picked(real.end, rows)
-    start, end = (intent.joints(rows, each) for each in commands)
+    start, end = intent.joints_of(rows, *commands)
     way = lengths(intent.meant(rows, commands[1]) - intent.meant(rows, commands[0]))
     acceleration = accelerations(machine, start, end, longest, way)
     if acceleration is None or intent.arrival is not None:
@@ -244,6 +244,12 @@ def path_error(
     known    what has been found out of the ends of motions; they are not looked at again then
     """
     written = WrittenPieces(Intent(machine, moves, state), pieces, moves.start if start is None else start)
+    return error_of(written, rows, known)
+
+
+def error_of(written: WrittenPieces, rows: Mask | None, known: Known | None) -> PathError:
+    """As `path_error`."""
+    pieces, moves = written.pieces, written.intent.moves
     chosen = ~pieces.unchanged if rows is None else rows[pieces.move]
     tally, which = FigureTally(), np.flatnonzero(chosen & (moves.kind != MotionKind.DWELL)[pieces.move])
     for part in samples(written, which, known):
@@ -342,8 +348,7 @@ def _leaps(written: WrittenPieces, which: Index) -> Mask:
 def _passed(written: WrittenPieces, which: Index, along: Mask) -> tuple[Index, Array]:
     """Where pieces pass a kink or a jump: which of them, and fraction."""
     long = np.flatnonzero(along)
-    ends = [written.joints(which[long], np.full(len(long), place)) for place in (0.0, 1.0)]
-    on, share = passed(written.intent, *ends)
+    on, share = passed(written.intent, *(picked(each, which[long]) for each in written.ends))
     return long[on], share
 
 

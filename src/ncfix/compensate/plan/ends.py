@@ -318,11 +318,11 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
     return Ends(wanted, failed, oriented, tuple(trouble for trouble in troubles if len(trouble)), before)
 
 
-def with_rotary_as_it_stands(intent: Intent, ends: Ends, unchanged: Mask) -> Ends:
+def with_rotary_as_it_stands(intent: Intent, ends: Ends, unchanged: Mask, before: Array | None) -> Ends:
     """The ends with X Y Z for rotary axes that get no word, where corrections before have left these."""
     if intent.wordless is None:
         return ends
-    stands = standing(intent.machine, intent.moves, ends.wanted, unchanged, intent.before).end
+    stands = standing(intent.machine, intent.moves, ends.wanted, unchanged, before).end
     off = intent.wordless & intent.machine.rotary & (stands != ends.wanted) & ~unchanged[:, None]
     rows = np.flatnonzero(off.any(axis=1))
     if not rows.size:
@@ -397,7 +397,12 @@ def path_of(intent: Intent, q: Array, tips: Array, begins: Mask, pinned: Mask, d
 
 
 def with_closed_circles(
-    intent: Intent, wanted: Array, unchanged: Mask, within: float, approaches: Array | None = None
+    intent: Intent,
+    wanted: Array,
+    unchanged: Mask,
+    within: float,
+    before: Array | None = None,
+    approaches: Array | None = None,
 ) -> Array:
     """Full circles made to end, within their plane, exactly where they really start.
 
@@ -414,7 +419,7 @@ def with_closed_circles(
     joined = (moves.start[rows[1:]] == moves.end[rows[:-1]]).all(axis=1)
     chained[1:] = (np.diff(rows) == 1) & same & joined
     first = rows[np.maximum.accumulate(np.where(chained, 0, np.arange(len(rows))))]
-    where = standing(intent.machine, moves, wanted, unchanged, intent.before, approaches)
+    where = standing(intent.machine, moves, wanted, unchanged, before, approaches)
     shift = (where.start - moves.start)[first[:, None], columns]
     own = (wanted - moves.end)[rows[:, None], columns]
     off = arcs.across(shift - own, moves.normal[rows])

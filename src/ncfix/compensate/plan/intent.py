@@ -22,7 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, picked, some
+from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked, put, some
 from ncfix.compensate.plan.kinematics import (
     REST,
     Signs,
@@ -56,13 +56,11 @@ class Intent:
 
     state  what else the errors depend on; `inputs` are numbers or one number per motion. Tool length and direction of
            motion are taken from the motions; its direction is the way in which the axes came to the first of them.
-    before (n_axes,) how far off the axes stand at the start of the first motion; None: not at all
     """
 
     machine: Machine
     moves: Moves
     state: State
-    before: Array | None = None
 
     def __post_init__(self) -> None:
         if tuple(self.moves.axes) != tuple(self.machine.axis_names):
@@ -114,7 +112,44 @@ class Intent:
 
     def joints_at(self, rows: Index, fraction: Array) -> Array:
         """Axis positions of a perfect control at fractions of motions."""
+        if self._tcp and len(rows):
+            if (fraction == 1).all():
+                return picked(self.ends[1], rows)
+            if (fraction == 0).all():
+                return picked(self.ends[0], rows)
         return self.joints(rows, self.segments.at(rows, fraction))
+
+    @cached_property
+    def _tcp(self) -> bool:
+        return bool(self.moves.tcp.any())
+
+    @cached_property
+    def ends(self) -> tuple[Array, Array]:
+        """Axis positions of a perfect control where motions start and where they end, (n, n_axes) each."""
+        return self.ends_of(np.arange(len(self.moves)), self.segments)
+
+    def ends_of(self, rows: Index, segments: Segments) -> tuple[Array, Array]:
+        """Axis positions where segments (k,) start and where they end, (k, n_axes) each; `rows` (k,): their motions."""
+        with np.errstate(invalid="ignore"):
+            start = segments.at(np.arange(len(rows)), np.zeros(len(rows)))
+        return self.joints_of(rows, start, segments.end)
+
+    def joints_of(self, rows: Index, start: Array, end: Array) -> tuple[Array, Array]:
+        """Axis positions at both ends, commands (k, n_axes), of motions `rows` (k,) or of pieces of them.
+
+        Where one starts as the one before it ends they are worked out once.
+        """
+        at_end = self.joints(rows, end)
+        if not self.moves.tcp[rows].any():
+            return start, at_end
+        tcp, length = self.moves.tcp[rows], self.moves.length_under_tcp[rows]
+        anew = np.ones(len(rows), dtype=bool)
+        anew[1:] = ~(every(start[1:] == end[:-1]) & (tcp[1:] == tcp[:-1]) & (length[1:] == length[:-1]))
+        others = np.flatnonzero(anew)
+        at_start = np.empty_like(at_end)
+        at_start[1:] = at_end[:-1]
+        put(at_start, others, self.joints(rows[others], picked(start, others)))
+        return at_start, at_end
 
     def tip(self, rows: Index, fraction: Array) -> Array:
         """The intended tool tip in the workpiece, (k, 3) mm."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, distinct, finite, greatest, lengths, some
+from ncfix.compensate.plan.arrays import Array, Index, Mask, distinct, finite, greatest, lengths, picked, some
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import Segments, arcs_within, surely_within
@@ -38,11 +38,13 @@ Joints = Callable[[Index, Array], Array]
 def findings(
     machine: Machine, moves: Moves, pieces: Pieces, start: Array | None = None, state: State | None = None
 ) -> tuple[Finding, ...]:
-    """Everything that is against correcting motions as `pieces` have them; only corrected motions are looked at.
+    """As `findings_of`; `start` (n, n_axes) is where motions really start, or as in the program."""
+    begun = moves.start if start is None else start
+    return findings_of(WrittenPieces(Intent(machine, moves, state or State()), pieces, begun))
 
-    start  (n, n_axes) where motions really start, as in `Plan` or `Emission`; those of the program if not given
-    """
-    written = WrittenPieces(Intent(machine, moves, state or State()), pieces, moves.start if start is None else start)
+
+def findings_of(written: WrittenPieces) -> tuple[Finding, ...]:
+    """Everything that is against correcting motions as they are written; only corrected ones are looked at."""
     found = [
         not_a_number(written),
         *beyond_ranges(written),
@@ -78,12 +80,12 @@ def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
     return _of_axes(written, "NCF405", outside, programmed), _of_axes(written, "NCF404", over, corrected)
 
 
-def increments_beyond_travel(machine: Machine, moves: Moves, pieces: Pieces, start: Array, state: State) -> Index:
+def increments_beyond_travel(written: WrittenPieces) -> Index:
     """Increments that are left as they are, and that leave the range of an axis because of where they begin."""
-    rows = np.flatnonzero(moves.incremental & pieces.unchanged[pieces.first])
+    pieces = written.pieces
+    rows = np.flatnonzero(written.intent.moves.incremental & pieces.unchanged[pieces.first])
     if not rows.size:
         return rows
-    written = WrittenPieces(Intent(machine, moves, state), pieces, start)
     beyond = _corrected_excess(written)
     if (beyond > FUZZ).any():
         beyond[programmed_excess(written) > FUZZ] = -np.inf
@@ -105,7 +107,7 @@ def _corrected_excess(written: WrittenPieces) -> Array:
     tcp = written.intent.moves.tcp[pieces.move]
     curved = tcp.copy()
     if tcp.any():
-        curved[curved] = _may_leave(written.intent, written.joints, each[curved], written.done[curved])
+        curved[curved] = _may_leave(written.intent, *(end[curved] for end in written.ends))
     if pieces.arc.any():
         curved |= _arcs_may_leave(written.intent.machine, written.segments, tcp)
     found = excess(written.intent.machine, written.joints, each, curved, written.done)
@@ -216,14 +218,15 @@ def programmed_excess(written: WrittenPieces) -> Array:
         np.flatnonzero(tcp & ~intent.segments.arc),
     )
     if tcp_rows.size:
-        curved[tcp_rows] = _may_leave(intent, intent.joints_at, tcp_rows, None if ends is None else ends[tcp_rows])
+        curved[tcp_rows] = _may_leave(intent, *(picked(end, tcp_rows) for end in intent.ends))
     return excess(intent.machine, intent.joints_at, each, curved, ends)
 
 
-def _may_leave(intent: Intent, joints: Joints, motion: Index, ends: Array | None) -> Mask:
-    """(k,) which of these motions under tool-centre-point control may leave a range on their way; see `excess`."""
-    begin = joints(motion, np.zeros(len(motion)))
-    end = joints(motion, np.ones(len(motion))) if ends is None else ends
+def _may_leave(intent: Intent, begin: Array, end: Array) -> Mask:
+    """(k,) which motions under tool-centre-point control may leave a range on their way; see `excess`.
+
+    begin, end  (k, n_axes) axis positions
+    """
     longest = float(np.nanmax(intent.moves.tool_length, initial=0.0))
     return ~surely_within(intent.machine, begin, end, longest)
 

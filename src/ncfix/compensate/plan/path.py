@@ -199,13 +199,21 @@ def plan(
     Motions that cannot be corrected stay unchanged and are named in the findings. Raises `RefusedError` NCF401 if the
     machine has no X, Y and Z.
     """
+    demands = Requirements(PathTolerance(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
+    return plan_of(Intent(machine, moves, state), strategy, demands, keep, before)
+
+
+def plan_of(
+    intent: Intent, strategy: Strategy, demands: Requirements, keep: Mask | None = None, before: Array | None = None
+) -> Plan:
+    """As `plan`, of a program on a machine."""
+    machine, moves = intent.machine, intent.moves
     unchanged = (moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)
     unchanged |= keep if keep is not None else False
     if machine.is_perfect or unchanged.all():
         as_it_is = untouched(moves, unchanged)
         return as_it_is if before is None else _behind(machine, as_it_is, moves, before)
-    demands = Requirements(PathTolerance(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
-    return _plan(Intent(machine, moves, state, before), strategy, demands, unchanged)
+    return _plan(intent, strategy, demands, unchanged, before)
 
 
 def _behind(machine: Machine, as_it_is: Plan, moves: Moves, before: Array) -> Plan:
@@ -215,20 +223,20 @@ def _behind(machine: Machine, as_it_is: Plan, moves: Moves, before: Array) -> Pl
     return replace(as_it_is, start=where.start, pieces=replace(as_it_is.pieces, end=where.end))
 
 
-def _plan(intent: Intent, strategy: Strategy, demands: Requirements, unchanged: Mask) -> Plan:
+def _plan(intent: Intent, strategy: Strategy, demands: Requirements, unchanged: Mask, before: Array | None) -> Plan:
     ends = corrected(intent, strategy, np.flatnonzero(~unchanged))
     unchanged = unchanged | ends.failed
     if strategy.corrects_orientation:
-        ends = with_rotary_as_it_stands(intent, ends, unchanged)
+        ends = with_rotary_as_it_stands(intent, ends, unchanged, before)
     approaches = corrected_approaches(intent, ends.wanted, unchanged) if strategy.follows_path else None
-    real, broken = _real(intent, ends.wanted, unchanged, demands, approaches)
+    real, broken = _real(intent, ends.wanted, unchanged, demands, before, approaches)
     bound = intent.moves.compensated | crooked(intent) if strategy.follows_path else np.ones(len(unchanged), dtype=bool)
 
     def without(finding: Finding) -> Plan:
         """The plan in which the motions of a finding stay unchanged, too."""
         also = unchanged.copy()
         also[finding.moves] = True
-        planned = _plan(intent, strategy, demands, also)
+        planned = _plan(intent, strategy, demands, also, before)
         return replace(planned, findings=(*ends.findings, finding, *planned.findings))
 
     text = "this arc would have to be made of straight pieces, and must not be split"
@@ -280,12 +288,17 @@ def _worse_contours(intent: Intent, beside: OffsetPoints | None, unchanged: Mask
 
 
 def _real(
-    intent: Intent, wanted: Array, unchanged: Mask, demands: Requirements, approaches: Array | None
+    intent: Intent,
+    wanted: Array,
+    unchanged: Mask,
+    demands: Requirements,
+    before: Array | None,
+    approaches: Array | None,
 ) -> tuple[Segments, Mask]:
     """What the control would be told without splitting, and the arcs (n,) that cannot stay arcs."""
     moves, programmed = intent.moves, intent.segments
-    wanted = with_closed_circles(intent, wanted, unchanged, demands.budget.path / 2, approaches)
-    where = standing(intent.machine, moves, wanted, unchanged, intent.before, approaches)
+    wanted = with_closed_circles(intent, wanted, unchanged, demands.budget.path / 2, before, approaches)
+    where = standing(intent.machine, moves, wanted, unchanged, before, approaches)
     real = replace(programmed, start=where.start, end=where.end)
     broken = np.zeros(len(moves), dtype=bool)
     rows = np.flatnonzero(programmed.arc & ~unchanged)

@@ -79,10 +79,15 @@ class WrittenPieces:
         """The axis positions of the program at the end of each piece, (m, n_axes) mm and rad."""
         return self.intent.joints_at(self.pieces.move, self.pieces.fraction)
 
-    @cached_property
+    @property
     def done(self) -> Array:
         """The axis positions at the end of each piece, (m, n_axes) mm and rad."""
-        return self.intent.joints(self.pieces.move, self.pieces.end)
+        return self.ends[1]
+
+    @cached_property
+    def ends(self) -> tuple[Array, Array]:
+        """The axis positions where each piece starts and where it ends, (m, n_axes) mm and rad."""
+        return self.intent.ends_of(self.pieces.move, self.segments)
 
     @cached_property
     def correction(self) -> Array:
