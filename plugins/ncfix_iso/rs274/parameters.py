@@ -43,8 +43,14 @@ def modulo(left: float, right: float) -> float:
     return rest + abs(right) if rest < 0.0 else rest
 
 
+FARTHEST = 2**31
+"""From here on a number is no index, label or count."""
+
+
 def whole(value: float, what: str) -> int:
     """A number that must be a whole one, as an index or a label; LinuxCNC allows 0.0001 off."""
+    if not abs(value) < FARTHEST:
+        raise Fault(ARITHMETIC, f"{what} is {value:g}, and no control counts so far")
     nearest = math.floor(value)
     if value - nearest > 0.9999:
         return nearest + 1
