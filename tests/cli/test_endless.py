@@ -15,6 +15,7 @@ from typing import IO, Any
 
 import pytest
 
+from conftest import FULL
 from ncfix import inputs
 from ncfix.cli.console import owned
 from ncfix.cli.main import run
@@ -80,8 +81,14 @@ def test_a_pipe_into_which_nobody_writes(verb: str, here: Path, ncfix: Any) -> N
     assert (result.code, "nobody writes into it" in result.err) == (ExitCode.UNREADABLE, True)
 
 
-@pytest.mark.parametrize("verb", ["machine check INPUT", "check INPUT --assume-zero", "trace INPUT --assume-zero"])
-@pytest.mark.parametrize("source", ["-", "/dev/stdin", "/dev/fd/0", "pipe", "<(cat FILE)"])
+READERS = ("check INPUT --assume-zero", "trace INPUT --assume-zero", "machine check INPUT")
+PIPES = ("-", "/dev/stdin", "/dev/fd/0", "pipe", "<(cat FILE)")
+
+
+@pytest.mark.parametrize(
+    ("verb", "source"),
+    [(verb, pipe) for verb in READERS for pipe in PIPES if FULL or verb == READERS[0] or pipe == "pipe"],
+)
 def test_pipes_are_read_as_files_are(verb: str, source: str, here: Path) -> None:
     file = "machine.toml" if verb.startswith("machine") else "part.ngc"
     line = f'"{sys.executable}" -m ncfix {verb.replace("INPUT", source)}'

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from conftest import some
 from ncfix.cli.programs import Motions
 from ncfix.cli.simulate import Errors
 from ncfix.diagnostics import ExitCode
@@ -168,6 +169,6 @@ def test_programs_of_the_corpus(in_parts_of: Any, shared: Callable[[str], Path])
     """Whether they can go in parts or not."""
     files = [each for each in sorted(shared("corpus").rglob("*")) if each.is_file()]
     found = [each for each in files if 2000 < each.stat().st_size < 30_000]
-    for path in found[:: max(len(found) // 20, 1)]:
+    for path in found[:: max(len(found) // some(20), 1)]:
         for verb in (VERBS[0], VERBS[4]):
             assert in_parts_of(1000, *verb, path, "--assume-zero") == in_parts_of(WHOLE, *verb, path, "--assume-zero")

@@ -6,18 +6,19 @@ from pathlib import Path
 
 import pytest
 
+from conftest import FULL
 from ncfix.diagnostics import UsageError
 from ncfix.tables.control import controls, get_control
 from ncfix.testing import check_control
 
-
-@pytest.mark.parametrize("name", ["linuxcnc", "isg"])
-def test_the_contract(name: str) -> None:
-    check_control(get_control(name))
+IN_ACTUAL_POSITIONS = {"type": "0"}
 
 
-def test_actual_positions_are_the_same_tables_in_another_form() -> None:
-    check_control(get_control("linuxcnc"), {"type": "0"})
+@pytest.mark.parametrize(
+    ("name", "settings"), [("linuxcnc", {}), ("isg", {}), *([("linuxcnc", IN_ACTUAL_POSITIONS)] if FULL else [])]
+)
+def test_the_contract(name: str, settings: dict[str, str]) -> None:
+    check_control(get_control(name), settings)
 
 
 def test_all_are_found() -> None:
