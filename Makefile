@@ -10,7 +10,7 @@ demo:            ## fix the shipped five-axis example
 test:            ## set up and run the tests
 	./try test
 
-full:            ## the tests with grids of cases and random programs whole, where a usual run takes a third or so (an hour)
+full:            ## the tests with grids of cases and random programs whole, where a usual run takes a fifth or so (an hour)
 	NCFIX_FULL=1 ./try test
 
 lint:            ## style, types, floors (needs: pip install -e '.[dev]')

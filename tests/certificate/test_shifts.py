@@ -7,7 +7,7 @@ import random
 import pytest
 
 from certificate.planting import machine
-from conftest import some
+from conftest import FULL
 from ncfix.certificate.findings import BlockProof
 from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
@@ -61,7 +61,7 @@ def proof_of(text: bytes, dialect: str, change: tuple[bytes, bytes] = (b"", b"")
 @pytest.mark.parametrize("dialect", SHIFTS)
 def test_programs_with_shifts_are_proved(dialect: str) -> None:
     rng, proved, motions = random.Random(dialect), 0, 0
-    for _ in range(some(8)):
+    for _ in range(8 if FULL else 3):
         text = shifted(rng, dialect)
         proof, fixed = proof_of(text, dialect)
         assert proof.faults == [], (proof.faults[0], text.decode(), fixed.decode())
