@@ -214,10 +214,10 @@ class KlartextControl(base.ProgramControl):
             self.whole = True
         super().make(motion)
         if self.is_rotated:
-            self.places.place(self._placed_by(motion))
+            self.places.place(self.placed_by(motion))
         self.whole = whole
 
-    def _placed_by(self, motion: Motion) -> int:
+    def placed_by(self, motion: Motion) -> int:
         """As of every control; a cycle with depths from the datum says where the tool axis stands, too."""
         if motion.placed is not None:
             return motion.placed

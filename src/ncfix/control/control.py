@@ -245,9 +245,7 @@ class ProgramControl(ControlState):
                 self.warn(NO_UNIT, NO_UNIT_SAID, f"put {self.unit_codes} at its beginning")
         if self.composed.unknown:
             self.places.lose(mask_of(self.composed.unknown))
-        placed = motion.axes if motion.placed is None else motion.placed
-        if motion.placed is None and (motion.passing or self.modal.incremental):
-            placed = 0
+        placed = self.placed_by(motion)
         unplaced = self.places.unplaced & ~placed
         if self.is_rotated and unplaced & (turned := self._turned()):
             unplaced |= turned  # turned axes go together
@@ -284,6 +282,12 @@ class ProgramControl(ControlState):
                     unknown[index] = self.unknown[index]
                 else:
                     del unknown[index]
+
+    def placed_by(self, motion: Motion) -> int:
+        """The axes whose words say where they stand behind the motion."""
+        if motion.placed is not None:
+            return motion.placed
+        return 0 if motion.passing or self.modal.incremental else motion.axes
 
     def _keep_places(self, motion: Motion, placed: int) -> None:
         """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
