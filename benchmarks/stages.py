@@ -44,7 +44,7 @@ STAGES: dict[str, tuple[tuple[Any, str], ...]] = {
     "write, the long way": ((solve, "emit"),),
     "write: put the text together": ((driver, "spliced"),),
     "figures: tip errors before and after": ((driver, "figures"),),
-    "figures, the long way": ((driver, "error_of"),),
+    "figures, the long way": ((driver, "path_error"),),
 }
 """The functions of each stage. What a stage calls of another counts for that one only."""
 REST = "the rest: joins parts, compares, counts, reports"

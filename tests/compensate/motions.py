@@ -7,9 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.compensate.plan.path import Plan
+from ncfix.compensate.plan import deviation, limits, path
+from ncfix.compensate.plan.arcs import Closure
+from ncfix.compensate.plan.figure_tally import PathError
+from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.plan.intent import Intent
+from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements
+from ncfix.compensate.plan.strategies import Strategy
+from ncfix.compensate.plan.written import Known, WrittenPieces
 from ncfix.control.moves import FeedMode, Frame, MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
+from ncfix.writer.pieces import Pieces
 
 
 @dataclass(frozen=True)
@@ -188,3 +196,44 @@ def _ways(path: np.ndarray, span: np.ndarray) -> np.ndarray:
         ways[k] = np.concatenate([way[:1], way])
         last = way[-1] if span[k] > 1e-6 else last
     return ways.reshape(-1, path.shape[2])
+
+
+def plan(
+    machine: Machine,
+    moves: Moves,
+    strategy: Strategy,
+    tolerance_mm: float,
+    closure: Closure = Closure(),  # noqa: B008
+    keep: np.ndarray | None = None,
+    *,
+    state: State = State(),  # noqa: B008
+    rounding_mm: float = 0.0,
+    split_rapids: bool = False,
+    arc_pieces: bool = False,
+) -> Plan:
+    """The plan of motions on a machine."""
+    demands = Requirements(PathTolerance(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
+    return path.plan(Intent(machine, moves, state), strategy, demands, keep)
+
+
+def findings(machine: Machine, moves: Moves, pieces: Pieces, start: np.ndarray | None = None) -> tuple[Finding, ...]:
+    """What is against pieces; motions start as in the program, or at `start`."""
+    return limits.findings(written(machine, moves, pieces, start))
+
+
+def path_error(
+    machine: Machine,
+    moves: Moves,
+    pieces: Pieces,
+    start: np.ndarray | None = None,
+    *,
+    rows: np.ndarray | None = None,
+    known: Known | None = None,
+) -> PathError:
+    """The tip errors along pieces; motions start as in the program, or at `start`."""
+    return deviation.path_error(written(machine, moves, pieces, start), rows, known)
+
+
+def written(machine: Machine, moves: Moves, pieces: Pieces, start: np.ndarray | None = None) -> WrittenPieces:
+    """Pieces on a program on a machine."""
+    return WrittenPieces(Intent(machine, moves, State()), pieces, moves.start if start is None else start)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
-from compensate.motions import Arc, changed, dense_errors, motions, sweep_of
+from compensate.motions import Arc, changed, dense_errors, motions, plan, sweep_of
 from ncfix.compensate.plan.arcs import Closure, turns_begun
-from ncfix.compensate.plan.path import Plan, plan
+from ncfix.compensate.plan.path import Plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Effect, Machine

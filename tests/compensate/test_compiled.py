@@ -8,16 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compensate.motions import motions
+from compensate.motions import motions, path_error, plan
 from compensate.test_stream import OPTIONS, program, whole
 from conftest import require_core, some
 from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, arc_lengths
 from ncfix.compensate.figures.nearest import Search
-from ncfix.compensate.plan.deviation import bounds, deviations_seen, path_error, samples, starts_to_check
+from ncfix.compensate.plan.deviation import bounds, deviations_seen, samples, starts_to_check
 from ncfix.compensate.plan.ends import corrected
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.sampling import bends, bends_closely, features
 from ncfix.compensate.plan.segments import Segments
 from ncfix.compensate.plan.splitting import STRETCH, PathNodes, fewest

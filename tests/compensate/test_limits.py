@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import STROKE, TOPOLOGIES, perfect, random_machine
-from compensate.motions import Arc, changed, interpolated, motions
+from compensate.motions import Arc, changed, findings, interpolated, motions, plan
 from ncfix.compensate.plan.findings import Finding, Notes
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.limits import FUZZ, findings, increments_beyond_travel
-from ncfix.compensate.plan.path import Plan, plan
+from ncfix.compensate.plan.limits import FUZZ, increments_beyond_travel
+from ncfix.compensate.plan.path import Plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.control.moves import Moves

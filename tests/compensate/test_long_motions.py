@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import perfect
-from compensate.motions import Arc, dense_errors, motions
+from compensate.motions import Arc, dense_errors, findings, motions, plan
 from ncfix.compensate.figures.simulation import samples
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.limits import findings
-from ncfix.compensate.plan.path import Plan, plan
+from ncfix.compensate.plan.path import Plan
 from ncfix.compensate.plan.sampling import MOST_SHOWN
 from ncfix.compensate.plan.splitting import STRETCH, PathNodes, fewest
 from ncfix.compensate.plan.strategies import get_strategy

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
-from compensate.motions import Arc, changed, dense_errors, motions
-from ncfix.compensate.plan.path import plan
+from compensate.motions import Arc, changed, dense_errors, motions, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Effect, Machine, State

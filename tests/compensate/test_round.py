@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
-from compensate.motions import Arc, dense_errors, motions
+from compensate.motions import Arc, dense_errors, motions, plan
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.plan.arcs import Closure
-from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.splitting import SHORTEST, WIDEST
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import Moves

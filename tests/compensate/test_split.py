@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import perfect
-from compensate.motions import Arc, changed, dense_errors, motions
-from ncfix.compensate.plan.path import plan
+from compensate.motions import Arc, changed, dense_errors, motions, plan
 from ncfix.compensate.plan.splitting import PathNodes, fewest
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.machine import Effect, Machine, State

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
-from compensate.motions import motions
+from compensate.motions import motions, plan
 from ncfix.compensate.plan import ends
 from ncfix.compensate.plan.findings import PoseError
-from ncfix.compensate.plan.path import plan
 from ncfix.compensate.plan.strategies import Strategy, get_strategy, strategies
 from ncfix.control.moves import MotionKind
 from ncfix.diagnostics import UsageError

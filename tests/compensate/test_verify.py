@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
-from compensate.motions import Arc, changed, dense_errors, motions
+from compensate.motions import Arc, changed, dense_errors, motions, path_error, plan
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.plan import deviation
-from ncfix.compensate.plan.deviation import path_error
 from ncfix.compensate.plan.figure_tally import FigureTally, PathSamples
-from ncfix.compensate.plan.path import plan, untouched
+from ncfix.compensate.plan.path import untouched
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup

@@ -18,15 +18,17 @@ from ncfix.compensate.driver import PartCorrector, fix_flat, fix_program
 from ncfix.compensate.following import Resolve, Task, follow, placed, suspected
 from ncfix.compensate.parts import MachineParts, Part, Parts
 from ncfix.compensate.plan.findings import Notes
+from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.limits import findings
 from ncfix.compensate.plan.path import untouched
+from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.compensate.report import WRITTEN_FLAT, FixReport, Tally
 from ncfix.compensate.workers import Read, WorkShare
 from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
 from ncfix.control.trace import trace
 from ncfix.diagnostics import Message
-from ncfix.machine import Machine
+from ncfix.machine import Machine, State
 from ncfix.text import stamp
 from ncfix.text.tree import Program
 
@@ -128,7 +130,8 @@ class Survey:
         if self.machine is not None:
             lost_centre = (moves.kind == MotionKind.ARC) & ~np.isfinite(moves.centre).all(axis=1)
             unchanged = (moves.rule == Rule.PASS) | ~np.isfinite(moves.end).all(axis=1) | lost_centre
-            for finding in findings(self.machine, moves, untouched(moves, unchanged).pieces):
+            pieces = untouched(moves, unchanged).pieces
+            for finding in findings(WrittenPieces(Intent(self.machine, moves, State()), pieces, moves.start)):
                 self.travel.add(finding, program, moves, position=position)
 
     def checked(self, blocks: int, remarks: Iterable[Message]) -> Checked:

@@ -50,7 +50,7 @@ from ncfix.compensate.parts import ContinuedPart, MachineParts, PartProof
 from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.plain_figures import figures, largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
-from ncfix.compensate.plan.deviation import error_of
+from ncfix.compensate.plan.deviation import path_error
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.offset import is_offset
@@ -208,7 +208,7 @@ class Corrector:
         emission, shown = solution.emission, solution.shown(self.task.options.split_rapids)
         pieces = replace(solution.plan.pieces, end=emission.end, centre=emission.centre)
         written = WrittenPieces(solution.intent, pieces, emission.start)
-        return error_of(written, shown if own is None else own & shown, solution.plan.known)
+        return path_error(written, shown if own is None else own & shown, solution.plan.known)
 
     def note(self, tally: Tally, program: Program, *errors: tuple[Moves, PathError]) -> None:
         """Take in the tip errors of a part, in each position of block delete."""

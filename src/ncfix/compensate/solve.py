@@ -27,8 +27,8 @@ from ncfix.compensate.plan.arcs import Closure, across
 from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs
-from ncfix.compensate.plan.limits import findings_of, increments_beyond_travel
-from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements, plan_of
+from ncfix.compensate.plan.limits import findings, increments_beyond_travel
+from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements, plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import WrittenPieces, on_digits, rounding, without_idle
 from ncfix.control.coordinates import INCH
@@ -299,13 +299,13 @@ def accepted_plan(
             unchanged[0] |= head.unchanged[at]
             shift = head.shift[at]
         unchanged, reaches_back = _with_what_they_need(moves, unchanged, bound, reasons)
-        planned = plan_of(intent, strategy, demands, unchanged, shift)
+        planned = plan(intent, strategy, demands, unchanged, shift)
         if len(moves):  # of the last one
             off = planned.start[-1] - moves.start[-1]
             history.append((bool(planned.pieces.unchanged[-1]), np.where(np.isfinite(off), off, 0.0)))
         planned = replace(planned, pieces=on_digits(intent, planned.pieces))
         written = WrittenPieces(intent, planned.pieces, planned.start)
-        against = findings_of(written)
+        against = findings(written)
         stays = planned.pieces.unchanged[planned.pieces.first] & ~unchanged
         for finding in against:
             stays[finding.moves] = True

@@ -35,11 +35,9 @@ from ncfix.compensate.plan.sampling import DENSITY, MOST, MOST_SHOWN, bends_clos
 from ncfix.compensate.plan.segments import Segments, accelerations
 from ncfix.compensate.plan.splitting import INSTANT
 from ncfix.compensate.plan.written import Known, WrittenPieces
-from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.machine import Machine, State
+from ncfix.control.moves import MotionKind, Rule
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import DeviationBounds
-from ncfix.writer.pieces import Pieces
 
 SURE = 0.5
 """A motion whose deviation at a first look is under this share of the tolerance is within it."""
@@ -226,29 +224,13 @@ START = 1e-6
 """Fraction of a motion at which its start is looked at."""
 
 
-def path_error(
-    machine: Machine,
-    moves: Moves,
-    pieces: Pieces,
-    start: Array | None = None,
-    *,
-    state: State = State(),  # noqa: B008
-    rows: Mask | None = None,
-    known: Known | None = None,
-) -> PathError:
+def path_error(written: WrittenPieces, rows: Mask | None = None, known: Known | None = None) -> PathError:
     """Tip errors of the real machine along the whole path, by simulation.
 
-    pieces   what is written, with the ends as the control will understand them (`Emission.end`, `.centre`)
-    start    (n, n_axes) where motions really start, as in `Plan` or `Emission`; those of the program if not given
+    written  pieces with the ends as the control will understand them (`Emission.end`, `.centre`)
     rows     (n,) motions to look at; all corrected ones if not given
     known    what has been found out of the ends of motions; they are not looked at again then
     """
-    written = WrittenPieces(Intent(machine, moves, state), pieces, moves.start if start is None else start)
-    return error_of(written, rows, known)
-
-
-def error_of(written: WrittenPieces, rows: Mask | None, known: Known | None) -> PathError:
-    """As `path_error`."""
     pieces, moves = written.pieces, written.intent.moves
     chosen = ~pieces.unchanged if rows is None else rows[pieces.move]
     tally, which = FigureTally(), np.flatnonzero(chosen & (moves.kind != MotionKind.DWELL)[pieces.move])

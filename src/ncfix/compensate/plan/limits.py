@@ -11,9 +11,7 @@ from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import Segments, arcs_within, surely_within
 from ncfix.compensate.plan.written import WrittenPieces
-from ncfix.control.moves import Moves
-from ncfix.machine import Machine, State
-from ncfix.writer.pieces import Pieces
+from ncfix.machine import Machine
 
 FUZZ = 1e-9
 """mm or rad beyond a limit that count as on it: rounding of the arithmetic, a thousandth of any control's digit."""
@@ -35,15 +33,7 @@ STEPS = 16
 Joints = Callable[[Index, Array], Array]
 
 
-def findings(
-    machine: Machine, moves: Moves, pieces: Pieces, start: Array | None = None, state: State | None = None
-) -> tuple[Finding, ...]:
-    """As `findings_of`; `start` (n, n_axes) is where motions really start, or as in the program."""
-    begun = moves.start if start is None else start
-    return findings_of(WrittenPieces(Intent(machine, moves, state or State()), pieces, begun))
-
-
-def findings_of(written: WrittenPieces) -> tuple[Finding, ...]:
+def findings(written: WrittenPieces) -> tuple[Finding, ...]:
     """Everything that is against correcting motions as they are written; only corrected ones are looked at."""
     found = [
         not_a_number(written),

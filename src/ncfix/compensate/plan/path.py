@@ -47,7 +47,7 @@ from ncfix.compensate.plan.splitting import INSTANT, Cutter, Split, joined, may_
 from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.plan.written import Known
 from ncfix.control.moves import MotionKind, Moves, Rule
-from ncfix.machine import Machine, State
+from ncfix.machine import Machine
 from ncfix.writer.pieces import Pieces
 
 LEAST_SHARE = 1e-6
@@ -171,42 +171,16 @@ class Requirements:
 
 
 def plan(
-    machine: Machine,
-    moves: Moves,
-    strategy: Strategy,
-    tolerance_mm: float,
-    closure: Closure = Closure(),  # noqa: B008
-    keep: Mask | None = None,
-    *,
-    state: State = State(),  # noqa: B008
-    rounding_mm: float = 0.0,
-    split_rapids: bool = False,
-    arc_pieces: bool = False,
-    before: Array | None = None,
+    intent: Intent, strategy: Strategy, demands: Requirements, keep: Mask | None = None, before: Array | None = None
 ) -> Plan:
     """Correct the motions of a program.
 
-    tolerance_mm  how far the tool tip may leave the intended path, at the emitted points and between them, before
-                  rounding
-    closure       what the control accepts as an arc; half of it is used
-    keep          (n,) motions to leave as they are, besides those that the tracer does not allow to correct
-    state         what else the errors depend on: `inputs`, numbers or one number per motion
-    rounding_mm   how far the tip may be off because of the control's digits: the norm of half output steps
-    split_rapids  hold the tolerance along rapids too, not only at their ends
-    arc_pieces    make arcs of several arcs where one is not enough; of straight pieces if not
-    before        (n_axes,) how far off the axes stand at the start of the first motion, mm and rad; not if not given
+    keep    (n,) motions to leave as they are, besides those that the tracer does not allow to correct
+    before  (n_axes,) how far off the axes stand at the start of the first motion, mm and rad; not if not given
 
     Motions that cannot be corrected stay unchanged and are named in the findings. Raises `RefusedError` NCF401 if the
     machine has no X, Y and Z.
     """
-    demands = Requirements(PathTolerance(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
-    return plan_of(Intent(machine, moves, state), strategy, demands, keep, before)
-
-
-def plan_of(
-    intent: Intent, strategy: Strategy, demands: Requirements, keep: Mask | None = None, before: Array | None = None
-) -> Plan:
-    """As `plan`, of a program on a machine."""
     machine, moves = intent.machine, intent.moves
     unchanged = (moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL)
     unchanged |= keep if keep is not None else False
