@@ -203,6 +203,17 @@ def test_a_full_circle_without_a_word_of_an_axis_becomes_lines(before: str):
     assert text.splitlines()[2:5:2] == [f"{before}G1  X2.000", "G2 X4 Y0 I1 J0"]
 
 
+@pytest.mark.parametrize("shift", [-0.00049, 0.00049])
+@pytest.mark.parametrize("units", ["G21 G20", "G20 G21", "G21 G21", "G20 G20"])
+def test_a_full_circle_in_another_unit_gets_no_words_for_what_digits_left_over(units: str, shift: float):
+    """Less than half a step of the control, which is more than three half steps of a number in inches."""
+    before, behind = units.split()
+    text = f"{before} G1 X1.000 Y2.000 Z0.000 F9\nG91\n{behind}\nG3 I.5 J.25\nM2\n"
+    line = rewritten(text, (shift, shift, 0.0)).splitlines()[3]
+    assert line.startswith("G3 I")
+    assert not set(line) & set("XY")
+
+
 @pytest.mark.parametrize(("block", "begins"), [("N30 I-1. J0.", "N30 G1 "), ("n30i-1.j0.", "n30g1")])
 @pytest.mark.parametrize("dialect", ["linuxcnc", "iso", "fanuc"])
 def test_a_full_circle_without_words_of_axes_keeps_its_number_in_front(block: str, begins: str, dialect: str):

@@ -112,7 +112,7 @@ class _Emitter:
         kinematics: Kinematics | None,
         bulk: Bulk | None,
     ) -> None:
-        self.program, self.kinematics = program, kinematics
+        self.program, self.kinematics, self.least_increment = program, kinematics, least_increment
         self.language = language_of(program.dialect, WrittenLanguage)
         self.spelling = self.language.spelling(program)
         self.moves, self.pieces, self.reading = moves, pieces, reading
@@ -335,7 +335,8 @@ class _Emitter:
         arcs = pieces.arc[rows] if len(fractions) > 1 and pieces.arc[rows].any() else None
         return Target(
             letters=moves.axes,
-            decimals=self.decimals[self.reading.frame[row]],
+            resolved=self.least_increment / frame.scale,
+            decimals=self.decimals[at],
             start=start,
             nominal=nominal,
             original=nominal - nominal_start if moves.incremental[row] else nominal,

@@ -64,7 +64,8 @@ class Target:
     """What one motion shall become, in program numbers.
 
     letters      axis letters of the columns
-    decimals     (n_axes,) digits after the point that the least increment needs
+    resolved     (n_axes,) the least increment
+    decimals     (n_axes,) digits after the point that it needs
     start        (n_axes,) where the control stands, as emitted so far (NaN unknown)
     nominal      (n_axes,) where the motion ended as programmed
     original     (n_axes,) value of each programmed word: target or increment
@@ -100,6 +101,7 @@ class Target:
     """
 
     letters: tuple[str, ...]
+    resolved: FloatArray
     decimals: NDArray[np.int64]
     start: FloatArray
     nominal: FloatArray
