@@ -89,6 +89,18 @@ def test_what_the_misprint_of_equation_3_8_costs():
     assert wrong[3] * 1e6 == pytest.approx(100 * (35 + 135) / 90, rel=1e-9)
 
 
+def test_where_three_targets_can_stand():
+    """Six of nine coordinates: those of X and the rotary axes (Eq. 32), of Y (36) and of Z (37), each with its rule."""
+    (xk, yk, zk), (xp, yp, zp), (xq, yq, zq) = K, P, Q
+    n = (xk - xq) * (yp - yq) * (zp - zk) - (xk - xp) * (yk - yq) * (zq - zp)
+    v = xk * zp - xk * zq - xp * zk + xp * zq + xq * zk - xq * zp
+    choices = {"Px Py Qx Qz Ky Kz": n, "Py Pz Qy Kx Kz Px": (yk - yp) * v, "Pz Qx Qz Ky Px Py": -(yp - yq) * v}
+    targets = {"K": K, "P": P, "Q": Q}
+    for choice, rule in choices.items():
+        used = [rows(targets[each[0]])["xyz".index(each[1])] for each in choice.split()]
+        assert np.linalg.det(used) == pytest.approx(rule, rel=1e-9)
+
+
 def test_targets_in_one_plane_of_z_have_no_closed_form_and_do_in_least_squares():
     """The thesis asks for unequal heights; three points that are not in line are enough."""
     errors = np.array([0.01, 0.02, -0.01, 1e-4, -2e-4, 3e-4])

@@ -97,5 +97,20 @@ def test_one_ball_has_no_length_standard_but_gains_are_relative():
     assert any(label.endswith("u^1") for label in held)
 
 
+def test_the_13_of_an_ac_table_have_no_error_along_the_spindle():
+    """Chapter 7 calls the spindle's offsets EX0S and EZ0S in a tool frame with z along y of the base (section 7.2).
+
+    Along the spindle an offset is the length of the stylus, which is never told from the set-up. With the spindle
+    indexed all others are told; the gain of one linear axis has no length standard.
+    """
+    selection = select(AC, "esmaeili-13-ac")
+    plan = strategy()
+    indexed = plan.with_columns({"spindle_deg": 60.0 * (np.arange(len(plan)) % 6)})
+    problem = Problem.of([indexed], AC, selection)
+    found = solve(problem.design, problem.nuisance(problem.start), np.zeros(len(problem.values)))
+    assert found.set_up == ()
+    assert [selection.labels[each.held] for each in found.combinations] == ["EZZ u^1"]
+
+
 def test_models_have_names():
     assert {"esmaeili-10", "esmaeili-12", "esmaeili-81", "esmaeili-84"} < set(MODELS)

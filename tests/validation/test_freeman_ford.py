@@ -212,6 +212,14 @@ def test_table_3_by_the_machine_file(a: int, c: int, printed: tuple[str, ...]) -
     assert [f"{value:.6f}" for value in nominal(*pose, tool_length=20.0)[:3]] == list(printed)
 
 
+def test_a_head_of_50_degrees_sweeps_200_degrees() -> None:
+    """Printed: 190 degrees. The spindle leans by up to 2 Yp to either side."""
+    nominal, _ = compiled(first_order())
+    lean = np.arccos(nominal(np.linspace(0, 2 * np.pi, 361), 0.0, Yp=50 * DEGREE)[:, 5]) / DEGREE
+    assert lean.min() == pytest.approx(0, abs=1e-5)
+    assert 2 * lean.max() == pytest.approx(200, abs=1e-9)
+
+
 # -- Figure 3 and the orders ------------------------------------------------------------------------------------------
 
 FIGURE_3 = {

@@ -5,7 +5,8 @@ radial and tilt motions of a rotary axis no part once per revolution (that is wh
 
 Named models are those of S. Esmaeili Marzdashti, PhD thesis, Polytechnique Montreal, 2021. Location errors are
 inter-axis errors, carried by what follows (`carried`). Error motions are ordinary cubics in mm and rad, Eq. 19; `b` is
-a backlash. The models of 10 and 12 have no length standard: EYY and EZZ are gains relative to X.
+a backlash. The models of 10 and 12 have no length standard: EYY and EZZ are gains relative to X. Names are in the base
+frame: the EZ0S of chapter 7 is in a tool frame whose z is the base's y, so it is EY0S here.
 """
 
 from __future__ import annotations
@@ -271,7 +272,7 @@ MODELS = {
         Model("esmaeili-10", "locations and relative gains of an AC table, chapter 6", TEN, "YY1 ZZ1"),
         Model("esmaeili-12", "the same with the backlash of A and C, chapter 5", TEN, "YY1 ZZ1 AAb CCb"),
         Model("esmaeili-13-bc", "locations, spindle and gains of a BC table, chapter 4", THIRTEEN_BC, GAINS),
-        Model("esmaeili-13-ac", "the same of an AC table, chapter 7", (*TEN, "EX0S", "EZ0S"), GAINS),
+        Model("esmaeili-13-ac", "the same of an AC table, chapter 7", (*TEN, "EX0S", "EY0S"), GAINS),
         Model("esmaeili-81", "cubics of all axes of an AC table, chapter 5", (), MOTIONS_81),
         Model("esmaeili-84", "cubics of all axes of a BC table, chapter 4", (), MOTIONS_84),
     )
