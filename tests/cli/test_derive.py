@@ -34,6 +34,10 @@ def test_latex(ncfix: Any, root: Path) -> None:
     assert rb"\begin{align*}" in ncfix("derive", "--chain", root / CHAIN, "--latex").out
 
 
+def test_c(ncfix: Any, root: Path) -> None:
+    assert b"void error(" in ncfix("derive", "--chain", root / CHAIN, "--c").out
+
+
 def test_python_runs(ncfix: Any, root: Path, tmp_path: Path) -> None:
     path = tmp_path / "formulas.py"
     assert ncfix("derive", "-m", root / HEAD, "--effects", "machine", "--python", "-o", path).code == 0

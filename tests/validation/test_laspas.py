@@ -68,7 +68,7 @@ def test_equations_13_to_26_are_the_machine_s_error_and_a_rigid_turn():
 
     Errors of the table X' count in the sense of its axis there, the tool's against the table; the machine file has the
     body's. S turns the lever besides the motion. Of X that is a turn of the whole part about the measurement point: the
-    angles between axes are right, and deviations on a tool path up to 11 um too large or too small (24.362 um/m, 450 mm).
+    angles between axes are right, and a deviation on his path 1 is off by 11 um at most (24.362 um/m, x = -350).
     """
     random = np.random.default_rng(7)
     motions = {axis: random.normal(size=(2, 3)) * [[0.02], [4e-5]] for axis in "XYZ"}
@@ -92,7 +92,8 @@ def test_equations_13_to_26_are_the_machine_s_error_and_a_rigid_turn():
         found = machine.error([x, y, z], State(laspas.LENGTH))[:3]
         # angle times angle times 1 m
         np.testing.assert_allclose(total, found + turned, rtol=0, atol=5e-6)
-    assert 24.362e-3 * (800 - 350) == pytest.approx(11, abs=0.05)
+    farthest = np.cross(square["X"], [-350.0, 0, 0] - measured["X"] * [1, 0, 0])
+    assert np.abs(farthest).max() * 1e3 == pytest.approx(11, abs=0.05)
 
 
 def test_the_reversal_of_z_is_missed_without_its_effect_and_found_with_it():

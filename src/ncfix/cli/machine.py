@@ -271,6 +271,7 @@ def _bases() -> list[Row]:
 @click.option("--letters", is_flag=True, help="Fixed angles between axes as letters instead of their values.")
 @click.option("--latex", "form", flag_value="latex", help="Print LaTeX.")
 @click.option("--python", "form", flag_value="python", help="Print a Python module of numpy functions.")
+@click.option("--c", "form", flag_value="c", help="Print C source of the same functions.")
 @click.option("--protocol", "form", flag_value="protocol", help="Print what can be identified, and a protocol.")
 @click.option("--vary", metavar="LIST", default="tool_length", help="Lengths to vary as well, for --protocol.")
 @click.option(
@@ -314,8 +315,8 @@ def derive(
             if form == "protocol":
                 text = symbolic.measuring(derivation, vary.split(","))
             else:
-                write = {"latex": symbolic.to_latex, "python": symbolic.to_python}.get(form or "", symbolic.to_text)
-                text = write(derivation)
+                written = {"latex": symbolic.to_latex, "python": symbolic.to_python, "c": symbolic.to_c}
+                text = written.get(form or "", symbolic.to_text)(derivation)
         target.write(text.encode())
     if as_json:
         console.put_json(**_derivation_as_dict(derivation))

@@ -1,19 +1,23 @@
-"""Text, LaTeX and Python: every formula is there, and what is printed computes what was derived."""
+"""Text, LaTeX, Python and C: every formula is there, and what is printed computes what was derived."""
 
 from __future__ import annotations
 
 import ast
+import ctypes
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
 
+from conftest import missing
 from ncfix.machine import load
 from ncfix.machine.symbolic import Chain, Derivation, Size, Variable, derive
 from ncfix.machine.symbolic.chain import UNITS, Rotation, Translation
-from ncfix.machine.symbolic.printing import compiled, to_latex, to_python, to_text
+from ncfix.machine.symbolic.printing import compiled, to_c, to_latex, to_python, to_text
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -85,6 +89,35 @@ def test_python_functions_broadcast(derivation: Derivation) -> None:
     x, c = np.linspace(0, 100, 4)[:, None], np.linspace(0, 1, 3)
     assert nominal(x, 0.0, 0.0, c, 0.0).shape == (4, 3, 6)
     assert error(x, 0.0, 0.0, c, 0.0, EXX=np.zeros((5, 1, 1))).shape == (5, 4, 3, 6)
+
+
+def test_c_computes_what_python_does(derivation: Derivation, tmp_path: Path) -> None:
+    """All dimensions are parameters: a tool length that nobody gives would be zero."""
+    compiler = shutil.which("cc") or missing("a C compiler (cc) is not installed", "NCFIX_REQUIRE_TOOLS")
+    source, made = tmp_path / "formulas.c", tmp_path / "formulas.so"
+    source.write_text(to_c(derivation))
+    assert max(map(len, source.read_text().splitlines())) <= 120
+    strict = ("-std=c99", "-pedantic", "-Wall", "-Werror", "-shared", "-fPIC")
+    subprocess.run([compiler, *strict, source, "-o", made, "-lm"], check=True)
+    functions = ctypes.CDLL(str(made))
+    rng = np.random.default_rng(5)
+    chain = derivation.chain
+    for name, function, given in zip(
+        ("nominal", "error"),
+        compiled(derivation),
+        ((*chain.axes, *chain.dimensions), (*chain.axes, *chain.dimensions, *chain.smalls)),
+        strict=True,
+    ):
+        values = dict(zip((each.name for each in given), rng.uniform(-3, 3, len(given)), strict=True))
+        result = (ctypes.c_double * 6)()
+        getattr(functions, name)(*map(ctypes.c_double, values.values()), result)
+        np.testing.assert_allclose(list(result), function(**values), rtol=1e-13, atol=1e-13)
+
+
+def test_no_name_leaves_the_comment_of_the_c_source() -> None:
+    variable = Variable("a", Size.SMALL, "*/ int main")
+    chain = Chain("*/ name", (variable,), (Rotation(UNITS["x"], variable.symbol),))
+    assert to_c(derive(chain)).count("*/") == 3
 
 
 def test_second_order_is_named_and_has_products() -> None:

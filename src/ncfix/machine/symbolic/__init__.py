@@ -32,7 +32,7 @@ from ncfix.machine.symbolic.identification import (  # noqa: E402
     protocol,
 )
 from ncfix.machine.symbolic.inverse import Inverse, inverse_nominal  # noqa: E402
-from ncfix.machine.symbolic.printing import to_latex, to_python, to_text  # noqa: E402
+from ncfix.machine.symbolic.printing import to_c, to_latex, to_python, to_text  # noqa: E402
 
 __all__ = [
     "Chain",
@@ -52,6 +52,7 @@ __all__ = [
     "loads_chain",
     "measuring",
     "protocol",
+    "to_c",
     "to_latex",
     "to_python",
     "to_text",

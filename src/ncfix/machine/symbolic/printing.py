@@ -1,4 +1,4 @@
-"""Formulas as plain text, as LaTeX (`align*` of amsmath) and as Python source of two functions of numpy arrays."""
+"""Formulas as plain text, as LaTeX (`align*` of amsmath), and as two functions in Python (numpy arrays) or in C."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import sympy as sp
+from sympy.printing.c import C99CodePrinter
+from sympy.printing.codeprinter import CodePrinter
 from sympy.printing.numpy import NumPyPrinter
 
 from ncfix.machine.symbolic.chain import Variable
@@ -102,6 +104,8 @@ def _latex_product(errors: str, size: sp.Expr, names: dict[sp.Expr, str]) -> str
 
 WIDTH = 116
 """Characters in a line of the source."""
+UNBROKEN = "\N{NO-BREAK SPACE}"
+"""A space at which no line ends."""
 
 
 def to_python(derivation: Derivation) -> str:
@@ -123,6 +127,28 @@ def to_python(derivation: Derivation) -> str:
     )
 
 
+def to_c(derivation: Derivation) -> str:
+    """C99: `void nominal(..., double result[6])` and `error`; every dimension and error is a parameter."""
+    chain = derivation.chain
+    title = f"{chain.name}: errors to {ordinal(derivation.order)} order. mm, rad."
+    told = (title, "", *variable_table(chain.variables))
+    lines = ["/*", *(f" * {line}".rstrip().replace("*/", "* /") for line in told), " */", "", "#include <math.h>"]
+    large, printer = (*chain.axes, *chain.dimensions), C99CodePrinter({"math_macros": {}})
+    nominal = {name: derivation.nominal[name] for name in (*POSITION, *DIRECTION)}
+    for name, formulas, meaning, given in (
+        ("nominal", nominal, MEANINGS[0], large),
+        ("error", derivation.error, MEANINGS[1], (*large, *chain.smalls)),
+    ):
+        parameters = [f"double{UNBROKEN}{each.name}" for each in given] + [f"double{UNBROKEN}result[6]"]
+        lines += ["", f"/* {meaning} */", *_wrapped(f"void {name}(", parameters, ")", ""), "{"]
+        places = {target: f"result[{place}]" for place, target in enumerate(formulas)}
+        plain = {target: formula.xreplace({sp.pi: sp.pi.evalf(17)}) for target, formula in formulas.items()}
+        for target, expression in _assignments(plain, given, printer):
+            lines += _wrapped(f"    {places.get(target, f'const double {target}')} = ", [expression], ";", "    ")
+        lines.append("}")
+    return "\n".join(lines).replace(UNBROKEN, " ") + "\n"
+
+
 def compiled(derivation: Derivation) -> tuple[Callable[..., object], Callable[..., object]]:
     """The functions `nominal` and `error` of that module, ready to be called."""
     module: dict[str, Callable[..., object]] = {}
@@ -135,8 +161,8 @@ def _function(
 ) -> str:
     lines = [*_wrapped(f"def {name}(", _parameters(large, small), "):", ""), f'    """{meaning}"""']
     lines.append("    shape = np.broadcast_shapes(*map(np.shape, locals().values()))")
-    for target, expression in _assignments(formulas, [*large, *small]):
-        lines += _wrapped(f"    {target} = ", [expression], "", "    ")
+    for target, expression in _assignments(formulas, [*large, *small], NumPyPrinter()):
+        lines += _wrapped(f"    {target} = ", [expression.replace("numpy.", "np.")], "", "    ")
     lines.append(
         f"    return np.stack([np.broadcast_to(v, shape) for v in ({', '.join(formulas)})], axis=-1).astype(float)"
     )
@@ -161,11 +187,12 @@ def _parameters(large: Sequence[Variable], small: Sequence[Variable]) -> Iterato
     yield from ("*", *keywords) if keywords else ()
 
 
-def _assignments(formulas: dict[str, sp.Expr], variables: Sequence[Variable]) -> Iterator[tuple[str, str]]:
+def _assignments(
+    formulas: dict[str, sp.Expr], variables: Sequence[Variable], printer: CodePrinter
+) -> Iterator[tuple[str, str]]:
     plain = {variable.symbol: variable.plain for variable in variables if variable.arguments}
     taken = {variable.name for variable in variables} | {*formulas, "shape", "v"}
     names = (symbol for symbol in sp.numbered_symbols("c") if symbol.name not in taken)
     parts, results = sp.cse([formula.xreplace(plain) for formula in formulas.values()], names)
-    printer = NumPyPrinter()
     for symbol, expression in (*parts, *zip(formulas, results, strict=True)):
-        yield str(symbol), printer.doprint(expression).replace("numpy.", "np.")
+        yield str(symbol), printer.doprint(expression)
