@@ -35,7 +35,7 @@ from ncfix.tables.control import (
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_even_nodes, least_of_functions
 from ncfix.tables.table_files import Remarks, check_all, messages_of
-from ncfix.tables.volume import AIM, Mesh, Volume, search
+from ncfix.tables.volume import AIM, Mesh, Volume, search, unseen_axes
 from ncfix_fanuc.parameters import (
     BACKLASH_ASSUMPTION,
     BACKLASH_OPTIONS,
@@ -72,8 +72,8 @@ ORDER_FORM = SettingForm("XYZ, ZYX, ...: each axis once", lambda text: sorted(te
 TEMPLATE = "N{no}A1P{dx}A2P{dy}A3P{dz};"
 FITS = {"auto": (False, True), "nodes": (False,), "area": (True,)}
 ROTARY_NOTES = {
-    "zero": "The grid is that of rotary axes at zero; at other angles more is left (rotary=middle shares it out).",
-    "middle": "The grid lies in the middle of what all angles of the rotary axes ask for, and is exact at none.",
+    "zero": "The grid is that of {} at zero; elsewhere more is left (rotary=middle shares it out).",
+    "middle": "The grid lies in the middle of what all positions of {} ask for, and is exact at none.",
 }
 LEVEL = 0.1
 """Of the target: where less changes towards an end of the travel, the edge of the grid may hold."""
@@ -307,8 +307,8 @@ class GridFilling:
         yield from self.backlash.notes(self.unit)
         done = self.backlash.tables(self.unit)
         yield from reversal_note(request.machine, request.space, request.tool_length, done)
-        if request.machine.rotary.any():
-            yield ROTARY_NOTES[self.rotary]
+        if others := unseen_axes(request.machine, request.space, request.tool_length, LINEAR):
+            yield ROTARY_NOTES[self.rotary].format(others)
         if style.template:
             yield f"{VOLUME_TEXT} is a guess at the control's own file (FANUC-5): compare it with a punched one first."
 

@@ -28,7 +28,7 @@ from ncfix.tables.control import Assumption, Control, Files, Option, Properties,
 from ncfix.tables.correction import corners, exact_correction, linear_axes, residual
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import DEGREE, Remarks, check_all, in_order, messages_of
-from ncfix.tables.volume import AIM, Mesh, Volume, inputs_that_matter, search
+from ncfix.tables.volume import AIM, Mesh, Volume, inputs_that_matter, search, unseen_axes
 from ncfix_fanuc.control import LEVEL
 from ncfix_fanuc.parameters import (
     BACKLASH_ASSUMPTION,
@@ -286,8 +286,9 @@ def _notes(
         yield f"{kind}: {left['max']:.2f} um at most are left, {left['rms']:.2f} rms."
         if not mesh.reached:
             yield f"Its share of the target of {1e3 * request.target:g} um is not reached with the points allowed."
-    if len(lattices) == 1 and request.machine.rotary.any():
-        yield "The lattice is that of rotary axes at zero; at other angles more is left."
+    seen = [axis for lattice, _ in lattices for axis in lattice.inputs]
+    if others := unseen_axes(request.machine, request.space, request.tool_length, seen):
+        yield f"The lattice is that of {others} at zero; elsewhere more is left."
     yield from more
     yield from reversal_note(request.machine, request.space, request.tool_length, play)
 
@@ -375,7 +376,8 @@ class LatticeFilling:
 def table_axes(request: Request) -> tuple[str, ...]:
     """The rotary axes that matter, if all of them turn the workpiece; else none."""
     machine = request.machine
-    found = [name for name in inputs_that_matter(machine, request.space, request.tool_length) if name not in LINEAR]
+    matter = inputs_that_matter(machine, request.space, request.tool_length)
+    found = [axis.name for axis in machine.axes if axis.rotary and axis.name in matter]
     on_table = machine.topology.upper().split("F")[0]
     return tuple(sorted(found)) if found and all(name in on_table for name in found) else ()
 

@@ -12,8 +12,9 @@ CODES = {
     ),
     "NCF481": Code(
         "a machine that tables are not made for",
-        "Tables correct the tool tip with three linear axes, and this machine has more or fewer.",
-        "`ncfix fix` corrects the programs of any machine.",
+        "Tables move the tool tip with three linear axes: with X, Y and Z where a machine has more, as a boring mill "
+        "has W. This one has fewer, or its axes have other names.",
+        "`ncfix fix` corrects programs for any machine with X, Y and Z.",
     ),
     "NCF482": Code(
         "no correction found at a node",

@@ -19,6 +19,7 @@ from ncfix.machine import Machine, State
 from ncfix.tables.compensation import Tables
 from ncfix.tables.grid import Array, full_grid
 
+SPATIAL = ("X", "Y", "Z")
 ARRIVED = 1e-7
 """mm: nearer to the intended tip than any control can resolve."""
 NEWTON_PASSES = 20
@@ -32,10 +33,15 @@ POSES = 20_000
 
 
 def linear_axes(machine: Machine) -> list[int]:
-    """The columns of the three linear axes; raises `RefusedError` NCF481 if there are not exactly three."""
+    """The columns of the three linear axes that take up the errors: X, Y and Z where there are more than three.
+
+    Raises `RefusedError` NCF481 if there are fewer, or more and X, Y or Z is not among them.
+    """
     found = np.flatnonzero(~machine.rotary).tolist()
+    if len(found) > 3:
+        found = [column for column in found if machine.axis_names[column] in SPATIAL]
     if len(found) != 3:
-        text = f"tables need exactly three linear axes, this machine has {len(found)}"
+        text = "tables need three linear axes, X, Y and Z if there are more, to bring the tip where it should be"
         raise RefusedError.of("NCF481", text, hint="correct its programs instead: ncfix fix")
     return found
 

@@ -103,7 +103,7 @@ class Volume:
     def of(
         cls, machine: Machine, inputs: tuple[str, ...], space: Array, tool_length: float, area: bool = False
     ) -> Volume:
-        """The three linear axes of a machine over some axes; the others stay at zero, or as near as they can."""
+        """X, Y and Z of a machine over some axes; the others stay at zero, or as near as they can."""
         columns = [machine.axis_names.index(name) for name in inputs]
         linear = linear_axes(machine)
         rest = np.clip(np.zeros(len(space)), space[:, 0], space[:, 1])
@@ -279,18 +279,23 @@ def even_line(low: float, high: float, count: int, anchor: float | None) -> Arra
 
 
 def inputs_that_matter(machine: Machine, space: Array, tool_length: float) -> tuple[str, ...]:
-    """The linear axes, and those rotary axes on which the correction depends."""
+    """The linear axes that take up the errors, and those others on which the correction depends."""
     q, other = random_poses(space, 200, seed=13), random_poses(space, 200, seed=17)
     state = State(tool_length)
     before = exact_correction(machine, q, state)
-    found = []
+    found, linear = [], linear_axes(machine)
     for axis, name in enumerate(machine.axis_names):
         moved = q.copy()
         moved[:, axis] = other[:, axis]
         changed = np.abs(exact_correction(machine, moved, state) - before).max()
-        if not machine.rotary[axis] or changed > MATTERS:
+        if axis in linear or changed > MATTERS:
             found.append(name)
     return tuple(found)
+
+
+def unseen_axes(machine: Machine, space: Array, tool_length: float, inputs: Sequence[str]) -> str:
+    """The axes on which the correction depends and a table over `inputs` does not, in words; empty: there are none."""
+    return ", ".join(name for name in inputs_that_matter(machine, space, tool_length) if name not in inputs)
 
 
 @dataclass(frozen=True, slots=True)
