@@ -1,17 +1,13 @@
-"""What docs/accuracy.md says, worked out: `make accuracy` writes the page.
+"""The tables of docs/accuracy.md that are worked out here: `make accuracy` writes them into the page.
 
     python tests/validation/accuracy.py [STUDY...] [--draws N] [--chains N] [-o FILE]
 
-The text is that of accuracy_text.md and accuracy_checklists.md, beside this file; in it a study's table replaces its
-mark `<!-- name -->`.
-Studies that are not asked for keep what the page has for them, and so does the hidden-effect benchmark's section, which
-`make hidden` writes.
+A table stands between marks that are not seen when the page is shown; the rest of the page stays as it is.
 """
 
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,10 +15,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from tests.hidden import tally  # noqa: E402
+from diagnose.tables import put  # noqa: E402
 
-TEMPLATE = Path(__file__).with_name("accuracy_text.md")
-CHECKLISTS = Path(__file__).with_name("accuracy_checklists.md")
 PAGE = ROOT / "docs" / "accuracy.md"
 
 
@@ -62,37 +56,6 @@ STUDIES: dict[str, Callable[[argparse.Namespace], str]] = {
 }
 
 
-WRITTEN_ELSEWHERE = ("study", "calibration", "metamorphic")
-"""Tables that `make study` and `make metamorphic` write; they stay."""
-
-
-def marked(name: str, table: str) -> str:
-    """A study's part of the page, between marks that are not seen when it is shown."""
-    return f"<!-- {name}: begin -->\n{table}\n<!-- {name}: end -->"
-
-
-def kept(page: str, name: str) -> str:
-    """What the page has for a study that is not worked out anew."""
-    found = re.search(rf"<!-- {name}: begin -->\n(.*?)\n<!-- {name}: end -->", page, re.DOTALL)
-    return found[1] if found else f"Not worked out yet: `make accuracy STUDIES={name}`."
-
-
-def benchmark(page: str) -> str:
-    """The section of the hidden-effect benchmark as the page has it."""
-    if tally.BEGIN not in page or tally.END not in page:
-        return ""
-    return page[page.index(tally.BEGIN) : page.index(tally.END) + len(tally.END)]
-
-
-def assembled(page: str, tables: dict[str, str]) -> str:
-    """The new page from the old one and the tables that were worked out."""
-    text = TEMPLATE.read_text().replace("<!-- checklists -->\n", CHECKLISTS.read_text())
-    for name in (*STUDIES, *WRITTEN_ELSEWHERE):
-        text = text.replace(f"<!-- {name} -->", marked(name, tables.get(name) or kept(page, name)))
-    section = benchmark(page)
-    return tally.replaced(text, section) if section else text
-
-
 def main() -> None:
     """Write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -106,9 +69,7 @@ def main() -> None:
         parser.error(f"no study {unknown[0]}: {', '.join(STUDIES)}")
     for name in options.studies or STUDIES:
         table = STUDIES[name](options)
-        # read again for each: another study, or the benchmark, may have written meanwhile
-        page = options.output.read_text() if options.output.exists() else ""
-        options.output.write_text(assembled(page, {name: table}))
+        put(str(options.output), name, [table])
         print(table)
 
 

@@ -7,6 +7,7 @@ import os
 import numpy as np
 import pytest
 
+from diagnose.tables import put
 from validation import accuracy, plans, random_chains, round_trips
 
 QUICK = (0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11)
@@ -52,12 +53,15 @@ def test_forty_planned_poses_beat_forty_random_ones(figures):
     assert found.planned < 1.25 * found.bound
 
 
-def test_a_page_keeps_what_is_not_worked_out_anew():
-    tables = dict.fromkeys(accuracy.STUDIES, "| first |")
-    page = accuracy.assembled("", tables)
-    section = f"{accuracy.tally.BEGIN}\nof the benchmark\n{accuracy.tally.END}"
-    again = accuracy.assembled(f"{page}\n{section}\n", {"plans": "| second |"})
-    assert again.count("| first |") == len(accuracy.STUDIES) - 1
-    assert again.count("| second |") == 1
-    assert section in again
-    assert accuracy.assembled(again, {}) == again
+def test_a_study_writes_its_table_into_the_page_and_nothing_else(tmp_path, root):
+    text = (root / "docs" / "accuracy.md").read_text()
+    page = tmp_path / "accuracy.md"
+    page.write_text(text)
+    for name in accuracy.STUDIES:
+        put(str(page), name, ["| another |"])
+    again = page.read_text()
+    assert again.count("| another |") == len(accuracy.STUDIES)
+    for name in accuracy.STUDIES:
+        begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+        put(str(page), name, [text[text.index(begin) + len(begin) + 1 : text.index(end) - 1]])
+    assert page.read_text() == text
