@@ -92,9 +92,10 @@ def units_of(settings: Mapping[str, str]) -> tuple[float, float]:
 
 
 def is_records(content: bytes) -> bool:
-    """Whether a file is of records between two lines with %, as parameters are punched."""
-    rows = [row.strip() for row in content.decode("latin-1").split("\n") if row.strip()]
-    return len(rows) > 1 and rows[0] == "%" and bool(RECORD.fullmatch(rows[1]) or PLAIN.fullmatch(rows[1]))
+    """Whether a file is of records as parameters are punched; the lines with % around them may have been lost."""
+    rows = ("".join(row.split()).upper() for row in content.decode("latin-1").splitlines())
+    first = next((row for row in rows if row.strip("%")), "")
+    return bool(RECORD.fullmatch(first) or PLAIN.fullmatch(first))
 
 
 def parameter_text(values: Mapping[int, Mapping[int, float]]) -> bytes:

@@ -27,7 +27,7 @@ ACTIVE = "ACTIVE"
 CONFIG = "config.cma"
 BACKLASH = "BACKLASH"
 POSITION = "AXISPOS"
-NCK_BEGIN = re.compile(r"(\S+) (MM|INCH)\s*")
+NCK_BEGIN = re.compile(r"(\S+) (MM|INCH)(?: +(?i:VERSION): *'[^']*')?(?: +U)?\s*")
 OLD_BEGIN = re.compile(r"(\S+)\s+DATUM:([-+]?\d+\.?\d*)\s+DISTANCE:([-+]?\d+\.?\d*)\s*")
 FUNCTION = re.compile(r"(\d+)=F\(\)")
 COMPONENT = re.compile(r"C[1-6]")

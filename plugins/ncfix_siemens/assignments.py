@@ -36,6 +36,8 @@ WHOLE = 1e-6
 """How far from a whole number (MAX - MIN) / STEP may be."""
 MOST = 100_000
 """Points of a table, beyond any control's."""
+BOOLS = ("FALSE", "TRUE")
+"""How SINUMERIK may write 0 and 1."""
 KEEPS = "the control keeps what it had"
 
 
@@ -211,7 +213,8 @@ class Assigned:
         """A field that is a whole number, one of those allowed; 0 if it is not there."""
         if name not in self.fields:
             return 0
-        value = self.number(name)
+        said = self.fields[name].value.upper()
+        value = float(BOOLS.index(said)) if said in BOOLS and allowed == (0, 1) else self.number(name)
         if value != int(value) or (allowed is not None and int(value) not in allowed):
             wanted = "a whole number" if allowed is None else f"one of {', '.join(map(str, allowed))}"
             self.remarks.refuse(self.fields[name].line, f"{name} is {value:g}, not {wanted}")

@@ -1,28 +1,54 @@
-"""Text as people and spreadsheets save it: UTF-8, UTF-16 or Latin-1, with cells parted by commas, semicolons or tabs.
+"""Text as people and spreadsheets save it: UTF-8, UTF-16 or Latin-1, with cells parted by commas, semicolons, tabs or
+blanks.
 
-Where semicolons or tabs part the cells, numbers may have a decimal comma, as spreadsheets of many countries write them;
-then all of a file have it, since 1,234 is read as it stands.
+Where semicolons, tabs or blanks part the cells, numbers may have a decimal comma, as spreadsheets of many countries
+write them; then all of a file have it, since 1,234 is read as it stands.
 """
 
 from __future__ import annotations
 
 import codecs
+import re
 from dataclasses import dataclass
 
 MARKS = ",;\t"
-"""What may part cells."""
+"""What may part cells, besides blanks."""
+WORD = re.compile(r'"[^"]*"|\S+')
+OTHERS = {
+    b"PK\x03\x04": ("a workbook of a spreadsheet", "save its sheet as CSV"),
+    b"\xd0\xcf\x11\xe0": ("a workbook of an old spreadsheet", "save its sheet as CSV"),
+    b"%PDF": ("a PDF", "export the readings of the instrument's program as text"),
+    b"\x1f\x8b": ("a compressed file", "unpack it first"),
+    b"<": ("XML", "export it as text or CSV from the program that wrote it"),
+    b"{": ("JSON", "export it as text or CSV from the program that wrote it"),
+}
+"""How files begin that hold no lines of cells: what they are, and what helps."""
 
 
 def plain_text(source: bytes) -> str | None:
-    """The text of a file: UTF-16 if it says so by its mark, else UTF-8, else Latin-1; None if it is none."""
+    """The text of a file: UTF-16 by its mark or its zeros, else UTF-8, else Latin-1; None if it is none."""
     try:
         if source.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
             found = source.decode("utf-16")
         else:
-            found = source.decode("utf-8-sig")
+            found = source.decode(_coding(source[:4096]))
     except UnicodeDecodeError:
         found = source.decode("latin-1")
     return None if "\0" in found else found
+
+
+def _coding(beginning: bytes) -> str:
+    """The coding of a text without a mark of UTF-16: there the other byte of most letters is zero, and one never is."""
+    zeros = beginning[0::2].count(0), beginning[1::2].count(0)
+    if min(zeros) or max(zeros) * 4 <= len(beginning):
+        return "utf-8-sig"
+    return "utf-16-be" if zeros[0] else "utf-16-le"
+
+
+def other_form(source: bytes) -> tuple[str, str]:
+    """What a file is that holds no lines of cells, and what helps; empty words for any other."""
+    start = source.removeprefix(codecs.BOM_UTF8).lstrip()
+    return next((said for begin, said in OTHERS.items() if start.startswith(begin)), ("", ""))
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +64,7 @@ class Cell:
 class SeparatedText:
     """How the cells of a file are parted, and how its numbers are written.
 
-    mark     what parts the cells
+    mark     what parts the cells; " " for any number of blanks
     decimal  the decimal mark of the first number that has one; "" before
     """
 
@@ -47,11 +73,13 @@ class SeparatedText:
 
     @classmethod
     def of(cls, names: str) -> SeparatedText:
-        """By the line with the names of the columns: a semicolon or a tab in it parts the cells, else commas do."""
-        return cls(next((mark for mark in ";\t" if mark in names), ","))
+        """By the line with the names of the columns: a semicolon, tab or comma in it, else blanks, part the cells."""
+        return cls(next((mark for mark in ";\t," if mark in names), " " if len(names.split()) > 1 else ","))
 
     def cells(self, row: str, line: int) -> list[Cell]:
         """The cells of a row; blanks and a spreadsheet's quotes round a cell are taken off."""
+        if self.mark == " ":
+            return [Cell(each[0].strip('"'), line, each.start() + 1) for each in WORD.finditer(row)]
         cells, column = [], 1
         for part in row.split(self.mark):
             text, at = part.strip(), column + len(part) - len(part.lstrip())

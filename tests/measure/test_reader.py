@@ -131,13 +131,13 @@ def test_a_number_that_lacks_digits_at_the_end_of_the_file_is_remarked_on(end):
     assert [message.place.line for message in found if message.place] == ([] if end in ("\n", "") else [6])
 
 
-@pytest.mark.parametrize("mark", [";", "\t"])
+@pytest.mark.parametrize("mark", [";", "\t", "   "])
 @pytest.mark.parametrize("decimal", [",", "."])
-@pytest.mark.parametrize("coding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-be", "latin-1"])
+@pytest.mark.parametrize("coding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-be", "utf-16-le", "latin-1"])
 def test_what_spreadsheets_of_other_countries_write(mark, decimal, coding):
     head, rows = GOOD[: GOOD.index("set,")], GOOD[GOOD.index("set,") :]
     text = head.replace("\n", 3 * mark + "\r\n") + rows.replace(",", mark).replace(".", decimal).replace("\n", "\r\n")
-    source = ("\ufeff" if coding == "utf-16-be" else "") + text
+    source = ("\ufeff" if coding == "utf-16-be" and mark == ";" else "") + text
     plain, other = reads(GOOD.encode(), THREE), reads(source.encode(coding), THREE)
     assert plain.headers == other.headers
     assert {key: list(column) for key, column in plain.columns.items()} == {
@@ -161,10 +161,46 @@ def test_all_faults_are_named_at_once():
     assert [code for code, *_ in faults(text)] == ["NCF608", "NCF607", "NCF608"]
 
 
-def test_a_binary_file_is_refused():
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        (b"PK\x03\x04\0\0", "spreadsheet(.|\n)*CSV"),
+        (b"%PDF-1.7\n", "PDF"),
+        (b'\xef\xbb\xbf<?xml version="1.0"?>\n<test/>\n', "XML"),
+        ("\ufeff{}".encode("utf-16"), "there is no line `# ncfix"),
+        (b"\x1f\x8b\x08\0\0\0", "unpack"),
+        (b"\0\1\2\0", "not a text file"),
+    ],
+)
+def test_what_holds_no_cells_is_refused_by_what_it_is(source: bytes, said: str):
+    with pytest.raises(ConfigError, match=said) as caught:
+        reads(source, THREE)
+    assert caught.value.messages[0].code == "NCF600"
+
+
+@pytest.mark.parametrize(
+    ("names", "kind"),
+    [
+        ("X,Y,dx,dy", "kind: tcp`"),
+        ("X;dx;ry", "kind: tcp6`"),
+        ("axis component position value", "kind: axis`"),
+        ("target,x,y,z,X,Y,Z", "kind: points`"),
+        ("Target (mm),Run 1", "kind: ...`"),
+    ],
+)
+def test_a_table_without_its_head_is_told_what_to_put_above_it(names: str, kind: str):
     with pytest.raises(ConfigError) as caught:
-        reads(b"PK\x03\x04\0\0", THREE)
-    assert caught.value.code == "NCF600"
+        reads(f"{names}\n1,2,3,4\n".encode(), THREE)
+    assert kind in caught.value.messages[0].hint
+
+
+def test_aligned_columns_count_their_cells():
+    """An empty cell between blanks is not seen, so that the row has too few: no value slips into the next column."""
+    text = HEAD + "    X       Y      dx\n  10.5     2.0   0.001\n 100.25  -3.0  -0.002\n"
+    found = reads(text.encode(), THREE)
+    assert found.columns["X"].tolist() == [10.5, 100.25]
+    assert ("NCF606", 6, 0) in faults(text.replace("-3.0", "    "))
+    assert ("NCF608", 6, 16) in faults(text.replace("-0.002", "O.002 "))
 
 
 def remarks(text: str, known=THREE) -> set[str]:
@@ -272,6 +308,7 @@ AS_SAVED = RTL.replace("Targets:\n0.000 50.000 100.000\n", "Targets :\n0.000  50
         AS_SAVED.replace("TITLE: spring", "TITLE: Carroll, new controller"),
         AS_SAVED.replace("ENVIRONMENT::", "\nEQUIPMENT::\nSerial: 1 2 3\nEOF::\n"),
         "\n" + AS_SAVED.replace(" 2 1.2", "\t2\t1.2"),
+        AS_SAVED.replace("Data:\n1 1", "Data: 1 1"),
     ],
 )
 def test_the_forms_of_an_interferometers_file(text: str):

@@ -17,6 +17,7 @@ from ncfix.machine.basis import Fourier, Polynomial
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
+from ncfix.tables.forms import lint_files
 from ncfix.tables.table_files import Remarks
 from ncfix.testing import check_control, single_error
 from ncfix.testing.tables import AXES
@@ -141,6 +142,14 @@ def test_nothing_of_the_parameter_sample_is_lost(shared: Callable[[str], Path]) 
     assert records[0].number == 0
     assert records[2].kind == "S"
     assert "\n".join(["%", *map(punched, records), "%", ""]).encode() == content
+
+
+def test_a_punched_file_that_lost_its_first_line_is_told_so() -> None:
+    found = lint_files({"CNC-PARA.TXT": b"N3620 A1P33 A2P40\nN10033 P-1\n"})["CNC-PARA.TXT"]
+    assert (found.owner, [each.text for each in found.messages]) == (
+        CONTROL.name,
+        ["should begin and end with a line %"],
+    )
 
 
 def test_axes_without_a_table_keep_what_the_control_has() -> None:

@@ -62,6 +62,13 @@ def test_golden_bytes_of_the_older_controls() -> None:
     )
 
 
+def test_a_control_may_put_the_version_of_the_table_behind_its_unit() -> None:
+    found = files()
+    name = next(name for name in found if name.endswith(".COM"))
+    found[name] = found[name].replace(b" MM", b" MM Version: 'Update:100.00 Date:2020-02-01'", 1)
+    assert not CONTROL.lint(found)
+
+
 def test_the_contract() -> None:
     check_control(CONTROL, {"sign": "error"})
 

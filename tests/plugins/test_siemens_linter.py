@@ -22,6 +22,7 @@ WRONG = {
     "ends exchanged": (GOOD.replace(b"MAX[0]=0.0", b"MAX[0]=-200.0"), "from -100 to -200"),
     "no input axis": (GOOD.replace(b"$AN_CEC_INPUT_AXIS[0]=(AX2)\n", b""), "has no $AN_CEC_INPUT_AXIS[0]"),
     "an axis of another machine": (GOOD.replace(b"(AX2)", b"(AX7)"), "which axis of the machine AX7 is"),
+    "a word for a direction": (GOOD.replace(b"DIRECTION[0]=0", b"DIRECTION[0]=TRUE"), "'TRUE' is not a number"),
     "no name of an axis": (GOOD.replace(b"(AX2)", b"(A+)"), "not the name of an axis"),
     "a decimal comma": (GOOD.replace(b"0.003", b"0,003"), "a decimal comma"),
     "a word": (GOOD.replace(b"0.003", b"three"), "not a number"),
@@ -69,7 +70,7 @@ DOUBTFUL = {
     "a chain of products": (PAIR.replace(b"TABLE[1]=0", b"TABLE[1]=1"), "is itself multiplied by another"),
     "one way only": (GOOD.replace(b"DIRECTION[0]=0", b"DIRECTION[0]=1"), "moves one way only"),
     "two ends of lines": (GOOD.replace(b"STEP[0]=50.0\n", b"STEP[0]=50.0\r\n"), "end in two ways"),
-    "EEC: ends that differ": (EEC.replace(b"MODULO[0,AX1]=0", b"MODULO[0,AX1]=1"), "another value than it begins"),
+    "EEC: ends that differ": (EEC.replace(b"MODULO[0,AX1]=0", b"MODULO[0,AX1]=TRUE"), "another value than it begins"),
 }
 
 
@@ -98,7 +99,9 @@ def test_an_axis_corrected_in_two_places() -> None:
 
 
 @pytest.mark.parametrize(
-    "content", [GOOD, PAIR, EEC, GOOD.replace(b"\n", b"\r\n")], ids=["sum", "pair", "EEC", "CR LF"]
+    "content",
+    [GOOD, PAIR, EEC, GOOD.replace(b"\n", b"\r\n"), EEC.replace(b"MODULO[0,AX1]=0", b"MODULO[0,AX1]=FALSE")],
+    ids=["sum", "pair", "EEC", "CR LF", "a word for no"],
 )
 def test_good_files_are_not_remarked_on(content: bytes) -> None:
     assert not CONTROL.lint({"a.INI": content})

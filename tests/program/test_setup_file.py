@@ -195,7 +195,9 @@ def test_csv_tables_of_spreadsheets(tmp_path: Path, mark: str, decimal: str, cod
         ("t.csv", "tool,length,radius,diameter\n1,100,5,10\n2,100,5,12\n", [3]),
         ("t.csv", "tool,length\n1,nan\n", [2]),
         ("t.toa", "$TC_DP3[1,1]=1O0\n$TC_DP3[2,1]=100\n$TC_ADP1[3]=50.0\n", [1, 3]),
+        ("t.toa", "$TC_DP3[1,1]=100\n$TC_SCP13[1,1]=0.5\n$TC_ECP13[1,1]=0\n$TC_ECP13[1,2]=-1\n", [2, 4]),
         ("t.toa", "CHANDATA(1)\n$TC_DP3[1,1]=100\nCHANDATA(2)\n$TC_DP3[1,1]=90\n", [0]),
+        ("t.nc", "G20\nG10 L10 P1 R4.5\nG21\nG10 L10 P2 R90.\n", [0]),
         ("t.nc", "G10 L10 P1 R100.\nG10 L10 P1 R90.\nG10 L10 P2 R90000\nG91 G10 L10 P3 R1.\nG1 X5.\n", [2, 3, 4, 5]),
     ],
 )
@@ -247,6 +249,14 @@ def test_offsets_of_fanuc_as_a_program(tmp_path: Path) -> None:
     """A wear of zero alone gives no length."""
     text = "%\nO9000(OFFSETS)\nG90G10L10P1R120.5\nG10 L11 P1 R-.02\nG10 L12 P1 R5.\nG10 L11 P2 R0\nM30\n%\n"
     assert table(tmp_path, "OFFSET.TXT", text) == {1: Tool(pytest.approx(120.48))}
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("", 1.0), ("G21\n", 1.0), ("G20 G90\n", 25.4)])
+def test_offsets_of_fanuc_among_settings_and_notes(tmp_path: Path, unit: str, scale: float) -> None:
+    text = f"%\nO9999 (OFFSETS)\n{unit}G90\nG10 L2 P1 X-310.5 Y-94. Z0 (G54)\nG10 L10 P1 R4.5 (T1 - DRILL)\n"
+    assert table(tmp_path, "OFFSET.NC", f"{text}N5 G10 L12 P1 R.5 (D);\nM30\n%\n") == {
+        1: Tool(pytest.approx(4.5 * scale))
+    }
 
 
 @pytest.mark.parametrize("kind", ["L1", "L11"])

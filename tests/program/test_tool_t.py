@@ -41,6 +41,20 @@ def test_inches(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "described",
+    [
+        "#STRUCTBEGIN\n   NAME = T\n     TYPE = N\n     WIDTH = 5\n     DEC = 0\n#STRUCTEND\n",
+        'TableDescription (\n  columns:=[\n    CfgColumnDescription (\n      key:="L",\n      width:=9\n   )\n  ]\n)\n',
+    ],
+)
+def test_newer_controls_describe_the_columns_above_their_names(tmp_path: Path, described: str) -> None:
+    first, rest = TABLE.format(unit="MM Version: 'Update:110.24'").split("\n", 1)
+    assert read(tmp_path, f"{first}\n{described}{rest}") == read(tmp_path, TABLE.format(unit="MM"))
+    with pytest.raises(ConfigError, match="no columns T and L"):
+        read(tmp_path, f"{first}\n{described[: described.rindex(chr(10), 0, -1)]}\n{rest}")
+
+
+@pytest.mark.parametrize(
     ("old", "new", "what"),
     [
         ("+90,25", "+9O,25", "L: '\\+9O,25' is not a number"),

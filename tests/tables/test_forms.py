@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ncfix.tables.forms import BY_NAME, FileForm, read_form, recognised
+from ncfix.tables.forms import BY_NAME, FileForm, lint_files, read_form, recognised
 
 SAMPLES = {
     "beckhoff_isg/crosscomp.lis": ("isg-list", 7),
@@ -74,6 +74,9 @@ BROKEN = {
     "rtl": (b"Target-count: 2\nRun-count: 1\nDEVIATIONS::\nRun Target Data:\n1 1 0.0\n", "1 deviations, 2 expected"),
     "etalon": (b"[EXY]\nGridpoints = {\n0 one\n}\n", "is no line of"),
     "pmac": (b"DEFINE COMP ten, #1\n", "is no line of"),
+    "pmac ": (b"DEFINE COMP 3, #1, #1, 6000\n16 8\n", "2 entries follow, and the line says 3"),
+    "pmac  ": (b"#2DEFINE COMP 2, 6000\n16\n8.5\n", "whole numbers"),
+    "pmac   ": (b"#2DEFINE COMP 2, 6000\n16\n8\n", "the last entry is 8"),
     "isg-list": (b"X\n", "is no line of"),
     "ini": (b"[A]\nb c\n", "is no line of"),
 }
@@ -133,6 +136,30 @@ def test_broken_files(form: str) -> None:
     assert any(expected in message.text for message in remarks.messages), remarks.messages
 
 
+@pytest.mark.parametrize("form", [form for form in BROKEN if BY_NAME[form.strip()].tells and form != "pmac"])
+def test_a_damaged_file_that_one_line_tells_is_of_its_form(form: str) -> None:
+    """What is wrong is named with its line, not that nobody knows the file."""
+    content, expected = BROKEN[form]
+    found = lint_files({"x": content})["x"]
+    assert found.owner == form.strip()
+    assert any(expected in message.text for message in found.messages), found.messages
+    assert {message.hint for message in found.messages} <= {"", "see docs/controllers.md"}
+
+
+@pytest.mark.parametrize(
+    ("form", "content", "texts"),
+    [
+        ("weihong", b"; \xb5\xa5\xce\xbb\nunit = mm\n[x]\n0, 0, 0\n5, 0.001, 0\n", ["a character that is not ASCII"]),
+        ("rtl", b"HEADER::\nMachine: \xbb\xfa\nTarget-count: 1\nRun-count: 1\nRun Target Data:\n1 1 0.0\n", []),
+        ("pmac", b"I51=0\n#1 DEL COMP\n#1 DEFINE COMP 4,2000 ; X\n160 80\n120 0\nI51=1\n", []),
+        ("pmac", b"DEFINE COMP 2, #1D, #3, 2000\n160 0\nDEFINE COMP 1.2, #1, #2, 20, 20\n1 2 3 4 5\n", []),
+    ],
+)
+def test_files_as_they_are_found(form: str, content: bytes, texts: list[str]) -> None:
+    found = lint_files({"x": content})["x"]
+    assert (found.owner, [message.text for message in found.messages]) == (form, texts)
+
+
 @given(st.lists(st.decimals(-10, 10, places=4), min_size=3, max_size=3), st.sampled_from(["\n", "\r\n"]))
 def test_any_numbers_come_back_as_they_were(numbers: list[Decimal], eol: str) -> None:
     rows = [f"{place}, {numbers[1]}, {numbers[2]}" for place in (numbers[0], numbers[0] + 1)]
@@ -150,7 +177,7 @@ VARIED = {
     "isg-list": b"  # head\nkw.ssfk.unit\t1   # 0.1 um\n\n",
     "etalon": b"[EXY]\nGridpoints = {\n\t-280.0\t-0.0013 // edge\n}\n\n[C0B]\nVALUE=0.1 \n",
     "elmo": ELMO.replace(b"3\t4\n", b" 3 4 \n\n"),
-    "pmac": b"; by the maker\ndefine comp 5, #1D,#1 ,20000 ; X\n 10 -12\n\n-3\n",
+    "pmac": b"; by the maker\ndefine comp 3, #1D,#1 ,20000 ; X\n 10 -12\n\n-3\n",
     "weihong": b"unit=mm\n; by laser\n[X] \n0.0,0,0.002\n\n 10.0 , 0.003 , 0.005\n",
     "hexagon": b"STARTX\n10.0 = 10.002\n\nEND\n",
     "centroid": b"24 -1448819  0 -32\t-38\n\n",

@@ -315,7 +315,7 @@ def _rtl(text: str, path: str) -> Rtl:
             plain = match[2]
         if key == "targets":
             found.targets += [number_of(word, path, number) for word in plain.split()]
-        elif section == "DEVIATIONS" and plain and not match:
+        elif section == "DEVIATIONS" and plain.strip() and (not match or key == "run target data"):
             found.readings.append(_deviation(found, plain.split(), number))
     return found.checked()
 

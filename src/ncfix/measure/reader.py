@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix import files
-from ncfix.cells import MARKS, Cell, SeparatedText, plain_text
+from ncfix.cells import MARKS, Cell, SeparatedText, other_form, plain_text
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Machine
 from ncfix.measure import checks, foreign
@@ -49,21 +49,17 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
     Raises `ConfigError` with NCF600 ... NCF616, all faults at once. Instruments' own formats are recognised by what
     they look like, see `ncfix.measure.foreign`.
     """
-    text = _decoded(source, path)
-    if not text.startswith("#"):
-        found = foreign.recognised(text, machine, path)
-        if found is not None:
-            return found
+    text = plain_text(source)
+    found = foreign.recognised(text, machine, path) if text is not None and not text.startswith("#") else None
+    if found is not None:
+        return found
+    what, hint = other_form(source)
+    if text is None or what:
+        said = f"{what}, not a measurement file" if what else "not a text file"
+        raise ConfigError.of("NCF600", said, Place(path), hint or "save it as CSV")
     lines = MeasurementLines(path, text.splitlines(), not text.endswith(("\n", "\r")))
     measurement = _measurement(lines, machine, plan)
     return checks.checked(measurement, machine, lines.lines)
-
-
-def _decoded(source: bytes, path: str) -> str:
-    text = plain_text(source)
-    if text is None:
-        raise ConfigError.of("NCF600", "not a text file", Place(path), "a measurement file is comma-separated text")
-    return text
 
 
 def _measurement(text: MeasurementLines, machine: Machine, plan: bool) -> Measurement:
@@ -158,7 +154,10 @@ def _kind_of(text: MeasurementLines, pairs: list[tuple[Cell, Cell]]) -> str:
     found = {key.text: value for key, value in pairs}
     version = found.get("ncfix-measurement")
     if version is None:
+        kinds = _kinds_by_columns(text)
         hint = "an instrument's table needs it above its columns, with `# kind: ...`; see docs/formats.md"
+        if kinds:
+            hint = f"above the columns, with `# kind: {kinds}`; lengths are mm, angles of axes degree"
         text.note("NCF600", "there is no line `# ncfix-measurement: 1`", 1 if text.lines else 0, 0, hint)
     elif version.text != str(VERSION):
         text.mark(version, "NCF600", f"version {version.text!r}, this ncfix reads {VERSION}")
@@ -170,6 +169,14 @@ def _kind_of(text: MeasurementLines, pairs: list[tuple[Cell, Cell]]) -> str:
         hint = did_you_mean(kind.text, KINDS) or f"one of {', '.join(KINDS)}"
         text.mark(kind, "NCF601", f"there is no kind {kind.text!r}", hint)
     return kind.text
+
+
+def _kinds_by_columns(text: MeasurementLines) -> str:
+    """Of which kind a table looks by the names of its columns; "" if of none."""
+    line = next((line for line in text.lines if line.strip() and not line.startswith("#")), "")
+    names = {cell.text for cell in SeparatedText.of(line).cells(line, 1)}
+    fits = [form for form in KINDS.values() if names & {*form.measured} and names >= {*form.required}]
+    return max(fits, key=lambda form: len(names & {*form.columns})).name if fits else ""
 
 
 def _check_header(text: MeasurementLines, pairs: list[tuple[Cell, Cell]], kind: str) -> None:

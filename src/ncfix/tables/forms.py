@@ -88,6 +88,8 @@ class TableFile:
         return replace(self, lines=(*self.lines[:index], line, *self.lines[index + 1 :]))
 
 
+PMAC_MOTOR, PMAC_END = r"(?:#\d+ *)?", rf"{BLANK}(?:;.*)?"
+
 Check = Callable[[TableFile, Remarks], None]
 
 
@@ -96,6 +98,9 @@ class FileForm:
     """What lines a kind of file has: name -> pattern, whose groups are numbers; and what must hold between them.
 
     needs  the kinds of lines that tell it: no file of the form is without one of each
+    tells  the kinds of lines that no other form has: a file with one is of this form, whatever else is wrong in it
+    free   the pattern that its texts for people begin with, in which letters of other alphabets are only remarked on;
+           "" where no control reads the file, so that they may stand anywhere
     """
 
     name: str
@@ -103,11 +108,15 @@ class FileForm:
     kinds: Mapping[str, str]
     check: Check = lambda document, remarks: None
     needs: tuple[str, ...] = ()
+    tells: tuple[str, ...] = ()
+    free: str = r";|//|#|\(|/\*"
 
 
 def read_form(form: FileForm, path: str, content: bytes) -> tuple[TableFile, Remarks]:
     """A file of a form, with remarks on lines that the form does not have."""
-    remarks = Remarks.of(path, content)
+    remarks = Remarks.of(path, content, form.free)
+    if not form.free:
+        remarks.wrong.clear()
     eol = "\r\n" if b"\r\n" in content else "\n"
     lines = [_line(form, remarks, number, row) for number, row in enumerate(remarks.rows, 1)]
     start = BYTE_ORDER if content.startswith(BYTE_ORDER.encode("latin-1")) else ""
@@ -185,7 +194,8 @@ def _runs(document: TableFile, remarks: Remarks) -> None:
 
 
 def _united(document: TableFile, remarks: Remarks) -> None:
-    if [line.kind for line in document.lines].count("unit") != 1 or document.lines[0].kind != "unit":
+    kinds = [line.kind for line in document.lines if line.kind not in NOTES]
+    if kinds.count("unit") != 1 or kinds[0] != "unit":
         remarks.refuse(0, "should begin with the line of the unit")
     for axis, rows in document.sections("axis").items():
         if len(rows) < 2 or any(after[0] <= before[0] for before, after in pairwise(rows)):
@@ -193,8 +203,23 @@ def _united(document: TableFile, remarks: Remarks) -> None:
 
 
 def _defined(document: TableFile, remarks: Remarks) -> None:
-    if not any(line.kind == "define" for line in document.lines):
+    """A table of one axis has as many entries as its line says; they are whole, and the last is that at zero, too."""
+    lines = [(n, line) for n, line in enumerate(document.lines, 1) if line.kind in ("define", "row")]
+    starts = [k for k, (_, line) in enumerate(lines) if line.kind == "define"]
+    if not starts:
         remarks.refuse(0, "no line DEFINE COMP")
+    for start, stop in pairwise([*starts, len(lines)]):
+        number, head = lines[start]
+        entries = [value for _, line in lines[start + 1 : stop] for value in line.numbers]
+        if any(value != int(value) for value in entries):
+            remarks.refuse(number, "entries are whole numbers, sixteenths of a count")
+        said = re.search(r"(?i)COMP *(\d+)(?=[ ,])", head.text)
+        if said is None:
+            continue
+        if len(entries) != int(said[1]):
+            remarks.refuse(number, f"{len(entries)} entries follow, and the line says {said[1]}")
+        elif entries[-1]:
+            remarks.doubt(number, f"the last entry is {entries[-1]}: at zero, where the table begins anew, it is 0")
 
 
 def _headed(document: TableFile, remarks: Remarks) -> None:
@@ -236,6 +261,7 @@ FORMS = (
             "blank": BLANK,
         },
         _framed("rule", "row"),
+        tells=("rule",),
     ),
     FileForm(
         "g10",
@@ -249,6 +275,7 @@ FORMS = (
             "blank": BLANK,
         },
         _framed("begin", "end"),
+        tells=("begin",),
     ),
     FileForm(
         "isg-csv",
@@ -281,6 +308,7 @@ FORMS = (
             "blank": BLANK,
         },
         needs=("section",),
+        tells=("open",),
     ),
     FileForm(
         "elmo",
@@ -298,17 +326,21 @@ FORMS = (
             "blank": BLANK,
         },
         _elmo,
+        tells=("mark",),
     ),
     FileForm(
         "pmac",
         "PMAC",
         {
             "comment": r";.*",
-            "define": rf"{BLANK}(?i:DEFINE +COMP) *\d+(?:\.\d+)*(?: *, *#\d+[dD]?)+(?: *, *\d+)+{BLANK}(?:;.*)?",
+            "define": rf"{BLANK}{PMAC_MOTOR}(?i:DEFINE +COMP) *\d+(?:\.\d+)*"
+            rf"(?: *, *#\d+[dD]?)*(?:(?: *, *| +)\d+)+{PMAC_END}",
+            "around": rf"{BLANK}(?i:[IPM]\d+ *= *\S+|{PMAC_MOTOR}DEL(?:ETE)? +COMP|#\d+|&\d+){PMAC_END}",
             "row": rf"{BLANK}{N}" + rf"(?:{GAP}{N})?" * 24 + rf"{BLANK}(?:;.*)?",
             "blank": BLANK,
         },
         _defined,
+        tells=("define",),
     ),
     FileForm(
         "weihong",
@@ -320,6 +352,7 @@ FORMS = (
             **NOTES,
         },
         _united,
+        tells=("unit",),
     ),
     FileForm(
         "hexagon",
@@ -331,6 +364,7 @@ FORMS = (
             "blank": BLANK,
         },
         _framed("start", "end"),
+        tells=("start",),
     ),
     FileForm("centroid", "Centroid's .tab", {"row": BLANK + GAP.join([N] * 5) + BLANK, "blank": BLANK}, needs=("row",)),
     FileForm(
@@ -346,6 +380,8 @@ FORMS = (
         },
         _runs,
         ("section",),
+        ("section",),
+        free="",
     ),
 )
 
@@ -407,8 +443,12 @@ def lint_files(files: Files, control: str = "") -> Mapping[str, Linted]:
 
 
 def _look(control: Control, files: Files) -> tuple[Message, ...]:
-    found: tuple[Message, ...] = called("controls", control.name, control.look, files, gives=tuple)
-    return tuple(replace(message, hint="") if message.hint == AGAIN else message for message in found)
+    return _from_elsewhere(called("controls", control.name, control.look, files, gives=tuple))
+
+
+def _from_elsewhere(messages: tuple[Message, ...]) -> tuple[Message, ...]:
+    """Without the advice for what ncfix has written itself."""
+    return tuple(replace(message, hint="") if message.hint == AGAIN else message for message in messages)
 
 
 def _shared(control: Control, files: Files, messages: Iterable[Message]) -> dict[str, Linted]:
@@ -422,10 +462,11 @@ def _shared(control: Control, files: Files, messages: Iterable[Message]) -> dict
 
 
 def _of_form(name: str, content: bytes) -> Linted:
-    """A file that no control of a plugin knows: of a form that is known, or of none."""
-    document = recognised(name, content)
-    if document is None:
-        hint = "ncfix lint --control NAME says whose it is; ncfix plugins lists the controls"
-        remark = Message("NCF509", "is no table of a form that ncfix or a plugin knows", Place(name), hint)
-        return Linted("", "", (remark,))
-    return Linted(document.form, BY_NAME[document.form].title, ())
+    """A file that no control of a plugin knows: of the first form that has all of its lines, or that one line tells."""
+    read = [(form, *read_form(form, name, content)) for form in FORMS]
+    whole = [(form, remarks) for form, _, remarks in read if not remarks.wrong]
+    told = [(form, remarks) for form, found, remarks in read if any(line.kind in form.tells for line in found.lines)]
+    for form, remarks in (whole or told)[:1]:
+        return Linted(form.name, form.title, _from_elsewhere(remarks.messages))
+    hint = "docs/controllers.md, Tables from elsewhere, has the forms; --control NAME says whose a damaged one is"
+    return Linted("", "", (Message("NCF509", "is no table of a form that ncfix or a plugin knows", Place(name), hint),))

@@ -54,7 +54,10 @@ class Remarks:
 
     @classmethod
     def of(cls, path: str, content: bytes, comment: str = "") -> Remarks:
-        """An empty list for a file; a byte that is not ASCII is noted, once: after `comment` it is only doubtful."""
+        """An empty list for a file; a byte that is not ASCII is noted, once: after a `comment` it is only doubtful.
+
+        comment  the pattern of what a comment begins with; "" where there are none
+        """
         text = content.decode("latin-1")
         remarks = cls(path, _rows(text.removeprefix(BYTE_ORDER)), open_end=not text.endswith(("\n", "\r")))
         if text.startswith(BYTE_ORDER):
@@ -63,7 +66,7 @@ class Remarks:
             remarks.doubt(0, "a line ends in CR alone", "LF or CR LF")
         for number, row in enumerate(remarks.rows, 1):
             if not row.isascii():
-                inside = comment and row.split(comment, 1)[0].isascii()
+                inside = comment and re.split(comment, row, maxsplit=1)[0].isascii()
                 note = remarks.doubt if inside else remarks.refuse
                 note(number, "a character that is not ASCII", "controls read plain ASCII")
                 break

@@ -7,8 +7,9 @@
   is in the spindle only the control knows, and they are left out. Source: Function Manual Tools (W1, WZV).
 - Fanuc: `G10 L10 P1 R120.5`, length of offset number P; L11 (or L1) its wear, or the whole in a file without L10;
   an offset with a wear alone is refused, and left out if that is zero. L12 and L13 are radii or diameters, which a
-  parameter says (5004#2), and are left out. A value without a decimal point counts in increments that nobody says here,
-  and is refused. Source: operator's manuals, "Tool compensation values".
+  parameter says (5004#2), and are left out, as work offsets are (L2, L20). G20 or G21 says the unit. A value without a
+  decimal point counts in increments that nobody says here, and is refused. Source: operator's manuals, "Tool
+  compensation values".
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from ncfix.control.coordinates import INCH
 from ncfix.control.setup import Tool
 
 Row = tuple[int, tuple[int | str, Tool] | str]
@@ -32,11 +34,17 @@ ASIDE = {"X": (5, 14, 23), "Y": (4, 13, 22)}
 """Of lengths 3 and 2, along the axes of the plane G17."""
 TURNING = range(500, 600)
 """Types of turning tools."""
-ADAPTER = "ADP"
+BESIDES = {"ADP": "adapters of tools", "SCP": "sum offsets", "ECP": "set-up offsets"}
+"""$TC_ that lengthen a tool besides its $TC_DP."""
 
 OFFSET = re.compile(
     rf"(?:N\d+)?(?:G9(?P<way>[01]))?G10L(?P<kind>\d+)P(?P<number>\d+)R(?P<value>{NUMBER});?", re.IGNORECASE
 )
+AROUND = re.compile(
+    r"(?:N\d+)?(?:O\d+|(?:G(?:90|20|21|17|40|49|80|94))+|(?:G90)?G10L(?:2|20)P.*|M(?:0?2|30|99))", re.IGNORECASE
+)
+"""Blocks among tool offsets that change none: a program's number, settings, work offsets, its end."""
+INCHES = {"G20": INCH, "G21": 1.0}
 GEOMETRY, WEAR, OLD, ACROSS = 10, 11, 1, (12, 13)
 
 
@@ -62,8 +70,8 @@ def tool_data_rows(text: str, scale: float) -> Iterator[Row]:
                     continue
                 edges.setdefault((int(tool), int(edge)), {})[int(number)] = float(value)
                 lines.setdefault(int(tool), line)
-            elif what.upper() == ADAPTER and re.fullmatch(NUMBER, value) and float(value):
-                yield line, "adapters of tools ($TC_ADP) are not followed"
+            elif (more := BESIDES.get(what.upper())) and re.fullmatch(NUMBER, value) and float(value):
+                yield line, f"{more} ($TC_{what.upper()}) are not followed"
     if len(units) > 1:
         yield 0, f"tools of several units: CHANDATA {', '.join(sorted(units))}; give those of one"
     taken = list(names.values())
@@ -79,19 +87,27 @@ def tool_data_rows(text: str, scale: float) -> Iterator[Row]:
 
 
 def is_offsets(text: str) -> bool:
-    """Whether a text is of G10 with tool offsets alone."""
-    rows = ["".join(row.split()) for row in text.splitlines() if row.strip().strip("%")]
-    return bool(rows) and any(OFFSET.fullmatch(row) for row in rows[:3])
+    """Whether a text has tool offsets as G10 writes them."""
+    return any(OFFSET.fullmatch(block) for _, block in _blocks(text))
+
+
+def _blocks(text: str) -> Iterator[tuple[int, str]]:
+    """The blocks of a program with their lines, without comments, blanks and marks of its ends."""
+    for line, row in enumerate(text.splitlines(), 1):
+        plain = "".join(re.sub(r"\([^)]*\)?", "", row).split()).strip("%;")
+        if plain:
+            yield line, plain
 
 
 def offset_rows(text: str, scale: float) -> Iterator[Row]:
-    """The offset numbers of a file of G10; scale: mm per unit of a length."""
+    """The offset numbers of a file of G10; scale: mm per unit of a length where no G20 or G21 says it."""
     found: dict[tuple[int, int], tuple[int, float]] = {}
-    for line, row in enumerate(text.splitlines(), 1):
-        plain = "".join(row.partition("(")[0].split())
-        match = OFFSET.fullmatch(plain)
-        if not plain.strip("%;") or re.fullmatch(r"O\d+;?|M(?:0?2|30|99);?", plain, re.IGNORECASE):
+    units: set[float] = set()
+    for line, plain in _blocks(text):
+        if AROUND.fullmatch(plain):
+            units |= {INCHES[code] for code in re.findall(r"G2[01](?!\d)", plain.upper())}
             continue
+        match = OFFSET.fullmatch(plain)
         kind = int(match["kind"]) if match else 0
         if match is None or kind not in (GEOMETRY, WEAR, OLD, *ACROSS):
             yield line, "is not understood: tool offsets are written as G10 L10 P1 R120.5, with L10 to L13"
@@ -104,6 +120,9 @@ def offset_rows(text: str, scale: float) -> Iterator[Row]:
             if key in found:
                 yield line, f"offset {key[0]} has two values"
             found[key] = line, float(match["value"])
+    if len(units) > 1:
+        yield 0, "G20 and G21 in one file"
+    scale = min(units, default=scale)
     apart = any(kind == GEOMETRY for _, kind in found)
     for number in dict.fromkeys(number for number, _ in found):
         parts = [found[number, kind] for kind in (GEOMETRY, WEAR) if (number, kind) in found]

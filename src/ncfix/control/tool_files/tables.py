@@ -4,9 +4,10 @@
   of the machine. G43 adds the offsets of all other axes, too: the length of a tool that has one is not
   known. I, J and Q are of a lathe's tool nose. Lines above the first tool that are none are for people, as the control
   takes them. Source: LinuxCNC documentation, "Tool table format".
-- TOOL.T: columns at fixed places under a line of names. L and R count with their oversizes DL and DR. A tool with an
-  index (5.1) and a row without a length are left out. A word that begins in one column and ends in the next is refused:
-  columns are at other places then. Source: TNC 640 user's manual, "Entering tool data in the table".
+- TOOL.T: columns at fixed places under a line of names, and above that a description of the columns on newer controls.
+  L and R count with their oversizes DL and DR. A tool with an index (5.1) and a row without a length are left out. A
+  word that begins in one column and ends in the next is refused: columns are at other places then. Source: TNC 640
+  user's manual, "Entering tool data in the table".
 
 What is written as a program, tool data of SINUMERIK and G10 of Fanuc, is in `ncfix.control.tool_files.programs`.
 """
@@ -18,7 +19,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import PurePath
 
-from ncfix.cells import MARKS, Cell, SeparatedText, plain_text
+from ncfix.cells import MARKS, Cell, SeparatedText, other_form, plain_text
 from ncfix.control.coordinates import INCH
 from ncfix.control.setup import Tool
 from ncfix.control.tool_files.programs import Row, is_offsets, is_tool_data, offset_rows, tool_data_rows
@@ -38,6 +39,7 @@ LONGEST = 1e6
 """mm; a number beyond it is a slip."""
 COLUMNS = ("tool", "length", "radius", "diameter")
 UNITS = {"mm": 1.0, "inch": INCH}
+OTHERWISE = "docs/formats.md lists the tables that are read; any other one as CSV with columns tool, length"
 
 
 def load_tool_table(path: str, axes: Collection[str] = ASIDE, unit: str = "mm") -> dict[int | str, Tool]:
@@ -48,9 +50,10 @@ def load_tool_table(path: str, axes: Collection[str] = ASIDE, unit: str = "mm") 
 
     Raises SourceError NCF002, ConfigError NCF385 with every line that is wrong.
     """
-    text = plain_text(read_bytes(path, MOST_SAID))
-    if text is None:
-        raise ConfigError.of(BAD_TABLE, "not plain text", Place(path), "save it as text")
+    source = read_bytes(path, MOST_SAID)
+    text, (what, hint) = plain_text(source), other_form(source)
+    if text is None or what:
+        raise ConfigError.of(BAD_TABLE, f"{what or 'not plain text'}, not a tool table", Place(path), hint or OTHERWISE)
     rows = text.splitlines()
     faults: list[Message] = []
     tools: dict[int | str, Tool] = {}
@@ -65,7 +68,7 @@ def load_tool_table(path: str, axes: Collection[str] = ASIDE, unit: str = "mm") 
         else:
             tools[content[0]] = content[1]
     if not tools and not faults:
-        faults.append(Message(BAD_TABLE, "there is no tool in it", Place(path)))
+        faults.append(Message(BAD_TABLE, "there is no tool in it", Place(path), OTHERWISE))
     if faults:
         raise ConfigError.collected(faults)
     return tools
@@ -165,9 +168,10 @@ def tool_t_rows(text: str) -> Iterator[Row]:
     """The rows of a TOOL.T."""
     lines = text.splitlines()
     head = TOOL_T_BEGIN.match(lines[0])
-    names = [(name[0].upper(), name.start()) for name in re.finditer(r"\S+", lines[1])] if len(lines) > 1 else []
+    at = _past_description(lines)
+    names = [(name[0].upper(), name.start()) for name in re.finditer(r"\S+", "".join(lines[at : at + 1]))]
     if head is None or not {"T", "L"} <= {name for name, _ in names}:
-        yield 2, "the second line names no columns T and L"
+        yield at + 1, "this line names no columns T and L"
         return
     if head["unit"] is None:
         yield 1, "the first line does not say MM or INCH"
@@ -176,19 +180,28 @@ def tool_t_rows(text: str) -> Iterator[Row]:
     stops = [start for _, start in names[1:]] + [None]
     sides = ((start, stop) for (name, start), stop in zip(names, stops, strict=True) if name in ("T", *WANTED))
     edges = {edge for side in sides for edge in side if edge}
-    for number, line in enumerate(lines[1:], 2):
+    for number, line in enumerate(lines[at:], at + 1):
         if TOOL_T_END.match(line):
             return
         if "\t" in line or any(re.match(r"\S\S", line[edge - 1 : edge + 1]) for edge in edges):
             yield number, "words are not below the names of their columns"
             continue
-        if number == 2:
+        if number == at + 1:
             continue
         cells = {name: line[start:stop].strip() for (name, start), stop in zip(names, stops, strict=True)}
         if cells["T"].isdigit() and cells["L"]:
             yield number, tool_of(cells, scale)
         elif line.strip() and not re.fullmatch(r"\d+(\.\d+)?", cells["T"]):
             yield number, f"{cells['T']!r} is not a tool number"
+
+
+def _past_description(lines: list[str]) -> int:
+    """The index of the line of column names: behind the description of the columns that newer controls write."""
+    begins = lines[1].split(maxsplit=1)[:1] if len(lines) > 1 else []
+    end = {"#STRUCTBEGIN": "#STRUCTEND", "TableDescription": ")"}.get("".join(begins))
+    if end is None:
+        return 1
+    return next((n for n, line in enumerate(lines[2:], 3) if line.startswith(end)), len(lines))
 
 
 def tool_of(cells: dict[str, str], scale: float) -> tuple[int, Tool] | str:
