@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
@@ -20,6 +22,7 @@ EXAMPLES = [
     Fourier((1, 3)),
     Periodic((1, 2, 5), 17.0),
     PiecewiseLinear((0.0, 10.0, 15.0, 60.0)),
+    PiecewiseLinear((0.0, 10.0, 15.0, 60.0), "negative"),
     Spline(KNOTS, 3),
     Spline((0.0, 0.0, 10.0, 60.0, 60.0), 1),
     PiecewiseConstant((10.0, 30.0)),
@@ -112,11 +115,15 @@ def test_steps_have_the_upper_value_where_they_jump() -> None:
     np.testing.assert_allclose(step.design(np.array([9.0, 10.0, 29.0, 30.0])) @ values, [1, 2, 2, 3])
 
 
-def test_a_step_for_one_direction_is_half_there_when_the_direction_is_unknown() -> None:
+@pytest.mark.parametrize(
+    "kind", [lambda way: PiecewiseConstant((10.0,), way), lambda way: PiecewiseLinear((10.0, 20.0), way)]
+)
+def test_what_acts_for_one_direction_is_half_there_when_the_direction_is_unknown(kind: Callable[[str], Basis]) -> None:
     for way, sign in (("positive", 1), ("negative", -1)):
-        step = PiecewiseConstant((10.0,), way)
-        assert step.needs_direction
-        assert [float(step.design(20.0, sign * d)[1]) for d in (1, 0, -1)] == [1.0, 0.5, 0.0]
+        basis = kind(way)
+        assert basis.needs_direction
+        assert [float(basis.design(20.0, sign * d)[1]) for d in (1, 0, -1)] == [1.0, 0.5, 0.0]
+    assert kind("down").complaints()[0][0] == "direction"
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 from ncfix.diagnostics import ConfigError
 from ncfix.machine import Effect
 from ncfix.machine.basis import Polynomial
+from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
@@ -30,6 +31,19 @@ def test_golden_bytes() -> None:
         "comp.ini": b"[TRAJ]\nCOORDINATES = X Y Z\nLINEAR_UNITS = mm\nANGULAR_UNITS = degree\n\n"
         b"[JOINT_0]\nCOMP_FILE = joint_0_X.comp\nCOMP_FILE_TYPE = 1\n",
     }
+
+
+def test_curves_of_both_directions_are_the_two_columns() -> None:
+    """Forward and reverse as a laser reads them: tables of one direction each in the machine file."""
+    places = (-200.0, 50.0, 300.0)
+    curves = {"positive": (0.004, -0.002, 0.006), "negative": (0.007, 0.003, 0.009)}
+    effects = tuple(Effect("EXX", curve, PiecewiseLinear(places, way)) for way, curve in curves.items())
+    machine = single_error("EXX").replace(effects=effects)
+    text = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001), 100).native["joint_0_X.comp"]
+    rows = np.array([line.split() for line in text.decode().splitlines()], dtype=float)
+    for column, curve in zip(rows.T[1:], curves.values(), strict=True):
+        # an error of 8 um in the place where the curve is read, on slopes of 5 um in 250 mm
+        np.testing.assert_allclose(np.interp(places, rows[:, 0], column), -np.array(curve), rtol=0, atol=2e-6)
 
 
 def at(files: dict[str, bytes], x: float, way: float) -> float:

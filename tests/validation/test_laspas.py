@@ -14,6 +14,7 @@ import pytest
 
 from ncfix.machine import Effect, State, load
 from ncfix.machine.basis import Backlash
+from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.measure.calibrate import calibrate
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.instruments import Faults, observe, simulate
@@ -106,6 +107,32 @@ def test_the_reversal_of_z_is_missed_without_its_effect_and_found_with_it():
     found = calibrate([data], empty)
     assert abs(found.estimate.coefficients[0] - 15.553e-3) < 4.5 * found.sigma[0]
     assert "NCF634" not in {message.code for message in found.remarks}
+
+
+def test_forward_and_reverse_curves_are_tables_of_one_direction_each():
+    """Section 5: 16 targets of X, five runs each way. The curves come back, and the error follows the direction.
+
+    Table 4 prints their range (17.1 um) and mean reversal (2.367 um); the curves are not printed.
+    """
+    random, places = np.random.default_rng(3), laspas.PLACES["X"]
+    forward = 17.1e-3 * np.sin(places / 300) / 2
+    curves = {"positive": forward, "negative": forward - 2.367e-3 * random.uniform(0.8, 1.2, len(places))}
+    tables = [PiecewiseLinear(tuple(places.tolist()), way) for way in curves]
+    pairs = zip(tables, curves.values(), strict=True)
+    known = laspas.HOME.replace(effects=tuple(Effect("EXX", tuple(c.tolist()), t) for t, c in pairs))
+    run = np.concatenate([places, places[::-1]])
+    columns = {"position": np.tile(run, 5), "direction": np.tile(np.repeat([1.0, -1.0], len(places)), 5)}
+    labels = {"axis": ("X",) * len(run) * 5, "component": ("EXX",) * len(run) * 5, "set": ("1",) * len(run) * 5}
+    plan = Measurement("axis", (("setup", "none"),), columns, labels)
+    data = simulate(plan, known, Faults(noise_um=0.5), seed=2)
+    empty = known.replace(effects=tuple(replace(effect, coefficients=(0.0,) * len(places)) for effect in known.effects))
+    found = calibrate([data], empty, loss="none")
+    error = (found.estimate.coefficients - np.concatenate(list(curves.values()))) / found.sigma
+    assert np.abs(error).max() < 4.5
+    q = np.column_stack([places, 0 * places, 0 * places])
+    x = known.axis_names.index("X")
+    for sign, curve in zip((1, -1), curves.values(), strict=True):
+        np.testing.assert_allclose(known.joint_errors(q, State(direction=sign))[:, x, 0], curve, rtol=1e-12)
 
 
 def test_table_10_as_a_magnitude(figures):

@@ -49,6 +49,20 @@ def spline_rates(knots: Array, degree: int, coefficients: Array) -> Array:
 
 
 BOTH, POSITIVE, NEGATIVE = "both", "positive", "negative"
+ONE_WAY = "both, positive or negative: acts for this direction of motion only"
+
+
+def share_of(way: str, direction: Array) -> Array | float:
+    """How much of what acts `way` there is for directions of motion (-1, 0, 1); half where they are not known."""
+    if way == BOTH:
+        return 1.0
+    share: Array = 0.5 * (1 + (1.0 if way == POSITIVE else -1.0) * direction)
+    return share
+
+
+def no_way(way: str) -> list[tuple[str, str]]:
+    """A complaint about a word that is no way."""
+    return [] if way in (BOTH, POSITIVE, NEGATIVE) else [("direction", f"{way!r} is none of both, positive, negative")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +70,13 @@ class PiecewiseLinear(Basis):
     """Values at given positions, straight lines between them: what a control's own table holds."""
 
     positions: tuple[float, ...] = key("numbers", "where the values stand, ascending")
+    direction: str = key("text", ONE_WAY, BOTH)
     name: ClassVar[str] = "table"
-    title: ClassVar[str] = "values at `positions`, linear between them"
+    title: ClassVar[str] = "values at `positions`, linear between them; for one `direction` if wanted"
+
+    @property
+    def needs_direction(self) -> bool:
+        return self.direction != BOTH
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -81,22 +100,24 @@ class PiecewiseLinear(Basis):
     def complaints(self) -> list[tuple[str, str]]:
         if len(self.positions) < 2:
             return [("positions", "a table needs at least two positions")]
-        return ascending("positions", self.positions)
+        return ascending("positions", self.positions) + no_way(self.direction)
 
     def rows(self, u: Array, direction: Array) -> Array:
         index, fraction = self._cell(u)
-        return _at(index, 1 - fraction, self.size) + _at(index + 1, fraction, self.size)
+        rows = _at(index, 1 - fraction, self.size) + _at(index + 1, fraction, self.size)
+        return rows * share_of(self.direction, direction)
 
     def slopes(self, u: Array, direction: Array) -> Array:
         index, _ = self._cell(u)
         inside = (u >= self.positions[0]) & (u < self.positions[-1])
         rate = np.where(inside, 1 / np.diff(self.positions)[index], 0.0)
-        return _at(index + 1, rate, self.size) - _at(index, rate, self.size)
+        slopes = _at(index + 1, rate, self.size) - _at(index, rate, self.size)
+        return slopes * share_of(self.direction, direction)
 
     def combine(self, gains: Array, u: Array, direction: Array) -> Array:
         index, fraction = self._cell(u)
         low: Array = gains[:, index]
-        return low + fraction * (gains[:, index + 1] - low)
+        return (low + fraction * (gains[:, index + 1] - low)) * share_of(self.direction, direction)
 
     def _cell(self, u: Array) -> tuple[Any, Array]:
         positions = np.asarray(self.positions)
@@ -172,7 +193,7 @@ class PiecewiseConstant(Basis):
     """One value below the first position, one between each pair, one above the last."""
 
     positions: tuple[float, ...] = key("numbers", "where the value jumps, ascending; it has the upper value there")
-    direction: str = key("text", "both, positive or negative: acts for this direction of motion only", BOTH)
+    direction: str = key("text", ONE_WAY, BOTH)
     name: ClassVar[str] = "step"
     title: ClassVar[str] = "constant pieces, one coefficient more than `positions`; for one `direction` if wanted"
 
@@ -195,26 +216,18 @@ class PiecewiseConstant(Basis):
         return float(np.abs(coefficients).max()), 0.0, 0.0
 
     def complaints(self) -> list[tuple[str, str]]:
-        wrong = ascending("positions", self.positions)
-        if self.direction not in (BOTH, POSITIVE, NEGATIVE):
-            wrong.append(("direction", f"{self.direction!r} is none of both, positive, negative"))
-        return wrong
+        return ascending("positions", self.positions) + no_way(self.direction)
 
     def rows(self, u: Array, direction: Array) -> Array:
-        return _at(np.searchsorted(np.asarray(self.positions), u, side="right"), self._share(direction), self.size)
+        share = share_of(self.direction, direction)
+        return _at(np.searchsorted(np.asarray(self.positions), u, side="right"), share, self.size)
 
     def slopes(self, u: Array, direction: Array) -> Array:
         return np.zeros((self.size, *np.shape(u)))
 
     def combine(self, gains: Array, u: Array, direction: Array) -> Array:
         index = np.searchsorted(np.asarray(self.positions), u, side="right")
-        return gains[:, index] * self._share(direction)
-
-    def _share(self, direction: Array) -> Array:
-        if self.direction == BOTH:
-            return np.ones(np.shape(direction))
-        sign = 1.0 if self.direction == POSITIVE else -1.0
-        return 0.5 * (1 + sign * direction)
+        return gains[:, index] * share_of(self.direction, direction)
 
 
 def ascending(name: str, values: tuple[float, ...], strictly: bool = True) -> list[tuple[str, str]]:
@@ -227,7 +240,7 @@ def ascending(name: str, values: tuple[float, ...], strictly: bool = True) -> li
     return [(name, f"{values[at]:g} is followed by {values[at + 1]:g}: not ascending")]
 
 
-def _at(index: Any, values: Array, size: int) -> Array:
+def _at(index: Any, values: Array | float, size: int) -> Array:
     """Rows that are zero but for `values` in row `index`."""
     return np.where(columns_like(range(size), index) == index, values, 0.0)
 
