@@ -186,3 +186,20 @@ def test_between_a_tool_change_and_the_next_length_offset_nothing_is_called_faul
     fixed = fix_program(read(text, "part", get("fanuc")), machine("table"), setup, FixOptions(verify=False)).text
     proof = prove(text, fixed, machine("table"), given, "fanuc")
     assert (proof.faults, proof.lines("the length of the tool is not known")) == ([], [8])
+
+
+def test_a_sinumerik_begins_with_the_first_edge_of_the_tool_in_the_spindle() -> None:
+    text = b"G71 G90 G17 G94\nG0 X-20 Y20\nG0 Z26\nG1 Z20 F100\nM30\n"
+    initial, known = {"X": 0.0, "Y": 0.0, "Z": 250.0}, machine("three")
+    setup = Setup(initial=initial, work_offsets={"G500": {}}, tools={0: Tool(length=80.0)})
+    fixed = fix_program(read(text, "part", get("siemens")), known, setup, FixOptions(verify=False)).text
+    proof = prove(text, fixed, known, Given(initial=initial, tools={0: 80.0}), "siemens")
+    assert (proof.faults, proof.proved_motions) == ([], 3)
+
+
+def test_a_pole_that_is_put_back_behind_a_circle_belongs_to_the_circle() -> None:
+    blocks = ["BEGIN PGM A MM", "TOOL CALL 1 Z S900", "L X+10 Y+10 Z+5 R0 FMAX", "CC X+0 Y+10", "L Z-1 F200"]
+    blocks += ["CP IPA+360 DR+", "L X+10.5 Y+11", "L Z+20", "CP IPA+90 DR+", "L X+2", "END PGM A MM"]
+    text = "".join(f"{number} {block}\n" for number, block in enumerate(blocks)).encode()
+    proof = proof_of(text, "three", {"X": 0.0, "Y": 0.0, "Z": 200.0}, "heidenhain")
+    assert proof.faults == []

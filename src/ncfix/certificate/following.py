@@ -100,8 +100,8 @@ class AxisFollower:
             self.system = "G54"
         self.tool: int | str = 0
         self.next_tool: int | str = 0
-        self.length: float | None = 0.0
-        """The tool length that is in force in coordinates."""
+        self.length: float | None = self.length_of(0) if family is Family.SINUMERIK else 0.0
+        """The tool length that is in force in coordinates; a SINUMERIK begins with D1 of the tool in the spindle."""
         self.between = False
         """The length offset in force is not of the tool in the spindle: which of them counts is not sure."""
         self.tcp = given.tcp

@@ -138,8 +138,9 @@ class Pairing:
                 more += 1
                 continue
             last = stop - 1 if whole else self._last(row, j, j + max(more, 0), min(stop, j + AHEAD))
-            if last + 1 < stop and more > last - j and not whole and not self.corrected.lines[last + 1].path:
-                last += self.original.lines[min(row + 1, len(own) - 1)].path != []
+            if last + 1 < stop and more > last - j and not whole:
+                behind, following = self.corrected.lines[last + 1], self.original.lines[min(row + 1, len(own) - 1)]
+                last += (not behind.path and following.path != []) or (_is_pole(behind) and not _is_pole(following))
             self.pairs.append(LinePair(row, j, last))
             more -= last - j
             j = last + 1
@@ -209,6 +210,11 @@ class Pairing:
                 self.faults.append(BlockFault("a line that the original does not have", line.number, 0))
 
 
+def _is_pole(line: TextLine) -> bool:
+    """Whether a line of Klartext says the pole only, which a correction puts back behind an arc for what follows."""
+    return bool(line.codes) and line.codes[0].name == "CC"
+
+
 def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> list[str]:
     """What is wrong with the text of the lines that stand for one.
 
@@ -236,10 +242,10 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
         if [*map(str.strip, STOPS.findall(line.rest))] != [*map(str.strip, STOPS.findall(last.rest))]:
             found.append("a stop is not at the end of the pieces of its block")
         ours, theirs = STOPS.sub("", ours), STOPS.sub("", theirs)
-    if arc or (klartext and line.codes and line.codes[0].name == "CC"):
+    if arc or (klartext and _is_pole(line)):
         motion = MOTION.get(pairing.original.family, MOTION[Family.WORDS])
         ours, theirs = motion.sub("", ours), motion.sub("", theirs)
-    circle = klartext and arc and (len(pieces) > 1 or bool(head.codes and head.codes[0].name == "CC"))
+    circle = klartext and arc and (len(pieces) > 1 or _is_pole(head))
     if not circle and ours.rstrip() != theirs.rstrip() and not _paced(ours, theirs, line, timed):
         found.append("words that are no axes have changed")
     if circle:
