@@ -305,6 +305,8 @@ AS_SAVED = RTL.replace("Targets:\n0.000 50.000 100.000\n", "Targets :\n0.000  50
         AS_SAVED,
         AS_SAVED.replace("\n", "\r\n"),
         AS_SAVED.replace("Axis: X", "Axis:X-axis"),
+        AS_SAVED.replace("Axis: X", "Axis: Eje x"),
+        AS_SAVED.replace("Axis: X", "Axis:X\u8f74"),
         AS_SAVED.replace("TITLE: spring", "TITLE: Carroll, new controller"),
         AS_SAVED.replace("ENVIRONMENT::", "\nEQUIPMENT::\nSerial: 1 2 3\nEOF::\n"),
         "\n" + AS_SAVED.replace(" 2 1.2", "\t2\t1.2"),
@@ -323,6 +325,9 @@ def test_the_forms_of_an_interferometers_file(text: str):
     [
         ("Axis: X", "Axis: C", "rotary axis"),
         ("Axis: X", "Axis:", "the axis is ''"),
+        ("Axis: X", "Axis: X1", "the axis is 'X1'"),
+        ("Axis: X", "Axis: X to Y", "the axis is 'X to Y'"),
+        ("Axis: X", "Axis: l\u00e4ngs", "the axis is"),
         ("TITLE: spring", "TITLE: Straightness of X", "another error than positioning"),
         ("2 1 0.4", "2 4 0.4", "target 4 of 3"),
         ("2 1 0.4", "2 1", "not a line of run, target and deviation"),

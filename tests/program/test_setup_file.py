@@ -167,6 +167,8 @@ def test_csv_tables(tmp_path: Path) -> None:
     }
     assert table(tmp_path, "tools.csv", "\ufeffLength,Tool,Diameter\n100.5,1,5\n") == {1: Tool(100.5, 2.5)}
     assert table(tmp_path, "tools.csv", "tool,length\n1,100.5\n") == {1: Tool(100.5, None)}
+    named = 'Tool,Name,Length,Comment\n1,"MILL D10",100.5,\n'
+    assert table(tmp_path, "tools.csv", named) == {1: Tool(100.5, None)}
 
 
 @pytest.mark.parametrize("mark", [";", "\t"])

@@ -11,7 +11,7 @@ CODES = {
         "not a measurement file",
         "The file begins with comment lines `# key: value`, one of them `# ncfix-measurement: 1`; or it is the file of "
         "an instrument that ncfix can read, which this is not.",
-        FORMATS,
+        f"docs/guide/calibrate.md says how the table of an instrument becomes one. {FORMATS}",
     ),
     "NCF601": Code("an unknown kind of measurement", "`# kind:` says what was measured; this kind is none.", FORMATS),
     "NCF602": Code(

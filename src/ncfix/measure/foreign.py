@@ -33,7 +33,10 @@ LOCATION = re.compile(r"E[XYZABC]0[A-Z]")
 
 SECTION = re.compile(r"([A-Z][A-Z -]*)::")
 KEY = re.compile(r"([A-Za-z][\w -]*?)\s*:(.*)")
-LETTER = re.compile(r"(?:axis\b\s*)?([a-z])(?:[\s_-]*(?:axis|achse)?)", re.IGNORECASE)
+LETTER = re.compile(
+    r"(?<![0-9a-z\u00c0-\u024f])([a-z])(?:[\s_-]*(?:axis|achse))?(?![0-9a-z\u00c0-\u024f])", re.IGNORECASE
+)
+"""A letter that stands alone among words of any language: `X-axis`, `Eje X`, `X\u8f74`."""
 OTHER = re.compile(r"straight|square|angular|flatness|diagonal|(?<![a-z])(?:pitch|yaw|roll)(?![a-z])", re.IGNORECASE)
 """Words of a title that speak of another error than positioning."""
 MICROMETRE = 1e-3
@@ -265,10 +268,11 @@ class Rtl:
     def axis(self) -> str:
         """The letter of the axis; raises `ConfigError` NCF618 if there is none, or another error was measured."""
         text, line = self.texts.get("axis", ("", 0))
-        match = LETTER.fullmatch(text)
-        if match is None:
+        letters = {letter.upper() for letter in LETTER.findall(text)}
+        if len(letters) != 1:
             raise self.odd(f"the axis is {text!r}" if line else "there is no line `Axis:`", line, "a letter: Axis: X")
-        if match[1].upper() in "ABC":
+        letter = letters.pop()
+        if letter in "ABC":
             said = "the unit of a rotary axis's deviations is not public: give them as kind axis, in rad"
             raise self.odd(said, line, "docs/formats.md, Measurement file")
         for key in ("title", "filetype", "location"):
@@ -276,7 +280,7 @@ class Rtl:
             if OTHER.search(other):
                 said = f"{other!r} speaks of another error than positioning, whose component and unit nobody says"
                 raise self.odd(said, where, "give the readings as kind axis, with their component")
-        return match[1].upper()
+        return letter
 
     def checked(self) -> Rtl:
         """The file, if its counts agree and its readings are of its targets; raises `ConfigError` NCF609, NCF618."""

@@ -155,7 +155,7 @@ def _kind_of(text: MeasurementLines, pairs: list[tuple[Cell, Cell]]) -> str:
     version = found.get("ncfix-measurement")
     if version is None:
         kinds = _kinds_by_columns(text)
-        hint = "an instrument's table needs it above its columns, with `# kind: ...`; see docs/formats.md"
+        hint = "an instrument's table needs it above its columns, with `# kind: ...`: docs/guide/calibrate.md"
         if kinds:
             hint = f"above the columns, with `# kind: {kinds}`; lengths are mm, angles of axes degree"
         text.note("NCF600", "there is no line `# ncfix-measurement: 1`", 1 if text.lines else 0, 0, hint)

@@ -38,6 +38,8 @@ NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)\Z")
 LONGEST = 1e6
 """mm; a number beyond it is a slip."""
 COLUMNS = ("tool", "length", "radius", "diameter")
+WORDS = ("name", "description", "comment", "note")
+"""Columns for people."""
 UNITS = {"mm": 1.0, "inch": INCH}
 OTHERWISE = "docs/formats.md lists the tables that are read; any other one as CSV with columns tool, length"
 
@@ -126,7 +128,7 @@ def csv_rows(text: str, scale: float) -> Iterator[Row]:
     separated = SeparatedText.of(lines[0][1])
     (first, row), *rows = lines
     names = [cell.text.lower() for cell in separated.cells(row, first)]
-    strangers = [name for name in names if name not in COLUMNS]
+    strangers = [name for name in names if name not in (*COLUMNS, *WORDS)]
     if strangers or not {"tool", "length"} <= set(names):
         yield first, f"the columns are {', '.join(COLUMNS)}; found {', '.join(names)}"
         return
@@ -143,6 +145,8 @@ def csv_tool(names: list[str], row: list[Cell], separated: SeparatedText, scale:
         return f"{len(row)} values for {len(names)} columns"
     values = {}
     for name, cell in zip(names, row, strict=True):
+        if name in WORDS:
+            continue
         try:
             plain = separated.plain(cell.text)
         except ValueError as error:
