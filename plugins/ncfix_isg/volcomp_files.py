@@ -60,6 +60,8 @@ SCREW_MARK = b"kw.ssfk"
 SCREW_FILE = "leadscrew_{}.lis"
 SCREW_HEAD = {"unit": ("", ("1",)), "bilateral": ("0", ("0", "1")), "modulo": ("0", ("0",))}
 """Entry -> its default, and what can be read. No text says which unit is meant if none is given."""
+INCREMENTS = "0"
+"""A unit that ncfix cannot run."""
 LARGE_SCREW = 10_000
 """1 mm: no machine has so much."""
 SCREW_POINT = re.compile(r"kw\.ssfk\.table\[(\d{1,6})\]\.(setpoint|pos|neg)")
@@ -394,7 +396,9 @@ def _terms(remarks: Remarks, numbers: Mapping[str, str] | None) -> Iterator[Term
     axis = _axis(remarks, entries, numbers)
     for name, (default, allowed) in SCREW_HEAD.items():
         line, found = entries.get(f"kw.ssfk.{name}", (0, default))
-        if found not in allowed:
+        if numbers is None and (name, found) == ("unit", INCREMENTS):
+            remarks.doubt(line, "values are increments: how large they are only the control knows")
+        elif found not in allowed:
             remarks.refuse(line, f"kw.ssfk.{name} is {found or 'missing'}", f"ncfix reads {' or '.join(allowed)}")
     both = entries.get("kw.ssfk.bilateral", (0, "0"))[1] == "1"
     points = _points(remarks, entries, ("pos", "neg") if both else ("pos",))

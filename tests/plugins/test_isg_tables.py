@@ -247,6 +247,14 @@ def test_leadscrew_lists_that_cannot_be_read(line: str, said: str) -> None:
     assert said in str(caught.value)
 
 
+def test_a_list_in_increments_is_looked_at_but_not_run() -> None:
+    tables = leadscrew(*EVEN, *BOTH)
+    alone = {"achskw2.lis": tables["achskw2.lis"].replace(b"unit 1", b"unit 0 /* increments */")}
+    assert [(each.code, "increments" in each.text) for each in CONTROL.look(alone)] == [("NCF492", True)]
+    with pytest.raises(ConfigError, match="unit is 0"):
+        CONTROL.read({**tables, **alone})
+
+
 @pytest.mark.parametrize("negate", ["", "XY", "z"])
 def test_what_the_control_turns_round_is_written_the_other_way_round(negate: str) -> None:
     """`negate XY` in the list (P-VOLC-00009) turns the compensation of X and Y: the same must be added all the same."""
