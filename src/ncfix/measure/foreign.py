@@ -268,7 +268,7 @@ class Rtl:
     def axis(self) -> str:
         """The letter of the axis; raises `ConfigError` NCF618 if there is none, or another error was measured."""
         text, line = self.texts.get("axis", ("", 0))
-        letters = {letter.upper() for letter in LETTER.findall(text)}
+        letters = {match[1].upper() for match in LETTER.finditer(text)}
         if len(letters) != 1:
             raise self.odd(f"the axis is {text!r}" if line else "there is no line `Axis:`", line, "a letter: Axis: X")
         letter = letters.pop()
