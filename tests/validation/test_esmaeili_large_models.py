@@ -20,7 +20,7 @@ from ncfix.measure.least_squares import solve
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.selection import Selection, select
 from tables.table_4_2 import coefficients
-from validation.esmaeili import HU40
+from validation.esmaeili import HU40, TABLE_4_3
 from validation.test_esmaeili_models import AC, strategy
 
 # Appendix, calibration: mm, mm/mm, ...; rad, rad/mm, rad/rad, ...; b: backlash
@@ -116,6 +116,19 @@ def test_in_axes_that_stand_still_two_of_the_81_are_lost():
     found = solve(problem.design, problem.nuisance(problem.start), np.zeros(len(problem.values)))
     assert [problem.selection.labels[k] for k in found.set_up] == ["EYA u^0"]
     assert len(found.kept) == 79
+
+
+def test_table_4_3_by_table_4_1():
+    """13 errors of the BC table, three absolute gains among them, by the balls with the scale bar: all are told."""
+    machine = HU40.replace(effects=())
+    selection = select(machine, "esmaeili-13-bc")
+    truth = np.array([TABLE_4_3[effect.name] for effect in selection.estimated])
+    data = simulate(samba(), selection.machine(machine, truth.tolist()), Faults(noise_um=1.0), seed=6)
+    found = calibrate([data], machine, selection, loss="none")
+    error = (found.estimate.coefficients - truth) / found.sigma
+    assert np.isfinite(error).all()
+    assert np.abs(error).max() < 4.5
+    assert found.chi_square == pytest.approx(1, abs=0.25)
 
 
 def test_table_4_2_by_table_4_1(figures):

@@ -133,6 +133,25 @@ def test_equation_2_24_sums_the_errors_of_all_joints(root: Path, name: str, fixe
             np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("name", ["three_axis", "wCBXFZYSt", "wCAYFXZSt", "dmu50", "angle_head"])
+def test_constants_that_can_be_told_are_6_and_4_for_each_turning_and_2_for_each_sliding_joint(
+    root: Path, name: str
+) -> None:
+    """Appendix B; Esmaeili counts the same, 20 for five axes. All frames between joints are off, the workpiece's, too."""
+    machine = load(root / "examples" / "machines" / f"{name}.toml").replace(effects=())
+    joints = [(f"0{axis.name}", True) for axis in machine.axes] + [("0S", False)]
+    constants = tuple(Effect(f"E{k}{joint}", (1.0,), carried=held) for joint, held in joints for k in "XYZABC")
+    size = np.where(machine.rotary, 2.5, 200.0)
+    q = np.random.default_rng(1).uniform(-size, size, (100, len(size)))
+    zero, one = np.zeros((3, 3)), np.eye(3)
+    set_up = [np.block([[one, -se3.skew(tip)], [zero, one]]) for tip in machine.tip(q, 80.0)]
+    seen = np.concatenate([machine.design(q, State(80.0), constants), set_up], axis=2)
+    seen[:, 3:] *= 200  # mm, and rad at 200 mm
+    values = np.linalg.svd((seen / np.linalg.norm(seen, axis=(0, 1))).reshape(-1, seen.shape[2]), compute_uv=False)
+    rotary = int(machine.rotary.sum())
+    assert (values > 1e-9 * values[0]).sum() == 6 + 4 * rotary + 2 * (len(machine.axes) - rotary)
+
+
 def test_a_guide_that_stands_still_is_an_effect_times_the_position():
     """A ram in a fixed bearing (Soons's fixed frame): its tilt acts with an arm that grows as it comes out.
 
