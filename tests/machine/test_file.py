@@ -153,3 +153,12 @@ def test_what_changes_the_hash_and_what_does_not() -> None:
         machine.replace(workpiece_offset=(0.0, 0.0, 1.0)),
     ):
         assert other.hash != machine.hash
+
+
+def test_a_table_says_its_direction_only_if_it_has_one() -> None:
+    """So that the hash of a file from before there was a choice stays: it is in stamps and certificates."""
+    known = Machine("slide", "w F X t", (Axis("X", False, False, (1.0, 0.0, 0.0)),))
+    for way, said in (("both", False), ("negative", True)):
+        machine = known.replace(effects=(Effect("EXX", (0.0, 0.01), PiecewiseLinear((0.0, 100.0), way)),))
+        assert (f'direction = "{way}"' in dumps(machine)) == said
+        assert loads(dumps(machine)) == machine

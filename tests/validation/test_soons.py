@@ -137,7 +137,7 @@ def test_equation_2_24_sums_the_errors_of_all_joints(root: Path, name: str, fixe
 def test_constants_that_can_be_told_are_6_and_4_for_each_turning_and_2_for_each_sliding_joint(
     root: Path, name: str
 ) -> None:
-    """Appendix B; Esmaeili counts the same, 20 for five axes. All frames between joints are off, the workpiece's, too."""
+    """Appendix B; Esmaeili counts the same, 20 for five axes. All frames are off, those of part and tool, too."""
     machine = load(root / "examples" / "machines" / f"{name}.toml").replace(effects=())
     joints = [(f"0{axis.name}", True) for axis in machine.axes] + [("0S", False)]
     constants = tuple(Effect(f"E{k}{joint}", (1.0,), carried=held) for joint, held in joints for k in "XYZABC")

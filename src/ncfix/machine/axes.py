@@ -244,7 +244,11 @@ class Effect:
     def file_keys(self) -> dict[str, Any]:
         """Its table in a machine file, in the order in which people read the keys; None for those left out."""
         basis = self.basis
-        parameters = {each.name: getattr(basis, each.name) for each in fields(basis)}  # type: ignore[arg-type]
+        own = {each: getattr(basis, each.name) for each in fields(basis)}  # type: ignore[arg-type]
+        parameters = {
+            each.name: None if isinstance(value, str) and value == each.default else value
+            for each, value in own.items()
+        }
         return {
             "name": self.name,
             "basis": None if basis.name == "constant" else basis.name,
