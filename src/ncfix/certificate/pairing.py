@@ -29,6 +29,8 @@ MOTION = {
     Family.KLARTEXT: re.compile(r"[ \t]*(?<![\w.])(?:L|CC|CP|CR|C|DR[+-])(?![\w.+-])", re.IGNORECASE),
 }
 STOPS = re.compile(r"[ \t]*\bM[ \t]*0*(?:0|1|2|30|60)(?![\d.])", re.IGNORECASE)
+ARCS = ("C", "CP", "CR")
+"""Arcs of Klartext."""
 SKIP = re.compile(r"[ \t]*/\d?")
 PACE = re.compile(
     r"[ \t]*(?:\bF(?:[ \t]*=)?[ \t]*(?:[\d.]+|MAX)|\bG9[34](?![\d.])|\bP[ \t]*\d+(?![\d.])|(?<![\w.])R[0LR](?![\w.]))",
@@ -140,7 +142,10 @@ class Pairing:
             last = stop - 1 if whole else self._last(row, j, j + max(more, 0), min(stop, j + AHEAD))
             if last + 1 < stop and more > last - j and not whole:
                 behind, following = self.corrected.lines[last + 1], self.original.lines[min(row + 1, len(own) - 1)]
-                last += (not behind.path and following.path != []) or (_is_pole(behind) and not _is_pole(following))
+                put_back = _begins(behind, "CC") and _begins(self.original.lines[row], *ARCS)
+                last += (not behind.path and following.path != []) or (
+                    put_back and not _begins(following, "CC", *ARCS)  # a pole before an arc belongs to that one
+                )
             self.pairs.append(LinePair(row, j, last))
             more -= last - j
             j = last + 1
@@ -210,9 +215,9 @@ class Pairing:
                 self.faults.append(BlockFault("a line that the original does not have", line.number, 0))
 
 
-def _is_pole(line: TextLine) -> bool:
-    """Whether a line of Klartext says the pole only, which a correction puts back behind an arc for what follows."""
-    return bool(line.codes) and line.codes[0].name == "CC"
+def _begins(line: TextLine, *names: str) -> bool:
+    """Whether a line of Klartext begins with one of these words."""
+    return bool(line.codes) and line.codes[0].name in names
 
 
 def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> list[str]:
@@ -242,10 +247,10 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
         if [*map(str.strip, STOPS.findall(line.rest))] != [*map(str.strip, STOPS.findall(last.rest))]:
             found.append("a stop is not at the end of the pieces of its block")
         ours, theirs = STOPS.sub("", ours), STOPS.sub("", theirs)
-    if arc or (klartext and _is_pole(line)):
+    if arc or (klartext and _begins(line, "CC")):
         motion = MOTION.get(pairing.original.family, MOTION[Family.WORDS])
         ours, theirs = motion.sub("", ours), motion.sub("", theirs)
-    circle = klartext and arc and (len(pieces) > 1 or _is_pole(head))
+    circle = klartext and arc and (len(pieces) > 1 or _begins(head, "CC"))
     if not circle and ours.rstrip() != theirs.rstrip() and not _paced(ours, theirs, line, timed):
         found.append("words that are no axes have changed")
     if circle:
