@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ncfix.compensate.figures.curve import Curve, CurvePoints, Stretches, length
 from ncfix.compensate.figures.nearest import Nearest, Search
-from ncfix.compensate.plan.arrays import Array, Index, finite, some
+from ncfix.compensate.plan.arrays import Array, Index, finite, some, taken
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import REST, Signs, carried, signs
 from ncfix.compensate.plan.sampling import BISECTIONS
@@ -98,7 +98,7 @@ class BacklashBodies:
         q = np.stack([intent.joints_at(legs.rows, each) for each in (legs.start, legs.stop)])
         known = np.flatnonzero(finite(q[0]) & finite(q[1]))
         first = np.zeros(len(intent.machine.axes)) if first is None else first
-        bodies = cls(intent, stretches, legs.taken(known), own[known], q[:, known], first, {})
+        bodies = cls(intent, stretches, taken(legs, known), own[known], q[:, known], first, {})
         if len(known):
             bodies.runs.update((axis, bodies._runs(axis)) for axis in intent.machine.directed)
         return bodies
@@ -223,7 +223,7 @@ def _legs(intent: Intent, stretches: Stretches) -> tuple[Stretches, Index]:
     start, stop = np.append(stretches.start[along], nothing), np.append(stretches.stop[along], all_of_it)
     order = np.argsort(rows, kind="stable")
     own = np.append(along, np.full(len(rest), -1))
-    return Stretches(rows, start, stop, start == 0).taken(order), own[order]
+    return taken(Stretches(rows, start, stop, start == 0), order), own[order]
 
 
 NEAR = 0.01
@@ -257,14 +257,6 @@ class Flank:
         aside[joined, 0] = aside[joined - 1, 2]
         return cls(aside)
 
-    def taken(self, which: slice) -> Flank:
-        """That of some of the parabolas."""
-        return Flank(self.aside[which])
-
-    def and_then(self, other: Flank) -> Flank:
-        """That of two parts of a path that follow each other."""
-        return Flank(np.concatenate([self.aside, other.aside]))
-
     def there(self, search: Search, path: Curve, samples: CurvePoints, found: Nearest) -> Array:
         """The gaps (k,) from samples of what is made, on the side on which it is nearer, to what is meant."""
         return self._lessened(search, samples.points, found, path, (samples.piece, samples.share), 1.0)
@@ -292,7 +284,7 @@ class Flank:
         off = np.abs(share[rows] - sample[rows] / 2) * path.ways[piece[rows]]
         rows = rows[off <= NEAR + length(aside[rows])]
         if rows.size:
-            nearest = search.around(points[rows] + aside[rows], found.taken(rows).way(search.curve))
+            nearest = search.around(points[rows] + aside[rows], taken(found, rows).way(search.curve))
             gap[rows] = np.minimum(gap[rows], nearest.gap)
         return gap
 

@@ -29,13 +29,14 @@ from ncfix.compensate.figures.nearest import Nearest, Search, over_holes, over_p
 from ncfix.compensate.figures.simulation import SimulatedErrors, actual_tip
 from ncfix.compensate.following import Task
 from ncfix.compensate.parts import MachineParts
-from ncfix.compensate.plan.arrays import Array, Index
+from ncfix.compensate.plan.arrays import Array, Index, stacked, taken
 from ncfix.compensate.plan.intent import Intent, left_in_cuts
 from ncfix.compensate.plan.kinematics import Signs, matters
 from ncfix.compensate.plan.written import rounding_of_arcs
 from ncfix.compensate.workers import Read
 from ncfix.control.moves import Moves
-from ncfix.control.trace import joined_moves, taken
+from ncfix.control.trace import joined_moves
+from ncfix.control.trace import taken as motions_taken
 from ncfix.diagnostics import DifferenceError, Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
@@ -94,7 +95,7 @@ class CutPath:
         stretches = bodies.divided() if bodies else stretches
         actual = Curve.through(stretches, bodies.tip if bodies else partial(actual_tip, intent))
         intended = in_lines(Curve.through(stretches, intent.tip)) if meant else None
-        flank = Flank.of(bodies, actual).taken(counted(actual)) if bodies else None
+        flank = taken(Flank.of(bodies, actual), counted(actual)) if bodies else None
         left = {axis: lines_of(found) for axis, found in left_in_cuts(intent.moves).items()}
         digits = rounding_of_arcs(intent.machine, np.nan_to_num(intent.moves.sweep[rows]))
         unseen = {why: lines_of(found) for why, found in not_looked_at(intent.moves).items()}
@@ -125,7 +126,8 @@ class PartEnd:
     def behind(cls, bodies: BacklashBodies, lines: Index) -> PartEnd:
         """Those at the end of motions in lines (n,)."""
         start, moves = max(len(lines) - 2 * BESIDE, 0), bodies.intent.moves
-        return cls(taken(moves, np.arange(start, len(lines))), lines[start:], bodies.came(start), bodies.before(start))
+        last = motions_taken(moves, np.arange(start, len(lines)))
+        return cls(last, lines[start:], bodies.came(start), bodies.before(start))
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +222,7 @@ class Track:
         self.complete = last
         self.cut += more.total
         self.curve = self.curve.and_then(more)
-        self.flank = flank if self.flank is None or flank is None else self.flank.and_then(flank)
+        self.flank = flank if self.flank is None or flank is None else stacked([self.flank, flank])
 
     def drop(self, before: float) -> None:
         """Forget what lies before a way along the path."""
@@ -228,7 +230,7 @@ class Track:
         count = int(np.searchsorted(curve.lengths + curve.ways, before))
         if count:
             self.curve = self.part(count, len(curve))
-            self.flank = self.flank and self.flank.taken(slice(count, None))
+            self.flank = self.flank and taken(self.flank, slice(count, None))
             self.dropped += count
 
     def joined(self, at: int) -> float:
@@ -281,16 +283,16 @@ class Match:
         search = Search(other.curve, self.near, self.ahead, other.dropped == 0, other.complete)
         groups = np.searchsorted(samples.piece, np.arange(GROUP, len(part), GROUP))
         found = search.all(samples.points, part.way(samples.piece, samples.share), groups)
-        last = found.taken(np.array([0])) if self.last is None else self.last.shifted(-other.dropped)
-        before, at_end = last.and_more(found.taken(np.arange(len(found.gap) - 1))), np.array([len(found.gap) - 1])
-        self.ahead, self.last = search.ahead, found.taken(at_end).shifted(other.dropped)
+        last = taken(found, slice(1)) if self.last is None else self.last.shifted(-other.dropped)
+        before = stacked([last, taken(found, slice(-1))])
+        self.ahead, self.last = search.ahead, taken(found, slice(-1, None)).shifted(other.dropped)
         between = [
             over_holes(search, part, samples, before.piece, found),
             *over_peaks(search, part, samples, before, found),
         ]
         for more in between:
-            samples, found = samples.and_more(more[0]), found.and_more(more[1])
-        gap = found.gap if flank is None else flank.taken(slice(start, stop)).there(search, part, samples, found)
+            samples, found = stacked([samples, more[0]]), stacked([found, more[1]])
+        gap = found.gap if flank is None else taken(flank, slice(start, stop)).there(search, part, samples, found)
         if other.flank is not None:
             gap = other.flank.back(search, samples.points, found)
         self.along.add(part.rows[samples.piece], gap, samples.weight)

@@ -79,10 +79,6 @@ class Stretches:
         rows, start = rows[order], np.concatenate([starts, ones])[order]
         return cls(rows, start, np.concatenate([ends, ones])[order], _opening(intent, rows, start))
 
-    def taken(self, which: Index) -> Stretches:
-        """Some of them."""
-        return Stretches(self.rows[which], self.start[which], self.stop[which], self.opens[which])
-
     def divided(self, which: Index, fraction: Array) -> Stretches:
         """These, some of them (m,) divided at fractions (m,) of their motions."""
         inside = np.flatnonzero((fraction > self.start[which]) & (fraction < self.stop[which]))
@@ -315,11 +311,6 @@ class CurvePoints:
         weight[last[joined]] += curve.ways[joined + 1] / 6
         weight[-1:] += after / 6
         return cls(piece, share, points, weight)
-
-    def and_more(self, other: CurvePoints) -> CurvePoints:
-        """These, and then others."""
-        names = ("piece", "share", "points", "weight")
-        return CurvePoints(*(np.concatenate([getattr(each, name) for each in (self, other)]) for name in names))
 
 
 def arc_lengths(begin: Array, middle: Array, end: Array) -> Array:

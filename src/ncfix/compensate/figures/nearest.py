@@ -22,7 +22,7 @@ import numpy as np
 
 from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, length
-from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places, ranges
+from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places, ranges, stacked, taken
 from ncfix.control.trace import NotInPartsError
 
 ALONG = 0.02
@@ -61,10 +61,6 @@ class Nearest:
     share: Array
     gap: Array
 
-    def taken(self, which: Index) -> Nearest:
-        """For some of the points."""
-        return Nearest(self.piece[which], self.share[which], self.gap[which])
-
     def shifted(self, by: int) -> Nearest:
         """The same, with the parabolas counted from elsewhere."""
         return replace(self, piece=self.piece + by)
@@ -72,11 +68,6 @@ class Nearest:
     def way(self, curve: Curve) -> Array:
         """The ways along the curve to there, (n,) mm; so far inside of the parabolas that rounding shows no others."""
         return curve.way(self.piece, np.clip(self.share, INSIDE, 1 - INSIDE))
-
-    def and_more(self, other: Nearest) -> Nearest:
-        """For these points, and then for others."""
-        names = ("piece", "share", "gap")
-        return Nearest(*(np.concatenate([getattr(each, name) for each in (self, other)]) for name in names))
 
     def put(self, which: Index, other: Nearest) -> None:
         """Take for some of the points what is there instead."""
@@ -105,9 +96,7 @@ class Search:
         groups  where others begin for which the difference of the two lengths of path is taken as the same, at first
         """
         parts = zip(np.split(points, groups), np.split(lengths, groups), strict=True)
-        found = [each for part in parts for each in self._together(*part)]
-        columns = ([getattr(each, name) for each in found] for name in ("piece", "share", "gap"))
-        return Nearest(*map(np.concatenate, columns))
+        return stacked([each for part in parts for each in self._together(*part)])
 
     def _together(self, points: Array, lengths: Array) -> list[Nearest]:
         """For points of a short way; of ever shorter ones where one path suddenly is longer than the other.
@@ -349,18 +338,13 @@ class NearestInterval:
     before: Nearest
     behind: Nearest
 
-    def taken(self, which: Index) -> NearestInterval:
-        """Some of them."""
-        ends = (each.taken(which) for each in (self.before, self.behind))
-        return NearestInterval(self.piece[which], self.low[which], self.high[which], *ends)
-
     def leaping(self, search: Search, path: Curve) -> NearestInterval:
         """Those on which there may be a peak beyond what is near enough."""
         way, near = path.ways[self.piece] * (self.high - self.low), search.near
         begin, end = (search.curve.way(each.piece, each.share) for each in (self.before, self.behind))
         within = (self.before.gap <= near) & (self.behind.gap <= near)
         peaks = within & (self.before.gap + self.behind.gap + way > 2 * near)
-        return self.taken(np.flatnonzero(peaks & (np.abs(end - begin - way) > near)))
+        return taken(self, np.flatnonzero(peaks & (np.abs(end - begin - way) > near)))
 
     def middle(self, search: Search, path: Curve) -> Nearest:
         """What is nearest to the middle of each: seen from the begin or from the end, whichever is nearer."""
@@ -371,14 +355,13 @@ class NearestInterval:
             for each, way in ((self.before, half), (self.behind, -half))
         )
         nearer = np.flatnonzero(other.gap < found.gap)
-        found.put(nearer, other.taken(nearer))
+        found.put(nearer, taken(other, nearer))
         return found
 
     def halves(self, middle: Nearest) -> NearestInterval:
         """Both halves of each, by what is nearest to its middle."""
-        piece, half = np.tile(self.piece, 2), (self.low + self.high) / 2
-        low, high = np.append(self.low, half), np.append(half, self.high)
-        return NearestInterval(piece, low, high, self.before.and_more(middle), middle.and_more(self.behind))
+        half = (self.low + self.high) / 2
+        return stacked([replace(self, high=half, behind=middle), replace(self, low=half, before=middle)])
 
 
 def over_peaks(
@@ -391,7 +374,7 @@ def over_peaks(
     """
     joined = np.flatnonzero((samples.share > 0) & (path.ways[samples.piece] > 0))
     share = samples.share[joined]
-    left = NearestInterval(samples.piece[joined], share - 0.5, share, before.taken(joined), found.taken(joined))
+    left = NearestInterval(samples.piece[joined], share - 0.5, share, taken(before, joined), taken(found, joined))
     for _ in range(HALVINGS):
         left = left.leaping(search, path)
         if not len(left.piece):

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ncfix.compensate.account import Account, Reason
-from ncfix.compensate.plan.arrays import Array, Index, Mask, owners, picked
+from ncfix.compensate.plan.arrays import Array, Index, Mask, owners, picked, stacked, taken
 from ncfix.compensate.plan.deviation import errors_at, samples
 from ncfix.compensate.plan.figure_tally import PathSamples
 from ncfix.compensate.plan.intent import Intent
@@ -271,23 +271,19 @@ class _Places:
         move, at = written.pieces.move[piece], written.before[piece] + fraction * written.span[piece]
         before, after = errors_at(intent, move, at, written.segments.at(piece, fraction))
         bent = PathSamples(move, at, before, after, np.zeros(len(piece)))
-        looked = [*samples(written, which, solution.plan.known), bent]
-        columns = ("move", "fraction", "before", "after", "weight")
-        move, at, before, after, weight = (np.concatenate([getattr(each, name) for each in looked]) for name in columns)
-        tip = intent.tip(move, at)
-        lifted = np.zeros(len(move), dtype=bool)
+        looked = stacked([*samples(written, which, solution.plan.known), bent])
+        tip = intent.tip(looked.move, looked.fraction)
+        holes = np.zeros(0, dtype=np.intp)
         if intent.moves.approach is not None:
-            holes = np.flatnonzero((intent.moves.kind[move] == MotionKind.CYCLE) & (at == 1.0))
-            above = intent.meant(move[holes], picked(intent.moves.approach, move[holes]))
-            extra = move[holes], np.zeros(len(holes)), above, before[holes], after[holes], np.zeros(len(holes))
-            move, at, tip, before, after, weight = (
-                np.concatenate(pair) for pair in zip((move, at, tip, before, after, weight), extra, strict=True)
-            )
-            lifted = np.concatenate([lifted, np.ones(len(holes), dtype=bool)])
-        weight = np.nan_to_num(weight)
-        order = np.lexsort((at, move))
-        order = order[np.isfinite(tip[order]).all(axis=1) & np.isfinite(before[order]) & np.isfinite(after[order])]
-        return cls(move[order], tip[order], before[order], after[order], weight[order], lifted[order])
+            holes = np.flatnonzero((intent.moves.kind[looked.move] == MotionKind.CYCLE) & (looked.fraction == 1.0))
+            drilled, none = taken(looked, holes), np.zeros(len(holes))
+            above = intent.meant(drilled.move, picked(intent.moves.approach, drilled.move))
+            looked, tip = stacked([looked, replace(drilled, fraction=none, weight=none)]), np.concatenate([tip, above])
+        lifted = np.arange(len(tip)) >= len(tip) - len(holes)
+        found = cls(looked.move, tip, looked.before, looked.after, np.nan_to_num(looked.weight), lifted)
+        known = np.isfinite(tip).all(axis=1) & np.isfinite(looked.before) & np.isfinite(looked.after)
+        order = np.lexsort((looked.fraction, looked.move))
+        return taken(found, order[known[order]])
 
 
 def _bent(written: WrittenPieces, which: Index) -> tuple[Index, Array]:

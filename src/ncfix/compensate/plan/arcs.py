@@ -7,11 +7,11 @@ centre moved by the mean correction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, picked, slices, vector_product
+from ncfix.compensate.plan.arrays import Array, Index, Mask, picked, slices, stacked, vector_product
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import ArcColumns, Segments, sweep_between
 
@@ -66,11 +66,7 @@ def fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, ro
     closure   what the control accepts; half of it is used
     rounding  how far a point may move when it is rounded to the control's digits, mm
     """
-    parts = [_fitted(intent, standing, rows[part], closure, rounding) for part in slices(len(rows), BATCH)]
-    if len(parts) == 1:
-        return parts[0]
-    names = [each.name for each in fields(Fitted)]
-    return Fitted(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return stacked([_fitted(intent, standing, rows[part], closure, rounding) for part in slices(len(rows), BATCH)])
 
 
 def _fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, rounding: float) -> Fitted:

@@ -7,9 +7,11 @@ them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
 from functools import reduce
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,28 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
+Table = TypeVar("Table")
+"""A dataclass whose fields are columns of one length: arrays, or such dataclasses again."""
+
+
+def taken(table: Table, rows: Index | slice) -> Table:
+    """Some rows of a table."""
+    columns = (getattr(table, each.name) for each in fields(table))  # type: ignore[arg-type]
+    return type(table)(*(taken(column, rows) if is_dataclass(column) else column[rows] for column in columns))
+
+
+def stacked(tables: Sequence[Table]) -> Table:
+    """The rows of tables one behind the other; a column that one of them lacks (None) is None."""
+    if len(tables) == 1:
+        return tables[0]
+    names = [each.name for each in fields(tables[0])]  # type: ignore[arg-type]
+    return type(tables[0])(*(_stacked([getattr(table, name) for table in tables]) for name in names))
+
+
+def _stacked(columns: list[Any]) -> Any:
+    if any(column is None for column in columns):
+        return None
+    return stacked(columns) if is_dataclass(columns[0]) else np.concatenate(columns)
 
 
 def every(mask: Mask) -> Mask:

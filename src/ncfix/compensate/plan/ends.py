@@ -24,7 +24,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ncfix.compensate.plan import arcs
-from ncfix.compensate.plan.arrays import Array, Index, Mask, chosen, distinct, every, finite, picked, put, slices
+from ncfix.compensate.plan.arrays import (
+    Array,
+    Index,
+    Mask,
+    chosen,
+    distinct,
+    every,
+    finite,
+    picked,
+    put,
+    slices,
+    stacked,
+)
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent, stays
 from ncfix.compensate.plan.kinematics import Correction, commands_from_joints, reached_joints, steer
@@ -342,17 +354,11 @@ def _solved(intent: Intent, strategy: Strategy, rows: Index, q: Array) -> Correc
         return with_rotary_held(intent, strategy, rows, ones, q, found)
     if not strategy.follows_path:
         return strategy.solve(intent.machine, q, intent.states(rows, ones))
-    parts = []
-    for part in slices(len(rows), BATCH):
-        parts.append(strategy.solve(intent.machine, q[part], intent.states(rows[part], ones[part])))
-    if len(parts) == 1:
-        return parts[0]
-    before = [part.before for part in parts if part.before is not None]
-    return Correction(
-        np.concatenate([part.q for part in parts]),
-        np.concatenate([part.converged for part in parts]),
-        np.concatenate([part.oriented for part in parts]),
-        np.concatenate(before) if len(before) == len(parts) else None,
+    return stacked(
+        [
+            strategy.solve(intent.machine, q[part], intent.states(rows[part], ones[part]))
+            for part in slices(len(rows), BATCH)
+        ]
     )
 
 

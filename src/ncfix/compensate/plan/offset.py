@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, owners, picked
+from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, owners, picked, stacked, taken
 from ncfix.compensate.plan.intent import Intent, correctable
 from ncfix.compensate.plan.sampling import interior
 from ncfix.compensate.plan.segments import Segments
@@ -83,11 +83,6 @@ class ContactPath:
         arc = segments.arc[rows] & (sense != 0)
         return cls(*ends, arc, np.nan_to_num(segments.centre[rows]), sense, up, radius)
 
-    def taken(self, rows: Index) -> ContactPath:
-        """Some of them."""
-        ends = self.start[rows], self.end[rows]
-        return ContactPath(*ends, self.arc[rows], self.centre[rows], self.turn[rows], self.up[rows], self.radius[rows])
-
     def heading(self, points: Array) -> Array:
         """The way in the plane at points (k, 3) of the motions, unit vectors."""
         straight = _flat(self.end - self.start, self.up)
@@ -143,7 +138,7 @@ def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
     up = np.array([frame.rotation for frame in moves.frames])[moves.frame[rows], :, moves.across[rows]]
     meant, done = (ContactPath.of(each, rows, up, moves.beside[rows]) for each in (intent.segments, real))
     makes = np.flatnonzero((lengths(_flat(meant.end - meant.start, up)) > NO_WAY) | meant.arc)
-    rows, meant, done = rows[makes], meant.taken(makes), done.taken(makes)
+    rows, meant, done = rows[makes], taken(meant, makes), taken(done, makes)
     if not rows.size:
         return None
     parts = [_along(intent, real, rows, meant, done)]
@@ -159,13 +154,12 @@ def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
     joined &= lengths(_flat(meant.end[first] - meant.start[second], meant.up[first])) < MET
     first = first[joined]
     if first.size:
-        pairs = [(course.taken(first), course.taken(first + 1)) for course in (meant, done)]
+        pairs = [(taken(course, first), taken(course, first + 1)) for course in (meant, done)]
         leads_in = np.zeros(len(first), dtype=bool)
         before = rows[first] - 1
         leads_in[:] = (before < 0) | (np.nan_to_num(moves.beside, nan=1.0)[np.maximum(before, 0)] == 0)
         parts += _at_corners(intent, real, rows[first], pairs, leads_in)
-    names = ("move", "before", "after", "corner", "rounding")
-    return OffsetPoints(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return stacked(parts)
 
 
 def _along(intent: Intent, real: Segments, rows: Index, meant: ContactPath, done: ContactPath) -> OffsetPoints:
@@ -176,7 +170,7 @@ def _along(intent: Intent, real: Segments, rows: Index, meant: ContactPath, done
     fraction = np.concatenate([fraction, np.zeros(len(rows)), np.ones(len(rows))])
     move = rows[own]
     places = [each.at(move, fraction) for each in (intent.segments, real)]
-    ways = [course.taken(own) for course in (meant, done)]
+    ways = [taken(course, own) for course in (meant, done)]
     for place, course in zip(places, ways, strict=True):
         points = place[:, intent.columns]
         place[:, intent.columns] = course.beside(points, np.zeros(len(points)))
@@ -220,7 +214,7 @@ def _at_corners(
         before, after = _gaps(intent, rows[wedge], ones[wedge], *(place[wedge] for place in places))
         at = points[0][wedge]
         rays = [
-            _in_tip(intent, rows[wedge], places[0][wedge], each.taken(wedge).beside_heading(at)) for each in pairs[0]
+            _in_tip(intent, rows[wedge], places[0][wedge], taken(each, wedge).beside_heading(at)) for each in pairs[0]
         ]
         sizes = _from_wedge(before, *rays), _from_wedge(after, *rays)
         found.append(OffsetPoints(rows[wedge], *sizes, sharp[wedge], digits[wedge]))

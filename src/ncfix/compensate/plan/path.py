@@ -26,6 +26,7 @@ from ncfix.compensate.plan.arrays import (
     owners,
     picked,
     ranges,
+    stacked,
     sums,
     vector_product,
 )
@@ -43,7 +44,7 @@ from ncfix.compensate.plan.intent import Intent, crooked
 from ncfix.compensate.plan.offset import OffsetPoints, beside_contours
 from ncfix.compensate.plan.sampling import too_long
 from ncfix.compensate.plan.segments import Segments
-from ncfix.compensate.plan.splitting import INSTANT, Cutter, Split, joined, may_be_round, split, taken
+from ncfix.compensate.plan.splitting import INSTANT, Cutter, Split, may_be_round, reordered, split
 from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.plan.written import Known
 from ncfix.control.moves import MotionKind, Moves, Rule
@@ -326,11 +327,7 @@ def in_pieces(
     )
     if parts is None:
         return straight
-    both = joined([parts, straight])
-    order = np.empty(len(rows), dtype=np.intp)
-    order[arcs] = np.arange(len(arcs))
-    order[lines] = len(arcs) + np.arange(len(lines))
-    return taken(both, order)
+    return reordered(stacked([parts, straight]), np.argsort(np.append(arcs, lines)))
 
 
 def _bows(deviation: Array, tolerance: float) -> Array:

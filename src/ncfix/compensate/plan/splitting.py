@@ -39,6 +39,7 @@ from ncfix.compensate.plan.arrays import (
     picked,
     places,
     ranges,
+    stacked,
     sums,
 )
 from ncfix.compensate.plan.ends import as_commands, path_of, with_rotary_held
@@ -351,43 +352,27 @@ def split(intent: Intent, real: Segments, rows: Index, pieces: Array, cutter: Cu
     nodes = np.clip(np.ceil(wished), 2 * PER_PIECE, MOST).astype(np.intp)
     parts = [_split(intent, real, rows[part], nodes[part], cutter) for part in batches(nodes, BATCH)]
     for _ in range(REFINEMENTS):
-        result = joined(parts)
+        result = stacked(parts)
         short = np.flatnonzero((nodes < FEW * result.counts) & (nodes < MOST))
         if not short.size:
             break
         nodes[short] = np.minimum(2 * PER_PIECE * result.counts[short], MOST)
         chosen = [short[part] for part in batches(nodes[short], BATCH)]
         finer = [_split(intent, real, rows[each], nodes[each], cutter) for each in chosen]
-        parts = [_replaced(result, short, joined(finer))]
-    result = joined(parts)
+        parts = [_replaced(result, short, stacked(finer))]
+    result = stacked(parts)
     result.worst[(nodes >= MOST) & (nodes < SPARSE * result.counts)] = np.inf
     return result
-
-
-def joined(parts: list[Split]) -> Split:
-    """Splits of different motions as one."""
-    return (
-        parts[0]
-        if len(parts) == 1
-        else Split(
-            np.concatenate([part.counts for part in parts]),
-            np.concatenate([part.fraction for part in parts]),
-            np.concatenate([part.end for part in parts]),
-            np.concatenate([part.arc for part in parts]),
-            np.concatenate([part.centre for part in parts]),
-            np.concatenate([part.worst for part in parts]),
-        )
-    )
 
 
 def _replaced(result: Split, which: Index, finer: Split) -> Split:
     """`result` with the motions `which` taken from `finer`."""
     order = np.arange(len(result.counts))
     order[which] = len(result.counts) + np.arange(len(which))
-    return taken(joined([result, finer]), order)
+    return reordered(stacked([result, finer]), order)
 
 
-def taken(parts: Split, order: Index) -> Split:
+def reordered(parts: Split, order: Index) -> Split:
     """The motions of `parts` in another order."""
     counts = parts.counts[order]
     take = ranges(offsets(parts.counts)[order], counts)
