@@ -15,12 +15,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from ncfix.diagnostics import Message, RefusedError
+from ncfix.diagnostics import RefusedError
 from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import (
     Assumption,
-    Control,
+    FileControl,
     Files,
     Least,
     Option,
@@ -34,7 +34,7 @@ from ncfix.tables.control import (
 )
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_even_nodes, least_of_functions
-from ncfix.tables.table_files import Remarks, check_all, messages_of
+from ncfix.tables.table_files import Remarks
 from ncfix.tables.volume import AIM, Mesh, Volume, search, unseen_axes
 from ncfix_fanuc.parameters import (
     BACKLASH_ASSUMPTION,
@@ -79,7 +79,7 @@ LEVEL = 0.1
 """Of the target: where less changes towards an end of the travel, the edge of the grid may hold."""
 
 
-class Fanuc(Control):
+class Fanuc(FileControl):
     """The control `fanuc`."""
 
     name = "fanuc"
@@ -180,26 +180,17 @@ class Fanuc(Control):
             files[VOLUME_TEXT] = template_text(volc)
         return Written(files, tuple(made.notes(volc, mesh)), made.least())
 
-    def read(self, files: Files) -> Compensation:
-        """As the control would interpolate them. Raises `ConfigError` NCF491."""
-        volc, backlash, remarks = _read(files)
-        check_all(remarks)
-        assert volc is not None
-        return Compensation((Term((volc.grid(),)), *backlash.tables(volc.unit).terms))
-
-    def lint(self, files: Files) -> tuple[Message, ...]:
-        """Records that do not fit, values beyond the range, and a CSV that says something else."""
-        return messages_of(_read(files)[2])
+    def examined(self, files: Files) -> tuple[Compensation | None, list[Remarks]]:
+        """The grid, as the control would interpolate it, and play."""
+        volc, remarks = read_volc(files)
+        backlash, more = read_backlash(files, volc.style.home_minus if volc else "")
+        if volc is None:
+            return None, [remarks, *more]
+        return Compensation((Term((volc.grid(),)), *backlash.tables(volc.unit).terms)), [remarks, *more]
 
     def knows(self, name: str, content: bytes) -> bool:
         """Records of the grid as ncfix writes them."""
         return name.lower() in (VOLUME_JSON, VOLUME_CSV) or (content.lstrip()[:1] == b"{" and b'"start_no"' in content)
-
-
-def _read(files: Files) -> tuple[Volc | None, BacklashAmounts, list[Remarks]]:
-    volc, remarks = read_volc(files)
-    backlash, more = read_backlash(files, volc.style.home_minus if volc else "")
-    return volc, backlash, [remarks, *more]
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.axis_tables import positioning
 from ncfix.tables.compensation import Compensation
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, whole
+from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, whole
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_own_axis
-from ncfix.tables.table_files import DEGREE, TURNING, Remarks, check_all, in_order, messages_of, unit_of
+from ncfix.tables.table_files import DEGREE, TURNING, Remarks, in_order, messages_of, unit_of
 from ncfix_fanuc.parameters import (
     PLACING_OPTIONS,
     UNITS,
@@ -51,7 +51,7 @@ THOUSANDTHS = 360_000
 """Of a degree in a turn."""
 
 
-class FanucPitch(Control):
+class FanucPitch(FileControl):
     """The control `fanuc-pitch`."""
 
     name = "fanuc-pitch"
@@ -147,15 +147,10 @@ class FanucPitch(Control):
         least = least_of_own_axis(request.machine, request.space, request.tool_length)
         return Written(files, tuple(notes), least)
 
-    def read(self, files: Files) -> Compensation:
-        """As the control sums them up. Raises `ConfigError` NCF491."""
+    def examined(self, files: Files) -> tuple[Compensation, list[Remarks]]:
+        """The increments, as the control sums them up."""
         terms, remarks = read_pitches(files)
-        check_all(remarks)
-        return Compensation(terms)
-
-    def lint(self, files: Files) -> tuple[Message, ...]:
-        """Values beyond the range, point numbers that do not fit, turns that do not close."""
-        return messages_of(read_pitches(files)[1])
+        return Compensation(terms), remarks
 
     def knows(self, name: str, content: bytes) -> bool:
         """Increments by point number, or records of parameters."""

@@ -20,14 +20,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from ncfix.diagnostics import Message, RefusedError
+from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, State
 from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import NOTHING, Compensation, Tables
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
+from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.correction import corners, exact_correction, linear_axes, residual
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.table_files import DEGREE, Remarks, check_all, in_order, messages_of
+from ncfix.tables.table_files import DEGREE, Remarks, in_order
 from ncfix.tables.volume import AIM, Mesh, Volume, inputs_that_matter, search, unseen_axes
 from ncfix_fanuc.control import LEVEL
 from ncfix_fanuc.parameters import (
@@ -107,7 +107,7 @@ class Turning:
         return correction
 
 
-class FanucRotary(Control):
+class FanucRotary(FileControl):
     """The control `fanuc-rotary`."""
 
     name = "fanuc-rotary"
@@ -212,19 +212,23 @@ class FanucRotary(Control):
         files |= backlash.files()
         return Written(files, tuple(_notes(request, lattices, backlash.tables(units[0]), backlash.notes(units[0]))))
 
-    def read(self, files: Files) -> Turning:
-        """As the control is taken to add them. Raises `ConfigError` NCF491."""
-        lattices, backlash, remarks = _read(files)
-        check_all(remarks)
-        first, *more = lattices
+    def examined(self, files: Files) -> tuple[Turning | None, list[Remarks]]:
+        """The lattices and play, as the control is taken to add them."""
+        found = [read_lattice(LATTICE_FILE, files.get(LATTICE_FILE, b""), linear=True)]
+        if TABLE_LATTICE_FILE in files:
+            found.append(read_lattice(TABLE_LATTICE_FILE, files[TABLE_LATTICE_FILE], linear=False))
+        lattices = [lattice for lattice, _ in found if lattice is not None]
+        if len({lattice.scale.sign for lattice in lattices}) > 1:
+            found[1][1].refuse(0, f"the sign is another one than that of {LATTICE_FILE}")
+        backlash, more = read_backlash(files, lattices[0].home_minus if lattices else "")
+        remarks = [*(each for _, each in found), *more]
+        if len(lattices) < len(found):
+            return None, remarks
+        first, *second = lattices
         play = backlash.tables(first.scale.units[0])
-        if not more:
-            return Turning(*first.grids(), play=play)
-        return Turning(*first.grids(), more[0].grids(), more[0].centre, play)
-
-    def lint(self, files: Files) -> tuple[Message, ...]:
-        """Records that do not fit, and values beyond the range."""
-        return messages_of(_read(files)[2])
+        if not second:
+            return Turning(*first.grids(), play=play), remarks
+        return Turning(*first.grids(), second[0].grids(), second[0].centre, play), remarks
 
     def reached(self, machine: Machine, tables: Tables) -> str:
         """Without a lattice over rotary axes, nothing that they do is in it."""
@@ -234,18 +238,6 @@ class FanucRotary(Control):
     def knows(self, name: str, content: bytes) -> bool:
         """Records of lengths and angles as ncfix writes them."""
         return content.lstrip()[:1] == b"{" and b'"lin"' in content
-
-
-def _read(files: Files) -> tuple[list[Lattice], BacklashAmounts, list[Remarks]]:
-    """The lattices of a folder that can be used, play, and remarks on every file."""
-    found = [read_lattice(LATTICE_FILE, files.get(LATTICE_FILE, b""), linear=True)]
-    if TABLE_LATTICE_FILE in files:
-        found.append(read_lattice(TABLE_LATTICE_FILE, files[TABLE_LATTICE_FILE], linear=False))
-    lattices = [lattice for lattice, _ in found if lattice is not None]
-    if len({lattice.scale.sign for lattice in lattices}) > 1:
-        found[1][1].refuse(0, f"the sign is another one than that of {LATTICE_FILE}")
-    backlash, more = read_backlash(files, lattices[0].home_minus if lattices else "")
-    return lattices, backlash, [*(remarks for _, remarks in found), *more]
 
 
 def _rounding(request: Request, lattice: Lattice) -> float:

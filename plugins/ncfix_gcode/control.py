@@ -17,11 +17,9 @@ from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.machine import dumps, loads
 from ncfix.plugin import (
     Array,
-    Control,
     Files,
     Grid,
     Machine,
-    Message,
     NcfixError,
     Option,
     Properties,
@@ -33,6 +31,7 @@ from ncfix.plugin import (
     Written,
     exact_correction,
 )
+from ncfix.tables.control import FileControl
 
 MACHINE, HOW = "machine.toml", "fix.toml"
 
@@ -80,7 +79,7 @@ class Rewriting:
         return correction
 
 
-class Gcode(Control):
+class Gcode(FileControl):
     """The control `gcode`."""
 
     name = "gcode"
@@ -123,28 +122,18 @@ class Gcode(Control):
         """Of rotary axes only where there are some; an orientation that only they could put right, too."""
         return self.reaches if machine.rotary.any() else "L-VOL"
 
-    def read(self, files: Files) -> Rewriting:
-        """How programs are rewritten. Raises `ConfigError` NCF491."""
-        found, remarks = self._read(files)
-        remarks.check()
-        assert found is not None
-        return found
-
-    def lint(self, files: Files) -> tuple[Message, ...]:
-        """Files that cannot be read."""
-        return self._read(files)[1].messages
-
-    def _read(self, files: Files) -> tuple[Rewriting | None, Remarks]:
+    def examined(self, files: Files) -> tuple[Rewriting | None, list[Remarks]]:
+        """How programs are rewritten."""
         remarks = Remarks.of(HOW, files.get(HOW, b""))
         try:
             how = tomllib.loads(files.get(HOW, b"").decode())
             machine = loads(files.get(MACHINE, b"").decode(), MACHINE)
-            return Rewriting(machine, get_strategy(how["strategy"]), _tolerance(str(how["tolerance_um"]))), remarks
+            return Rewriting(machine, get_strategy(how["strategy"]), _tolerance(str(how["tolerance_um"]))), [remarks]
         except (ValueError, KeyError, TypeError) as error:
             remarks.refuse(0, f"is not what ncfix writes: {type(error).__name__}: {error}")
         except NcfixError as error:
             remarks.refuse(0, error.messages[0].text)
-        return None, remarks
+        return None, [remarks]
 
 
 def _tolerance(text: str) -> float:

@@ -15,10 +15,10 @@ import numpy as np
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.axis_tables import AxisTables, additive
 from ncfix.tables.compensation import Compensation, Term, own_terms
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
+from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_sums
-from ncfix.tables.table_files import DEGREE, ORDER, Remarks, check_all, in_order, messages_of, unit_of
+from ncfix.tables.table_files import DEGREE, ORDER, Remarks, in_order, messages_of, unit_of
 from ncfix_heidenhain.table_files import CONFIG, ComTable, cma_text, nck_text, old_text, read_cma, read_com
 
 MOST = 256
@@ -31,7 +31,7 @@ LARGEST = 9.9999
 """mm, degree: what the columns of the peer's files hold."""
 
 
-class Heidenhain(Control):
+class Heidenhain(FileControl):
     """The control `heidenhain`."""
 
     name = "heidenhain"
@@ -135,30 +135,8 @@ class Heidenhain(Control):
         least = least_of_sums(machine, request.space, request.tool_length)
         return Written(files, _notes(lines, most, both), least)
 
-    def read(self, files: Files) -> Compensation:
-        """As the control would take them. Raises `ConfigError` NCF491."""
-        terms, remarks = self._read(files)
-        check_all(remarks)
-        return Compensation(tuple(terms))
-
-    def lint(self, files: Files) -> tuple[Message, ...]:
-        """What the control would misread, and what is rarely meant."""
-        return messages_of(self._read(files)[1])
-
-    def knows(self, name: str, content: bytes) -> bool:
-        """A `.COM` or a `.CMA`, by the name in its first line."""
-        return TABLES.match(content) is not None
-
-    def look(self, files: Files) -> tuple[Message, ...]:
-        """The same without the sign, and `.COM` files by themselves if there is no `.CMA`."""
-        configs = [name for name in files if name.lower().endswith(".cma")]
-        if SIGN in files:
-            return self.lint(files)
-        remarks = [read_cma(files)[2]] if configs else []
-        remarks += [read_com(name, content)[1] for name, content in sorted(files.items()) if name not in configs]
-        return messages_of(remarks)
-
-    def _read(self, files: Files) -> tuple[list[Term], list[Remarks]]:
+    def examined(self, files: Files) -> tuple[Compensation, list[Remarks]]:
+        """The tables of the active line of the `.CMA`, with the sign that is kept beside them."""
         axes, tables, config = read_cma(files)
         remarks, terms = [config], []
         sign = files.get(SIGN, b"").decode("latin-1").strip()
@@ -173,7 +151,20 @@ class Heidenhain(Control):
         for name in files:
             if name.upper().endswith(".COM") and name not in tables.values():
                 config.doubt(0, f"{name} is not entered in the active line: the control does not use it")
-        return terms, remarks
+        return Compensation(tuple(terms)), remarks
+
+    def knows(self, name: str, content: bytes) -> bool:
+        """A `.COM` or a `.CMA`, by the name in its first line."""
+        return TABLES.match(content) is not None
+
+    def look(self, files: Files) -> tuple[Message, ...]:
+        """The same without the sign, and `.COM` files by themselves if there is no `.CMA`."""
+        configs = [name for name in files if name.lower().endswith(".cma")]
+        if SIGN in files:
+            return self.lint(files)
+        remarks = [read_cma(files)[2]] if configs else []
+        remarks += [read_com(name, content)[1] for name, content in sorted(files.items()) if name not in configs]
+        return messages_of(remarks)
 
 
 def _terms(axis: str, com: ComTable, axes: tuple[str, ...], sense: float, remarks: Remarks) -> Iterator[Term]:

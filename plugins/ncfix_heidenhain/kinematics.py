@@ -12,9 +12,9 @@ from ncfix.diagnostics import Message, RefusedError
 from ncfix.machine import Machine
 from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import Compensation, Tables, Term, own_terms
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written, one_of, whole
+from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.table_files import DEGREE, Remarks, check_all, in_order, messages_of, unit_of
+from ncfix.tables.table_files import DEGREE, Remarks, in_order, messages_of, unit_of
 from ncfix_heidenhain.chain import (
     LETTERS,
     AxisErrors,
@@ -35,7 +35,7 @@ CHAIN = re.compile(rb"(?im)^[ \t]*NR\b.*\bCOMPTAB\b")
 ANGLES = {"deg": DEGREE, "rad": 1.0}
 
 
-class KinematicsComp(Control):
+class KinematicsComp(FileControl):
     """The control `heidenhain-kinematics`."""
 
     name = "heidenhain-kinematics"
@@ -140,22 +140,31 @@ class KinematicsComp(Control):
         files[CONFIG] = cma_text(axes, tables)
         files[UNITS] = f"{settings['sign']} {settings['angle_unit']}\n".encode()
         notes = _notes(components, [flag for _, flag in found], most)
-        done = Compensation(self.read(files).own)
+        done = Compensation(self.examined(files)[0].own)
         left = list(reversal_note(machine, request.space, request.tool_length, done))
         own = (each for each in machine.effects if each.basis.needs_direction and each.joint == each.name[1])
         if left and not play and any(each.active for each in own):
             left.append("The mean of both ways is written; --set backlash=on writes what the way back needs.")
         return Written(files, (*notes, *left))
 
-    def read(self, files: Files) -> ErrorChain:
-        """As the control would follow the chain. Raises `ConfigError` NCF491."""
-        kinematics, remarks = self._read(files)
-        check_all(remarks)
-        return kinematics
-
-    def lint(self, files: Files) -> tuple[Message, ...]:
-        """What the control would misread, and what is rarely meant."""
-        return messages_of(self._read(files)[1])
+    def examined(self, files: Files) -> tuple[ErrorChain, list[Remarks]]:
+        """The chain, as the control would follow it."""
+        axes, tables, config = read_cma(files)
+        table = Remarks.of(TABLE, files.get(TABLE, b""))
+        chain = read_rows(table, files.get(TABLE, b""))
+        remarks = [config, table]
+        sense, angle = _read_units(files, config)
+        components: dict[tuple[str, str], Grid] = {}
+        own: list[Term] = []
+        for axis, name in tables.items():
+            com, found = read_com(name, files[name])
+            remarks.append(found)
+            if com is not None:
+                grids, terms = _grids(axis, com, axes, sense, found)
+                components |= grids
+                own += terms
+        _check_names(chain, components, table)
+        return ErrorChain(chain, sense, angle, components, tuple(own)), remarks
 
     def reached(self, machine: Machine, tables: Tables) -> str:
         """Without a rotary axis in the chain there is nothing of theirs in it."""
@@ -173,24 +182,6 @@ class KinematicsComp(Control):
         for each in remarks:
             read_rows(each, files[each.path])
         return messages_of(remarks)
-
-    def _read(self, files: Files) -> tuple[ErrorChain, list[Remarks]]:
-        axes, tables, config = read_cma(files)
-        table = Remarks.of(TABLE, files.get(TABLE, b""))
-        chain = read_rows(table, files.get(TABLE, b""))
-        remarks = [config, table]
-        sense, angle = _read_units(files, config)
-        components: dict[tuple[str, str], Grid] = {}
-        own: list[Term] = []
-        for axis, name in tables.items():
-            com, found = read_com(name, files[name])
-            remarks.append(found)
-            if com is not None:
-                grids, terms = _grids(axis, com, axes, sense, found)
-                components |= grids
-                own += terms
-        _check_names(chain, components, table)
-        return ErrorChain(chain, sense, angle, components, tuple(own)), remarks
 
 
 def _axes(machine: Machine) -> tuple[str, ...]:

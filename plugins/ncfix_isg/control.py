@@ -16,7 +16,6 @@ from typing import ClassVar
 from ncfix.plugin import (
     Assumption,
     Compensation,
-    Control,
     Files,
     Grid,
     Message,
@@ -28,7 +27,6 @@ from ncfix.plugin import (
     Reversal,
     Term,
     Written,
-    check_all,
     in_order,
     messages_of,
     one_of,
@@ -37,7 +35,7 @@ from ncfix.plugin import (
     whole,
     wrong_setting,
 )
-from ncfix.tables.control import SettingForm
+from ncfix.tables.control import FileControl, SettingForm
 from ncfix.tables.grid_sums import faces, searched
 from ncfix.tables.volume import AIM, Volume, inputs_that_matter, search
 from ncfix_isg.volcomp_files import (
@@ -67,7 +65,7 @@ ONE = 3
 """Up to so many inputs a single grid does."""
 
 
-class Isg(Control):
+class Isg(FileControl):
     """The control `isg`."""
 
     name = "isg"
@@ -193,16 +191,13 @@ class Isg(Control):
             files[SCREW_FILE.format(each.axis)] = list_text(each, numbers[each.axis])
         return Written(files, tuple(_notes(made, request, play)))
 
-    def read(self, files: Files) -> Compensation:
-        """As the control would take them. Raises `ConfigError` NCF491."""
-        compensation, remarks = self._read(files)
-        check_all(remarks)
-        return compensation
-
-    def lint(self, files: Files) -> tuple[Message, ...]:
-        """What the control would report, and what is rarely meant."""
-        _, remarks = self._read(files)
-        return messages_of(remarks)
+    def examined(self, files: Files) -> tuple[Compensation, list[Remarks]]:
+        """Grids, some turned round, and play."""
+        listed, config = read_configuration(files)
+        grids, remarks = read_grids(listed.files, listed.numbers, files)
+        play, more = read_leadscrews(files, listed.numbers)
+        turned = (_times(grid, listed.factors) for grid in grids)
+        return Compensation((*(Term((grid,)) for grid in turned), *play)), [config, *remarks, *more]
 
     def knows(self, name: str, content: bytes) -> bool:
         """A list of VOLCOMP or of a leadscrew, or a table whose head names positions, then errors."""
@@ -215,13 +210,6 @@ class Isg(Control):
         grids = sorted(name for name, content in files.items() if is_grid(content))
         remarks = [*read_grids(grids, LETTERS, files)[1], *read_leadscrews(files, None)[1]]
         return messages_of(remarks)
-
-    def _read(self, files: Files) -> tuple[Compensation, list[Remarks]]:
-        listed, config = read_configuration(files)
-        grids, remarks = read_grids(listed.files, listed.numbers, files)
-        play, more = read_leadscrews(files, listed.numbers)
-        turned = (_times(grid, listed.factors) for grid in grids)
-        return Compensation((*(Term((grid,)) for grid in turned), *play)), [config, *remarks, *more]
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,12 +17,12 @@ import numpy as np
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import State
 from ncfix.tables.compensation import Compensation, Term
-from ncfix.tables.control import Assumption, Control, Files, Least, Option, Properties, Request, Written
+from ncfix.tables.control import Assumption, FileControl, Files, Least, Option, Properties, Request, Written
 from ncfix.tables.correction import orientation_error, random_poses
 from ncfix.tables.grid import Array
 from ncfix.tables.scheme import Scheme, SchemeTask, automatic
 from ncfix.tables.scheme_fixed import fixed
-from ncfix.tables.table_files import check_all, messages_of
+from ncfix.tables.table_files import Remarks, messages_of
 from ncfix_siemens.products import TableReading, as_corrections, read_folder, reading_of, tables_of
 from ncfix_siemens.settings import (
     ASSUMPTIONS,
@@ -48,7 +48,7 @@ CHECKS = 1000
 """Random poses at which schemes are compared."""
 
 
-class Siemens(Control):
+class Siemens(FileControl):
     """The control `siemens`."""
 
     name = "siemens"
@@ -104,19 +104,14 @@ class Siemens(Control):
         }
         return Written(probe_files(dict(settings.axes), ranges, settings.style))
 
-    def read(self, files: Files) -> Compensation:
-        """As the control would run them. Raises `ConfigError` NCF491."""
+    def examined(self, files: Files) -> tuple[Compensation | None, list[Remarks]]:
+        """Tables of both kinds, as what comments say of sign, products and letters has them."""
         folder = read_folder(files)
         reading, unsaid = reading_of(folder)
-        check_all([*folder.remarks, unsaid])
-        assert reading is not None
-        return as_corrections(folder, reading)
-
-    def lint(self, files: Files) -> tuple[Message, ...]:
-        """What the control would stumble over, ignore or take otherwise than it looks, and what is rarely meant."""
-        folder = read_folder(files)
-        _, unsaid = reading_of(folder)
-        return messages_of([*folder.remarks, unsaid])
+        remarks = [*folder.remarks, unsaid]
+        if reading is None or any(each.wrong for each in remarks):
+            return None, remarks
+        return as_corrections(folder, reading), remarks
 
     def knows(self, name: str, content: bytes) -> bool:
         """Assignments to values of tables."""

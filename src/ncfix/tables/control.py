@@ -10,7 +10,7 @@ range worked in; running that is the emulation. A plugin registers a function th
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -20,6 +20,7 @@ from ncfix.machine import Machine
 from ncfix.plugins import called, nearest, registry, useless
 from ncfix.tables.compensation import Compensation, Tables, class_of
 from ncfix.tables.grid import Array
+from ncfix.tables.table_files import Remarks, check_all, messages_of
 
 Files = Mapping[str, bytes]
 """File name (no folder) -> content."""
@@ -266,6 +267,25 @@ class Control(ABC):
     def described(self) -> dict[str, Any]:
         """Properties and assumptions as plain data."""
         return {"properties": asdict(self.properties), "assumptions": [asdict(each) for each in self.assumptions]}
+
+
+class FileControl(Control):
+    """A control whose files are looked at once: it loads those in which nothing is wrong, and lints by all remarks."""
+
+    @abstractmethod
+    def examined(self, files: Files) -> tuple[Tables | None, Sequence[Remarks]]:
+        """What the control does with these files, and remarks on each; None only where something is wrong."""
+
+    def read(self, files: Files) -> Tables:
+        """What the control does with these files. Raises `ConfigError` NCF491."""
+        tables, remarks = self.examined(files)
+        check_all(remarks)
+        assert tables is not None
+        return tables
+
+    def lint(self, files: Files) -> tuple[Message, ...]:
+        """What the control would not load or would misread, and what is rarely meant."""
+        return messages_of(self.examined(files)[1])
 
 
 def controls() -> dict[str, Control]:
