@@ -17,6 +17,7 @@ from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.machine import dumps, loads
 from ncfix.plugin import (
     Array,
+    FileControl,
     Files,
     Grid,
     Machine,
@@ -31,7 +32,6 @@ from ncfix.plugin import (
     Written,
     exact_correction,
 )
-from ncfix.tables.control import FileControl
 
 MACHINE, HOW = "machine.toml", "fix.toml"
 

@@ -16,6 +16,7 @@ from typing import ClassVar
 from ncfix.plugin import (
     Assumption,
     Compensation,
+    FileControl,
     Files,
     Grid,
     Message,
@@ -35,7 +36,7 @@ from ncfix.plugin import (
     whole,
     wrong_setting,
 )
-from ncfix.tables.control import FileControl, SettingForm
+from ncfix.tables.control import SettingForm
 from ncfix.tables.grid_sums import faces, searched
 from ncfix.tables.volume import AIM, Volume, inputs_that_matter, search
 from ncfix_isg.volcomp_files import (

@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from ncfix.tables.compensation import own_terms as own_terms
     from ncfix.tables.control import Assumption as Assumption
     from ncfix.tables.control import Control as Control
+    from ncfix.tables.control import FileControl as FileControl
     from ncfix.tables.control import Files as Files
     from ncfix.tables.control import Option as Option
     from ncfix.tables.control import Properties as Properties
@@ -110,7 +111,7 @@ ELSEWHERE = {
     "ncfix.tables.axis_tables": ("Reversal", "positioning", "reversal_note", "reversals"),
     "ncfix.tables.compensation": ("Compensation", "Tables", "Term", "own_terms"),
     "ncfix.tables.control": (
-        *("Assumption", "Control", "Files", "Option", "Properties", "Request", "Written"),
+        *("Assumption", "Control", "FileControl", "Files", "Option", "Properties", "Request", "Written"),
         *("number", "one_of", "whole", "wrong_setting"),
     ),
     "ncfix.tables.correction": ("exact_correction",),

@@ -18,7 +18,7 @@ from ncfix_siemens.sinumerik.destination import (
     doubtful_polar,
 )
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT, BlockWordValues, ProgrammedMotion
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT, BlockWordValues
 
 NO_HEADING = "in which direction the motion before this arc (CT) ends is not known"
 TURNS_AT_RUNTIME = "the turns of the arc (CT) are known only at run time"
@@ -35,20 +35,20 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     ahead = (0.0, 0.0) if heading is None else (heading[plane.first], heading[plane.second])
     chord = step[plane.first], step[plane.second]
     if why or end.unknown or control.unknown or not math.hypot(*ahead):
-        control.go(ProgrammedMotion(MotionKind.FEED, words, end, CT_LEFT, refusal=why or NO_HEADING))
+        control.go(MotionKind.FEED, words, end, CT_LEFT, refusal=why or NO_HEADING)
         return
     along = ahead[0] * chord[0] + ahead[1] * chord[1]
     left = ahead[0] * chord[1] - ahead[1] * chord[0]
     if abs(left) <= STRAIGHT * math.hypot(*ahead) * math.hypot(*chord):
         if along <= 0.0 and any(chord):
             raise Fault(ARC_FAULT, "the arc (CT) would have to turn back on the spot: its end lies straight behind")
-        control.go(ProgrammedMotion(MotionKind.FEED, words, end, CT_LEFT))
+        control.go(MotionKind.FEED, words, end, CT_LEFT)
         return
     away = (chord[0] ** 2 + chord[1] ** 2) / (2 * left)
     sweep = 2 * math.atan2(left, along)
     sweep += math.copysign(2 * math.pi * max(round(words.get("TURN")), 0), left)
     circle = circle_of(control, plane, (-ahead[1] * away, ahead[0] * away), sweep)
-    control.go(ProgrammedMotion(MotionKind.ARC, words, end, CT_LEFT if left > 0 else CT_RIGHT, arc=circle))
+    control.go(MotionKind.ARC, words, end, CT_LEFT if left > 0 else CT_RIGHT, arc=circle)
 
 
 def tangent_refusal(words: BlockWordValues) -> str:
@@ -113,7 +113,7 @@ def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     finish = step[plane.first], step[plane.second]
     sweep = sweep_angle(centre, finish, 1 + max(round(words.get("TURN")), 0), clockwise=clockwise)
     circle = circle_of(control, plane, centre, sweep)._replace(fixed=is_fixed(words, plane))
-    control.go(ProgrammedMotion(MotionKind.ARC, words, end, code, refusal=refusal, arc=circle))
+    control.go(MotionKind.ARC, words, end, code, refusal=refusal, arc=circle)
 
 
 def is_fixed(words: BlockWordValues, plane: Plane) -> bool:
@@ -230,21 +230,17 @@ def through_point(control: Sinumerik, words: BlockWordValues, code: int) -> None
     end = destination(control, words)
     why = VIA_AT_RUNTIME if words.unknown(*VIA, "TURN") else doubtful_diameter(control, words, "I1")
     if why:
-        control.go(ProgrammedMotion(MotionKind.FEED, words, end, code, refusal=why))
+        control.go(MotionKind.FEED, words, end, code, refusal=why)
         return
     if end.unknown or control.unknown:
-        control.go(
-            ProgrammedMotion(
-                MotionKind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known"
-            )
-        )
+        control.go(MotionKind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known")
         return
     start, finish = tuple(control.position[:3]), tuple(end.target[:3])
     if not words.axes & 0b111 and not {"AP", "RP"} & words.values.keys():
         raise Fault(ARC_FAULT, NO_END)
     circle = circle_through(start, via_point(control, words), finish)  # type: ignore[arg-type]
     circle = circle._replace(sweep=circle.sweep + 2 * math.pi * max(round(words.get("TURN")), 0))
-    control.go(ProgrammedMotion(MotionKind.ARC, words, end, code, arc=circle))
+    control.go(MotionKind.ARC, words, end, code, arc=circle)
 
 
 def via_point(control: Sinumerik, words: BlockWordValues) -> Triple:

@@ -27,7 +27,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
     MEASURING,
     BlockWordValues,
     Drilling,
-    ProgrammedMotion,
 )
 
 Points = tuple[tuple[float, float], ...]
@@ -99,7 +98,7 @@ def lead_to(
         program[index] = control.stretch * value
         lost.pop(index, None)
     end = MotionEnd(control.command(program, axes), control.axes_of(lost), lost)
-    return BlockWordValues(block, {}, {}, axes), end, WRITE_OUT.format(name)
+    return BlockWordValues(block, axes=axes), end, WRITE_OUT.format(name)
 
 
 MADE = "motions that the control makes up ({})"
@@ -183,8 +182,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
     take_up(control)
     mind_carried(control)
     control.use_all_start_positions()
-    here = MotionEnd(control.position[:], dict(control.unknown), dict(control.lost_in_frame()))
-    drill(control, BlockWordValues(block, {}, {}, 0), here, drilling, refusal=WITH_WORDS if words.axes else "")
+    drill(control, BlockWordValues(block), control.here(), drilling, refusal=WITH_WORDS if words.axes else "")
 
 
 def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
@@ -203,8 +201,7 @@ def hole_after(control: Sinumerik, words: BlockWordValues) -> None:
     """The modal cycle behind a motion that is none to a hole: a hole where that has led."""
     drilling = control.modes.modal_cycle
     assert drilling is not None
-    here = MotionEnd(control.position[:], dict(control.unknown), dict(control.lost_in_frame()))
-    drill(control, BlockWordValues(words.block, {}, {}, 0), here, drilling, refusal=TO_A_HOLE, modal=True)
+    drill(control, BlockWordValues(words.block), control.here(), drilling, refusal=TO_A_HOLE, modal=True)
 
 
 def drill(
@@ -229,16 +226,12 @@ def drill(
     placed = (stated & ~counted) | (1 << across if depth is not None else 0)
     control.builder.called(call_of(control, drilling, words.block, modal=modal))
     code = control.modal.motion
-    control.go(
-        ProgrammedMotion(MotionKind.CYCLE, words, bottom, code if code >= 0 else 10, refusal=refusal, placed=placed)
-    )
+    control.go(MotionKind.CYCLE, words, bottom, code if code >= 0 else 10, refusal=refusal, placed=placed)
     control.heading = None
     if clear is None or depth is None:
-        up = MotionEnd(control.position, control.unknown, dict(control.lost_in_frame()) | {across: AFTER_CYCLE})
-        up = MotionEnd(up.target, control.axes_of(up.lost), up.lost)
+        up = control.here(control.lost_in_frame() | {across: AFTER_CYCLE})
     else:
-        here = MotionEnd(control.position, dict(control.unknown), dict(control.lost_in_frame()))
-        up = at_height(control, here, clear)
+        up = at_height(control, control.here(), clear)
         control.count_from_here(1 << across)
     control.stand(up.target, up.unknown, up.lost)
 
@@ -274,6 +267,5 @@ def made(control: Sinumerik, block: int, *, refusal: str = "", passing: Passing 
     """Motions that the control makes up: where the axes stand after them is not known."""
     gone = [index for index in GEOMETRY if index in control.machine]
     lost = dict(control.lost_in_frame()) | dict.fromkeys(gone, AFTER_CYCLE)
-    words = BlockWordValues(block, {}, {}, mask_of(gone))
-    end = MotionEnd(control.position[:], control.axes_of(lost), lost)
-    control.go(ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, refusal, passing))
+    words = BlockWordValues(block, axes=mask_of(gone))
+    control.go(MotionKind.RAPID, words, control.here(lost), control.modal.motion, refusal=refusal, passing=passing)

@@ -53,7 +53,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
     UNFOLLOWED_MOTIONS,
     UNSEEN,
     BlockWordValues,
-    ProgrammedMotion,
 )
 
 if TYPE_CHECKING:
@@ -316,13 +315,9 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
         return
     why = ASYNCHRONOUS.get(step.name, "a positioning axis (POS)")
     if step.name in GO_SOMEWHERE:
-        still = BlockWordValues(turn.words.block, {}, {}, mask_of(gone))
+        still = BlockWordValues(turn.words.block, axes=mask_of(gone))
         lost = control.lost_in_frame() | control.along_frame(dict.fromkeys(gone, AFTER_POSITIONING))
-        control.go(
-            ProgrammedMotion(
-                MotionKind.RAPID, still, MotionEnd(control.position[:], control.axes_of(lost), lost), 0, refusal=why
-            )
-        )
+        control.go(MotionKind.RAPID, still, control.here(lost), 0, refusal=why)
     else:
         control.refuse_rest(f"{why} is not followed")
 
@@ -334,10 +329,8 @@ def follow_polynomial(control: Sinumerik, turn: Turn, step: AssignedVariable, le
     letters = LETTERS if letter is None else letter
     axes = [each for each in letters if INDEX[each] in control.machine]
     ends: dict[str, float | None] = dict.fromkeys(axes, None if value is None else number(value))
-    words = BlockWordValues(turn.words.block, ends, {}, mask_of(INDEX[each] for each in axes))
-    control.go(
-        ProgrammedMotion(MotionKind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS)
-    )
+    words = BlockWordValues(turn.words.block, ends, axes=mask_of(INDEX[each] for each in axes))
+    control.go(MotionKind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS)
 
 
 def note_letting(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
@@ -382,10 +375,8 @@ def refuse(control: Sinumerik, plan: SinumerikPlan, block: int) -> None:
     passing = Passing(Pass.MACHINE_COORDINATES, "machine coordinates") if machine else None
     control.row_block = block
     lost = dict.fromkeys(control.machine, DECIDED_AT_RUNTIME)
-    words = BlockWordValues(block, {}, {}, plan.axes)
-    control.go(
-        ProgrammedMotion(MotionKind.RAPID, words, MotionEnd(control.position[:], lost, dict(lost)), 0, passing=passing)
-    )
+    words = BlockWordValues(block, axes=plan.axes)
+    control.go(MotionKind.RAPID, words, MotionEnd(control.position[:], lost, dict(lost)), 0, passing=passing)
 
 
 def earliest(unit: SinumerikUnit, block: int) -> int | None:

@@ -25,7 +25,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
     MOTIONS,
     UNFOLLOWED_MOTIONS,
     BlockWordValues,
-    ProgrammedMotion,
 )
 
 _ACTION = r"""
@@ -125,11 +124,7 @@ def by_itself(control: Sinumerik, words: BlockWordValues, special: frozenset[str
 def straight(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """G0 and G1."""
     end = destination(control, words)
-    control.go(
-        ProgrammedMotion(
-            MotionKind.FEED if code else MotionKind.RAPID, words, end, code, refusal=refusal_of(control, words)
-        )
-    )
+    control.go(MotionKind.FEED if code else MotionKind.RAPID, words, end, code, refusal=refusal_of(control, words))
 
 
 def is_one_piece(control: Sinumerik, words: BlockWordValues) -> bool:
@@ -172,7 +167,7 @@ def refusal_of(control: Sinumerik, words: BlockWordValues) -> str:
 def refused(control: Sinumerik, words: BlockWordValues, code: int, why: str) -> None:
     """A motion that is followed only as far as its end."""
     control.use_all_start_positions()
-    control.go(ProgrammedMotion(MotionKind.FEED, words, destination(control, words), code, refusal=why))
+    control.go(MotionKind.FEED, words, destination(control, words), code, refusal=why)
 
 
 def to_machine_position(control: Sinumerik, words: BlockWordValues, name: str) -> None:
@@ -180,11 +175,7 @@ def to_machine_position(control: Sinumerik, words: BlockWordValues, name: str) -
     end = machine_destination(control, words)
     code = control.modal.motion if control.modal.motion in (0, 10) else control.modal.straight
     kind = MotionKind.RAPID if code == 0 else MotionKind.FEED
-    control.go(
-        ProgrammedMotion(
-            kind, words, end, code, passing=Passing(Pass.MACHINE_COORDINATES, MACHINE.format(name)), by_machine=True
-        )
-    )
+    control.go(kind, words, end, code, passing=Passing(Pass.MACHINE_COORDINATES, MACHINE.format(name)), by_machine=True)
 
 
 def measure(control: Sinumerik, words: BlockWordValues) -> None:
@@ -193,7 +184,7 @@ def measure(control: Sinumerik, words: BlockWordValues) -> None:
     gone = {i: AFTER_MEASURING for i in control.machine if end.target[i] != control.position[i] or i in end.unknown}
     lost = end.lost | control.along_frame(gone)
     ends = MotionEnd(end.target, end.unknown | gone, lost)
-    control.go(ProgrammedMotion(MotionKind.FEED, words, ends, control.modal.motion, passing=MEASURING))
+    control.go(MotionKind.FEED, words, ends, control.modal.motion, passing=MEASURING)
 
 
 def soft_approach(control: Sinumerik, words: BlockWordValues) -> None:
@@ -209,15 +200,11 @@ def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     reasons = dict.fromkeys((*gone, *(GEOMETRY if gone and control.tcp else ())), AFTER_REFERENCE)
     reasons = {index: why for index, why in reasons.items() if index in control.machine}
     lost = control.lost_in_frame() | control.along_frame(reasons)
-    words = BlockWordValues(words.block, {}, {}, mask_of(gone))
+    words = BlockWordValues(words.block, axes=mask_of(gone))
     end = MotionEnd(control.position[:], dict(control.unknown) | reasons, lost)
-    control.go(
-        ProgrammedMotion(MotionKind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True)
-    )
+    control.go(MotionKind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True)
 
 
 def dwell(control: Sinumerik, words: BlockWordValues) -> None:
     """G4: F is seconds, S turns of the spindle."""
-    still = BlockWordValues(words.block, {}, {}, 0)
-    end = MotionEnd(control.position, control.unknown, control.lost_in_frame())
-    control.go(ProgrammedMotion(MotionKind.DWELL, still, end, control.modal.motion, passing=DWELL))
+    control.go(MotionKind.DWELL, BlockWordValues(words.block), control.here(), control.modal.motion, passing=DWELL)

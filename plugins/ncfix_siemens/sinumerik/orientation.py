@@ -46,7 +46,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
     OTHERS,
     VECTOR,
     BlockWordValues,
-    ProgrammedMotion,
 )
 
 BAD_VECTOR = "NCF254"
@@ -357,11 +356,7 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
     lost = {index: why for index, why in lost.items() if index not in axes}
     mask = mask_of(control.turning)
     end = MotionEnd(target, control.axes_of(lost), lost)
-    control.go(
-        ProgrammedMotion(
-            MotionKind.RAPID, BlockWordValues(block, {}, {}, mask), end, control.modal.motion, passing=SWIVEL
-        )
-    )
+    control.go(MotionKind.RAPID, BlockWordValues(block, axes=mask), end, control.modal.motion, passing=SWIVEL)
 
 
 def level(control: Sinumerik, plane: SwivelPlane) -> None:

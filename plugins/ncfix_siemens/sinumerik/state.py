@@ -33,7 +33,7 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.expressions import Value
 from ncfix.control.frames import WORLD, Affine, FrameStack, shifted
-from ncfix.control.moves import Arc, Motion, MotionKind, Pass, Rule
+from ncfix.control.moves import Arc, Motion, MotionEnd, MotionKind, Pass, Passing, Rule, UnknownAxes
 from ncfix.control.setup import Run, Tool
 from ncfix.control.state import Modal
 from ncfix.control.tcp import switch
@@ -48,7 +48,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
     BlockWordValues,
     Modes,
     NamedTools,
-    ProgrammedMotion,
 )
 
 GEOMETRY = (X, Y, Z)
@@ -267,55 +266,74 @@ class Sinumerik(ProgramControl):
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
-    def go(self, motion: ProgrammedMotion) -> None:
-        """Make a motion of a block, and keep where it leads in coordinates of the program."""
-        words, end = motion.words, motion.end
-        axes, placed = self._axes_of(words), motion.placed
+    def here(self, lost: UnknownAxes | None = None) -> MotionEnd:
+        """Where the axes stand; `lost`: what is not known along the axes of the program's frame, if not what is now."""
+        if lost is None:
+            return MotionEnd(self.position[:], dict(self.unknown), dict(self.lost_in_frame()))
+        return MotionEnd(self.position[:], self.axes_of(lost), lost)
+
+    def go(
+        self,
+        kind: MotionKind,
+        words: BlockWordValues,
+        end: MotionEnd,
+        code: int,
+        *,
+        refusal: str = "",
+        passing: Passing | None = None,
+        arc: Arc | None = None,
+        placed: int | None = None,
+        by_machine: bool = False,
+    ) -> None:
+        """Make a motion of a block, and keep where it leads in coordinates of the program.
+
+        code        the motion code, in tenths
+        refusal, passing, arc  as in `Motion`
+        placed      as there; None: the axes of its words, but for increments, and none where the motion is passed
+        by_machine  the words are machine coordinates
+        """
+        axes = self._axes_of(words)
         if placed is None:
-            placed = 0 if motion.passing else axes & ~mask_of(self.counted_words(words))
+            placed = 0 if passing else axes & ~mask_of(self.counted_words(words))
         self.fresh_tool = False
-        refusal, self.whole = motion.refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
+        refusal, self.whole = refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
         sure = (letter for letter, form in words.forms.items() if form in TURNING and letter in INDEX)
         self.builder.says_the_way(mask_of(INDEX[letter] for letter in sure))
-        leaves = self._leaves_plane(motion)
-        if leaves and not motion.passing:
+        leaves = self._leaves_plane(end) and (passing is None or passing.rule != Pass.ALIGNMENT)
+        if leaves and not passing:
             refusal = refusal or TURNED_AWAY
-        follows = not motion.passing and not refusal
+        follows = not passing and not refusal
         if follows:
             self.ask_for_length()
-        self._head(motion, follows=follows)
-        self.make(Motion(motion.kind, axes, end, motion.code, refusal, motion.passing, motion.arc, placed))
+        if kind != MotionKind.DWELL:
+            self.heading = self._heading(end, arc) if follows else None
+        self.make(Motion(kind, axes, end, code, refusal, passing, arc, placed))
         self.whole = False
-        self.count_from_here(axes, by_machine=motion.by_machine)
+        self.count_from_here(axes, by_machine=by_machine)
         if leaves:
             self.suspend("tilt", TURNED_AWAY)
 
-    def _leaves_plane(self, motion: ProgrammedMotion) -> bool:
+    def _leaves_plane(self, end: MotionEnd) -> bool:
         """Whether a rotary axis turns in a swivelled plane: without TRAORI the plane stays where it was."""
-        if not self.held or (motion.passing is not None and motion.passing.rule == Pass.ALIGNMENT):
-            return False
-        end, here = motion.end.target, self.position
-        return any(end[i] != here[i] or (i in self.unknown and i not in motion.end.unknown) for i in self.turning)
+        target, here = end.target, self.position
+        moved = (target[i] != here[i] or (i in self.unknown and i not in end.unknown) for i in self.turning)
+        return self.held and any(moved)
 
     @property
     def held(self) -> bool:
         """Whether the plane is swivelled (CYCLE800), and the control does not lead the tip."""
         return self.modes.swivelled and not (self.modes.transformed or self.setup.tcp)
 
-    def _head(self, motion: ProgrammedMotion, *, follows: bool) -> None:
-        """Keep the direction in which a motion is about to end; None where it is not known, or not followed."""
-        end, arc = motion.end, motion.arc
-        if motion.kind == MotionKind.DWELL:
-            return
+    def _heading(self, end: MotionEnd, arc: Arc | None) -> Sequence[float] | None:
+        """The direction in which a motion is about to end; None where it is not known."""
         step = [b - a for a, b in zip(self.position, end.target, strict=True)]
-        if not follows or any(index in self.unknown or index in end.unknown for index in (X, Y, Z)):
-            self.heading = None
-        elif arc is not None:
-            self.heading = self.in_frame(departing(arc, end.target, step))
-        elif any(step[:3]):
-            self.heading = self.in_frame(step)
-        elif any(step):
-            self.heading = None
+        if any(index in self.unknown or index in end.unknown for index in GEOMETRY):
+            return None
+        if arc is not None:
+            return self.in_frame(departing(arc, end.target, step))
+        if any(step[:3]):
+            return self.in_frame(step)
+        return None if any(step) else self.heading
 
     def head_as_latest(self) -> None:
         """Keep the direction in which the last of many motions of the fast lane ended, as that of single ones."""

@@ -10,11 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from ncfix.control.coordinates import INDEX, LETTERS
 from ncfix.control.frames import ZEROS
-from ncfix.control.moves import Arc, MotionEnd, MotionKind, Passing
 
 _SETTERS = """
     movt ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos
@@ -242,9 +240,9 @@ class BlockWordValues:
     """
 
     block: int
-    values: dict[str, float | None]
-    forms: dict[str, str]
-    axes: int
+    values: dict[str, float | None] = field(default_factory=dict)
+    forms: dict[str, str] = field(default_factory=dict)
+    axes: int = 0
     texts: dict[str, str] = field(default_factory=dict)
     refusal: str = ""
     whole: bool = False
@@ -264,26 +262,6 @@ class BlockWordValues:
     def unknown(self, *addresses: str) -> bool:
         """Whether one of these words is there and known only at run time."""
         return any(address in self.values and self.values[address] is None for address in addresses)
-
-
-class ProgrammedMotion(NamedTuple):
-    """One motion of a block, as its words say it: what `Sinumerik.go` makes a `Motion` of.
-
-    code        the motion code, in tenths
-    refusal, passing, arc  as in `Motion`
-    placed     as there; None: the axes of its words, but for increments, and none where the motion is passed
-    by_machine  the words are machine coordinates
-    """
-
-    kind: MotionKind
-    words: BlockWordValues
-    end: MotionEnd
-    code: int
-    refusal: str = ""
-    passing: Passing | None = None
-    arc: Arc | None = None
-    placed: int | None = None
-    by_machine: bool = False
 
 
 @dataclass(frozen=True, slots=True)
