@@ -190,7 +190,9 @@ def json_text(indent: int | None = 1, /, **content: object) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Values as JSON has them: arrays as lists, no NaN."""
+    """Values as JSON has them: messages by their parts, arrays as lists, no NaN."""
+    if isinstance(value, Message):
+        return value.as_dict()
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):

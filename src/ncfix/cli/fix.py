@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -254,6 +254,16 @@ def fix(
     if (code := after_next_groups(context)) is not None:
         return code
     return _reported(batches, as_json, json_lines)
+
+
+def like_fix(names: Container[str]) -> Callable[[click.Command], click.Command]:
+    """Give another verb the options of `fix` for these parameters, behind its own."""
+
+    def with_options(command: click.Command) -> click.Command:
+        command.params += [param for param in fix.params if param.name in names]
+        return command
+
+    return with_options
 
 
 def _outputs(context: click.Context, programs: Sequence[str], asked: Outputs) -> Outputs:

@@ -121,9 +121,7 @@ def plugins(as_json: bool) -> int:
             }
             for plugin in found.loaded
         ]
-        console.put_json(
-            plugins=entries, left_out=[problem.as_dict() for problem in found.problems], core=core.status()
-        )
+        console.put_json(plugins=entries, left_out=found.problems, core=core.status())
     else:
         rows = []
         for each in found.loaded:
@@ -139,6 +137,11 @@ def plugins(as_json: bool) -> int:
 @click.pass_context
 def completion(context: click.Context, shell: str) -> None:
     """Print the completion script for SHELL, e.g. `eval "$(ncfix completion bash)"`."""
+    console.put(completion_script(context.find_root().command, shell) + "\n")
+
+
+def completion_script(command: click.Command, shell: str) -> str:
+    """What a shell runs to complete the arguments of `ncfix`."""
     found = get_completion_class(shell)
     assert found is not None
-    console.put(found(context.find_root().command, {}, "ncfix", "_NCFIX_COMPLETE").source() + "\n")
+    return found(command, {}, "ncfix", "_NCFIX_COMPLETE").source()

@@ -61,8 +61,7 @@ def check(file: str, as_json: bool) -> int:
     console.tell(*remarks)
     name = f"{visible(shown(file))}: {visible(found.name)}"
     if as_json:
-        entries = [message.as_dict() for message in remarks]
-        console.put_json(path=shown(file), ok=not impossible, name=found.name, hash=found.hash, remarks=entries)
+        console.put_json(path=shown(file), ok=not impossible, name=found.name, hash=found.hash, remarks=remarks)
     elif impossible:
         console.say(f"{name}: {console.counted(impossible, 'fault')}: no machine is like this one")
     else:

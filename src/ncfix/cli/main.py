@@ -174,7 +174,7 @@ def failed(error: NcfixError, as_json: str | None) -> int:
     if as_json:
         with suppress(NcfixError, console.ReaderGoneError):
             indent = 1 if as_json == "--json" else None
-            console.put(console.json_text(indent, errors=[message.as_dict() for message in error.messages]))
+            console.put(console.json_text(indent, errors=error.messages))
     return error.exit_code
 
 

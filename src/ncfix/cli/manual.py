@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator
 
 import click
-from click.shell_completion import get_completion_class
 
 from ncfix.cli import console
+from ncfix.cli.listings import completion_script
 from ncfix.cli.main import VERBS, cli
 
 EXIT_CODES = (
@@ -42,9 +42,7 @@ def shared_files() -> Iterator[tuple[str, str]]:
     """The files of `share`: paths and texts."""
     yield PAGE, page()
     for shell, path in SHARED.items():
-        found = get_completion_class(shell)
-        assert found is not None
-        yield path, found(cli, {}, "ncfix", "_NCFIX_COMPLETE").source().rstrip() + "\n"
+        yield path, completion_script(cli, shell).rstrip() + "\n"
 
 
 def page() -> str:

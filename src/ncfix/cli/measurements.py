@@ -125,8 +125,7 @@ def calibrate(
     console.tell(*remarks)
     target.write(dumps(calibration.machine).encode())
     if as_json:
-        entries = [message.as_dict() for message in remarks]
-        console.put_json(**_as_dict(calibration, over), remarks=entries, output=target.path)
+        console.put_json(**_as_dict(calibration, over), remarks=remarks, output=target.path)
     elif output != STREAM:
         _print(calibration, over)
     return ExitCode.DONE

@@ -73,40 +73,23 @@ def of_kind(kind: str) -> OneOf:
 
 
 PATH = PathName()
-
-
 FOLDER = PathName("dir")
-
-
 DIALECT = of_kind("dialects")
-
-
 CONTROL = of_kind("controls")
 
-
-machine_option = click.option(
-    "-m",
-    "--machine",
-    "machine_path",
-    type=PATH,
-    metavar="FILE",
-    required=True,
-    envvar="NCFIX_MACHINE",
-    help="The machine file (TOML).",
+optional_machine_option, machine_option = (
+    click.option(
+        "-m",
+        "--machine",
+        "machine_path",
+        type=PATH,
+        metavar="FILE",
+        required=required,
+        envvar="NCFIX_MACHINE",
+        help="The machine file (TOML).",
+    )
+    for required in (False, True)
 )
-
-
-optional_machine_option = click.option(
-    "-m",
-    "--machine",
-    "machine_path",
-    type=PATH,
-    metavar="FILE",
-    envvar="NCFIX_MACHINE",
-    help="The machine file (TOML).",
-)
-
-
 dialect_option = click.option(
     "--dialect",
     type=DIALECT,
@@ -114,8 +97,6 @@ dialect_option = click.option(
     envvar="NCFIX_DIALECT",
     help="The control's language; found out if not given.",
 )
-
-
 table_option = click.option(
     "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Where to write the table (CSV)."
 )

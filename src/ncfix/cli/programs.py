@@ -97,15 +97,14 @@ def _outcome(following: FollowingSetup, file: ProgramFile, flatten: bool) -> tup
             checked, dialect = through([source], whole if flatten else partial(_in_parts, following, source), whole)
     except NcfixError as error:
         console.tell(*error.messages)
-        return error.exit_code, {**entry, "errors": [message.as_dict() for message in error.messages]}
+        return error.exit_code, {**entry, "errors": error.messages}
     console.tell_some(checked.findings)
     count = len(checked.findings)
     verdict = console.counted(count, "finding") if count else "nothing found"
     verdict += "" if following.machine else ", without a machine"
     size = f"{console.counted(checked.blocks, 'block')}, {console.counted(checked.moves, 'motion')}"
     console.say(f"{visible(shown(path))}: {size}, {dialect}: {verdict}")
-    entry |= {"dialect": dialect, "blocks": checked.blocks, "moves": checked.moves}
-    entry["findings"] = [message.as_dict() for message in checked.findings]
+    entry |= {"dialect": dialect, "blocks": checked.blocks, "moves": checked.moves, "findings": checked.findings}
     return ExitCode.FINDINGS if count else ExitCode.DONE, entry
 
 

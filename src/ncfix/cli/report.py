@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from ncfix.batch.programs import subprograms
 from ncfix.cli import console
-from ncfix.cli.fix import fix
+from ncfix.cli.fix import like_fix
 from ncfix.cli.options import PATH, force_option, load_machine, sound
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.pages import Pages
@@ -24,19 +24,11 @@ if TYPE_CHECKING:
 
 DEEPEST = 64
 """How deep the lists and objects of a result lie in one another at most."""
-
-
 OF_FIX = ("dialect", "strategy", "tolerance_um", "split_rapids", "flatten")
 """Parameters of `fix` that a page of a program has, too."""
 
 
-def _like_fix(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Give the verb those options of `fix`."""
-    own = [param for param in fix.params if param.name in OF_FIX]
-    function.__click_params__ = [*reversed(own), *getattr(function, "__click_params__", ())]  # type: ignore[attr-defined]
-    return function
-
-
+@like_fix(OF_FIX)
 @click.command()
 @click.argument("sources", type=PATH, nargs=-1, required=True, metavar="PROGRAM|MACHINE|RESULT...")
 @click.option(
@@ -45,7 +37,6 @@ def _like_fix(function: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("-o", "--output", type=PATH, metavar="FILE", required=True, help="The page: FILE.html or FILE.md.")
 @click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Draw the errors of PROGRAM for a paper, too.")
 @force_option
-@_like_fix
 @setup_options
 def report(
     sources: tuple[str, ...],

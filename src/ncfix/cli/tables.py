@@ -171,10 +171,9 @@ def tell(made: Exported, control: Control, as_json: bool) -> None:
         if program is not None:
             entries["program"] = program.as_dict()
         entries |= {"class": made.reaches, "files": sorted(made.files), "residual_um": figures}
-        warnings = [message.as_dict() for message in made.messages]
         if made.least:
             entries["least_um"] = {"max": 1e3 * made.least.value, "why": made.least.why}
-        console.put_json(**entries, limits=made.limits(), notes=made.notes, warnings=warnings)
+        console.put_json(**entries, limits=made.limits(), notes=made.notes, warnings=made.messages)
         return
     rows = [(when, *(f"{figures[when][key]:.2f}" for key in ("max", "rms", "mean"))) for when in ("before", "after")]
     console.table(("tip error, um", "max", "rms", "mean"), rows)
@@ -266,9 +265,8 @@ def lint(paths: tuple[str, ...], control: str, as_json: bool) -> int:
             console.tell_some(messages)
             code = ExitCode.FINDINGS if messages else ExitCode.DONE
             worst = max(worst, code if looked.owner else ExitCode.UNREADABLE)
-            found = [message.as_dict() for message in messages]
             whose = {"form": looked.owner or None, "title": looked.title or None}
-            entries.append({"path": shown(path), **whose, "findings": found})
+            entries.append({"path": shown(path), **whose, "findings": messages})
             if not as_json:
                 verdict = console.counted(len(messages), "finding") if messages else "nothing found"
                 console.say(f"{shown(path)}: {looked.title or 'of no known form'}: {verdict}")

@@ -133,12 +133,11 @@ def verify(
     """
     following = FollowingSetup.of(machine_path, dialect, given)
     if certificate is not None or against is not None:
-        from ncfix.cli.shop.certificates import verify_certificate
+        from ncfix.cli.shop.certificates import Proving, verify_certificate
 
         assert following.machine is not None
-        known, setup = following.machine, following.setup
-        files = (certificate, against, as_json)
-        return verify_certificate(original, fixed, known, machine_path, setup, dialect, tolerance_um, *files)
+        proving = Proving(following.machine, machine_path, following.setup, dialect, tolerance_um)
+        return verify_certificate(proving, original, fixed, certificate, against, as_json)
     with console.busy(f"comparing {shown(fixed)} with {shown(original)}"):
         found = compared(following, original, fixed, tolerance_um)
     if as_json:

@@ -269,10 +269,10 @@ class FixJob:
             console.say(f"  {ACCEPT if flat else FLATTEN + ACCEPT}")
         code = ExitCode.REFUSED if refused else ExitCode.DONE
         if self.certify and entry["output"] is not None and (fixed.changed or not target.in_place):
-            from ncfix.cli.shop.certificates import certify_output
+            from ncfix.cli.shop.certificates import Proving, certify_output
 
-            known = (self.machine, self.certify, self.setup, self.dialect, self.options.tolerance_um)
-            entry["certificate"] = certify_output(target, *known)
+            proving = Proving(self.machine, self.certify, self.setup, self.dialect, self.options.tolerance_um)
+            entry["certificate"] = certify_output(proving, target)
             code = ExitCode.FINDINGS if entry["certificate"]["faults"] else code
         return FixOutcome(code, entry, digest=digest)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ncfix import files
@@ -42,44 +43,35 @@ def given_of(setup: Setup, dialect: Dialect) -> Given:
     )
 
 
-def certified(
-    original: tuple[str, bytes],
-    corrected: tuple[str, bytes],
-    machine: Machine,
-    machine_path: str,
-    setup: Setup,
-    dialect: str | None,
-    tolerance_um: float,
-) -> dict[str, Any]:
-    """The certificate of a correction; programs are given by name and content."""
-    from ncfix.certificate.certificate import Subject
+@dataclass(frozen=True, slots=True)
+class Proving:
+    """What the correction of a program is proved by; `dialect`: if it was said."""
 
-    known = dialect_of(original[1], original[0], dialect, machine)
-    machine_file = (shown(machine_path), read(machine_path))
-    return Subject(
-        original, corrected, machine_file, machine, given_of(setup, known), known.name, tolerance_um
-    ).certificate()
+    machine: Machine
+    machine_path: str
+    setup: Setup
+    dialect: str | None
+    tolerance_um: float
+
+    def certificate(self, original: str, fixed: str) -> dict[str, Any]:
+        """The certificate of a correction, of both programs as they are in their files."""
+        from ncfix.certificate.certificate import Subject
+
+        before, after, machine_file = ((shown(path), read(path)) for path in (original, fixed, self.machine_path))
+        known = dialect_of(before[1], before[0], self.dialect, self.machine)
+        given = given_of(self.setup, known)
+        return Subject(before, after, machine_file, self.machine, given, known.name, self.tolerance_um).certificate()
 
 
 def verify_certificate(
-    original: str,
-    fixed: str,
-    machine: Machine,
-    machine_path: str,
-    setup: Setup,
-    dialect: str | None,
-    tolerance_um: float,
-    output: str | None,
-    against: str | None,
-    as_json: bool,
+    proving: Proving, original: str, fixed: str, output: str | None, against: str | None, as_json: bool
 ) -> int:
     """Prove a corrected program by the second reader; write the certificate, or compare it with an earlier one."""
     from ncfix.certificate.certificate import FAULTY, differences, dumps, loads, said
 
     earlier = None if against is None else loads(read(against), shown(against))
-    texts = [(shown(path), read(path)) for path in (original, fixed)]
     with console.busy(f"proving {shown(fixed)}"):
-        now = certified(texts[0], texts[1], machine, machine_path, setup, dialect, tolerance_um)
+        now = proving.certificate(original, fixed)
     if output is not None:
         files.write_whole(output, dumps(now).encode())
     changed = [] if earlier is None else list(differences(earlier, now))
@@ -92,20 +84,11 @@ def verify_certificate(
     return ExitCode.FINDINGS if changed or now["verdict"] == FAULTY else ExitCode.DONE
 
 
-def certify_output(
-    target: OutputTarget,
-    machine: Machine,
-    machine_path: str,
-    setup: Setup,
-    dialect: str | None,
-    tolerance_um: float,
-) -> dict[str, Any]:
+def certify_output(proving: Proving, target: OutputTarget) -> dict[str, Any]:
     """Prove what was written for a program as it is on the disk, and write its certificate beside it."""
     from ncfix.certificate.certificate import FAULTY, dumps
 
-    source = target.backup if target.in_place else target.source
-    texts = [(shown(path), read(path)) for path in (source, target.path)]
-    found = certified(texts[0], texts[1], machine, machine_path, setup, dialect, tolerance_um)
+    found = proving.certificate(target.backup if target.in_place else target.source, target.path)
     path = target.path + SUFFIX
     files.write_whole(path, dumps(found).encode(), target.force or target.resume)
     counts = f"{found['proved']} of {found['blocks']} blocks"

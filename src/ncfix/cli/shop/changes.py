@@ -39,14 +39,13 @@ def show_changes(job: FixJob, program: ProgramFile, motions: bool, as_json: bool
     except Exception as error:
         own = owned(error)
         console.tell(*own.messages)
-        return own.exit_code, {**entry, "errors": [message.as_dict() for message in own.messages]}
+        return own.exit_code, {**entry, "errors": own.messages}
     report = changes.fixed.report
     refused = report.refusals
     console.tell_some([*report.warnings, *refused])
     if refused and not job.options.allow_refused:
         console.say(f"{visible(name)}: {console.counted(len(refused), 'motion')} refused, so nothing would be written")
-        refusals = [message.as_dict() for message in refused]
-        return ExitCode.REFUSED, {**entry, "changed": False, "motions": [], "refused": refusals}
+        return ExitCode.REFUSED, {**entry, "changed": False, "motions": [], "refused": refused}
     if not as_json:
         _put(changes, found, motions, text, name)
     entry |= {"changed": changes.fixed.changed, "motions": as_plain(found), "refused": []}

@@ -15,7 +15,7 @@ import click
 from ncfix import files
 from ncfix.batch.watching import WatchedFolder, moments, state_of
 from ncfix.cli import console
-from ncfix.cli.fix import fix, workers_for
+from ncfix.cli.fix import like_fix, workers_for
 from ncfix.cli.options import FOLDER, PATH, Positive, load_machine, sound
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import ProgramGroup, ProjectCommand, tell_of
@@ -136,14 +136,7 @@ def _clock(at: float) -> str:
     return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(at))
 
 
-def _like_fix(command: click.Command) -> click.Command:
-    """Give the verb those options of `fix` that it takes."""
-    own = {param.name for param in command.params}
-    command.params += [param for param in fix.params if param.name in TAKEN and param.name not in own]
-    return command
-
-
-@_like_fix
+@like_fix(TAKEN)
 @click.command(cls=FolderCommand)
 @click.argument("folder", type=FOLDER, metavar="IN")
 @click.argument("output", type=FOLDER, metavar="OUT")
