@@ -414,8 +414,7 @@ class TurningTable:
         turning = np.stack([np.cross(axis, self.levers) for axis in np.eye(3)], axis=-1)
         shifting = np.broadcast_to(np.eye(3), turning.shape)
         design = np.concatenate([shifting, turning], axis=-1).reshape(-1, 6)
-        found: Array = np.linalg.lstsq(design, added.T, rcond=None)[0].T
-        return found
+        return np.linalg.lstsq(design, added.T, rcond=None)[0].T
 
     def _correction(self, q: Array) -> Array:
         linear = [self.machine.axis_names.index(name) for name in LINEAR]

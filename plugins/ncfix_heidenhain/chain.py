@@ -245,8 +245,7 @@ def tilt(axis: Axis) -> Array:
         return np.diag([1.0 if i == (index + 1) % 3 else -1.0 for i in range(3)])
     x, y, z = about / sine
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    found: Array = np.eye(3) + sine * cross + (1 - cosine) * cross @ cross
-    return found
+    return np.eye(3) + sine * cross + (1 - cosine) * cross @ cross
 
 
 def angles(frame: Array) -> tuple[float, float, float]:

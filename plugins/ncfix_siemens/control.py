@@ -147,8 +147,7 @@ def _wrong(request: Request) -> float:
 def _largest(request: Request, scheme: Scheme) -> Array:
     """The largest correction of each axis at random poses, mm and rad."""
     q = random_poses(request.space, CHECKS, seed=9)
-    largest: Array = np.abs(scheme.tables.at(request.machine.axis_names, q)).max(axis=0)
-    return largest
+    return np.abs(scheme.tables.at(request.machine.axis_names, q)).max(axis=0)
 
 
 def _own(term: Term) -> bool:

@@ -129,8 +129,7 @@ def misnumbered(text: NDArray[np.uint8], blocks: NDArray[np.int64], found: Scan)
 
 def inside(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which places stand inside a block."""
-    found: NDArray[np.bool_] = places < blocks[block_of(blocks, places), 1]
-    return found
+    return places < blocks[block_of(blocks, places), 1]
 
 
 def of_several_lines(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:

@@ -166,8 +166,7 @@ class KlartextUnit(TextUnit[KlartextPlan]):
 
     def closed(self) -> NDArray[np.bool_]:
         """See `TextUnit.closed`."""
-        closed: NDArray[np.bool_] = ~self.lanes.open
-        return closed
+        return ~self.lanes.open
 
     def next_plan(self, block: int) -> KlartextPlan | None:
         """What the first block from there on does that does anything but set a pole."""

@@ -279,8 +279,7 @@ class VariableExpressions(Expressions):
             places = tuple(number(part(scope)) for part in index)
             if None in places:
                 return Unknown()
-            value: Value = scope.variables.value((name, places))  # type: ignore[attr-defined]
-            return value
+            return scope.variables.value((name, places))  # type: ignore[attr-defined]
 
         return evaluate
 

@@ -84,8 +84,7 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDAr
         return pointed
     last = first_piece[1:] - 1
     turned = (pieces.end[last] != moves.end)[:, moves.rotary].any(axis=1)
-    found: NDArray[np.bool_] = pointed & (turned | (np.diff(first_piece) > 1))
-    return found
+    return pointed & (turned | (np.diff(first_piece) > 1))
 
 
 SINUMERIK = WrittenLanguage(

@@ -248,8 +248,7 @@ def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Seque
 
 def even_motions(control: Sinumerik, motion: IntArray) -> list[bool]:
     """(n,) motions in which the rotary axes turn evenly, whatever the tool does meanwhile."""
-    even: list[bool] = ((motion == 0) | (control.modes.orientation == BY_AXES)).tolist()
-    return even
+    return ((motion == 0) | (control.modes.orientation == BY_AXES)).tolist()
 
 
 # -- CYCLE800 ----------------------------------------------------------------------------------------------------------

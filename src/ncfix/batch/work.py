@@ -51,8 +51,7 @@ def executor_of(name: str) -> ExecutorMaker:
 def _made(name: str, make: ExecutorMaker, workers: int) -> Executor:
     from concurrent.futures import Executor
 
-    executor: Executor = called("executors", name, make, workers, gives=Executor)
-    return executor
+    return called("executors", name, make, workers, gives=Executor)
 
 
 def results_in_order(

@@ -79,8 +79,7 @@ class Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """One verb; plugins are only loaded if it is not a built-in one."""
         if cmd_name in VERBS:
-            command: click.Command = getattr(import_module(f"ncfix.cli.{MODULES.get(cmd_name, cmd_name)}"), cmd_name)
-            return command
+            return getattr(import_module(f"ncfix.cli.{MODULES.get(cmd_name, cmd_name)}"), cmd_name)
         return registry("commands").get(cmd_name)
 
     def resolve_command(

@@ -48,8 +48,7 @@ def rule_of(moves: Moves, row: int) -> NoFigureReason:
 
 def at_feed(moves: Moves) -> Mask:
     """(n,) feeds, arcs and holes, also those that pass."""
-    found: Mask = (moves.kind != MotionKind.RAPID) & (moves.kind != MotionKind.DWELL)
-    return found
+    return (moves.kind != MotionKind.RAPID) & (moves.kind != MotionKind.DWELL)
 
 
 def at_measured_places(moves: Moves) -> Mask:

@@ -86,8 +86,7 @@ class Positions:
         row = np.array([command], dtype=np.float64)
         q = joints_from_commands(self.machine, row, np.array([before.on]), np.array([before.tool_length]))
         found = commands_from_joints(self.machine, q, np.array([after.on]), np.array([after.tool_length]))
-        result: list[float] = found[0].tolist()
-        return result
+        return found[0].tolist()
 
 
 def kinematics_of(machine: Machine) -> Kinematics | None:
@@ -300,8 +299,7 @@ def _round(values: Array, step: float) -> Mask:
     grid = COARSE * step
     phase = np.exp(2j * np.pi * values / grid)
     start = np.angle(phase.mean()) / (2 * np.pi) * grid
-    near: Mask = np.abs((values - start + grid / 2) % grid - grid / 2) <= NEAR * step
-    return near
+    return np.abs((values - start + grid / 2) % grid - grid / 2) <= NEAR * step
 
 
 def refuse_stamped(program: Program, options: FixOptions) -> None:

@@ -220,8 +220,7 @@ class Interpreter(ABC, Generic[U]):
 
     def moves(self) -> Moves:
         """The motions of the program, when it has been followed."""
-        moves: Moves = self.control.moves()
-        return moves
+        return self.control.moves()
 
     def note_uncorrected(self, program: Program, moves: Moves) -> None:
         """Say where blocks begin that name axes though the program never goes through them.

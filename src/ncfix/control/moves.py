@@ -275,10 +275,7 @@ class Moves:
     @property
     def cutting(self) -> NDArray[np.bool_]:
         """(n,) motions at feed: straight ones, arcs and canned cycles, but for what is passed by rule."""
-        cutting: NDArray[np.bool_] = (
-            (self.kind != MotionKind.RAPID) & (self.kind != MotionKind.DWELL) & (self.rule != Rule.PASS)
-        )
-        return cutting
+        return (self.kind != MotionKind.RAPID) & (self.kind != MotionKind.DWELL) & (self.rule != Rule.PASS)
 
     @property
     def moved(self) -> NDArray[np.bool_]:

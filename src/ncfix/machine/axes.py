@@ -121,8 +121,7 @@ class GaugeLine:
 
     def tip(self, length: Array) -> Array:
         """The tip of a tool of this length, shape (...) [mm] -> (..., 3)."""
-        tip: Array = np.asarray(self.point) - np.asarray(length)[..., None] * np.asarray(self.direction)
-        return tip
+        return np.asarray(self.point) - np.asarray(length)[..., None] * np.asarray(self.direction)
 
 
 @dataclass(frozen=True, slots=True)

@@ -321,8 +321,7 @@ def carried_frames(joints: tuple[JointPose, ...], tool: GaugeLine, lengths: Arra
     """The frame at the tip, as `carried_tips`: the directions of its axes, and where it is, (3, 4, n)."""
     tip = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
     axes = np.broadcast_to(FRAME_AXES, (3, 3, tip.shape[-1]))
-    frame: Array = carry(joints, np.concatenate([axes, tip], axis=1), OF_FRAME) - columns(offset) * OF_FRAME
-    return frame
+    return carry(joints, np.concatenate([axes, tip], axis=1), OF_FRAME) - columns(offset) * OF_FRAME
 
 
 def build_chain(axes: tuple[Axis, ...], model: ErrorModel) -> JointChain:

@@ -205,8 +205,7 @@ def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Arra
     origin = advance(axis, position, columns(ORIGIN))
     velocity, turned, origin = np.broadcast_arrays(velocity, turned, origin)
     carried = np.concatenate([velocity + cross(origin, turned), turned])  # the adjoint of the nominal motion
-    found: Array = line - carried + own
-    return found
+    return line - carried + own
 
 
 def _twist(motion: Array, reference: Array) -> Array:

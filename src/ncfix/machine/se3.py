@@ -97,8 +97,7 @@ def apply(motion: ArrayLike, points: ArrayLike) -> Array:
     """Points moved, shapes (..., 4, 4) and (..., 3) -> (..., 3)."""
     motion = np.asarray(motion, dtype=np.float64)
     points = np.asarray(points, dtype=np.float64)
-    result: Array = (motion[..., :3, :3] @ points[..., None])[..., 0] + motion[..., :3, 3]
-    return result
+    return (motion[..., :3, :3] @ points[..., None])[..., 0] + motion[..., :3, 3]
 
 
 def rotation_vector(rotation: ArrayLike) -> Array:
@@ -124,5 +123,4 @@ def _near_half_turn(r: Array, sine: Array, angle: Array) -> Array:
     axis = np.take_along_axis(symmetric, column[..., None, None], axis=-1)[..., 0]
     axis = axis / np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-300)
     sign = np.where((axis * sine).sum(-1) < 0, -1.0, 1.0)
-    result: Array = (sign * angle)[..., None] * axis
-    return result
+    return (sign * angle)[..., None] * axis

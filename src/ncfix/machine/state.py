@@ -191,10 +191,8 @@ class Signal:
         if not self.axes:
             return poses.inputs[self.name]
         if self.axis is None:
-            angle: Array = poses.positions[list(self.summed)].sum(axis=0) / self.unit
-            return angle
-        position: Array = poses.positions[self.axis] / self.unit
-        return position
+            return poses.positions[list(self.summed)].sum(axis=0) / self.unit
+        return poses.positions[self.axis] / self.unit
 
     def u(self, poses: Poses, domain: tuple[float, float]) -> Array:
         """What the basis sees, (n,), without a unit; `domain` is the basis's own range of u."""

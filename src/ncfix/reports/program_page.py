@@ -258,7 +258,7 @@ def _limit(name: str, found: Extent, rotary: bool, limit: float | None) -> list[
 def _percent(share: Array) -> list[list[float]]:
     """Lengths of path (2, k) as percent of all of it."""
     total = np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
-    return np.round(100 * share / total, 4).tolist()  # type: ignore[no-any-return]
+    return np.round(100 * share / total, 4).tolist()
 
 
 def _flat(spot: ListedPlace) -> dict[str, object]:

@@ -73,8 +73,7 @@ def positioning(machine: Machine, space: Array, tool_length: float, most: int, t
             correction = own_rotary_correction(machine, q, state)
         else:
             correction = exact_correction(machine, q, state, done.at(machine.axis_names, q) * machine.rotary)
-        found: Array = correction[:, axis].reshape(len(positions), MEAN_POSES).mean(axis=1)
-        return found
+        return correction[:, axis].reshape(len(positions), MEAN_POSES).mean(axis=1)
 
     for axis in sorted(range(len(space)), key=lambda index: not machine.rotary[index]):
         limit = target / RADIUS if machine.rotary[axis] else target
@@ -252,8 +251,7 @@ def _half_play(machine: Machine, space: Array, tool_length: float, axis: int, fi
     """Half of what the own correction of an axis changes by with its way, at positions of it, (n,) mm."""
     q, ways = poses_along(axis, fine, even_poses(space, PLAY_POSES)), np.eye(len(space))[axis]
     ahead, back = (exact_correction(machine, q, State(tool_length, way))[:, axis] for way in (ways, -ways))
-    half: Array = (ahead - back).reshape(len(fine), PLAY_POSES).mean(axis=1) / 2
-    return half
+    return (ahead - back).reshape(len(fine), PLAY_POSES).mean(axis=1) / 2
 
 
 def reversal_note(machine: Machine, space: Array, tool_length: float, done: Compensation = NOTHING) -> Iterator[str]:

@@ -100,8 +100,7 @@ def rotary_correction(machine: Machine, q: Array, state: State) -> Array:
 def orientation_error(machine: Machine, q: Array, correction: Array, state: State) -> Array:
     """By what angle the tool is wrong at commands q that are corrected, (n,) rad."""
     turn = _turn(machine.actual(q + correction, state), machine.nominal(q, state.tool_length))
-    angle: Array = np.linalg.norm(turn, axis=0)
-    return angle
+    return np.linalg.norm(turn, axis=0)
 
 
 def _turn(actual: Array, meant: Array) -> Array:

@@ -234,8 +234,7 @@ def emulate(
 
 
 def _read(control: Control, files: Files) -> Tables:
-    tables: Tables = called("controls", control.name, control.read, files, gives=Tables)
-    return tables
+    return called("controls", control.name, control.read, files, gives=Tables)
 
 
 def _read_again(control: Control, written: Written) -> Tables:

@@ -106,8 +106,7 @@ def faces(volume: Volume, owners: Sequence[int], target: float) -> tuple[Face, .
 def _coarse(low: float, high: float, number: int) -> Array:
     """Positions over a range, not so even that a screw's period could hide."""
     shift = 0.3 * (np.mod((np.arange(COARSE) + number) * 0.618034, 1.0) - 0.5)
-    nodes: Array = low + (high - low) * (np.arange(COARSE) + 0.5 + shift) / COARSE
-    return nodes
+    return low + (high - low) * (np.arange(COARSE) + 0.5 + shift) / COARSE
 
 
 def _largest_sets(sizes: Mapping[Set, float], target: float) -> list[Set]:

@@ -81,8 +81,7 @@ class AxisPositions:
         """All positions (steps + 1,), from low to high or less than one part in a thousand beyond it, mm or rad."""
         first = np.floor(self.low * SCALE + 1e-6)
         step = np.ceil((self.high * SCALE - first) / self.steps - 1e-6)
-        positions: Array = (first + step * np.arange(self.steps + 1)) / SCALE * self.unit
-        return positions
+        return (first + step * np.arange(self.steps + 1)) / SCALE * self.unit
 
     def stride(self, curve: Array, most: int, limit: float) -> int:
         """The widest step, in fine ones, with which straight lines stay within `limit` of a curve over `fine`.
@@ -159,8 +158,7 @@ def _sobol_net(dimensions: int) -> Array:
     if dimensions > 1 + len(SOBOL):
         from scipy.stats import qmc
 
-        many: Array = qmc.Sobol(dimensions, scramble=False).random_base2(SAMPLES)
-        return many
+        return qmc.Sobol(dimensions, scramble=False).random_base2(SAMPLES)
     bits = [[1] * SAMPLES]
     for polynomial, first in SOBOL[: dimensions - 1]:
         degree, numbers = len(first), list(first)
@@ -175,8 +173,7 @@ def _sobol_net(dimensions: int) -> Array:
     for k in range(1, len(points)):
         lowest = (k & -k).bit_length() - 1
         points[k] = points[k - 1] ^ directions[:, lowest]
-    net: Array = points / 2**SAMPLES
-    return net
+    return points / 2**SAMPLES
 
 
 def followed(sample: TableSample, layouts: TableLayouts, along: AlongAxis) -> dict[int, list[TableLayout]]:

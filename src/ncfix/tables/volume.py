@@ -274,8 +274,7 @@ def even_line(low: float, high: float, count: int, anchor: float | None) -> Arra
     steps = np.max(sides, axis=0)
     chosen = int(np.argmin(steps))
     step = np.ceil(steps[chosen] / STEP - SLACK) * STEP
-    nodes: Array = anchor + step * (before - chosen)
-    return nodes
+    return anchor + step * (before - chosen)
 
 
 def inputs_that_matter(machine: Machine, space: Array, tool_length: float) -> tuple[str, ...]:

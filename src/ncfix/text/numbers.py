@@ -78,8 +78,7 @@ def find_numbers(text: NDArray[np.uint8], numeric: NDArray[np.bool_], fixed: NDA
 
 def is_numeric(text: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """`NUMERIC[text]`, faster: digits and the point stand together in the alphabet, with a stroke between them."""
-    numeric: NDArray[np.bool_] = (text - np.uint8(POINT) < ord("9") - POINT + 1) & (text != ord("/"))
-    return numeric
+    return (text - np.uint8(POINT) < ord("9") - POINT + 1) & (text != ord("/"))
 
 
 SHORT = 64

@@ -157,8 +157,7 @@ ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
 
 def rules() -> NumberRules:
     """These numbers, as the core takes them."""
-    made: NumberRules = core.loops("words").NumberRules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
-    return made
+    return core.loops("words").NumberRules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
 
 
 @dataclass(frozen=True, slots=True)

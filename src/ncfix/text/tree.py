@@ -353,8 +353,7 @@ class Program:
         """The line numbers on which blocks (n,) start, all at once."""
         text = np.frombuffer(self.source, dtype=np.uint8)
         ends = np.flatnonzero(text == ord("\n" if b"\n" in self.source else "\r"))
-        lines: NDArray[np.int64] = self.first_line + np.searchsorted(ends, self.blocks[blocks, 0])
-        return lines
+        return self.first_line + np.searchsorted(ends, self.blocks[blocks, 0])
 
     def place(self, block: int, span: Span | None = None) -> Place:
         """Where a block, or a span of it, stands in the file: for messages."""

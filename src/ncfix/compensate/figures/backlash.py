@@ -52,8 +52,7 @@ class Runs:
         """The runs in which fractions of motions (n,) are, (n,); where two meet, the one of that motion."""
         place = rows + fraction
         after = np.where(fraction == 0, np.searchsorted(self.place, place, "right"), np.searchsorted(self.place, place))
-        run: Index = np.maximum(after - 1, 0)
-        return run
+        return np.maximum(after - 1, 0)
 
     def sides(self, run: Index, q: Array) -> Array:
         """Where the body is with the axis at positions (n,) of runs (n,), (n,) -1 to 1."""

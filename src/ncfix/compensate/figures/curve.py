@@ -326,8 +326,7 @@ def distance(one: Array, other: Array) -> Array:
 
 def length(vectors: Array) -> Array:
     """The lengths of vectors (n, 3), (n,)."""
-    found: Array = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-    return found
+    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
 def _unit(vectors: Array) -> Array:

@@ -182,8 +182,7 @@ class Search:
         """1 where a cut ends, -1 where one begins, 0 elsewhere, (n,)."""
         opens = self.curve.opens
         ends = (share == 1) & opens.take(piece + 1, mode="clip")
-        found: Array = 1.0 * ends - ((share == 0) & opens[piece])
-        return found
+        return 1.0 * ends - ((share == 0) & opens[piece])
 
     def _hop(self, piece: Index, push: Array, one: Mask) -> Index:
         """Where to look next: as far along as the point lies, or on the very next parabola that has a length."""
@@ -267,8 +266,7 @@ def _newton(curve: Curve, points: Array, piece: Index, share: Array) -> tuple[Ar
 
 def _dot(one: Array, other: Array) -> Array:
     """The products (n,) of vectors (3, n)."""
-    found: Array = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-    return found
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def _on_chords(curve: Curve, points: Array, piece: Index) -> tuple[Array, Array]:
@@ -315,8 +313,7 @@ def _shares_beside(path: Curve, samples: CurvePoints, rows: Index, points: Array
     chord = samples.points[rows] - begin
     square = np.einsum("ij,ij->i", chord, chord)
     along = np.einsum("ij,ij->i", points - begin, chord) / np.where(square > 0, square, 1.0)
-    found: Array = share - 0.5 + np.clip(along, 0.0, 1.0) / 2
-    return found
+    return share - 0.5 + np.clip(along, 0.0, 1.0) / 2
 
 
 HALVINGS = 24

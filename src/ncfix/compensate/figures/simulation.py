@@ -100,8 +100,7 @@ class SimulatedErrors:
 
 def lines_of(parts: list[Index]) -> list[int]:
     """The lines that occur in parts, each once, in order."""
-    lines: list[int] = distinct(np.concatenate([np.zeros(0, dtype=np.intp), *parts])).tolist()
-    return lines
+    return distinct(np.concatenate([np.zeros(0, dtype=np.intp), *parts])).tolist()
 
 
 def _added(total: float, values: Array) -> float:
@@ -145,15 +144,13 @@ class TipError:
     def size(self) -> Array:
         """The distance between the two, (k,) mm."""
         gap = self.actual - self.intended
-        size: Array = np.sqrt(np.einsum("ij,ij->i", gap, gap))
-        return size
+        return np.sqrt(np.einsum("ij,ij->i", gap, gap))
 
     @property
     def weight(self) -> Array:
         """The length of intended path that each sample stands for, (k,) mm."""
         step = np.linalg.norm(np.diff(self.intended, axis=0), axis=1) * (np.diff(self.rows) == 0)
-        weight: Array = (np.concatenate([[0.0], step]) + np.concatenate([step, [0.0]])) / 2
-        return weight
+        return (np.concatenate([[0.0], step]) + np.concatenate([step, [0.0]])) / 2
 
 
 def tip_errors(intent: Intent, lines: Index, first: int = 0, made: Tip | None = None) -> Iterator[TipError]:

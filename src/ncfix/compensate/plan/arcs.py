@@ -93,8 +93,7 @@ def full_circles(intent: Intent, rows: Index) -> Mask:
     turns = moves.sweep[rows] / (2 * np.pi)
     whole = (np.abs(turns) > 0.5) & (np.abs(turns - np.round(turns)) < 1e-6)
     chord = (picked(moves.end, rows) - picked(moves.start, rows))[:, intent.columns]
-    result: Mask = whole & (np.linalg.norm(across(chord, moves.normal[rows]), axis=1) < CLOSED)
-    return result
+    return whole & (np.linalg.norm(across(chord, moves.normal[rows]), axis=1) < CLOSED)
 
 
 def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array, Array]:
@@ -117,8 +116,7 @@ def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array,
 
 def across(vectors: Array, normal: Array) -> Array:
     """The part of vectors (k, 3) across the normals."""
-    result: Array = vectors - np.einsum("ij,ij->i", vectors, normal)[:, None] * normal
-    return result
+    return vectors - np.einsum("ij,ij->i", vectors, normal)[:, None] * normal
 
 
 def _in_plane(origin: Array, normal: Array, points: Array) -> Array:
@@ -132,8 +130,7 @@ def _onto_bisector(start: Array, end: Array, normal: Array, centre: Array) -> Ar
     length = np.linalg.norm(chord, axis=1, keepdims=True)
     along = chord / np.where(length > 0, length, 1.0)
     off = np.einsum("ij,ij->i", centre - (start + end) / 2, along)[:, None]
-    result: Array = centre - off * along
-    return result
+    return centre - off * along
 
 
 def _best_on_bisector(arcs: Segments, ends: Pair, centre: Array, wanted: Array) -> Array:
@@ -147,14 +144,12 @@ def _best_on_bisector(arcs: Segments, ends: Pair, centre: Array, wanted: Array) 
     squares, share = (np.einsum("ijk,ijk->k", slope, each) for each in (slope, off))
     amount = share / np.maximum(squares, 1e-12)
     limit = 10 * _farthest(off) + NUDGE
-    result: Array = centre + np.clip(amount, -limit, limit)[:, None] * way
-    return result
+    return centre + np.clip(amount, -limit, limit)[:, None] * way
 
 
 def _farthest(off: Array) -> Array:
     """The longest of vectors (3, looks, k) of each arc, (k,)."""
-    result: Array = np.sqrt((off * off).sum(axis=0).max(axis=0))
-    return result
+    return np.sqrt((off * off).sum(axis=0).max(axis=0))
 
 
 def _points(arcs: Segments, ends: Pair, centre: Array) -> Array:
@@ -180,8 +175,7 @@ def _sound(
     clear = closed | (chord > APART * rounding + CLOSED)
     same = np.abs(sweep - arcs.sweep) < 0.1 + 0.1 * np.abs(arcs.sweep)
     same &= closed | (turns_begun(sweep) == turns_begun(arcs.sweep))
-    result: Mask = agree & clear & same & np.isfinite(sweep)
-    return result
+    return agree & clear & same & np.isfinite(sweep)
 
 
 def turns_begun(sweep: Array) -> Array:

@@ -175,8 +175,7 @@ def distance(intent: Intent, real: Segments, rows: Index, fraction: Array) -> Ar
     """How far the tip is from where it could be at fractions of motions done as `real` has them, (k,) mm."""
     commands = real.at(rows, fraction)
     gap = correctable(intent, rows, commands, intent.gap(rows, fraction, commands))
-    size: Array = np.sqrt(np.einsum("ij,ij->i", gap, gap))
-    return size
+    return np.sqrt(np.einsum("ij,ij->i", gap, gap))
 
 
 def beside(intent: Intent, real: Segments, rows: Index) -> Array | None:
@@ -323,8 +322,7 @@ def _leaps(written: WrittenPieces, which: Index) -> Mask:
         | some(moves.wordless[move - 1])
     )
     leads = (written.span[which] <= 2 * INSTANT) | ~written.intent.moving(move)
-    leaps: Mask = (move > 0) & behind & leads & finite(picked(moves.start, move))
-    return leaps
+    return (move > 0) & behind & leads & finite(picked(moves.start, move))
 
 
 def _passed(written: WrittenPieces, which: Index, along: Mask) -> tuple[Index, Array]:

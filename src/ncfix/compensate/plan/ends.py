@@ -180,8 +180,7 @@ def _translated(machine: Machine, moves: Moves, row: int, shift: Array) -> Array
     if not reached.all():
         return np.zeros_like(shift)
     commands = commands_from_joints(machine, q, moves.tcp[pair[1]], moves.length_under_tcp[pair[1]])
-    result: Array = commands[1] - commands[0]
-    return result
+    return commands[1] - commands[0]
 
 
 def corrected_approaches(intent: Intent, wanted: Array, unchanged: Mask) -> Array | None:

@@ -84,8 +84,7 @@ class Intent:
     def moving(self, rows: Index) -> Mask:
         """Which of motions `rows` (k,) are to move anything; others only take up what is off where they begin."""
         way = np.abs(picked(self.moves.end, rows) - picked(self.moves.start, rows))
-        moving: Mask = some((way >= REST) & (way < np.inf)) | (self.moves.kind[rows] == MotionKind.ARC)
-        return moving
+        return some((way >= REST) & (way < np.inf)) | (self.moves.kind[rows] == MotionKind.ARC)
 
     @cached_property
     def wordless(self) -> Mask | None:
@@ -285,8 +284,7 @@ def stays(moves: Moves, unchanged: Mask, shift: Array, before: Array | None) -> 
     moving = (shift != 0).any(axis=0)
     if before is not None:
         moving |= before != 0
-    result: Mask = moves.wordless & ~unchanged[:, None] & moving
-    return result
+    return moves.wordless & ~unchanged[:, None] & moving
 
 
 def left_in_cuts(moves: Moves) -> dict[str, Index]:

@@ -118,8 +118,7 @@ def is_offset(moves: Moves) -> Mask:
     """(n,) motions beside which the control takes the tool by a radius that is known."""
     if moves.beside is None:
         return np.zeros(len(moves), dtype=bool)
-    offset: Mask = np.nan_to_num(moves.beside) != 0
-    return offset
+    return np.nan_to_num(moves.beside) != 0
 
 
 def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
@@ -285,15 +284,13 @@ def _from_wedge(gap: Array, come: Array, go: Array) -> Array:
 
     def to_rays(sign: float) -> Array:
         rays = [np.maximum(sign * by_come, 0.0), np.maximum(-sign * by_go, 0.0)]
-        size: Array = np.sqrt(np.maximum(square - np.maximum(*rays) ** 2, 0.0))
-        return size
+        return np.sqrt(np.maximum(square - np.maximum(*rays) ** 2, 0.0))
 
     return np.maximum(to_rays(1.0), to_rays(-1.0))
 
 
 def _dot(vectors: Array, others: Array) -> Array:
-    products: Array = np.einsum("ij,ij->i", vectors, others)
-    return products
+    return np.einsum("ij,ij->i", vectors, others)
 
 
 def _flat(vectors: Array, up: Array) -> Array:

@@ -294,8 +294,7 @@ def _followed(intent: Intent, real: Segments, unchanged: Mask, strategy: Strateg
     followed = (
         (kind == MotionKind.FEED) | (kind == MotionKind.ARC) | ((kind == MotionKind.RAPID) & demands.split_rapids)
     )
-    result: Mask = followed & ~unchanged & intent.moving(np.arange(len(unchanged))) & finite(real.start)
-    return result
+    return followed & ~unchanged & intent.moving(np.arange(len(unchanged))) & finite(real.start)
 
 
 def _judged(

@@ -91,8 +91,7 @@ def reach(intent: Intent, rows: Index) -> Array:
     points = [float(np.linalg.norm(axis.point)) for axis in machine.axes if axis.rotary]
     fixed = max(points, default=0.0) + float(np.linalg.norm(machine.workpiece_offset))
     tip = np.maximum(*(np.linalg.norm(end[rows][:, intent.columns], axis=1) for end in (moves.start, moves.end)))
-    reach: Array = tip + fixed + np.abs(moves.tool_length[rows])
-    return reach
+    return tip + fixed + np.abs(moves.tool_length[rows])
 
 
 def _arc_ways(intent: Intent, rows: Index) -> Array:
@@ -105,8 +104,7 @@ def _arc_ways(intent: Intent, rows: Index) -> Array:
 def arc_radii(intent: Intent, rows: Index) -> Array:
     """The radii of arcs where they start, (k,) mm."""
     start = intent.segments.start[rows[:, None], intent.columns] - intent.moves.centre[rows]
-    radius: Array = np.linalg.norm(vector_product(intent.moves.normal[rows], start), axis=1)
-    return radius
+    return np.linalg.norm(vector_product(intent.moves.normal[rows], start), axis=1)
 
 
 def even(counts: Index) -> Array:

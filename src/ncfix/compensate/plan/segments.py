@@ -81,8 +81,7 @@ class Segments:
     def chords(self, rows: Index, fraction: Array) -> Array:
         """As `evenly`, with X Y Z of arcs on their chords."""
         share = fraction[:, None, None]
-        commands: Array = (1 - share) * picked(self.start, rows) + share * picked(self.end, rows)
-        return commands
+        return (1 - share) * picked(self.start, rows) + share * picked(self.end, rows)
 
     def _onto(self, command: Array, rows: Index | slice, found: Array) -> None:
         """Put X Y Z (3, m, k) of some rows into commands (m, ., n_axes)."""
@@ -167,8 +166,7 @@ def _about_axis(point: Array, centre: Array, normal: Array) -> Array:
 
 def height(points: Array, normal: Array) -> Array:
     """How far vectors (k, 3) go along the normals, (k, 1)."""
-    along: Array = np.einsum("ij,ij->i", points, normal)[:, None]
-    return along
+    return np.einsum("ij,ij->i", points, normal)[:, None]
 
 
 def sweep_between(start: Array, end: Array, centre: Array, normal: Array, like: Array) -> Array:
@@ -180,8 +178,7 @@ def sweep_between(start: Array, end: Array, centre: Array, normal: Array, like: 
     sine = np.einsum("ij,ij->i", vector_product(first, last), normal)
     cosine = np.einsum("ij,ij->i", first, last) - height(first, normal)[:, 0] * height(last, normal)[:, 0]
     change = np.arctan2(sine, cosine) - like
-    result: Array = like + change - 2 * np.pi * np.round(change / (2 * np.pi))
-    return result
+    return like + change - 2 * np.pi * np.round(change / (2 * np.pi))
 
 
 def surely_within(machine: Machine, begin: Array, end: Array, tool_length: float) -> Mask:
@@ -244,8 +241,7 @@ def accelerations(
         arm += tool_length + 2 * swing + 2 * _reach(table[1], table[1][0])
     if way is None:
         way = lengths(last - first) + turning * arm + tilting * swing
-    result: Array = share * (turning**2 * arm + 2 * turning * way + tilting**2 * swing)
-    return result
+    return share * (turning**2 * arm + 2 * turning * way + tilting**2 * swing)
 
 
 def _pivots(machine: Machine, workpiece_side: bool) -> tuple[Index, Array]:

@@ -195,8 +195,7 @@ def radii(intent: Intent, rows: Index) -> Array:
     """The radius of each arc (k,), mm."""
     moves = intent.moves
     spoke = moves.end[rows[:, None], intent.columns] - moves.centre[rows]
-    radius: Array = np.linalg.norm(across(spoke, moves.normal[rows]), axis=1)
-    return radius
+    return np.linalg.norm(across(spoke, moves.normal[rows]), axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,8 +274,7 @@ class RoundGrid:
         node = first[piece] + places(inner)
         command = pieces.at(piece, share) - self.grid.command[node]
         follow = self.grid.follow
-        off: Array = np.einsum("kij,kj->ki", follow[node] if len(follow) > 1 else follow, command)
-        return off
+        return np.einsum("kij,kj->ki", follow[node] if len(follow) > 1 else follow, command)
 
 
 def _on_bisector(pieces: Segments, way: Array, height: Array) -> Segments:

@@ -404,5 +404,4 @@ def _about(points: Array, axis: int, angle: Array) -> Array:
 
 def _value(effect: Effect, position: Array) -> Array:
     """An effect at axis positions in mm or degrees, (n,)."""
-    value: Array = effect.basis.design((position - effect.center) / effect.scale) @ np.asarray(effect.coefficients)
-    return value
+    return effect.basis.design((position - effect.center) / effect.scale) @ np.asarray(effect.coefficients)

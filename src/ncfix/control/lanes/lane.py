@@ -224,8 +224,7 @@ def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockR
 def closes(control: ProgramControl, step: FloatArray, centre: FloatArray) -> Mask:
     """(k,) arcs that surely close, from their start to `step` about `centre`; of the others `on_circle` says it."""
     start, end = np.hypot(*centre.T), np.hypot(*(step - centre).T)
-    sure: Mask = (np.minimum(start, end) > 2 * ZERO_RADIUS) & (np.abs(start - end) < control.closure_mm / 2)
-    return sure
+    return (np.minimum(start, end) > 2 * ZERO_RADIUS) & (np.abs(start - end) < control.closure_mm / 2)
 
 
 def on_circle(
@@ -272,8 +271,7 @@ def is_flat(control: ProgramControl, unit: ProgramText, blocks: IntArray) -> Mas
         return np.zeros(len(blocks), dtype=np.bool_)
     slots = unit.lanes.centre[program.template[blocks], plane.across]
     across = words(program.numbers, program.first_number[blocks], slots)
-    flat: Mask = np.isnan(across) | ((across == 0.0) & control.takes_zero_across)
-    return flat
+    return np.isnan(across) | ((across == 0.0) & control.takes_zero_across)
 
 
 def centre_words(

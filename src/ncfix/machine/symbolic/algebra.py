@@ -100,8 +100,7 @@ class Algebra:
 
     def entries(self, matrix: DomainMatrix) -> list[list[Poly]]:
         """The polynomials of a matrix."""
-        rows: list[list[Poly]] = matrix.to_list()
-        return rows
+        return matrix.to_list()
 
     def expression(self, poly: Poly) -> sp.Expr:
         """A short way to write the polynomial."""

@@ -89,8 +89,7 @@ def _latex(expression: sp.Expr, names: dict[sp.Expr, str]) -> str:
     """sympy takes names for plain symbols only, so functions such as EXX(X) are put in as symbols first."""
     plain = {symbol: sp.Symbol(str(symbol)) for symbol in names if not symbol.is_Symbol}
     labels = {plain.get(symbol, symbol): name for symbol, name in names.items()}
-    text: str = sp.latex(expression.xreplace(plain), symbol_names=labels, fold_func_brackets=True)
-    return text
+    return sp.latex(expression.xreplace(plain), symbol_names=labels, fold_func_brackets=True)
 
 
 def _latex_product(errors: str, size: sp.Expr, names: dict[sp.Expr, str]) -> str:
