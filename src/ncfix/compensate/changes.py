@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ncfix.compensate.driver import Corrector, Fixed, fix_flat, fix_program
+from ncfix.compensate.driver import Fixed, fix_flat, fix_program
 from ncfix.compensate.following import placed
 from ncfix.compensate.plan.arrays import Array, Index, picked
 from ncfix.compensate.plan.kinematics import reached_joints, signs
@@ -23,12 +23,10 @@ from ncfix.text.writer import Edit, Splices, spliced
 if TYPE_CHECKING:
     from ncfix.compensate import FixOptions
     from ncfix.compensate.following import Resolve
-    from ncfix.compensate.solve import WrittenPlan
+    from ncfix.control.moves import Moves
     from ncfix.control.setup import Setup
     from ncfix.text.tree import Program
 
-FLAT = "NCF445"
-"""The remark that a program is written out flat."""
 CONTEXT = 3
 """Lines round a change that a diff shows."""
 MOST_NAMED = 3
@@ -69,17 +67,11 @@ class MotionChange:
 class Changes:
     """What a correction changes.
 
-    program  as it is corrected: where blocks are written out flat, another than was given
     fixed    the result
-    edits    what is replaced in its text, the stamp, too; None where the text was numbered anew
-    plan     the motions, None of a machine without errors
     machine  with the workpiece in its place
     """
 
-    program: Program
     fixed: Fixed
-    edits: Splices | None
-    plan: WrittenPlan | None
     machine: Machine
 
     @classmethod
@@ -87,44 +79,37 @@ class Changes:
         cls, program: Program, machine: Machine, setup: Setup, options: FixOptions, resolve: Resolve | None
     ) -> Changes:
         """Correct a program, and keep how; raises what `fix_program` does."""
-        seen: list[tuple[Program, Corrector]] = []
         fix = fix_flat if options.flatten else fix_program
-        fixed = fix(program, machine, setup, options, resolve, lambda *each: seen.append(each))
-        if not seen:
-            return cls(program, fixed, Splices.of([]), None, machine)
-        flat = any(message.code == FLAT for message in fixed.report.warnings)
-        source, corrector = seen[-1 if flat else 0]
-        assert corrector.joint is not None
-        stamp = [Edit(corrector.at, corrector.at, corrector.stamped)] if corrector.stamped else []
-        edits = Splices.joined([corrector.joint.splices, Splices.of(stamp)])
-        anew = spliced(source.source, edits) != fixed.text
-        return cls(source, fixed, None if anew else edits, corrector.joint.plans[0], placed(machine, setup))
+        fixed = fix(program, machine, setup, options, resolve)
+        return cls(fixed, machine if fixed.made is None else placed(machine, setup))
 
     def unified(self, original: bytes, before: str, after: str) -> Iterator[bytes]:
         """The lines of a unified diff of the text that was given; nothing if nothing changes."""
-        text = self.fixed.text
-        if text == original:
+        text, made = self.fixed.text, self.fixed.made
+        if made is None or text == original:
             return
-        heads = (f"--- {before}\n".encode(), f"+++ {after}\n".encode())
-        if self.edits is None or original != self.program.source:
-            old, new = original.splitlines(keepends=True), text.splitlines(keepends=True)
-            found = difflib.diff_bytes(difflib.unified_diff, old, new, n=CONTEXT, lineterm=b"\n")
-            yield from (*heads, *(_ended(line) for number, line in enumerate(found) if number > 1))
-            return
-        yield from heads
-        yield from _hunks(original.splitlines(keepends=True), list(_replaced(original, self.edits)))
+        yield from (f"--- {before}\n".encode(), f"+++ {after}\n".encode())
+        old = original.splitlines(keepends=True)
+        if original == made.program.source and spliced(original, made.edits) == text:
+            yield from _hunks(old, list(_replaced(original, made.edits)))
+        else:  # written out flat, or numbered anew
+            found = difflib.diff_bytes(
+                difflib.unified_diff, old, text.splitlines(keepends=True), n=CONTEXT, lineterm=b"\n"
+            )
+            yield from (_ended(line) for number, line in enumerate(found) if number > 1)
 
     def motions(self) -> Iterator[MotionChange]:
         """The commands that change, motion after motion, axis after axis."""
-        if self.plan is None:
+        made = self.fixed.made
+        if made is None:
             return
-        plan, moves = self.plan, self.plan.moves
+        plan, moves = made.plan, made.plan.moves
         steps = np.where(moves.rotary, self.machine.least_increment[1], self.machine.least_increment[0])
         changed = (np.abs(plan.shift) > steps / 2) & ~plan.unchanged[:, None]
         rows = np.flatnonzero(changed.any(axis=1))
         pieces = np.bincount(plan.plan.pieces.move, minlength=len(moves))
-        lines, shift = self.program.lines(moves.block), plan.shift
-        why = self._reasons(rows)
+        lines, shift = made.program.lines(moves.block), plan.shift
+        why = self._reasons(moves, rows)
         scale = np.where(moves.rotary, np.degrees(1.0), 1.0)
         for at, row in enumerate(rows.tolist()):
             for axis in np.flatnonzero(changed[row]).tolist():
@@ -133,10 +118,8 @@ class Changes:
                 found = (moves.axes[axis], bool(moves.rotary[axis]), before, before + way, 1e3 * way)
                 yield MotionChange(int(lines[row]), *found, int(pieces[row]), why[at])
 
-    def _reasons(self, rows: Index) -> Sequence[Mapping[str, float]]:
-        """The largest errors of the tip at the ends of motions, um, by the names of effects."""
-        assert self.plan is not None
-        moves = self.plan.moves
+    def _reasons(self, moves: Moves, rows: Index) -> Sequence[Mapping[str, float]]:
+        """The largest errors of the tip at the ends of motions `rows`, um, by the names of effects."""
         length = np.nan_to_num(picked(moves.tool_length, rows))
         q, _ = reached_joints(self.machine, picked(moves.end, rows), moves.tcp[rows], length)
         state = State(length, signs(picked(moves.end - moves.start, rows)))

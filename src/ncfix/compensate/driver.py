@@ -52,9 +52,7 @@ from ncfix.compensate.plain_figures import figures, largest_shift, written
 from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import path_error
 from ncfix.compensate.plan.figure_tally import PathError
-from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.offset import is_offset
-from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.compensate.report import FixReport, Tally, in_lines
 from ncfix.compensate.solve import AcceptedPlan, PrecedingMotion, WrittenPlan, accepted_plan, increments
 from ncfix.compensate.workers import OpenFiles, Read, WorkShare, worker_pool
@@ -67,7 +65,7 @@ from ncfix.machine import Machine
 from ncfix.text import stamp
 from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
-from ncfix.text.writer import Splices, spliced
+from ncfix.text.writer import Edit, Splices, spliced
 from ncfix.writer.emit import Emission
 from ncfix.writer.language import WrittenLanguage
 
@@ -112,13 +110,8 @@ class ProvedPart:
         return replace(self, text=len(self.text))
 
 
-def _nobody(left: PrecedingMotion, size: int) -> None:
-    """Takes what a part leaves where nothing comes behind it."""
-
-
-Watch = Callable[[Program, Machine, WrittenPlan, Mask | None, Signs | None], object]
-"""Is shown each part that has been corrected: its program, the machine, its plan, which motions are its own, and the
-way in which axes came to its first one."""
+Watch = Callable[[Program, WrittenPlan, Mask | None], object]
+"""Is shown each part that has been corrected: its program, its plan, and which motions are its own."""
 
 
 @dataclass(slots=True)
@@ -155,14 +148,14 @@ class Corrector:
         moves: Sequence[Moves],
         accepted: AcceptedPlan | None = None,
         before: PrecedingMotion | None = None,
-        leave: Callable[[PrecedingMotion, int], object] = _nobody,
+        leave: Callable[[PrecedingMotion, int], object] | None = None,
     ) -> ProvedPart:
         """Settle, write, prove and count a part.
 
         moves   its motions, in each position of block delete
         accepted  the plan to begin with, if that has been made already
         before  what the part before has left
-        leave   is told what this one leaves, and how long its text is, before it is proved
+        leave   is told what this one leaves, and how long its text is, before it is proved; None: nothing comes behind
         """
         task, part = self.task, continued.joined
         readings: Readings | None = [None] * len(moves)
@@ -172,7 +165,7 @@ class Corrector:
             if before is not None and (solution.reaches_back or solution.unchanged[0] != before.unchanged):
                 raise NotInPartsError("a refusal reaches back into an earlier part")
             text = self._text(part.program, joint.splices, before is None)
-            if not part.last and readings[0] is None:
+            if leave is not None and not part.last and readings[0] is None:
                 leave(PrecedingMotion.of(solution.rounds, np.zeros(len(solution.moves.axes), dtype=np.int8)), len(text))
             readings = self.proof.misreadings(continued, joint, text)
         self.joint = joint
@@ -185,9 +178,7 @@ class Corrector:
             errors = [(each.moves, self._tip_errors(each, own)) for each in joint.plans]
             self.note(tally, part.program, *errors)
         if self.watch is not None:
-            self.watch(
-                part.program, self.machine, solution, own, None if continued.head is None else continued.direction
-            )
+            self.watch(part.program, solution, own)
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _text(self, program: Program, splices: Splices, first: bool) -> bytes:
@@ -205,10 +196,8 @@ class Corrector:
 
     def _tip_errors(self, solution: WrittenPlan, own: Mask | None) -> PathError:
         """Tip errors before and after, with the numbers as the control will understand them; of motions `own` (n,)."""
-        emission, shown = solution.emission, solution.shown(self.task.options.split_rapids)
-        pieces = replace(solution.plan.pieces, end=emission.end, centre=emission.centre)
-        written = WrittenPieces(solution.intent, pieces, emission.start)
-        return path_error(written, shown if own is None else own & shown, solution.plan.known)
+        shown = solution.shown(self.task.options.split_rapids)
+        return path_error(solution.written, shown if own is None else own & shown, solution.plan.known)
 
     def note(self, tally: Tally, program: Program, *errors: tuple[Moves, PathError]) -> None:
         """Take in the tip errors of a part, in each position of block delete."""
@@ -231,20 +220,28 @@ class Fixed:
     """The corrected program, whether it differs from the original, and what there is to report.
 
     lines  of a program that was written out flat: the line of the original of each of its lines
+    made   how it was corrected; None for a machine without errors
     """
 
     text: bytes
     changed: bool
     report: FixReport
     lines: tuple[int, ...] = ()
+    made: Made | None = field(default=None, repr=False, compare=False)
 
 
-Seen = Callable[[Program, Corrector], object]
-"""Is given the program as it was read, and what corrected it."""
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What a program was corrected with.
 
+    program  as it was read, or as it was written out flat
+    plan     its motions, in the first position of block delete
+    edits    what they replace in its text; with the stamp
+    """
 
-def _unseen(program: Program, corrector: Corrector) -> None:
-    """Where nobody wants to see it."""
+    program: Program
+    plan: WrittenPlan
+    edits: Splices
 
 
 def fix_program(
@@ -253,12 +250,10 @@ def fix_program(
     setup: Setup,
     options: FixOptions = FixOptions(),  # noqa: B008
     resolve: Resolve | None = None,
-    seen: Seen = _unseen,
 ) -> Fixed:
     """Correct a program for a machine. A program that needs no change comes back as it is, without a stamp.
 
     resolve  gives the text of a subprogram file by its name
-    seen     is given the program as it was read, and what corrected it
 
     Raises SourceError for what cannot be followed or is not known, RefusedError NCF430 for a program that carries a
     stamp, NCF438 for one that seems to have been corrected without one. Motions that had to be left uncorrected are in
@@ -279,17 +274,19 @@ def fix_program(
     there = placed(resolving(machine, program.dialect, program.source), setup)
     corrector = Corrector(task, there, proof, lambda: words)
     done = corrector.correct(ContinuedPart.whole(program, moves[0], corrector.machine), moves)
-    seen(program, corrector)
-    tally, text = done.tally, done.text
+    tally, text, joint = done.tally, done.text, corrector.joint
     assert isinstance(text, bytes)
+    assert joint is not None
+    stamps = [Edit(corrector.at, corrector.at, corrector.stamped)] if corrector.stamped else []
+    made = Made(program, joint.plans[0], Splices.joined([joint.splices, Splices.of(stamps)]))
     suspicion = suspected(tally.numbers, tally.step, program.path, options.force)
     tally.blocks = len(program)
     report = tally.report(program.path, (*suspicion, *messages_of(positions)), options)
     report = replace(report, block_delete=tuple(sorted(each.on) for each in positions if each.on is not None))
     renumber = language_of(program.dialect, Language).renumber
     if text == program.source or renumber is None or options.block_numbers != "renumber":
-        return Fixed(text, text != program.source, report)
-    return Fixed(renumber(text), True, report)
+        return Fixed(text, text != program.source, report, made=made)
+    return Fixed(renumber(text), True, report, made=made)
 
 
 def fix_flat(
@@ -298,7 +295,6 @@ def fix_flat(
     setup: Setup,
     options: FixOptions,
     resolve: Resolve | None = None,
-    seen: Seen = _unseen,
 ) -> Fixed:
     """As `fix_program`; where that refuses motions, the program is written out flat and corrected so.
 
@@ -307,7 +303,7 @@ def fix_flat(
     The report speaks of the lines of the original. A flat program has the numbers of one position of block delete, so a
     program that is to be right in several stays as it is. Raises what `fix_program` and `flatten` raise.
     """
-    fixed = fix_program(program, machine, setup, options, resolve, seen)
+    fixed = fix_program(program, machine, setup, options, resolve)
     if not (fixed.report.refused and fixed.report.moves):
         return fixed
     if len(fixed.report.block_delete) > 1:
@@ -319,7 +315,7 @@ def fix_flat(
     from ncfix.control.flatten import flatten
 
     flat = flatten(program, setup, machine.axis_names, rotary_names(machine), by_name, resolve, kinematics_of(machine))
-    again = fix_program(flat.program, machine, setup, options, resolve, seen)
+    again = fix_program(flat.program, machine, setup, options, resolve)
     if {each.line for each in fixed.report.refused} <= {flat.lines[each.line - 1] for each in again.report.refused}:
         return fixed
     report = in_lines(again.report, flat, program)
@@ -387,7 +383,7 @@ class PartCorrector(Corrector):
         if self.task.options.verify:
             self.note(tally, part.program, (moves, figures(plan, plain, self.task.options.split_rapids)))
         if self.watch is not None:
-            self.watch(part.program, self.machine, solution, None, None)
+            self.watch(part.program, solution, None)
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _accepted_plan(self, continued: ContinuedPart) -> AcceptedPlan:

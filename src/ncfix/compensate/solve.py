@@ -154,6 +154,13 @@ class WrittenPlan:
         """The motions as programmed."""
         return self.intent.moves
 
+    @property
+    def written(self) -> WrittenPieces:
+        """The pieces, with the numbers as the control will understand them."""
+        emission = self.emission
+        pieces = replace(self.plan.pieces, end=emission.end, centre=emission.centre)
+        return WrittenPieces(self.intent, pieces, emission.start)
+
     def shown(self, rapids: bool) -> Mask:
         """(n,) motions that figures are of: corrected ones that cut, and `rapids` if the tolerance holds along them.
 

@@ -32,14 +32,13 @@ from ncfix.version import __version__
 if TYPE_CHECKING:
     from ncfix.cli.shop.pages import Pages
     from ncfix.compensate import FixOptions
-    from ncfix.compensate.driver import Corrector, Fixed, Stream
+    from ncfix.compensate.driver import Fixed, Stream
     from ncfix.compensate.figures.path_record import PathRecord
     from ncfix.compensate.report import FixReport
     from ncfix.control.setup import Setup
     from ncfix.machine import Machine
     from ncfix.reports.program_page import ProgramPage
     from ncfix.text.dialect import Dialect
-    from ncfix.text.tree import Program
 
 FLATTEN = "--flatten may correct more: it writes out what cycles, loops and subprograms repeat; "
 STALE = "is of an earlier state of the program, the machine, the set-up or the options, and was left as it is"
@@ -182,12 +181,10 @@ class FixJob:
 
         path = shown(source.path)
         program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
-        seen: list[tuple[Program, Corrector]] = []
-        look = [lambda *each: seen.append(each)] if self.pages else []
         correct = fix_flat if self.options.flatten else fix_program
-        found = correct(program, self.machine, self.setup, self.options, find, *look)
+        found = correct(program, self.machine, self.setup, self.options, find)
         report = self._remarked(found.report, program.dialect)
-        page = self._page(_recorded(seen, found), report, text) if self.pages else None
+        page = self._page(_recorded(found), report, text) if self.pages else None
         return FixedText(found.text, found.changed, report, program.dialect.name, page)
 
     def _remarked(self, report: FixReport, dialect: Dialect) -> FixReport:
@@ -277,15 +274,13 @@ class FixJob:
         return FixOutcome(code, entry, digest=digest)
 
 
-def _recorded(seen: Sequence[tuple[Program, Corrector]], fixed: Fixed) -> PathRecord:
-    """What is to be shown of a program that was corrected as a whole; seen twice if it was written out flat, too."""
+def _recorded(fixed: Fixed) -> PathRecord:
+    """What is to be shown of a program that was corrected as a whole."""
     from ncfix.compensate.figures.path_record import PathRecord
 
     record = PathRecord()
-    if seen:
-        program, corrector = seen[-1 if fixed.lines else 0]
-        assert corrector.joint is not None
-        record.take(program, corrector.machine, corrector.joint.plans[0])
+    if fixed.made is not None:
+        record.take(fixed.made.program, fixed.made.plan)
     if fixed.lines:
         record.in_lines(fixed.lines)
     return record

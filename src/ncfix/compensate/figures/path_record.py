@@ -17,13 +17,10 @@ from ncfix.compensate.account import Account, Reason
 from ncfix.compensate.plan.arrays import Array, Index, Mask, owners, picked, stacked, taken
 from ncfix.compensate.plan.deviation import errors_at, samples
 from ncfix.compensate.plan.figure_tally import PathSamples
-from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.sampling import even
 from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.compensate.solve import WrittenPlan
 from ncfix.control.moves import MotionKind, Moves
-from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 
 CUT, RAPID, REFUSED, PASSED = range(4)
@@ -111,27 +108,12 @@ class PathRecord:
     _held: int = 0
     _strays: float = 0.0
 
-    def take(
-        self,
-        program: Program,
-        machine: Machine,
-        solution: WrittenPlan,
-        own: Mask | None = None,
-        direction: Signs | None = None,
-    ) -> None:
-        """Take in a part; of its motions those that are `own` (n,) if given.
-
-        machine    with the workpiece in its place
-        direction  (n_axes,) in which axes came to its first motion
-        """
+    def take(self, program: Program, solution: WrittenPlan, own: Mask | None = None) -> None:
+        """Take in a part; of its motions those that are `own` (n,) if given."""
         moves = solution.moves
-        state = State() if direction is None else State(direction=direction)
-        intent = Intent(machine, moves, state)
-        pieces = replace(solution.plan.pieces, end=solution.emission.end, centre=solution.emission.centre)
-        written = WrittenPieces(intent, pieces, solution.emission.start)
         mine = np.ones(len(moves), dtype=bool) if own is None else own
         lines = program.lines(moves.block)
-        found = _Places.of(written, mine & (moves.kind != MotionKind.DWELL), solution)
+        found = _Places.of(solution, mine & (moves.kind != MotionKind.DWELL))
         kind, shown = _kinds(moves, solution), solution.shown(False)
         self._count(found, shown)
         way = self.way + np.cumsum(found.weight)
@@ -264,9 +246,10 @@ class _Places:
     lifted: Mask
 
     @classmethod
-    def of(cls, written: WrittenPieces, mine: Mask, solution: WrittenPlan) -> _Places:
+    def of(cls, solution: WrittenPlan, mine: Mask) -> _Places:
         """Those at which figures look, and some more where the way is bent."""
-        intent, which = written.intent, np.flatnonzero(mine[written.pieces.move])
+        written, intent = solution.written, solution.intent
+        which = np.flatnonzero(mine[written.pieces.move])
         piece, fraction = _bent(written, which)
         move, at = written.pieces.move[piece], written.before[piece] + fraction * written.span[piece]
         before, after = errors_at(intent, move, at, written.segments.at(piece, fraction))
