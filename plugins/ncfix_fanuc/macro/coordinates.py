@@ -167,7 +167,7 @@ def switch_polar(control: MacroControl, block: Block, code: int) -> None:
 def cartesian(control: MacroControl, block: Block) -> Block:
     """The block with radius and angle made coordinates of the plane; where a radius is added is not followed."""
     plane = control.modal.plane
-    letters = LETTERS[plane.first], LETTERS[plane.second]
+    letters = plane.of(LETTERS)
     given = [letter for letter in letters if letter in block.values]
     if control.polar is None or not given:
         return block
@@ -197,7 +197,7 @@ def further_round(control: MacroControl, block: Block, letters: tuple[str, str])
     control.polar = radius, angle + block.turn * count
     turn, position = math.radians(angle + block.turn), control.program_position()
     ends = radius * math.cos(turn), radius * math.sin(turn)
-    for letter, index, end in zip(letters, (plane.first, plane.second), ends, strict=True):
+    for letter, index, end in zip(letters, plane.pair, ends, strict=True):
         block.values[letter] = end - position[index] / control.modal.unit
     block.axes |= plane.axes
     if letters[1] in block.unknown:

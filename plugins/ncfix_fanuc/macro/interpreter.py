@@ -144,7 +144,7 @@ class MacroInterpreter(RS274Interpreter):
     def note_angle(self, plan: RS274Plan) -> None:
         """A line given by its angle (,A): the coordinate that its block leaves out is not followed."""
         plane = self.control.modal.plane
-        missing = [index for index in (plane.first, plane.second) if LETTERS[index] not in plan.letters]
+        missing = [index for index in plane.pair if LETTERS[index] not in plan.letters]
         self.control.lose(missing, AFTER_ANGLE)
 
     def without_vacant(self, plan: RS274Plan) -> RS274Plan:

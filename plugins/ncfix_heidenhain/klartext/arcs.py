@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
-from ncfix.control.coordinates import IDENTITY, LETTERS, Plane, Vector, X, Y, dot, rotated
+from ncfix.control.arcs import CLOCKWISE, COUNTER, Point, centre_from_radius, check_closure, sweep_angle
+from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
 from ncfix.control.moves import Arc, Motion, MotionEnd, MotionKind
@@ -74,19 +74,10 @@ AROUND = "an arc about a pole (CC) that was set before the datum was moved: wher
 FLAT = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class PlaneArc:
-    """An arc in its plane: centre and end from its start, mm along the plane's axes; signed sweep, rad."""
-
-    plane: Plane
-    centre: tuple[float, float]
-    sweep: float
-
-
 def circular(control: KlartextControl, step: Step) -> None:
     """C: about the pole to an end point."""
     pole = known_pole(control)
-    plane, turning = control.path.plane, sense(step)
+    plane, clockwise = control.path.plane, is_clockwise(step)
     control.use()
     where = programmed_position(control, step.words)
     if give_up(control, step, where):
@@ -94,20 +85,19 @@ def circular(control: KlartextControl, step: Step) -> None:
     if control.path.pole_in != pole_frame(control):
         do_without(control, step, where, AROUND)
         return
-    start, end = points(control, where, plane)
+    start, away = start_and_way(control, where, plane)
     centre = pole[0] - start[0], pole[1] - start[1]
-    away = end[0] - start[0], end[1] - start[1]
     try:
         check_closure(centre, away, control.dialect.closure_mm, control.dialect.closure_relative)
     except Fault as fault:
         do_without(control, step, where, fault.text)
         return
-    swing(control, step, where, PlaneArc(plane, centre, sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)))
+    swing(control, step, where, plane, centre, sweep_angle(centre, away, 1, clockwise=clockwise))
 
 
 def circular_by_radius(control: KlartextControl, step: Step) -> None:
     """CR."""
-    turning = sense(step)
+    clockwise = is_clockwise(step)
     control.use()
     where = programmed_position(control, step.words)
     if "R" not in step.words.values:
@@ -115,21 +105,19 @@ def circular_by_radius(control: KlartextControl, step: Step) -> None:
     if give_up(control, step, where):
         return
     plane = plane_of(step.words)
-    start, end = points(control, where, plane)
-    away = end[0] - start[0], end[1] - start[1]
-    radius = control.stretch * step.words.values["R"]
+    _, away = start_and_way(control, where, plane)
     try:
-        centre = centre_from_radius(away, radius, clockwise=turning == CLOCKWISE)
+        centre = centre_from_radius(away, control.stretch * step.words.values["R"], clockwise=clockwise)
     except Fault as fault:
         do_without(control, step, where, fault.text)
         return
-    swing(control, step, where, PlaneArc(plane, centre, sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)))
+    swing(control, step, where, plane, centre, sweep_angle(centre, away, 1, clockwise=clockwise))
 
 
 def circular_polar(control: KlartextControl, step: Step) -> None:
     """CP: about the pole to a polar angle; several turns, and a height, make a helix."""
     pole = known_pole(control)
-    plane, turning = control.path.plane, sense(step)
+    plane, clockwise = control.path.plane, is_clockwise(step)
     control.use()
     where, angle = polar(
         control, MotionWords({k: v for k, v in step.words.values.items() if k not in ("PR", "IPR")}, step.words.unknown)
@@ -139,16 +127,15 @@ def circular_polar(control: KlartextControl, step: Step) -> None:
     if not step.words.values.keys() & {"PA", "IPA"}:
         do_without(control, step, where, NO_ANGLE)
         return
-    start, end = points(control, where, plane)
+    start, away = start_and_way(control, where, plane)
     centre = pole[0] - start[0], pole[1] - start[1]
     if math.hypot(*centre) < FLAT:
         raise Fault(BAD_ARC, "the arc has no radius: the tool stands at the pole")
     if angle is None:
-        away = end[0] - start[0], end[1] - start[1]
-        angle = sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)
-    elif (angle < 0) != (turning == CLOCKWISE) and angle:
+        angle = sweep_angle(centre, away, 1, clockwise=clockwise)
+    elif (angle < 0) != clockwise and angle:
         raise Fault(BAD_ARC, "the sign of IPA and DR contradict each other")
-    swing(control, step, where, PlaneArc(plane, centre, angle))
+    swing(control, step, where, plane, centre, angle)
 
 
 def tangential(control: KlartextControl, step: Step) -> None:
@@ -162,8 +149,7 @@ def tangential(control: KlartextControl, step: Step) -> None:
         return
     plane = control.path.plane if step.name == "ctp" else plane_of(step.words)
     ahead = [dot(row, control.path.tangent) for row in control.inverse] if control.is_rotated else control.path.tangent
-    start, end = points(control, where, plane)
-    away = end[0] - start[0], end[1] - start[1]
+    _, away = start_and_way(control, where, plane)
     left = -ahead[plane.second], ahead[plane.first]
     side = away[0] * left[0] + away[1] * left[1]
     size = math.hypot(*left)
@@ -172,25 +158,19 @@ def tangential(control: KlartextControl, step: Step) -> None:
         return
     radius = (away[0] ** 2 + away[1] ** 2) * size / (2 * side)
     centre = radius * left[0] / size, radius * left[1] / size
-    swing(control, step, where, PlaneArc(plane, centre, sweep_angle(centre, away, 1, clockwise=radius < 0)))
+    swing(control, step, where, plane, centre, sweep_angle(centre, away, 1, clockwise=radius < 0))
 
 
-def swing(control: KlartextControl, step: Step, where: FramePosition, circle: PlaneArc) -> None:
-    """The arc itself."""
-    plane = circle.plane
+def swing(
+    control: KlartextControl, step: Step, where: FramePosition, plane: Plane, centre: Point, sweep: float
+) -> None:
+    """The arc itself; its centre from its start, mm along the axes of the plane, and its signed sweep, rad."""
     axes = step.words.axes | plane.axes
     end = command_of(control, where, axes)
-    local = [0.0, 0.0, 0.0]
-    local[plane.first], local[plane.second] = circle.centre
-    outward = rotated(control.rotation, local) if control.is_rotated else local
     hand = handed(control.frames.mirror.rotation)
-    centre = tuple(p + o for p, o in zip(control.position[:3], outward, strict=True))
-    normal = tuple(dot(row, IDENTITY[plane.across]) for row in control.rotation)
-    sweep = hand * circle.sweep
-    relative = step.name in ("ct", "ctp", "cp") or step.words.incremental
-    control.modal.incremental = relative
-    arc = Arc(centre, normal, sweep, fixed=step.name == "c")  # type: ignore[arg-type]
-    code, why = CLOCKWISE if circle.sweep < 0 else COUNTER, derived(control, step.words, axes)
+    arc = control.circle(plane, centre, hand * sweep)._replace(fixed=step.name == "c")
+    control.modal.incremental = step.name in ("ct", "ctp", "cp") or step.words.incremental
+    code, why = CLOCKWISE if sweep < 0 else COUNTER, derived(control, step.words, axes)
     control.make(Motion(MotionKind.ARC, axes, end, code, refusal=why, arc=arc))
     control.modal.incremental = False
     control.path.tangent = direction_at_end(control.position, arc)
@@ -206,13 +186,11 @@ def direction_at_end(end: Vector, arc: Arc) -> tuple[float, float, float]:
     return way[0] / length, way[1] / length, way[2] / length
 
 
-def sense(step: Step) -> int:
-    """DR+ or DR-."""
-    if "dr-" in step.flags:
-        return CLOCKWISE
-    if "dr+" in step.flags:
-        return COUNTER
-    raise Fault(BAD_ARC, f"{step.name.upper()} needs DR+ or DR-, the sense of rotation")
+def is_clockwise(step: Step) -> bool:
+    """DR-, not DR+."""
+    if not step.flags & {"dr-", "dr+"}:
+        raise Fault(BAD_ARC, f"{step.name.upper()} needs DR+ or DR-, the sense of rotation")
+    return "dr-" in step.flags
 
 
 def known_pole(control: KlartextControl) -> tuple[float, float]:
@@ -228,12 +206,10 @@ def plane_of(words: MotionWords) -> Plane:
     return PLANE_OF.get(named, PLANE_OF[frozenset((0, 1))])
 
 
-def points(
-    control: KlartextControl, where: FramePosition, plane: Plane
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Start and end of a motion along the axes of a plane."""
-    start, end = here(control).inner, where.inner
-    return (start[plane.first], start[plane.second]), (end[plane.first], end[plane.second])
+def start_and_way(control: KlartextControl, where: FramePosition, plane: Plane) -> tuple[Point, Point]:
+    """The start of a motion, and the way from there to its end, along the axes of a plane, mm."""
+    start, end = plane.of(here(control).inner), plane.of(where.inner)
+    return start, (end[0] - start[0], end[1] - start[1])
 
 
 def give_up(control: KlartextControl, step: Step, where: FramePosition) -> bool:

@@ -101,7 +101,7 @@ def astray(control: KlartextControl, step: Step, *, called: bool) -> str:
     if other:
         return NOT_TAKEN.format(said, other)
     if name in ("lp", "cp", "ctp") or words.keys() & POLAR:
-        plane = (control.path.plane.first, control.path.plane.second)
+        plane = control.path.plane.pair
         twice = next((word for word in words if word in CARTESIAN and "XYZ".find(word[-1]) in plane), "")
         return TWICE.format(said, twice) if twice else ""
     if name.startswith("appr ") and not words.keys() & MOVING:

@@ -199,7 +199,7 @@ def departure(control: KlartextControl, step: Step) -> None:
         return
     tangent, control.path.tangent = control.path.tangent, None
     plane = control.path.plane
-    lost: UnknownAxes = {i: DEPARTED for i in (plane.first, plane.second) if i in control.machine}
+    lost: UnknownAxes = {i: DEPARTED for i in plane.pair if i in control.machine}
     target = control.position[:]
     straight_on = step.name == "dep lt" and "LEN" in step.words.values and not (beside or step.words.unknown)
     if straight_on and tangent is not None:

@@ -174,15 +174,15 @@ def set_pole(control: KlartextControl, words: MotionWords) -> None:
     )
     plane = PLANE_OF.get(named, path.plane) if len(named) == 2 else path.plane
     others = words.values.keys() & (MOVING - {f"{sign}{letter}" for sign in ("", "I") for letter in "XYZ"})
-    if others or any(index not in (plane.first, plane.second) for index in named) or len(named) > 2:
+    if others or any(index not in plane.pair for index in named) or len(named) > 2:
         raise Fault(BAD_POLE, "CC needs the two axes of one plane")
     where = programmed_position(control, words)
     old = {} if path.pole is None else {path.plane.first: path.pole[0], path.plane.second: path.pole[1]}
     keep = {} if not named else old
-    values = [keep.get(i, where.inner[i]) if i not in named else where.inner[i] for i in (plane.first, plane.second)]
+    values = [keep.get(i, where.inner[i]) if i not in named else where.inner[i] for i in plane.pair]
     lost = [
         i
-        for i in (plane.first, plane.second)
+        for i in plane.pair
         if (i in where.unknown and (i in named or i not in keep)) or (named and i not in named and i not in keep)
     ]
     path.plane, path.pole = plane, None if lost else (values[0], values[1])
@@ -192,7 +192,7 @@ def set_pole(control: KlartextControl, words: MotionWords) -> None:
 def pole_frame(control: KlartextControl) -> object:
     """What the numbers of a pole mean: datum along the axes of its plane, rotation, unit."""
     plane = control.path.plane
-    return control.offset[plane.first], control.offset[plane.second], control.rotation, control.stretch
+    return plane.of(control.offset), control.rotation, control.stretch
 
 
 def polar(control: KlartextControl, words: MotionWords) -> tuple[FramePosition, float | None]:
@@ -201,7 +201,7 @@ def polar(control: KlartextControl, words: MotionWords) -> tuple[FramePosition, 
     if path.pole is None:
         raise Fault(BAD_POLE, "polar coordinates, and no pole (CC) is known")
     plane, (first, second) = path.plane, path.pole
-    control.use_start_positions((plane.first, plane.second))
+    control.use_start_positions(plane.pair)
     start = here(control)
     where = programmed_position(control, words)
     away = start.inner[plane.first] - first, start.inner[plane.second] - second
@@ -209,7 +209,7 @@ def polar(control: KlartextControl, words: MotionWords) -> tuple[FramePosition, 
     where.inner[plane.first] = first + radius * math.cos(angle)
     where.inner[plane.second] = second + radius * math.sin(angle)
     why = doubt(control, words, start)
-    for index in (plane.first, plane.second):
+    for index in plane.pair:
         where.unknown.pop(index, None)
         if why:
             where.unknown[index] = why
@@ -235,7 +235,7 @@ def doubt(control: KlartextControl, words: MotionWords, start: FramePosition) ->
     """Why it is not known where polar words lead from a start; empty if it is."""
     plane = control.path.plane
     if not {"PR", "PA"} <= words.values.keys():
-        for index in (plane.first, plane.second):
+        for index in plane.pair:
             if index in start.unknown:
                 return start.unknown[index]
     if words.unknown & {"PR", "PA", "IPR", "IPA"}:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
-from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
+from ncfix.control.coordinates import CENTRE_LETTERS, Plane
 from ncfix.control.expressions import Fault
-from ncfix.control.moves import Arc, Motion, MotionKind
+from ncfix.control.moves import Motion, MotionKind
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.motion import check_feed, destination
 from ncfix_iso.rs274.parameters import whole
@@ -27,7 +25,7 @@ def arc(control: RS274Control, block: Block, code: int) -> None:
     control.use_start_positions(tuple(control.unknown))
     end = destination(control, block)
     step = control.way_to(end.target)
-    point = step[plane.first], step[plane.second]
+    point = plane.of(step)
     doubtful = bool(end.unknown or control.unknown or block.unknown or control.composed.unknown)
     clockwise = code == CLOCKWISE
     try:
@@ -39,8 +37,8 @@ def arc(control: RS274Control, block: Block, code: int) -> None:
     turns = turns_of(block) if control.rules.strict else 1
     sweep = control.handedness * sweep_angle(centre, point, turns, clockwise=clockwise)
     refusal = refusal_of(block, plane) or ("" if control.rules.strict else spiral(block, plane))
-    circle_of_arc = circle(control, plane, centre, sweep)
-    control.make(Motion(MotionKind.ARC, block.axes, end, code, refusal=refusal, arc=circle_of_arc))
+    circle = control.circle(plane, centre, sweep)
+    control.make(Motion(MotionKind.ARC, block.axes, end, code, refusal=refusal, arc=circle))
 
 
 def turns_of(block: Block) -> int:
@@ -53,7 +51,7 @@ def turns_of(block: Block) -> int:
 
 def refusal_of(block: Block, plane: Plane) -> str:
     """Why an arc is refused: its centre is known only at run time."""
-    centre_words = {CENTRE_LETTERS[index] for index in (plane.first, plane.second)} | {"R"}
+    centre_words = set(plane.of(CENTRE_LETTERS)) | {"R"}
     if block.unknown & centre_words:
         return "the centre of the arc is known only at run time"
     return ""
@@ -81,7 +79,7 @@ def check_words(control: RS274Control, block: Block, plane: Plane) -> None:
     across = CENTRE_LETTERS[plane.across]
     if control.rules.strict and across in block.values:
         raise Fault(ARC_FAULT, f"{across} belongs to no arc in the plane G{plane.code // 10}")
-    wanted = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    wanted = plane.of(CENTRE_LETTERS)
     missing = [letter for letter in wanted if letter not in block.values]
     if control.modal.arc_absolute and missing:
         raise Fault(ARC_FAULT, f"with absolute centres (G90.1) the arc needs {missing[0]}")
@@ -92,7 +90,7 @@ def centre_of(control: RS274Control, block: Block, plane: Plane, end: Point, *, 
     unit = control.modal.unit
     if "R" in block.values:
         return centre_from_radius(end, unit * block.values["R"], clockwise=clockwise)
-    first, second = (unit * block.get(CENTRE_LETTERS[index]) for index in (plane.first, plane.second))
+    first, second = (unit * block.get(CENTRE_LETTERS[index]) for index in plane.pair)
     if control.modal.arc_absolute:
         here = control.program_position()
         first, second = first - here[plane.first], second - here[plane.second]
@@ -102,7 +100,7 @@ def centre_of(control: RS274Control, block: Block, plane: Plane, end: Point, *, 
 
 def supposed(control: RS274Control, block: Block, plane: Plane, end: Point) -> str:
     """What may have been meant by an arc that is none: another plane, or X as a diameter, as on lathes."""
-    letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    letters = plane.of(CENTRE_LETTERS)
     across = CENTRE_LETTERS[plane.across]
     if "R" not in block.values and across in block.values and not all(letter in block.values for letter in letters):
         return f"{across} is a centre in another plane, and G{plane.code // 10} is in force (lathes cut in G18)"
@@ -113,15 +111,3 @@ def supposed(control: RS274Control, block: Block, plane: Plane, end: Point) -> s
     except Fault:
         return ""
     return "with X as a diameter the arc would be one: is the program for a lathe? X is read as a radius"
-
-
-def circle(control: RS274Control, plane: Plane, centre: Point, sweep: float) -> Arc:
-    """The circle in commands."""
-    local = [0.0, 0.0, 0.0]
-    local[plane.first], local[plane.second] = centre
-    normal = IDENTITY[plane.across]
-    if control.is_rotated:
-        local = [dot(row, local) for row in control.rotation]
-        normal = tuple(dot(row, normal) for row in control.rotation)  # type: ignore[assignment]
-    x, y, z = (math.nan if i in control.unknown else control.position[i] + local[i] for i in range(3))
-    return Arc((x, y, z), normal, sweep)

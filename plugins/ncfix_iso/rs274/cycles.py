@@ -122,10 +122,10 @@ def place_hole(control: RS274Control, block: Block, program: Vector) -> None:
         program[X], program[Y] = unit * place[0], unit * place[1]
     if block.turn is not None:
         turn = math.radians(block.turn)
-        first, second = program[plane.first], program[plane.second]
+        first, second = plane.of(program)
         program[plane.first] = first * math.cos(turn) - second * math.sin(turn)
         program[plane.second] = first * math.sin(turn) + second * math.cos(turn)
-        given |= {plane.first, plane.second}
+        given |= set(plane.pair)
     for index, letter in enumerate(LETTERS):
         if index not in given and letter in block.values:
             step = program[index] if control.modal.incremental else 0.0

@@ -249,7 +249,7 @@ class RS274Flattener(Flattener):
         if self.control.modal.incremental:
             self.must_stand(block.axes | 1 << plane.across)
         unplaced = self.control.places.unplaced & ~block.axes
-        known = [i for i in (plane.first, plane.second) if not unplaced >> i & 1]
+        known = [i for i in plane.pair if not unplaced >> i & 1]
         over = "".join(LETTERS[i] for i in known if LETTERS[i] in self.steps)
         across = LETTERS[plane.across]
         named = "".join(x for x in LETTERS if block.axes >> INDEX[x] & 1 and x in self.steps and x not in over)

@@ -394,7 +394,7 @@ def rotate_system(control: RS274Control, block: Block, code: int) -> None:
     else:
         unfollowed(control, block, code)
     if control.frames.rotation.rotation != before:
-        control.unnamed = frozenset((control.modal.plane.first, control.modal.plane.second))
+        control.unnamed = frozenset(control.modal.plane.pair)
     turned_back(control)
     control.refresh()
     control.places.shift(mask_of(control.unnamed))
@@ -404,7 +404,7 @@ def uncertain(control: RS274Control, block: Block) -> str:
     """Why a rotation (G68) is not certain; empty if it is."""
     if "R" not in block.values:
         return "the angle of the rotation (G68) is not in the program"
-    centred = any(LETTERS[index] in block.values for index in (control.modal.plane.first, control.modal.plane.second))
+    centred = any(LETTERS[index] in block.values for index in control.modal.plane.pair)
     again = control.frames.rotation.rotation != IDENTITY and not control.rules.adds_rotations
     if control.modal.incremental and (centred or again):
         return "what the words of a rotation (G68) count from in G91 differs from control to control"
@@ -415,14 +415,14 @@ def turn_about_point(control: RS274Control, block: Block, before: Rotation) -> N
     """Put a rotation by R about the words of the plane into force, on top of another."""
     plane = control.modal.plane
     centre = control.program_position()
-    for index in (plane.first, plane.second):
+    for index in plane.pair:
         letter = LETTERS[index]
         if letter in block.values:
             step = centre[index] if control.modal.incremental else 0.0
             centre[index] = control.scale[index] * block.values[letter] + step
         else:
             control.use_start_positions((index,))
-    if block.unknown or control.unknown.keys() & {plane.first, plane.second}:
+    if block.unknown or control.unknown.keys() & set(plane.pair):
         control.refuse_rest("the centre or angle of a rotation (G68) is known only at run time")
     turned = turned_about(product(before, about(plane, block.get("R"))), centre)
     control.frames = replace(control.frames, rotation=turned)

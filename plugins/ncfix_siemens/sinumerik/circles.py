@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
-from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
+from ncfix.control.coordinates import CENTRE_LETTERS, Plane, dot
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
 from ncfix.control.moves import Arc, MotionEnd, MotionKind
@@ -32,8 +32,8 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     end, heading, plane = destination(control, words), control.heading, control.modal.plane
     why = tangent_refusal(words)
     step = control.way_to(end.target)
-    ahead = (0.0, 0.0) if heading is None else (heading[plane.first], heading[plane.second])
-    chord = step[plane.first], step[plane.second]
+    ahead = (0.0, 0.0) if heading is None else plane.of(heading)
+    chord = plane.of(step)
     if why or end.unknown or control.unknown or not math.hypot(*ahead):
         control.go(MotionKind.FEED, words, end, CT_LEFT, refusal=why or NO_HEADING)
         return
@@ -85,12 +85,12 @@ def misled(control: Sinumerik, words: BlockWordValues, name: str, taken: frozens
     if stray:
         return NOT_TAKEN.format(name, stray[0])
     plane = control.modal.plane
-    centre = sorted({CENTRE_LETTERS[index] for index in (plane.first, plane.second)} & named)
+    centre = sorted(set(plane.of(CENTRE_LETTERS)) & named)
     across = sorted(set(CENTRE_LETTERS) & named - set(centre))
     otherwise = sorted({"CR", "AR"} & named)
     if across and not centre and otherwise:
         return ACROSS.format(name, across[0], otherwise[0])
-    ended = any(words.axes >> index & 1 for index in (plane.first, plane.second))
+    ended = any(words.axes >> index & 1 for index in plane.pair)
     if "CR" in named and (centre or "AR" in named):
         return TWICE.format(name, "CR", (centre or ["AR"])[0])
     return TWICE.format(name, "AR", "an end point beside its centre") if "AR" in named and centre and ended else ""
@@ -110,7 +110,7 @@ def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
             raise
         centre = (1.0, 0.0)
     step = control.way_to(end.target)
-    finish = step[plane.first], step[plane.second]
+    finish = plane.of(step)
     sweep = sweep_angle(centre, finish, 1 + max(round(words.get("TURN")), 0), clockwise=clockwise)
     circle = circle_of(control, plane, centre, sweep)._replace(fixed=is_fixed(words, plane))
     control.go(MotionKind.ARC, words, end, code, refusal=refusal, arc=circle)
@@ -118,13 +118,13 @@ def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 
 def is_fixed(words: BlockWordValues, plane: Plane) -> bool:
     """Whether words say where the centre is: by `AC`, or as the pole."""
-    letters = (CENTRE_LETTERS[index] for index in (plane.first, plane.second))
+    letters = plane.of(CENTRE_LETTERS)
     return bool({"AP", "RP"} & words.values.keys()) or any(words.forms.get(each) == ABSOLUTE for each in letters)
 
 
 def refusal_of(words: BlockWordValues, plane: Plane) -> str:
     """Why an arc is refused: something of it is known only at run time, or not followed."""
-    letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    letters = plane.of(CENTRE_LETTERS)
     if words.unknown(*letters, "CR", "AR", "TURN"):
         return CENTRE_AT_RUNTIME
     doubled = {"AP", "RP"} & words.values.keys() and {*letters, "CR", "AR"} & words.values.keys()
@@ -143,8 +143,8 @@ def geometry(control: Sinumerik, words: BlockWordValues, end: MotionEnd, *, cloc
     """The centre relative to the start in the plane, mm, and the end; raises `Fault` if the control refuses the arc."""
     plane = control.modal.plane
     step = control.way_to(end.target)
-    chord = step[plane.first], step[plane.second]
-    letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    chord = plane.of(step)
+    letters = plane.of(CENTRE_LETTERS)
     has_centre = any(letter in words.values for letter in letters)
     if {"AP", "RP"} & words.values.keys():
         centre = centre_at_pole(control, plane)
@@ -175,7 +175,7 @@ def centre_words(control: Sinumerik, words: BlockWordValues, plane: Plane) -> Po
     """The centre relative to the start, mm: I J K count from the start unless they say `AC`."""
     here = control.program_position()
     found = []
-    for index in (plane.first, plane.second):
+    for index in plane.pair:
         letter = CENTRE_LETTERS[index]
         value = control.stretch * words.get(letter)
         found.append(value - here[index] if words.forms.get(letter) == ABSOLUTE else value)
@@ -209,16 +209,12 @@ def ended_by_angle(
 
 def circle_of(control: Sinumerik, plane: Plane, centre: Point, sweep: float) -> Arc:
     """The circle in commands; where an odd number of axes is mirrored it runs the other way about its normal."""
-    local = [0.0, 0.0, 0.0]
-    local[plane.first], local[plane.second] = centre
-    normal = IDENTITY[plane.across]
-    if control.is_rotated:
-        sense = handed(control.rotation)
-        local = [dot(row, local) for row in control.rotation]
-        x, y, z = (sense * dot(row, normal) for row in control.rotation)
-        normal = (x, y, z)
-    a, b, c = (math.nan if i in control.unknown else control.position[i] + local[i] for i in range(3))
-    return Arc((a, b, c), normal, sweep)
+    circle = control.circle(plane, centre, sweep)
+    if not control.is_rotated:
+        return circle
+    sense = handed(control.rotation)
+    x, y, z = (sense * value for value in circle.normal)
+    return circle._replace(normal=(x, y, z))
 
 
 # -- by way of a point ------------------------------------------------------------------------------------------------

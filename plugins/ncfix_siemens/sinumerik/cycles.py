@@ -82,9 +82,9 @@ def points_of(control: Sinumerik, step: Calling) -> Points:
 def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float, float]) -> bool:
     """Whether the axes stand nearer to the last place than to the first."""
     plane = control.modal.plane
-    if any(control.lost_in_frame().get(index, AFTER_PATTERN) != AFTER_PATTERN for index in (plane.first, plane.second)):
+    if any(control.lost_in_frame().get(index, AFTER_PATTERN) != AFTER_PATTERN for index in plane.pair):
         return False
-    here = [control.program_position()[index] / control.stretch for index in (plane.first, plane.second)]
+    here = [control.program_position()[index] / control.stretch for index in plane.pair]
     return math.dist(here, last) < math.dist(here, first)
 
 
@@ -94,7 +94,7 @@ def lead_to(
     """The words that lead to a place, where that is, and why its hole is not corrected."""
     plane, program, lost = control.modal.plane, control.program_position(), dict(control.lost_in_frame())
     axes = plane.axes
-    for index, value in zip((plane.first, plane.second), point, strict=True):
+    for index, value in zip(plane.pair, point, strict=True):
         program[index] = control.stretch * value
         lost.pop(index, None)
     end = MotionEnd(control.command(program, axes), control.axes_of(lost), lost)
@@ -193,7 +193,7 @@ def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
     for point in points:
         words, over, refusal = lead_to(control, block, point, name)
         drill(control, words, over, drilling, refusal=refusal, modal=True)
-    lost = control.lost_in_frame() | dict.fromkeys((plane.first, plane.second), AFTER_PATTERN)
+    lost = control.lost_in_frame() | dict.fromkeys(plane.pair, AFTER_PATTERN)
     control.stand(control.position, control.axes_of(lost), lost)
 
 

@@ -99,11 +99,11 @@ def polar(control: Sinumerik, words: BlockWordValues, program: Vector, lost: Unk
     control.modes.polar = angle, radius
     control.check_offset()
     if pole is None or angle is None or radius is None or why:
-        lost |= dict.fromkeys((plane.first, plane.second), why or (RUNTIME if pole else NO_POLE))
+        lost |= dict.fromkeys(plane.pair, why or (RUNTIME if pole else NO_POLE))
         return plane.axes
     program[plane.first] = pole[0] + radius * math.cos(angle)
     program[plane.second] = pole[1] + radius * math.sin(angle)
-    for index in (plane.first, plane.second):
+    for index in plane.pair:
         lost.pop(index, None)
     return plane.axes
 
@@ -115,7 +115,7 @@ def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector
     one; increments count from either. So the axes must stand where the last polar words have led them.
     """
     plane = control.modal.plane
-    doubled = [letter for letter in "XYZ" if letter in words.values and INDEX[letter] in (plane.first, plane.second)]
+    doubled = [letter for letter in "XYZ" if letter in words.values and INDEX[letter] in plane.pair]
     if doubled:
         return TWICE.format(doubled[0])
     if radius is not None and abs(radius) < NEAR_POLE:
@@ -130,7 +130,7 @@ def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector
 def stands_there(control: Sinumerik, here: Vector, angle: float | None, distance: float | None) -> bool:
     """Whether the axes stand at this angle and distance about the pole, as far as they are given."""
     plane, pole = control.modal.plane, control.modes.pole
-    if pole is None or control.lost_in_frame().keys() & {plane.first, plane.second}:
+    if pole is None or control.lost_in_frame().keys() & set(plane.pair):
         return False
     x, y = here[plane.first] - pole[0], here[plane.second] - pole[1]
     near = distance is None or abs(math.hypot(x, y) - distance) < NEAR_POLE
@@ -168,7 +168,7 @@ def set_pole(control: Sinumerik, words: BlockWordValues, code: int) -> None:
         base = where_it_stands(control)
     elif code == 1120:
         base = control.modes.pole or ((0.0, 0.0) if control.modes.in_plane else None)
-    steps = [words.values.get(LETTERS[index], 0.0) for index in (plane.first, plane.second)]
+    steps = [words.values.get(LETTERS[index], 0.0) for index in plane.pair]
     if POLAR & words.values.keys():
         angle, radius = math.radians(words.get("AP")), words.get("RP")
         steps = [radius * math.cos(angle), radius * math.sin(angle)]
@@ -188,10 +188,10 @@ def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
     """Where the axes of the plane stand in the frame; None where that is not known."""
     here, plane = control.program_position(), control.modal.plane
     control.use_all_start_positions()
-    axes = plane.first, plane.second
+    axes = plane.pair
     if control.lost_in_frame().keys() & {*axes} or control.places.unplaced & mask_of(axes):
         return None
-    return None if any(control.unsteady(index) for index in axes) else (here[plane.first], here[plane.second])
+    return None if any(control.unsteady(index) for index in axes) else plane.of(here)
 
 
 def machine_destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd:

@@ -127,7 +127,7 @@ class SinumerikFlattener(Flattener):
     def place(self, point: tuple[float, float]) -> str:
         """The rapid to a place of a pattern of holes."""
         plane = self.control.modal.plane
-        letters = [LETTERS[index] for index in (plane.first, plane.second)]
+        letters = plane.of(LETTERS)
         digits = [decimals_for(self.steps[letter]) + MORE_DECIMALS for letter in letters]
         words = zip(letters, point, digits, strict=True)
         return " ".join(["G0", *(f"{letter}{BARE.short(value, places)}" for letter, value, places in words)])

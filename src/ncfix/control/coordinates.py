@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 LETTERS = "XYZABCUVW"
 """The axis letters of RS274NGC in the order of its parameters; every position here is a list in this order."""
@@ -31,6 +32,7 @@ Rotation = tuple[tuple[float, float, float], tuple[float, float, float], tuple[f
 """Rows of a 3 x 3 matrix that acts on X Y Z."""
 
 IDENTITY: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,21 @@ class Plane:
     def axes(self) -> int:
         """Its two axes as a bit mask."""
         return 1 << self.first | 1 << self.second
+
+    @property
+    def pair(self) -> tuple[int, int]:
+        """Its two axes, in their order."""
+        return self.first, self.second
+
+    def of(self, values: Sequence[T]) -> tuple[T, T]:
+        """Those of its two axes, among values of all axes."""
+        return values[self.first], values[self.second]
+
+    def in_space(self, point: tuple[float, float]) -> Vector:
+        """A point of it as X, Y and Z."""
+        space = [0.0, 0.0, 0.0]
+        space[self.first], space[self.second] = point
+        return space
 
 
 PLANES = {

@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass, field
 
+from ncfix.control.arcs import Point
 from ncfix.control.coordinates import (
     DEGREE,
     IDENTITY,
@@ -30,7 +31,7 @@ from ncfix.control.coordinates import (
     zeros,
 )
 from ncfix.control.frames import WORLD, FrameStack, mixed_into
-from ncfix.control.moves import AT_START, UnknownAxes
+from ncfix.control.moves import AT_START, Arc, UnknownAxes
 from ncfix.control.pointing import Pair
 from ncfix.control.posture import NEAREST, SQUARE, MachinePosture, Postures, WayRules, normal_of
 from ncfix.control.setup import Run, SetupLookup
@@ -283,6 +284,20 @@ class ControlState(ABC):
     def way_to(self, target: Vector) -> Vector:
         """The way of X, Y and Z from where the control stands to a command, along those of its frame, mm."""
         return self.in_frame([b - a for a, b in zip(self.position, target, strict=True)])
+
+    def circle(self, plane: Plane, centre: Point, sweep: float) -> Arc:
+        """That of an arc in commands; NaN along axes of which it is not known where the arc starts.
+
+        centre  from the start of the arc, in a plane of the program's frame, mm
+        sweep   rad, as the commands turn
+        """
+        away, normal = plane.in_space(centre), IDENTITY[plane.across]
+        if self.is_rotated:
+            away = rotated(self.rotation, away)
+            a, b, c = (dot(row, normal) for row in self.rotation)
+            normal = a, b, c
+        x, y, z = (math.nan if i in self.unknown else self.position[i] + away[i] for i in XYZ)
+        return Arc((x, y, z), normal, sweep)
 
     def command(self, program: Vector, axes: int) -> Vector:
         """The command of a position in the program's frame; axes that no word of `axes` moves stay where they are.

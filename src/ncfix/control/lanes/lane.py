@@ -202,7 +202,7 @@ def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockR
     if not rows.size:
         return None, count
     plane = control.modal.plane
-    columns = [plane.first, plane.second]
+    columns = list(plane.pair)
     begin, end = stage.path[rows], stage.path[rows + 1]
     centre, radius = centre_words(control, unit, block + rows, begin)
     step, clockwise = (end - begin)[:, columns], stage.motion[rows] == CLOCKWISE
@@ -257,7 +257,7 @@ def named(control: ProgramControl, lanes: LaneTables) -> Mask:
     plane = control.modal.plane
     if plane.across > 2:
         return np.zeros(len(lanes.turns), dtype=np.bool_)
-    first, second = (lanes.centre[:, letter] >= 0 for letter in (plane.first, plane.second))
+    first, second = (lanes.centre[:, letter] >= 0 for letter in plane.pair)
     centre = first & second if control.modal.arc_absolute else first | second
     ends_there = lanes.mask & (1 << plane.first | 1 << plane.second) != 0
     able: Mask = np.where(lanes.radius >= 0, ends_there, centre)
@@ -280,7 +280,7 @@ def centre_words(
     """What the centre words of blocks say, (k, 2) relative to their starts `begin`, and R, (k,) NaN without; in mm."""
     program, lanes, plane = unit.program, unit.lanes, control.modal.plane
     shapes, first, mm = program.template[blocks], program.first_number[blocks], control.unit_of(X)
-    columns = [plane.first, plane.second]
+    columns = list(plane.pair)
     centre = np.stack([words(program.numbers, first, lanes.centre[shapes, letter]) for letter in columns], axis=1)
     centre = mm * np.where(np.isnan(centre), 0.0, centre)
     fixed = lanes.fixed[shapes][:, columns] | control.modal.arc_absolute
