@@ -191,31 +191,14 @@ def _sizes(machine: Machine) -> Iterator[Fault]:
         )
         if size <= limit:
             continue
-        hint, impossible = "", size > BEYOND * limit
-        text = f"{name}, {component_title(name, machine.axis(name[-1]))}: {sized(size, angle)} is"
+        hint, impossible, extent = "", size > BEYOND * limit, "much, and more than"
         if impossible:
             meant = [f"{size:.4g} {unit}" for unit, factor in UNITS[angle] if LEAST * limit <= size * factor <= limit]
             hint = f"is {' or '.join(meant)} meant? Coefficients are in {'rad' if angle else 'mm'}"
             hint = hint if meant else "see the unit, and `center`, `scale` and `range`"
-            yield (
-                "NCF320",
-                f"{text} {size / limit:.3g} times what is much, {sized(limit, angle)}",
-                hint,
-                True,
-                "effect",
-                name,
-                "coefficients",
-            )
-        else:
-            yield (
-                "NCF320",
-                f"{text} much, and more than {sized(limit, angle)}",
-                "",
-                False,
-                "effect",
-                name,
-                "coefficients",
-            )
+            extent = f"{size / limit:.3g} times what is much,"
+        text = f"{name}, {component_title(name, machine.axis(name[-1]))}: {sized(size, angle)} is {extent}"
+        yield "NCF320", f"{text} {sized(limit, angle)}", hint, impossible, "effect", name, "coefficients"
 
 
 def _largest(machine: Machine, effects: Sequence[Effect]) -> float:
@@ -268,13 +251,8 @@ def _travels(machine: Machine) -> Iterator[Fault]:
         if axis.rotary:
             if np.isfinite(high - low) and _radians((low, high)):
                 text = f"{axis.name}: the range {low:g} ... {high:g} looks like radians: degrees are asked for"
-                yield (
-                    "NCF322",
-                    text,
-                    f"is {np.degrees(low):.4g} ... {np.degrees(high):.4g} degrees meant?",
-                    True,
-                    *range_of,
-                )
+                hint = f"is {np.degrees(low):.4g} ... {np.degrees(high):.4g} degrees meant?"
+                yield "NCF322", text, hint, True, *range_of
         elif np.isfinite(high - low) and not LEAST_TRAVEL <= high - low <= MOST_TRAVEL:
             meant = "metres" if high - low < LEAST_TRAVEL else "um"
             text = f"{axis.name}: no axis has a travel of {high - low:g} mm"
