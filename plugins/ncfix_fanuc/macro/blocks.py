@@ -18,16 +18,7 @@ from typing import TYPE_CHECKING
 from lark import Token
 
 from ncfix.control.coordinates import LETTERS
-from ncfix.text.build import (
-    Branch,
-    Node,
-    Parsed,
-    TreeBuilder,
-    check_exponents,
-    check_numbers,
-    edges,
-    kind,
-)
+from ncfix.text.build import Branch, Node, Parsed, TreeBuilder, check_exponents, check_numbers, edges, kind
 from ncfix.text.dialect import Dialect
 from ncfix.text.grammar import squeeze
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS

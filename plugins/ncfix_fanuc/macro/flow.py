@@ -43,9 +43,7 @@ def is_builders(label: str) -> bool:
 def ran(control: MacroControl, label: str) -> None:
     """Such a program has run."""
     control.warn(
-        NOT_AT_HAND,
-        TAKEN.format(label=label),
-        "check what it sets, or say where its file is: --subprograms DIR",
+        NOT_AT_HAND, TAKEN.format(label=label), "check what it sets, or say where its file is: --subprograms DIR"
     )
     control.lose(control.machine, AFTER.format(label=label))
     control.places.lose(mask_of(control.machine))

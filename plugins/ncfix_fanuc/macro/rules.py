@@ -63,11 +63,7 @@ FANUC_HARMLESS = (groups.ISO_HARMLESS_G - {630}) | {54, 401, 502, 805}
 """G5.4 is about the servo drives; G40.1, G50.2 and G80.5 end what is refused where it begins."""
 
 FANUC_M = grouped(
-    STOP=(0, 10, 20, 300),
-    TOOL=(60,),
-    SPINDLE=(30, 40, 50, 190),
-    COOLANT=(70, 80, 90),
-    CALL=(970, 980, 990, 1980),
+    STOP=(0, 10, 20, 300), TOOL=(60,), SPINDLE=(30, 40, 50, 190), COOLANT=(70, 80, 90), CALL=(970, 980, 990, 1980)
 )
 
 

@@ -22,15 +22,7 @@ from ncfix.text.dialect import Dialect
 from ncfix.text.grammar import UnspacedBlock, parse
 from ncfix.text.numbers import POINT, SIGN, table
 from ncfix.text.reach import UNREAD
-from ncfix.text.shapes import (
-    ODD,
-    Scan,
-    block_of,
-    in_slices,
-    scan_beside,
-    scan_compiled,
-    split_blocks,
-)
+from ncfix.text.shapes import ODD, Scan, block_of, in_slices, scan_beside, scan_compiled, split_blocks
 from ncfix.text.spelling import value_of
 from ncfix.text.tree import (
     END,

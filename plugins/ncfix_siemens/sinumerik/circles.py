@@ -12,11 +12,7 @@ from ncfix.control.coordinates import CENTRE_LETTERS, Plane, dot
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
 from ncfix.control.moves import Arc, MotionEnd, MotionKind
-from ncfix_siemens.sinumerik.destination import (
-    NO_POLE,
-    destination,
-    doubtful_polar,
-)
+from ncfix_siemens.sinumerik.destination import NO_POLE, destination, doubtful_polar
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT, BlockWordValues
 

@@ -12,20 +12,11 @@ from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, mask_of
 from ncfix.control.moves import MotionEnd, MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, tangential, through_point
 from ncfix_siemens.sinumerik.cycles import TO_A_HOLE, drill, hole_after
-from ncfix_siemens.sinumerik.destination import (
-    destination,
-    doubtful_polar,
-    machine_destination,
-)
+from ncfix_siemens.sinumerik.destination import destination, doubtful_polar, machine_destination
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.orientation import oriented
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import (
-    ALONG_TOOL,
-    MOTIONS,
-    UNFOLLOWED_MOTIONS,
-    BlockWordValues,
-)
+from ncfix_siemens.sinumerik.vocabulary import ALONG_TOOL, MOTIONS, UNFOLLOWED_MOTIONS, BlockWordValues
 
 _ACTION = r"""
     \$A_\w+(?:\[[^\]]*\])?=\S+

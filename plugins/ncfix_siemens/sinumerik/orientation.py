@@ -40,13 +40,7 @@ from ncfix.text.tree import StringLiteral
 from ncfix_siemens.sinumerik.plans import Calling, plain_text
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.unit import NO_LENGTH, SinumerikUnit
-from ncfix_siemens.sinumerik.vocabulary import (
-    ANGLES,
-    NORMALS,
-    OTHERS,
-    VECTOR,
-    BlockWordValues,
-)
+from ncfix_siemens.sinumerik.vocabulary import ANGLES, NORMALS, OTHERS, VECTOR, BlockWordValues
 
 BAD_VECTOR = "NCF254"
 WAY = "NCF253"

@@ -20,17 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.control.control import AFTER_THAT, ProgramControl
-from ncfix.control.coordinates import (
-    CENTRE_LETTERS,
-    DEGREE,
-    INDEX,
-    LETTERS,
-    Vector,
-    X,
-    Y,
-    Z,
-    mask_of,
-)
+from ncfix.control.coordinates import CENTRE_LETTERS, DEGREE, INDEX, LETTERS, Vector, X, Y, Z, mask_of
 from ncfix.control.expressions import Value
 from ncfix.control.frames import WORLD, Affine, FrameStack, shifted
 from ncfix.control.moves import Arc, Motion, MotionEnd, MotionKind, Pass, Passing, Rule, UnknownAxes

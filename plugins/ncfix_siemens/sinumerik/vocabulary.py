@@ -179,10 +179,7 @@ ASYNCHRONOUS = {
 }
 """Names that with an axis as index, `OS[Z]=1`, let it move by itself."""
 
-UNSEEN = {
-    "fxs": "travel to a fixed stop (FXS)",
-    "g": "a G code that is named by its group (G[..])",
-}
+UNSEEN = {"fxs": "travel to a fixed stop (FXS)", "g": "a G code that is named by its group (G[..])"}
 """Names that with an index change what motions after them do, in a way that is not followed."""
 
 OF_THE_CONTROL = re.compile(

@@ -25,13 +25,7 @@ from ncfix.cli.options import (
     tolerance_option,
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.shop.projects import (
-    ProjectCommand,
-    after_next_groups,
-    group_of,
-    is_from_file,
-    project_options,
-)
+from ncfix.cli.shop.projects import ProjectCommand, after_next_groups, group_of, is_from_file, project_options
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, targets
 from ncfix.diagnostics import UsageError
 from ncfix.host import processors

@@ -152,11 +152,7 @@ def _as_dict(calibration: Calibration, over: Prediction) -> dict[str, Any]:
         "chi_square": calibration.chi_square,
         "freedom": estimate.freedom,
         "condition": estimate.solution.condition,
-        "rms_um": {
-            "before": calibration.before_um,
-            "after": calibration.after_um,
-            "sets": residual.rms_by_set(),
-        },
+        "rms_um": {"before": calibration.before_um, "after": calibration.after_um, "sets": residual.rms_by_set()},
         "prediction": asdict(over),
         "largest_cook": float(residual.cook.max(initial=0.0)),
         **{name: rows for name, rows in tests.items() if rows},
@@ -298,14 +294,7 @@ def plan(
     room = _room(ranges, lengths, balls, reaches, inputs)
     with console.busy("choosing poses"):
         found = ncfix.plan(
-            machine,
-            kind=kind,
-            count=count,
-            room=room,
-            effects=effects,
-            separate=names,
-            existing=before,
-            seed=seed,
+            machine, kind=kind, count=count, room=room, effects=effects, separate=names, existing=before, seed=seed
         )
     empty = found.plan.form.measured if kind != "probe" else ()
     text = dumps(found.plan, empty)

@@ -16,15 +16,7 @@ import ncfix
 from ncfix.arguments import FAULT, SEED
 from ncfix.cli import console
 from ncfix.cli.following import FollowingSetup, dialect_in, task_of, tell_of_stamp, through
-from ncfix.cli.options import (
-    PATH,
-    dialect_option,
-    force_option,
-    json_option,
-    load_machine,
-    machine_option,
-    numbers,
-)
+from ncfix.cli.options import PATH, dialect_option, force_option, json_option, load_machine, machine_option, numbers
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import TableCommand, project_options
 from ncfix.cli.streams import HeldOutput, Source, source_of

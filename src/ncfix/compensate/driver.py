@@ -290,11 +290,7 @@ def fix_program(
 
 
 def fix_flat(
-    program: Program,
-    machine: Machine,
-    setup: Setup,
-    options: FixOptions,
-    resolve: Resolve | None = None,
+    program: Program, machine: Machine, setup: Setup, options: FixOptions, resolve: Resolve | None = None
 ) -> Fixed:
     """As `fix_program`; where that refuses motions, the program is written out flat and corrected so.
 

@@ -32,12 +32,7 @@ def checked(measurement: Measurement, machine: Machine, lines: Sequence[str] = (
 
     lines  those of its file, to be shown with a message
     """
-    faults = [
-        *_directions(measurement),
-        *_clock(measurement),
-        *_named(measurement, machine),
-        *_lengths(measurement),
-    ]
+    faults = [*_directions(measurement), *_clock(measurement), *_named(measurement, machine), *_lengths(measurement)]
     if faults:
         raise ConfigError.collected([_shown(fault, lines) for fault in faults])
     remarks = [

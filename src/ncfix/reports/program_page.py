@@ -114,10 +114,7 @@ class ProgramPage:
                 yield card(value, about)
         yield card(f"{report.compensated}", "motion blocks corrected")
         colour = ' class="bad"' if report.refused else ""
-        yield card(
-            f"<span{colour}>{len(report.refused)}</span> · {report.passed}",
-            "blocks refused · passed by rule",
-        )
+        yield card(f"<span{colour}>{len(report.refused)}</span> · {report.passed}", "blocks refused · passed by rule")
         if report.max_correction_um is not None:
             yield card(f"{report.max_correction_um:.1f} µm", "largest correction of X, Y and Z")
         yield card(
@@ -182,11 +179,7 @@ class ProgramPage:
         if not blocks:
             return ""
         rows = [
-            [
-                self._button(each.spot) if each.spot else str(each.line),
-                escape(each.reason),
-                self._code(each.line),
-            ]
+            [self._button(each.spot) if each.spot else str(each.line), escape(each.reason), self._code(each.line)]
             for each in blocks
         ]
         more = f" The first {LISTED} of them." if count > len(rows) else ""

@@ -159,13 +159,7 @@ def _points(arcs: Segments, ends: Pair, centre: Array) -> Array:
 
 
 def _sound(
-    arcs: Segments,
-    ends: Pair,
-    centre: Array,
-    sweep: Array,
-    closed: Mask,
-    closure: Closure,
-    rounding: float,
+    arcs: Segments, ends: Pair, centre: Array, sweep: Array, closed: Mask, closure: Closure, rounding: float
 ) -> Mask:
     """Whether radii agree to half of what the control accepts, after rounding, and the arc cannot be mistaken."""
     radii = [np.linalg.norm(across(point - centre, arcs.normal), axis=1) for point in ends]

@@ -35,12 +35,7 @@ Joints = Callable[[Index, Array], Array]
 
 def findings(written: WrittenPieces) -> tuple[Finding, ...]:
     """Everything that is against correcting motions as they are written; only corrected ones are looked at."""
-    found = [
-        not_a_number(written),
-        *beyond_ranges(written),
-        too_large(written),
-        too_fast(written),
-    ]
+    found = [not_a_number(written), *beyond_ranges(written), too_large(written), too_fast(written)]
     return tuple(finding for finding in found if len(finding))
 
 

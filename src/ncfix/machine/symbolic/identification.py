@@ -157,10 +157,7 @@ class Identifiable:
 
 
 def identifiable(
-    derivation: Derivation,
-    varied: Sequence[str] | None = None,
-    components: Sequence[str] = TIP,
-    absolute: bool = True,
+    derivation: Derivation, varied: Sequence[str] | None = None, components: Sequence[str] = TIP, absolute: bool = True
 ) -> Identifiable:
     """What can be identified when `varied` is varied; errors that depend on positions are left out.
 
