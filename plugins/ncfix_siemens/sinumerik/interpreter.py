@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING
@@ -19,7 +18,7 @@ from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.expressions import number
 from ncfix.control.flow import Call
 from ncfix.control.interpreter import RUNTIME, Interpreter
-from ncfix.control.moves import MotionEnd, MotionKind, Moves, Pass, Passing, Rule
+from ncfix.control.moves import MotionEnd, MotionKind, Moves, Pass, Passing
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, SourceError
@@ -401,15 +400,7 @@ def targets(unit: SinumerikUnit, step: Branching, block: int) -> list[int]:
 
 def demoted(moves: Moves, first: int | None) -> Moves:
     """The motions with those of blocks from `first` on refused, which may be executed again from another state."""
-    if first is None:
-        return moves
-    rows = (moves.block >= first) & (moves.rule == Rule.CORRECT)
-    if not rows.any():
-        return moves
-    reasons = moves.reasons if DECIDED_AT_RUNTIME in moves.reasons else (*moves.reasons, DECIDED_AT_RUNTIME)
-    reason = np.where(rows, reasons.index(DECIDED_AT_RUNTIME), moves.reason).astype(np.int16)
-    rule = np.where(rows, Rule.REFUSE, moves.rule).astype(np.int8)
-    return replace(moves, rule=rule, reason=reason, reasons=reasons)
+    return moves if first is None else moves.refused(moves.block >= first, DECIDED_AT_RUNTIME)
 
 
 LOUD_M = frozenset({20, 60, 170, 300})

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -197,9 +196,4 @@ def all_or_none(moves: Moves, program: Program) -> Moves:
         return moves
     shapes = [index for index, template in enumerate(program.templates) if polar_words(template)]
     polar = np.isin(program.template[moves.block], shapes)
-    if not (polar & (moves.rule != Rule.CORRECT)).any():
-        return moves
-    rows = polar & (moves.rule == Rule.CORRECT)
-    reasons = (*moves.reasons, ALL_OR_NONE)
-    reason = np.where(rows, len(moves.reasons), moves.reason).astype(np.int16)
-    return replace(moves, rule=np.where(rows, Rule.REFUSE, moves.rule).astype(np.int8), reason=reason, reasons=reasons)
+    return moves.refused(polar, ALL_OR_NONE) if (polar & (moves.rule != Rule.CORRECT)).any() else moves

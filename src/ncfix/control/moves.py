@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -271,6 +271,16 @@ class Moves:
     def call_of(self, row: int) -> CycleCall | None:
         """The call with which the cycle of a motion is called, if that has a block of its own."""
         return None if self.call is None or self.call[row] < 0 else self.calls[self.call[row]]
+
+    def refused(self, rows: NDArray[np.bool_], why: str) -> Moves:
+        """The motions with those of `rows` (n,) refused that would be corrected."""
+        rows = rows & (self.rule == Rule.CORRECT)
+        if not rows.any():
+            return self
+        reasons = self.reasons if why in self.reasons else (*self.reasons, why)
+        rule = np.where(rows, Rule.REFUSE, self.rule).astype(self.rule.dtype)
+        reason = np.where(rows, reasons.index(why), self.reason).astype(self.reason.dtype)
+        return replace(self, rule=rule, reason=reason, reasons=reasons)
 
     @property
     def cutting(self) -> NDArray[np.bool_]:
