@@ -7,6 +7,7 @@ back after an arc that is written about a pole of its own.
 
 from __future__ import annotations
 
+import cmath
 import math
 import re
 from bisect import bisect_left
@@ -16,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.control.arcs import Point, sweep_angle
+from ncfix.control.arcs import sweep_angle
 from ncfix.text.spelling import Spelling, value_of
 
 FloatArray = NDArray[np.float64]
@@ -101,11 +102,11 @@ class ArcText(NamedTuple):
 
 
 class InPlane(NamedTuple):
-    """An arc in its plane: begin, end, about what, its sense, digits of lengths, and `PieceOfArc.turn`."""
+    """An arc in its plane, points as complex numbers: begin, end, about what, its sense, digits, `PieceOfArc.turn`."""
 
-    begin: Point
-    end: Point
-    middle: Point
+    begin: complex
+    end: complex
+    middle: complex
     clockwise: bool
     digits: int
     turn: float | None
@@ -113,22 +114,17 @@ class InPlane(NamedTuple):
 
 def arc_text(arc: PieceOfArc, style: Spelling) -> ArcText:
     """Put an arc into words."""
-    first, second, across = (arc.spatial[index] for index in arc.plane)
-    begin, end, centre = arc.begin.tolist(), arc.end.tolist(), arc.centre.tolist()
-    flat = InPlane(
-        (begin[first], begin[second]),
-        (end[first], end[second]),
-        (centre[arc.plane[0]], centre[arc.plane[1]]),
-        arc.clockwise,
-        int(arc.decimals[first]),
-        arc.turn,
+    columns, across = arc.columns, arc.spatial[arc.plane[2]]
+    begin, end, middle = (
+        complex(*each) for each in (arc.begin[columns], arc.end[columns], arc.centre[[*arc.plane[:2]]])
     )
+    flat = InPlane(begin, end, middle, arc.clockwise, int(arc.decimals[columns[0]]), arc.turn)
     sense = "DR-" if arc.clockwise else "DR+"
-    rises = across >= 0 and abs(end[across] - begin[across]) >= 0.5 * 10.0 ** -int(arc.decimals[across])
+    rises = across >= 0 and abs(arc.end[across] - arc.begin[across]) >= 0.5 * 10.0 ** -int(arc.decimals[across])
     if rises or (arc.turn is not None and abs(arc.turn) > LEAST_FULL_TURN + 1e-3):
         pole, angle, reached = helix(flat, style)
         ending = arc.end.copy()
-        ending[first], ending[second] = reached
+        ending[columns] = reached.real, reached.imag
         return ArcText("CP", pole_words(arc.plane, pole), ("IPA" + angle,), sense, ending, spatial(arc, point_of(pole)))
     found = by_radius(flat, style)
     if found is not None:
@@ -138,45 +134,35 @@ def arc_text(arc: PieceOfArc, style: Spelling) -> ArcText:
     return ArcText("C", pole_words(arc.plane, pole), (), sense, arc.end, spatial(arc, point_of(pole)))
 
 
-def distance(a: Point, b: Point) -> float:
-    """From one point to another."""
-    return math.hypot(b[0] - a[0], b[1] - a[1])
-
-
-def swept(arc: InPlane, middle: Point) -> float:
+def swept(arc: InPlane, middle: complex) -> float:
     """The signed angle, rad, from begin to end about a centre, at most a turn."""
-    (x, y), end = arc.begin, arc.end
-    to_centre, to_end = (middle[0] - x, middle[1] - y), (end[0] - x, end[1] - y)
-    return sweep_angle(to_centre, to_end, 1, clockwise=arc.clockwise)
+    to_centre, to_end = middle - arc.begin, arc.end - arc.begin
+    return sweep_angle((to_centre.real, to_centre.imag), (to_end.real, to_end.imag), 1, clockwise=arc.clockwise)
 
 
-def by_radius(arc: InPlane, style: Spelling) -> tuple[str, Point] | None:
+def by_radius(arc: InPlane, style: Spelling) -> tuple[str, complex] | None:
     """R as written, and the centre that it means; None if that is over an output step from where it belongs."""
-    (x, y), end, wanted = arc.begin, arc.end, arc.middle
-    size = (distance(arc.begin, wanted) + distance(end, wanted)) / 2
+    way, wanted = arc.end - arc.begin, arc.middle
+    size = (abs(wanted - arc.begin) + abs(wanted - arc.end)) / 2
     sign = 1.0 if abs(swept(arc, wanted)) <= math.pi else -1.0
     text = style.number(sign * size, arc.digits)
-    radius, half_chord = abs(value_of(text)), distance(arc.begin, end) / 2
+    radius, half_chord = abs(value_of(text)), abs(way) / 2
     if not radius > half_chord > 0:
         return None
     rise = math.sqrt(radius**2 - half_chord**2)
     side = 1.0 if (not arc.clockwise) == (sign > 0) else -1.0
-    across = y - end[1], end[0] - x
-    middle = (
-        (x + end[0]) / 2 + side * (rise * across[0] / (2 * half_chord)),
-        (y + end[1]) / 2 + side * (rise * across[1] / (2 * half_chord)),
-    )
-    return (text, middle) if distance(middle, wanted) <= 10.0**-arc.digits else None
+    middle = (arc.begin + arc.end) / 2 + side * (rise * (1j * way) / (2 * half_chord))
+    return (text, middle) if abs(wanted - middle) <= 10.0**-arc.digits else None
 
 
-def pole_text(middle: Point, style: Spelling, digits: int) -> tuple[str, str]:
+def pole_text(middle: complex, style: Spelling, digits: int) -> tuple[str, str]:
     """The coordinates of a pole as they are written."""
-    return style.number(middle[0], digits), style.number(middle[1], digits)
+    return style.number(middle.real, digits), style.number(middle.imag, digits)
 
 
-def point_of(texts: tuple[str, str]) -> Point:
+def point_of(texts: tuple[str, str]) -> complex:
     """What coordinates say."""
-    return value_of(texts[0]), value_of(texts[1])
+    return complex(value_of(texts[0]), value_of(texts[1]))
 
 
 def pole_words(plane: tuple[int, int, int], texts: tuple[str, str]) -> tuple[str, ...]:
@@ -184,28 +170,27 @@ def pole_words(plane: tuple[int, int, int], texts: tuple[str, str]) -> tuple[str
     return tuple(sorted(("XYZ"[plane[0]] + texts[0], "XYZ"[plane[1]] + texts[1])))
 
 
-def helix(arc: InPlane, style: Spelling) -> tuple[tuple[str, str], str, Point]:
+def helix(arc: InPlane, style: Spelling) -> tuple[tuple[str, str], str, complex]:
     """CP: a pole that is about equally far from both ends, IPA, and the end that the control works out of these.
 
     The angle is put on its digits before the pole is: about a far one that leads nearer to the end. About a near one
     it is better found again from the pole as it is written.
     """
-    begin, end = arc.begin, arc.end
-    wanted = between(begin, end, arc.middle, turned_by(arc, arc.middle))
+    wanted = between(arc, turned_by(arc, arc.middle))
     first = on_digits(turned_by(arc, wanted), style)
     angle = math.radians(value_of(first))
-    fitting = seen_under(begin, end, angle)
-    if distance(fitting, wanted) * (1 - math.cos(angle / 2)) < ASIDE:
+    fitting = seen_under(arc, angle)
+    if abs(wanted - fitting) * (1 - math.cos(angle / 2)) < ASIDE:
         wanted = fitting
     texts = pole_text(wanted, style, max(POLE_DIGITS, arc.digits))
     pole = point_of(texts)
     angles = first, on_digits(turned_by(arc, pole), style)
-    reached = [swung(begin, pole, math.radians(value_of(text))) for text in angles]
-    best = 0 if distance(reached[0], end) <= distance(reached[1], end) else 1
+    reached = [pole + cmath.rect(1.0, math.radians(value_of(text))) * (arc.begin - pole) for text in angles]
+    best = 0 if abs(arc.end - reached[0]) <= abs(arc.end - reached[1]) else 1
     return texts, angles[best], reached[best]
 
 
-def turned_by(arc: InPlane, middle: Point) -> float:
+def turned_by(arc: InPlane, middle: complex) -> float:
     """As `swept`, with the whole turns that the arc was meant to have."""
     angle = swept(arc, middle)
     return angle if arc.turn is None else angle + 2 * math.pi * round((arc.turn - angle) / (2 * math.pi))
@@ -216,52 +201,40 @@ def on_digits(angle: float, style: Spelling) -> str:
     return style.number(math.degrees(angle), ANGLE_DIGITS)
 
 
-def swung(begin: Point, pole: Point, angle: float) -> Point:
-    """A point turned about another one by an angle, rad."""
-    x, y = begin[0] - pole[0], begin[1] - pole[1]
-    c, s = math.cos(angle), math.sin(angle)
-    return pole[0] + (c * x - s * y), pole[1] + (s * x + c * y)
-
-
-def between(begin: Point, end: Point, middle: Point, angle: float) -> Point:
+def between(arc: InPlane, angle: float) -> complex:
     """The centre that is equally far from both ends; of nearly full circles, where rounded ends are equally far only
     from a place far aside, a centre on the way there, so that the rest of the arc suffers no more than its end.
     """
-    goal = equally_far(begin, end, middle)
-    aside = distance(middle, goal)
-    uneven = abs(distance(begin, middle) - distance(end, middle))
+    goal = equally_far(arc)
+    aside = abs(goal - arc.middle)
+    uneven = abs(abs(arc.middle - arc.begin) - abs(arc.middle - arc.end))
     bulge = 2.0 if abs(angle) > math.pi else 1 - math.cos(angle)
     if bulge * aside <= 2 * uneven:
         return goal
-    part = uneven / (uneven + bulge * aside)
-    return middle[0] + part * (goal[0] - middle[0]), middle[1] + part * (goal[1] - middle[1])
+    return arc.middle + uneven / (uneven + bulge * aside) * (goal - arc.middle)
 
 
-def equally_far(begin: Point, end: Point, middle: Point) -> Point:
-    """The point next to `middle` that is equally far from begin and end; of full turns any is."""
-    x, y = end[0] - begin[0], end[1] - begin[1]
-    length = math.hypot(x, y)
-    if length < 1e-6:
-        return middle
-    x, y = x / length, y / length
-    way = (middle[0] - (begin[0] + end[0]) / 2) * x + (middle[1] - (begin[1] + end[1]) / 2) * y
-    return middle[0] - way * x, middle[1] - way * y
+def equally_far(arc: InPlane) -> complex:
+    """The point next to the centre that is equally far from begin and end; of full turns any is."""
+    way = arc.end - arc.begin
+    if abs(way) < 1e-6:
+        return arc.middle
+    way /= abs(way)
+    return arc.middle - ((arc.middle - (arc.begin + arc.end) / 2) * way.conjugate()).real * way
 
 
-def seen_under(begin: Point, end: Point, angle: float) -> Point:
+def seen_under(arc: InPlane, angle: float) -> complex:
     """The point from which the way from begin to end is seen under an angle, rad; infinitely far for none."""
     half = math.tan(angle / 2)
     if abs(half) < 1e-12:
-        return math.inf, math.inf
-    height = 0.5 / half
-    x, y = end[0] - begin[0], end[1] - begin[1]
-    return (begin[0] + end[0]) / 2 - height * y, (begin[1] + end[1]) / 2 + height * x
+        return complex(math.inf, math.inf)
+    return (arc.begin + arc.end) / 2 + 0.5 / half * (1j * (arc.end - arc.begin))
 
 
-def spatial(arc: PieceOfArc, middle: Point) -> FloatArray:
+def spatial(arc: PieceOfArc, middle: complex) -> FloatArray:
     """A centre in the plane as one of X Y Z, (3,); across the plane it lies where the arc begins."""
     found = arc.centre.copy()
-    found[arc.plane[0]], found[arc.plane[1]] = middle
+    found[arc.plane[0]], found[arc.plane[1]] = middle.real, middle.imag
     across = arc.spatial[arc.plane[2]]
     if across >= 0:
         found[arc.plane[2]] = arc.begin[across]
