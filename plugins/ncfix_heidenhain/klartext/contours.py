@@ -17,6 +17,7 @@ from ncfix_heidenhain.klartext.arcs import IN_PLANE, somewhere
 from ncfix_heidenhain.klartext.control import FREELY, KlartextControl
 from ncfix_heidenhain.klartext.free import ContourElement, Element, solved
 from ncfix_heidenhain.klartext.layout import CORNERS
+from ncfix_heidenhain.klartext.plans import QParameters
 from ncfix_heidenhain.klartext.targets import command_of, here, pole_frame
 from ncfix_heidenhain.klartext.units import KlartextUnit
 
@@ -128,7 +129,8 @@ def element_of(control: KlartextControl, text: str) -> Element | None:
     arc, rest = found["arc"].upper() == "C", text[found.end() :]
     if SENSE.sub(" ", WORD.sub(" ", REST.sub(" ", rest))).strip():
         return None
-    pairs = [(name.upper(), number(control, value)) for name, value in WORD.findall(REST.sub(" ", rest))]
+    words, parameters = WORD.findall(REST.sub(" ", rest)), control.scope.parameters
+    pairs = [(name.upper(), number(value, parameters)) for name, value in words]
     signs = {name.upper(): 1 if sign == "+" else -1 for name, sign in SENSE.findall(rest)}
     if any(isinstance(value, Unknown) for _, value in pairs):
         return None
@@ -152,21 +154,16 @@ def element_of(control: KlartextControl, text: str) -> Element | None:
     )
 
 
-def number(control: KlartextControl, text: str) -> Value:
-    """The value of a number or a Q parameter."""
+def number(text: str, parameters: QParameters) -> Value:
+    """The value of a number or a Q parameter, with its sign."""
     bare = "".join(text.split()).lstrip("+-")
-    value = control.scope.parameters.get(bare.upper()) if bare[0] in "Qq" else value_of(bare)
+    value = parameters.get(bare.upper()) if bare[0] in "Qq" else value_of(bare)
     return scaled(-1.0 if text.startswith("-") else 1.0, value)
 
 
 def in_radians(values: Mapping[str, float], name: str) -> float | None:
     """An angle."""
     return math.radians(values[name]) if name in values else None
-
-
-def others_of(text: str) -> str:
-    """What stands in a block besides geometry."""
-    return " ".join("".join(word.split()) for word in REST.findall(text))
 
 
 # -- written out ------------------------------------------------------------------------------------------------------
@@ -183,7 +180,7 @@ def written_out(control: KlartextControl, unit: KlartextUnit, block: int, place:
     element = solved_element(control, unit, block)
     if element is None:
         return []
-    others = others_of(statement_text(unit, block))
+    others = " ".join("".join(word.split()) for word in REST.findall(statement_text(unit, block)))
     if element.circle is None:
         return [f"L {place(element.end)} {others}".rstrip()]
     sense = "DR+" if element.circle.sense > 0 else "DR-"

@@ -17,12 +17,11 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 
 from ncfix.control.coordinates import X, Y, Z, mask_of
-from ncfix.control.expressions import Fault, Value, nominal, numbers, scaled
+from ncfix.control.expressions import Fault, nominal, numbers
 from ncfix.control.moves import Motion, MotionKind
-from ncfix.text.spelling import value_of
 from ncfix_heidenhain.klartext import transformations
 from ncfix_heidenhain.klartext.arcs import IN_PLANE, Step
-from ncfix_heidenhain.klartext.contours import LEFT_OUT
+from ncfix_heidenhain.klartext.contours import LEFT_OUT, VALUE, number
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, HolePosition, KlartextControl
 from ncfix_heidenhain.klartext.plans import QParameters
 from ncfix_heidenhain.klartext.targets import (
@@ -234,10 +233,7 @@ MOST_HOLES = 100_000
 """A pattern of more counts as one whose holes are not known."""
 
 KINDS = re.compile(r"(POS|ROW|PAT|FRAME|PITCHCIRC|CIRC)\s*\d*\s*\(([^()]*)\)", re.IGNORECASE)
-WORDS = re.compile(
-    r"(I?[XY]|Z|DX|DY|D|NUMX|NUMY|NUM|ROTX|ROTY|ROT|START|STEP|END)\s*([+-]?)\s*(Q[LR]?\d+|\d+[.,]?\d*|[.,]\d+)",
-    re.IGNORECASE,
-)
+WORDS = re.compile(rf"(I?[XY]|Z|DX|DY|D|NUMX|NUMY|NUM|ROTX|ROTY|ROT|START|STEP|END)\s*({VALUE})", re.IGNORECASE)
 
 Values = Mapping[str, float]
 
@@ -248,7 +244,7 @@ def pattern_of(text: str, parameters: QParameters) -> tuple[HolePosition, ...] |
     found: list[HolePosition] = []
     certain = True
     for kind, inside in KINDS.findall(code):
-        said = {name.upper(): number(sign, value, parameters) for name, sign, value in WORDS.findall(inside)}
+        said = {name.upper(): number(value, parameters) for name, value in WORDS.findall(inside)}
         certain &= numbers(said.values()) is not None
         values = {name: nominal(value) for name, value in said.items()}
         if not understood(inside, values) or holes(values) + len(found) > MOST_HOLES:
@@ -266,12 +262,6 @@ def understood(inside: str, values: Values) -> bool:
 def holes(values: Values) -> float:
     """How many holes a pattern has at most."""
     return max(values.get("NUM", 0.0), max(values.get("NUMX", 0.0), 1.0) * max(values.get("NUMY", 0.0), 1.0))
-
-
-def number(sign: str, text: str, parameters: QParameters) -> Value:
-    """The value of a number or a Q parameter."""
-    value = parameters.get(text.upper()) if text[0] in "Qq" else value_of(text)
-    return scaled(-1.0 if sign == "-" else 1.0, value)
 
 
 # -- forms ------------------------------------------------------------------------------------------------------------
