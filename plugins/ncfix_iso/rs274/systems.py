@@ -288,43 +288,55 @@ def origin_for_position(control: RS274Control, block: Block, system: int, origin
 # -- shifts and rotations of all of them -------------------------------------------------------------------------------
 
 
+LOCAL, BY_POSITION, CANCELLED, RESTORED = 520, 920, 921, 923
+"""G52, G92, G92.1 and G92.3."""
+
+
 def shift_system(control: RS274Control, block: Block, code: int) -> None:
     """G52 and G92: shift all coordinate systems, by the words or so that the position gets their values."""
-    if code == 921 and block.axes and not control.rules.strict:
+    linuxcnc = control.rules.strict
+    if code == CANCELLED and block.axes and not linuxcnc:
         preset_system(control, block, code)
         return
-    if code in (520, 920) and not block.axes:
-        if control.rules.strict:
+    if code not in (LOCAL, BY_POSITION):
+        take_shift(control, code)
+        return
+    if not block.axes:
+        if linuxcnc:
             raise Fault("NCF221", f"G{code // 10} needs an axis word")
         return
-    moved_while_turned(control, f"G{code // 10}")
-    if code == 520 and not control.rules.strict and is_on_top(control, block):
-        control.refuse_rest(ON_TOP)
-    if code == 920 and not control.rules.strict and control.modal.incremental:
-        control.refuse_rest(COUNTED_ON)
-    if not control.rules.strict and code in (520, 920):
-        set_local(control, block, cancelled=code == 920)
-    if code == 520 and not control.rules.strict:
-        return
-    before, doubtful = control.frames.additive.shift, {*control.composed.unknown}
-    if code in (520, 920):
-        set_shift(control, block, from_position=code == 920)
+    if not linuxcnc:
+        moved_while_turned(control, f"G{code // 10}")
+        if control.modal.incremental and code == BY_POSITION:
+            control.refuse_rest(COUNTED_ON)
+        elif code == LOCAL and is_on_top(control, block):
+            control.refuse_rest(ON_TOP)
+        set_local(control, block, cancelled=code == BY_POSITION)
+        if code == LOCAL:
+            return
+    set_shift(control, block, from_position=code == BY_POSITION)
+    control.parameters.assign(SHIFT_ACTIVE, 1.0)
+    compose(control)
+    named = mask_of(words_of(block))
+    if code == BY_POSITION:
+        control.places.place(named)
     else:
-        control.frames = replace(
-            control.frames, additive=Affine(tuple(stored(control, SHIFT))) if code == 923 else WORLD
-        )
-    if code == 921:
+        control.places.shift(named)
+
+
+def take_shift(control: RS274Control, code: int) -> None:
+    """G92.1, G92.2, which also keeps the shift for G92.3, and that: the shift is no longer in force, or it is again."""
+    moved_while_turned(control, "G92")
+    again = code == RESTORED
+    before, doubtful = control.frames.additive.shift, {*control.composed.unknown}
+    control.frames = replace(control.frames, additive=Affine(tuple(stored(control, SHIFT))) if again else WORLD)
+    if code == CANCELLED:
         for index in range(N_LETTERS):
             store(control, SHIFT, index, 0.0, unknown=False)
-    control.parameters.assign(SHIFT_ACTIVE, float(code in (520, 920, 923)))
+    control.parameters.assign(SHIFT_ACTIVE, float(again))
     compose(control)
-    if code == 920:
-        control.places.place(mask_of(words_of(block)))
-    elif code == 520:
-        control.places.shift(mask_of(words_of(block)))
-    else:
-        after, doubtful = control.frames.additive.shift, doubtful | {*control.composed.unknown}
-        control.places.shift(mask_of(i for i in control.machine if before[i] != after[i] or i in doubtful))
+    after, doubtful = control.frames.additive.shift, doubtful | {*control.composed.unknown}
+    control.places.shift(mask_of(i for i in control.machine if before[i] != after[i] or i in doubtful))
 
 
 def preset_system(control: RS274Control, block: Block, code: int) -> None:
