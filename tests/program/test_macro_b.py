@@ -73,6 +73,11 @@ WORKED: dict[str, tuple[str, list[list[float]]]] = {
         "G0X[#7+#8+#9]Y[#11+#17+#18]Z[#19+#20+#21+#22+#23]\nX#24Y#25Z#26\nM99",
         [[6, 15, 45], [12, 13, 14]],
     ),
+    "M is an argument behind G65": ("M8G65P9010A1.M48\nM30\nO9010\nG0X#1Y#13\nM99", [[1, 48, 0]]),
+    "codes and variables before G65 take effect": (
+        "G0X5.\nG91#100=2.G65P9010A1.\nM30\nO9010\nG0X#1Y#100\nM99",
+        [[5, 0, 0], [6, 2, 0]],
+    ),
     "I J K several times": (
         "G65P9010A1.B2.C3.I4.J5.K6.I7.J8.\nM30\nO9010\nG0X[#4+#5+#6]Y[#7+#8]Z[#1+#2+#3]\nM99",
         [[15, 15, 6]],

@@ -12,7 +12,7 @@ from ncfix.control.expressions import Fault, Unknown, Value, nominal
 from ncfix.control.interpreter import RUNTIME
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
-from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
+from ncfix.text.tree import Assignment, Constant, Literal, Opaque, Program, Span, Template, Word
 from ncfix_fanuc.macro import coordinates, system, tilt
 from ncfix_fanuc.macro.blocks import CORNER, G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl
@@ -33,6 +33,7 @@ G65, G66_1, G67 = 650, 661, 670
 SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
 BY_ANGLE = "a line that is given by its angle (,A) is not followed"
 AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
+BESIDE_CALL = "G65 calls a program with other codes in its block, so the program cannot be written out flat"
 MODAL_CALL = "G66 calls the program O{}, which is not at hand, so the program cannot be written out flat"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
 
@@ -126,6 +127,7 @@ class MacroInterpreter(RS274Interpreter):
         plan = self.without_vacant(plan)
         codes = plan.codes
         if codes is not None and codes.g.get(MACRO) and plan.fault is None:
+            self.before_call(plan, index)
             self.macro(plan, codes)
             return False
         refusal = self.control.refusal
@@ -314,6 +316,22 @@ class MacroInterpreter(RS274Interpreter):
 
     # -- macros -------------------------------------------------------------------------------------------------------
 
+    def before_call(self, plan: RS274Plan, index: int) -> None:
+        """Execute what a block sets before it calls a macro: codes and variables; behind the call M is an argument."""
+        items = plan.template.items
+        call = next(place for place, item in enumerate(items) if isinstance(item, Word) and self.calls(item))
+        before = [item for item in items[:call] if not isinstance(item, Word) or item.address in "GM"]
+        if any(isinstance(item, (Word, Assignment)) for item in before):
+            if self.watcher:
+                raise Fault(RUNTIME, BESIDE_CALL)
+            super().execute_words(plan_of(Template(tuple(before), plan.template.n_numbers), self.control.rules), index)
+
+    def calls(self, word: Word) -> bool:
+        """Whether a word is a code that calls a macro, or ends that."""
+        if word.address != "G" or not isinstance(word.value, Constant):
+            return False
+        return self.control.rules.g_groups.get(round(10 * word.value.value)) == MACRO
+
     def macro(self, plan: RS274Plan, codes: Codes) -> None:
         """G65 calls a macro once, G66 after every motion that follows, G67 ends that."""
         code = codes.g[MACRO]
@@ -337,14 +355,18 @@ class MacroInterpreter(RS274Interpreter):
 
     def arguments(self, plan: RS274Plan) -> Iterator[tuple[str, Value]]:
         """The arguments of a macro call in the order written; vacant ones are not passed."""
-        for word in plan.template.words:
-            if word.address not in "GMNPL":
+        words = plan.template.words
+        behind = next(place for place, word in enumerate(words) if self.calls(word)) + 1
+        for place, word in enumerate(words):
+            if word.address not in "NPL" and (place >= behind or word.address not in "GM"):
                 value = self.argument(word)
                 if not math.isnan(nominal(value)):
                     yield word.address, value
 
     def argument(self, word: Word) -> Value:
         """The value of a word of a macro call."""
+        if isinstance(word.value, Constant):
+            return word.value.value
         value = self.control.rules.compiled(word.value, word.address)(self.control)
         if isinstance(word.value, Literal) and word.value.pointless and word.address in LENGTHS:
             return self.control.without_point(word.address, nominal(value))
