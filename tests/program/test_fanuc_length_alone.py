@@ -26,6 +26,7 @@ def remarked(rest: str) -> bool:
         "G49\nG28 G91 Z0.\nM30\n%\n",
         "G49 (off)\nT2 M6\nG0 Z80.\nX5.\nM30\n%\n",
         "G49 Z80.\nX5.\nM30\n%\n",
+        "G91\nG49\nG90\nZ80.\nX5.\nM30\n%\n",
     ],
 )
 def test_where_z_is_named_before_anything_moves_it_does_not_matter(rest: str) -> None:
@@ -37,6 +38,7 @@ def test_where_z_is_named_before_anything_moves_it_does_not_matter(rest: str) ->
     [
         "G49\nG0 X5.\nZ80.\nM30\n%\n",
         "G49\nG91 G0 Z5.\nM30\n%\n",
+        "G49\nG91\nG0 Z5.\nM30\n%\n",
         "G49\nM98 P100\nM30\nO100\nX5.\nM99\n%\n",
         "G49\n/G0 Z80.\nX5.\nM30\n%\n",
         "G49\nIF [#1 EQ 1] GOTO 9\nG0 Z80.\nN9 X5.\nM30\n%\n",

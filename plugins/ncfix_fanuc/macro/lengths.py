@@ -42,7 +42,7 @@ CANCEL = (PLAIN_CANCEL, 491)
 SAME = {491: PLAIN_CANCEL, BY_VECTOR: BY_ANGLE, HAAS_TIP: BY_ANGLE}
 """What codes do to the length of the tool."""
 
-G91 = 910
+G90, G91 = 900, 910
 REFERENCE = frozenset((280, 300, 530))
 ENDS = frozenset((20, 300))
 CALLS = frozenset((970, 980, 990, 1980))
@@ -88,12 +88,13 @@ def direct(control: MacroControl, block: Block, code: int) -> None:
 
 def z_is_named_first(control: MacroControl) -> bool:
     """Whether Z is named, or the program ends, before anything else moves: then nothing rests on where Z stands."""
+    incremental = control.modal.incremental
     for shape in control.coming():
         words = {word.address for word in shape.words}
+        incremental = G91 in shape.g_codes or (incremental and G90 not in shape.g_codes)
         if not all(isinstance(item, Word | Comment | Tape) for item in shape.items):
             return False
         if "Z" in words:
-            incremental = control.modal.incremental or G91 in shape.g_codes
             return not incremental or not REFERENCE.isdisjoint(shape.g_codes)
         if not ENDS.isdisjoint(shape.m_codes):
             return True
