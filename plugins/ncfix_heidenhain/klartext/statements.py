@@ -235,7 +235,7 @@ def call_tool(
     control.tool_called = True
     control.tools.offset = control.tools.spindle
     tell_radius(control, words.values.get("DR", 0.0))
-    named = control.setup.named_tools.get(tool.upper()) if isinstance(tool, str) else None
+    named = control.setup.tool_called(tool) if isinstance(tool, str) else None
     if named is not None and named.radius is not None:
         control.tools.cutter = named.radius + words.values.get("DR", 0.0) * control.modal.unit
     length = length_by_name(control, tool) if isinstance(tool, str) else length_of(control, int(control.tools.spindle))
@@ -266,7 +266,7 @@ def set_length(control: KlartextControl, length: float) -> None:
 
 def length_by_name(control: KlartextControl, name: str) -> float:
     """The length of a tool that is called by its name, mm; zero if it is lacking."""
-    named = control.setup.named_tools.get(name.upper())
+    named = control.setup.tool_called(name)
     if named is not None and named.length is not None:
         return named.length
     control.knowledge.lack("NCF202", f"length of tool {name}", "is used", f'--tool "{name}"=LENGTH')

@@ -58,6 +58,7 @@ REFERENCE = {
 }
 AFTER_REFERENCE = "where the axis {} stands after a reference or fixed point is not given"
 SOFT_APPROACH = frozenset({1470, 1480, 2470, 2480, 3470, 3480})
+BY_ANGLE = "a contour that is given by an angle (ANG)"
 AFTER_APPROACH = "where the axis {} stands after a soft approach or retraction is not followed"
 CORNERS = frozenset({"RND", "CHF", "CHR"})
 """Words with which the control rounds or breaks the corner at the end of the block."""
@@ -116,6 +117,9 @@ def straight(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """G0 and G1."""
     end = destination(control, words)
     control.go(MotionKind.FEED if code else MotionKind.RAPID, words, end, code, refusal=refusal_of(control, words))
+    if "ANG" in words.values:
+        plane = control.modal.plane
+        control.lose([i for i in (plane.first, plane.second) if not words.axes >> i & 1], AFTER_THAT.format(BY_ANGLE))
 
 
 def is_one_piece(control: Sinumerik, words: BlockWordValues) -> bool:
@@ -151,7 +155,7 @@ def refusal_of(control: Sinumerik, words: BlockWordValues) -> str:
     if words.values.keys() & {"RND", "RNDM", "CHF", "CHR", "ANG"} and words.unknown("RND", "RNDM", "CHF", "CHR"):
         return "a rounding or chamfer is known only at run time"
     if "ANG" in words.values:
-        return "a contour that is given by an angle (ANG)"
+        return BY_ANGLE
     return doubtful_polar(control, words)
 
 

@@ -415,11 +415,8 @@ class Sinumerik(ProgramControl):
 
     def _given(self, number: int, edge: int) -> Tool | None:
         """A tool with one of its edges, if the setup has it."""
-        tools = self.setup.named_tools
         name = self.named.name(number)
-        if edge != 1:
-            return tools.get(f"{name} D{edge}".upper())
-        return tools.get(name.upper()) if name in self.named.numbers else self.setup.tools.get(number)
+        return self.setup.tool_called(name if edge == 1 else f"{name} D{edge}")
 
     def spindle_length(self) -> float:
         """As of every control, by the names of tools."""

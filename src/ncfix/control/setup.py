@@ -93,6 +93,10 @@ class Setup:
     subprograms: tuple[str, ...] = ()
     probed: Mapping[str, float] | None = None
 
+    def tool_called(self, name: str) -> Tool | None:
+        """The tool of a name; digits are a number where no tool has that name (`T="5"`)."""
+        return self.named_tools.get(name.upper()) or (self.tools.get(int(name)) if name.isdecimal() else None)
+
 
 def check_offsets(setup: Setup, axes: Collection[str]) -> None:
     """Refuse work offsets whose numbers seem to be in the order of the machine's axes. Raises `UsageError` NCF384.

@@ -171,6 +171,10 @@ def test_a_tool_that_is_called_by_name_is_asked_for_as_one_by_number_is() -> Non
     assert follow(called, named_tools={"DRILL": Tool(80.0)}).messages == ()
 
 
+def test_a_name_of_digits_is_a_number_where_no_tool_has_that_name() -> None:
+    assert follow('TOOL CALL "5" Z\nL X+1', tools={5: Tool(80.0)}).messages == ()
+
+
 @pytest.mark.parametrize("dwell", ["V.ZEIT 0.5", "V.ZEIT0,5", "DWELL 0.5", "V.IDO5", "TEMPO. 1"])
 def test_cycles_call_their_numbers_by_words_of_many_languages(dwell: str) -> None:
     """`V.` is no axis, and `T.` no tool: an address has a number behind it."""

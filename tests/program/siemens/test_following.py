@@ -253,6 +253,16 @@ def test_machine_coordinates_pass_and_keep_the_tool_length() -> None:
     assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.PASS, Rule.PASS]
 
 
+def test_what_a_line_by_its_angle_leaves_out_is_not_known() -> None:
+    followed = follow("G54 G0 X0 Y0 Z0\nG1 ANG=30 X40 F100\nX50\nX60 Y5\nX70")
+    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.REFUSE, Rule.REFUSE, Rule.CORRECT]
+
+
+def test_a_name_of_digits_is_a_number_where_no_tool_has_that_name() -> None:
+    followed = follow('T="5" M6\nG54 G0 X1 Y1 Z1', tools={5: Tool(80.0)})
+    assert ends(followed) == [[1, 1, 81]]
+
+
 def test_what_is_not_given_is_asked_for() -> None:
     with pytest.raises(UsageError) as caught:
         follow('T="DRILL 8.5" M6\nG54 G0 X1 Y1 Z1', setup=Setup(initial=ZERO))

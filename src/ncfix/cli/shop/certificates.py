@@ -27,6 +27,7 @@ def given_of(setup: Setup, dialect: Dialect) -> Given:
     from ncfix.certificate.following import Given
 
     tools: dict[int | str, float | None] = {number: tool.length for number, tool in setup.tools.items()}
+    tools |= {str(number): tool.length for number, tool in setup.tools.items()}
     tools |= {name.upper(): tool.length for name, tool in setup.named_tools.items()}
     return Given(
         offsets=setup.work_offsets,
