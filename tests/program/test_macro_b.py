@@ -136,6 +136,19 @@ STOPS = {
 }
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("M98P7\nM30\n%\nO0007\nM99\n", "the program O7 stands behind the % at which the control stops reading"),
+        ("GOTO N100\nN100 M30", "GOTO takes the number of a block, without N"),
+    ],
+)
+def test_where_the_control_stops_the_reason_is_named(text: str, said: str) -> None:
+    with pytest.raises(SourceError) as caught:
+        follow(text, dialect="fanuc")
+    assert caught.value.messages[0].text == said
+
+
 @pytest.mark.parametrize("text", STOPS)
 def test_where_the_control_stops(text: str) -> None:
     with pytest.raises(SourceError) as caught:

@@ -9,6 +9,7 @@ Programs of the machine's builder or of a probe's maker, O8000 to O9999, are in 
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterable
 from functools import cached_property
@@ -68,6 +69,7 @@ SETS = 10
 
 LENGTHS = frozenset("ABCIJKQRUVWXYZ")
 """Arguments whose numbers count least increments of their address when they have no decimal point."""
+BEHIND_TAPE = "the program O{} stands behind the % at which the control stops reading"
 
 
 def local_variables(arguments: Iterable[tuple[str, Value]]) -> Store:
@@ -297,6 +299,9 @@ class MacroFlow(ProgramFlow[RS274Unit]):
         if file is None and self.in_parts:
             raise NotInPartsError("a subprogram may stand further down")
         if file is None:
+            if re.search(rb"(?m)^[ \t]*[Oo:]0*%s(?!\d)" % label.encode(), self.main.program.source):
+                hint = f"take that % out, or put O{label} in a file of its own"
+                raise Fault(NO_SUBPROGRAM, BEHIND_TAPE.format(label), hint)
             hint = "it is looked for in the file, in files beside it, and where --subprograms DIR says"
             raise Fault(NO_SUBPROGRAM, f"there is no program O{label}", hint)
         outline = self.outline_of(file)

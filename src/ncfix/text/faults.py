@@ -243,6 +243,8 @@ def in_address(stop: Stop) -> BlockError:
     prose = re.match(r"[A-Za-z_]{3,}", stop.text[stop.place(1) :])
     if prose:
         return stop.fault("NCF110", f"{prose[0][:40]!r} is no word of this dialect", back=1)
+    if re.search(r"(?i)GOTO\Z", stop.squeezed.code[: stop.position]):
+        return stop.fault("NCF110", "GOTO takes the number of a block, without N")
     if address == "O":
         text = "the name is not closed with >" if stop.at == "<" else "the O-word has no number or name"
         return stop.fault("NCF119", text, back=1)
