@@ -9,7 +9,7 @@ from ncfix.control.expressions import Fault
 from ncfix.control.moves import MotionEnd, UnknownAxes
 from ncfix.control.tcp import led_in_machine
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, POLAR, TURNING, BlockWordValues
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, HALF_A_TURN, POLAR, SHORTEST_WAY, TURNING, BlockWordValues
 
 RUNTIME = "where the axis {} stands is known only at run time"
 RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM90)"
@@ -80,10 +80,10 @@ def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vect
 
 def turned(form: str, here: float, angle: float, *, known: bool) -> float:
     """The angle at which a rotary axis arrives: on the shortest way, or in the positive or negative sense, rad."""
-    if not known:
+    if not known or (form == SHORTEST_WAY and abs(angle - here) < math.radians(HALF_A_TURN)):
         return angle
     step = (angle - here + STILL) % TURN - STILL
-    if form == "dc":
+    if form == SHORTEST_WAY:
         return here + (step if step <= math.pi + STILL else step - TURN)
     return here + step if form == "acp" or step <= STILL else here + step - TURN
 

@@ -174,9 +174,16 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
 
     def run_lane(self, unit: SinumerikUnit, block: int, plan: SinumerikPlan) -> int:
         """See `Interpreter`; blocks that point the tool go in a lane of their own."""
-        if plan.vector is None:
-            return super().run_lane(unit, block, plan)
-        return run_vectors(self.control, unit, block, not unit.external)
+        if plan.vector is not None:
+            return run_vectors(self.control, unit, block, not unit.external)
+        control, first = self.control, self.control.builder.count
+        ways = dict(unit.shortest_ways(block, unit.lane_end(block)))
+        if not all(control.goes_to_number(letter, angle) for letter, angle in ways.items()):
+            return 0
+        done = super().run_lane(unit, block, plan)
+        if ways and done:
+            control.builder.says_the_way(mask_of(ways), control.builder.count - first, first)
+        return done
 
     def lane_is_open(self, plan: SinumerikPlan) -> bool:
         """See `Interpreter`."""

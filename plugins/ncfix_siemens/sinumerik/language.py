@@ -23,8 +23,8 @@ from ncfix_siemens.sinumerik.interpreter import SinumerikInterpreter
 from ncfix_siemens.sinumerik.plans import fixed_centre
 from ncfix_siemens.sinumerik.scanning import polar_words, renumbered, scan
 from ncfix_siemens.sinumerik.state import Sinumerik
-from ncfix_siemens.sinumerik.vocabulary import VECTOR
-from ncfix_siemens.sinumerik.writing import SPELLING, SinumerikLayout, SinumerikWriter, layout_of
+from ncfix_siemens.sinumerik.vocabulary import SHORTEST_WAY, VECTOR
+from ncfix_siemens.sinumerik.writing import SPELLING, SinumerikLayout, SinumerikWriter, form_of, layout_of
 
 SPATIAL = frozenset("XYZ")
 
@@ -49,13 +49,15 @@ def unroll(interpreter: SinumerikInterpreter, steps: Mapping[str, float], limit:
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
     layout = layout_of(program, block)
-    formed = layout is not None and not layout.forms.keys().isdisjoint(layout.axes)
-    if layout is None or not layout.axes or layout.polar or layout.angles or formed:
+    if layout is None or not layout.axes or layout.polar or layout.angles:
+        return None
+    forms = {layout.forms[letter] for letter in layout.forms.keys() & layout.axes.keys()}
+    if not forms <= {SHORTEST_WAY}:
         return None
     if layout.points and not layout.axes.keys() <= SPATIAL:
         return None
     found = bulk_layout(program, block, layout)
-    further = not (layout.after or layout.prefix or layout.points)
+    further = not (layout.after or layout.prefix or layout.points or forms)
     return found and replace(found, further=further, by_vector=layout.points, arc=arc_in_bulk(program, block, layout))
 
 
@@ -74,11 +76,14 @@ def without(words: Mapping[str, Word], addresses: Container[str]) -> dict[str, W
 
 
 def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(n,) motions for `BlockWriter`: a changed direction of the tool, or one that further pieces have.
+    """(n,) motions for `BlockWriter`: a changed direction of the tool or angle of DC, or one that further pieces have.
 
     One that is the same, and in one piece, leads the rotary axes to where the program has them.
     """
-    shapes = [any(word.address in VECTOR for word in template.words) for template in program.templates]
+    shapes = [
+        any(word.address in VECTOR or form_of(word) == SHORTEST_WAY for word in template.words)
+        for template in program.templates
+    ]
     pointed: NDArray[np.bool_] = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
     if not pointed.any():
         return pointed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass, field, replace
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
@@ -30,7 +30,7 @@ from ncfix.text.tree import (
 )
 from ncfix_siemens.sinumerik.blocks import BRACKET, STATEMENT
 from ncfix_siemens.sinumerik.expressions import FUNCTIONS_OF_NUMBERS, TEXT_FUNCTIONS, compiled
-from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, VECTOR
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, SHORTEST_WAY, VECTOR
 
 DWELL_WORDS = "FS"
 """With G4: how long."""
@@ -113,6 +113,7 @@ class SinumerikPlan:
     lane       set if the block may go through the fast lane
     functions  what stands in its expressions and only the control can evaluate
     vector     the slots of A3 B3 C3, -1 for none, if a block for the fast lane has any of them
+    shortest   the axes that go the shortest way, `C=DC(350)`, as bits, if it is a block for the fast lane
     """
 
     template: Template
@@ -125,6 +126,7 @@ class SinumerikPlan:
     opaque: frozenset[str] = frozenset()
     lane: Lane | None = None
     vector: tuple[int, ...] | None = None
+    shortest: int = 0
     functions: tuple[Calling, ...] = ()
     names: frozenset[str] = field(default=frozenset())
 
@@ -145,6 +147,8 @@ def plan_of(template: Template) -> SinumerikPlan:
     plan.lane = lane_of(plan)
     if plan.lane is not None and not template.slots.keys().isdisjoint(VECTOR):
         plan.vector = tuple(template.slots.get(address, -1) for address in VECTOR)
+    if plan.lane is not None:
+        plan.shortest = sum(1 << INDEX[letter] for letter in in_form(template, "ABC", SHORTEST_WAY))
     return plan
 
 
@@ -261,7 +265,8 @@ def branching(item: OWordLine) -> Branching:
 def lane_of(plan: SinumerikPlan) -> Lane | None:
     """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
     template, fixed = plan.template, fixed_centre(plan.template)
-    words, slots = [word for word in template.words if not is_code(word)], {**template.slots, **fixed}
+    words = [word for word in template.words if not is_code(word)]
+    slots = {**template.slots, **fixed, **in_form(template, "ABC", SHORTEST_WAY)}
     if len(slots) < len(words) or not all(isinstance(item, Word | Comment) for item in template.items):
         return None
     pointed = not slots.keys().isdisjoint(VECTOR)
@@ -279,18 +284,16 @@ def lane_of(plan: SinumerikPlan) -> Lane | None:
 
 def fixed_centre(template: Template) -> dict[str, int]:
     """The words of a centre that count from the origin, `I=AC(5)`: the slots of their numbers."""
+    return in_form(template, CENTRE_LETTERS, ABSOLUTE)
+
+
+def in_form(template: Template, letters: Container[str], form: str) -> dict[str, int]:
+    """The words with some addresses that have a plain number in a form, `I=AC(5)`: the slots of their numbers."""
     found = {}
     for word in template.words:
-        value = word.value
-        if (
-            word.address in CENTRE_LETTERS
-            and isinstance(value, FunctionCall)
-            and value.name == ABSOLUTE
-            and not value.indexed
-        ):
-            match value.arguments:
-                case (Literal(slot),):
-                    found[word.address] = slot
+        match word.value:
+            case FunctionCall(name, (Literal(slot),), indexed=False) if name == form and word.address in letters:
+                found[word.address] = slot
     return found
 
 

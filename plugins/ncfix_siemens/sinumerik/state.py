@@ -31,6 +31,7 @@ from ncfix.control.turns import Winding
 from ncfix.text.dialect import Dialect
 from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
 from ncfix_siemens.sinumerik.vocabulary import (
+    HALF_A_TURN,
     INCREMENTAL,
     MOTIONS,
     PATH_WORDS,
@@ -375,6 +376,12 @@ class Sinumerik(ProgramControl):
         steps = [] if self.modal.incremental else [index for index in self.counted_words(words) if endless >> index & 1]
         places = ((self.position[index], target[index]) for index in (*self.over, *steps))
         return any(not 0 <= place < turn for pair in places for place in pair)
+
+    def goes_to_number(self, index: int, angle: float) -> bool:
+        """Whether the shortest way to an angle, degrees, leads to the number itself, within the same turn."""
+        here, step = self.position[index], self.scale[index] * angle
+        counts = self.rotary[index] and not self.modal.incremental and self.offset[index] == 0.0
+        return counts and 0.0 <= here < 2 * math.pi and abs(step - here) < math.radians(HALF_A_TURN)
 
     def wrap(self) -> None:
         """A rotary axis that went past a full turn with DC, ACP or ACN counts from 0 to 360 degrees again."""

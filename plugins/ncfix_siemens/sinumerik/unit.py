@@ -18,13 +18,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.control.coordinates import N_LETTERS
 from ncfix.control.expressions import Fault, Unknown, Value
 from ncfix.control.interpreter import TextUnit
+from ncfix.control.lanes.block_rows import words
 from ncfix.control.pointing import FloatArray, Pointing, Ways, to_each
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.text.tree import StringLiteral as Label
 from ncfix_siemens.sinumerik.expressions import INITIAL, constant
 from ncfix_siemens.sinumerik.plans import Branching, SinumerikPlan, plan_of
+from ncfix_siemens.sinumerik.vocabulary import HALF_A_TURN
 
 HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*(?:;.*)?$", re.IGNORECASE)
 PROCEDURE = re.compile(r"PROC[ \t]+(?P<name>\w+)[ \t]*(?:\((?P<parameters>.*)\))?(?P<rest>[^()]*)$", re.IGNORECASE)
@@ -94,6 +97,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         self.saves = False
         self.directions = Directions()
         self._vector_stops: NDArray[np.int64] | None = None
+        self._long_ways: NDArray[np.int64] | None = None
         self._vectors: NDArray[np.int64] | None = None
         self._match_structures()
         self._read_procedure()
@@ -103,6 +107,41 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
     def closed(self) -> NDArray[np.bool_]:
         """See `TextUnit.closed`."""
         return np.array([plan.lane is None or plan.vector is not None for plan in self.all_plans()], dtype=np.bool_)
+
+    def lane_end(self, block: int) -> int:
+        """See `TextUnit`; a block whose `DC` is another thing than the number in it goes by itself."""
+        if self._long_ways is None:
+            shortest = self.all_shortest()
+            found = [self.long_ways(letter) for letter in range(N_LETTERS) if np.any(shortest >> letter & 1)]
+            self._long_ways = np.unique(np.concatenate([*found, [self.stop]])).astype(np.int64)
+        return min(super().lane_end(block), int(self._long_ways[np.searchsorted(self._long_ways, block)]))
+
+    def all_shortest(self) -> NDArray[np.int64]:
+        """(s,) the axes that go the shortest way in blocks of each shape, as bits."""
+        return np.array([plan.shortest for plan in self.all_plans()], dtype=np.int64)
+
+    def long_ways(self, letter: int) -> NDArray[np.int64]:
+        """The blocks where an axis goes past a full turn, or beside which its words are in another form.
+
+        Elsewhere the shortest way leads to the number itself, from the number of the last block that names the axis.
+        """
+        named = np.array([plan.axes >> letter & 1 for plan in self.all_plans()], dtype=np.bool_)
+        rows = np.flatnonzero(named[self.program.template[self.begin : self.stop]]) + self.begin
+        shapes, first = self.program.template[rows], self.program.first_number[rows]
+        shortest = (self.all_shortest() >> letter & 1)[shapes] != 0
+        angle = words(self.program.numbers, first, self.lanes.axes[shapes, letter])
+        before, other = np.concatenate(([np.nan], angle[:-1])), np.concatenate(([False], shortest[:-1])) != shortest
+        near = (angle >= 0.0) & (angle < 360.0) & (np.abs(angle - before) < HALF_A_TURN)
+        return rows[other | (shortest & ~near)]
+
+    def shortest_ways(self, block: int, stop: int) -> Iterator[tuple[int, float]]:
+        """The axes that go the shortest way in these blocks, and to which angle first, degrees."""
+        shapes = self.program.template[block:stop]
+        bits = self.all_shortest()[shapes]
+        for letter in range(N_LETTERS):
+            if (found := np.flatnonzero(bits >> letter & 1)).size:
+                slot = self.lanes.axes[shapes[found[0]], letter]
+                yield letter, float(self.program.numbers[self.program.first_number[block + found[0]] + slot])
 
     def vector_end(self, block: int) -> int:
         """The first block from `block` on that gives no direction of the tool, or is not for the fast lane."""

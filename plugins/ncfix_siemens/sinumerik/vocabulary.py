@@ -42,10 +42,12 @@ _ARCS = frozenset({"CR", "AR", "TURN", "I1", "J1", "K1"})
 PATH_WORDS = POLAR | NORMALS | OTHERS | _ARCS | {*INDEX, *VECTOR, *ANGLES, ALONG_TOOL, "ANG"}
 """The words that lead somewhere, whatever motion is in force."""
 
-ABSOLUTE, INCREMENTAL = "ac", "ic"
-TURNING = frozenset({"dc", "acp", "acn"})
+ABSOLUTE, INCREMENTAL, SHORTEST_WAY = "ac", "ic", "dc"
+TURNING = frozenset({SHORTEST_WAY, "acp", "acn"})
 FORMS = TURNING | {ABSOLUTE, INCREMENTAL}
 """How one word is meant, `X=IC(10)`: absolutely, incrementally, or to an angle on the shortest way or in a sense."""
+HALF_A_TURN = 180.0 - 1e-6
+"""Degrees; so far and farther which way is the shorter is not for rounded numbers to say."""
 FORM = re.compile(r"\s*(?P<form>[A-Z]+)\s*\(\s*(?P<value>.*?)\s*\)\s*\Z", re.IGNORECASE | re.DOTALL)
 
 MOTIONS = {"cip": 1000, "ct": 1010, "poly": 1020, "aspline": 1030, "bspline": 1040, "cspline": 1050}

@@ -197,9 +197,10 @@ class MotionBuilder:
         rows = np.flatnonzero(axes)
         self._resting |= dict(zip((self.count + rows).tolist(), axes[rows].tolist(), strict=True))
 
-    def says_the_way(self, axes: int, motions: int = 1) -> None:
-        """The motions that are added next turn these axes in a way that their words say, or nothing leaves open."""
-        self._directed.append((self.count, self.count + motions, axes))
+    def says_the_way(self, axes: int, motions: int = 1, first: int | None = None) -> None:
+        """Motions, those added next or from `first` on, turn axes in a way that words say, or nothing leaves open."""
+        begin = self.count if first is None else first
+        self._directed.append((begin, begin + motions, axes))
 
     def extend(self, stretch: MotionColumns) -> None:
         """Many motions."""
