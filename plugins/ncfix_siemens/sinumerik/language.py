@@ -20,13 +20,15 @@ from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 from ncfix_siemens.sinumerik.blocks import parse_block
 from ncfix_siemens.sinumerik.interpreter import SinumerikInterpreter
-from ncfix_siemens.sinumerik.plans import fixed_centre
+from ncfix_siemens.sinumerik.plans import fixed_centre, in_form
 from ncfix_siemens.sinumerik.scanning import polar_words, renumbered, scan
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import SHORTEST_WAY, VECTOR
 from ncfix_siemens.sinumerik.writing import SPELLING, SinumerikLayout, SinumerikWriter, form_of, layout_of
 
 SPATIAL = frozenset("XYZ")
+SAME_ANGLE = 1e-9
+"""rad"""
 
 
 def runs_straight_on(template: Template) -> bool:
@@ -78,7 +80,8 @@ def without(words: Mapping[str, Word], addresses: Container[str]) -> dict[str, W
 def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(n,) motions for `BlockWriter`: a changed direction of the tool or angle of DC, or one that further pieces have.
 
-    One that is the same, and in one piece, leads the rotary axes to where the program has them.
+    So are those in which DC leads to another number than its own, past a full turn. A direction that is the same, and in
+    one piece, leads the rotary axes to where the program has them.
     """
     shapes = [
         any(word.address in VECTOR or form_of(word) == SHORTEST_WAY for word in template.words)
@@ -89,7 +92,19 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDAr
         return pointed
     last = first_piece[1:] - 1
     turned = (pieces.end[last] != moves.end)[:, moves.rotary].any(axis=1)
-    return pointed & (turned | (np.diff(first_piece) > 1))
+    return pointed & (turned | (np.diff(first_piece) > 1) | past_a_turn(program, moves))
+
+
+def past_a_turn(program: Program, moves: Moves) -> NDArray[np.bool_]:
+    """(n,) motions in which the shortest way leads to another number than DC has."""
+    found, shapes = np.zeros(len(moves), dtype=np.bool_), program.template[moves.block]
+    for shape, template in enumerate(program.templates):
+        for letter, slot in in_form(template, moves.axes, SHORTEST_WAY).items():
+            rows, column = np.flatnonzero(shapes == shape), moves.axes.index(letter)
+            angle = np.radians(program.numbers[program.first_number[moves.block[rows]] + slot])
+            offset = np.array([frame.offset[column] for frame in moves.frames])[moves.frame[rows]]
+            found[rows] |= np.abs(moves.end[rows, column] - offset - angle) > SAME_ANGLE
+    return found
 
 
 SINUMERIK = WrittenLanguage(

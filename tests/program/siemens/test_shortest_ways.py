@@ -50,13 +50,15 @@ def test_most_of_them_go_through_the_fast_lane() -> None:
     assert sum(taken) > 150
 
 
+@pytest.mark.parametrize("offset", [0.0, 30.0])
 @pytest.mark.parametrize("strategy", ["rotary-then-linear", "full"])
-def test_many_at_a_time_they_are_written_as_one_by_one(strategy: str) -> None:
+def test_many_at_a_time_they_are_written_as_one_by_one(strategy: str, offset: float) -> None:
     options = FixOptions(strategy=strategy, allow_refused=True, verify=False)
+    setup = Setup(work_offsets={"G54": {"C": offset}}, assume_zero=True)
     program = read(wandering(2, "A").encode(), "part.mpf", "siemens")
 
     def written() -> bytes:
-        return fix_program(program, load(CRADLE), Setup(assume_zero=True), options).text
+        return fix_program(program, load(CRADLE), setup, options).text
 
     def without_bulk(dialect: Dialect, kind: type[WrittenLanguage]) -> WrittenLanguage:
         return replace(language_of(dialect, kind), bulk=None)
