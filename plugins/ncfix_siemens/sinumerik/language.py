@@ -80,8 +80,8 @@ def without(words: Mapping[str, Word], addresses: Container[str]) -> dict[str, W
 def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(n,) motions for `BlockWriter`: a changed direction of the tool or angle of DC, or one that further pieces have.
 
-    So are those in which DC leads to another number than its own, past a full turn. A direction that is the same, and in
-    one piece, leads the rotary axes to where the program has them.
+    So are those in which DC leads past a full turn, to another number than its own. A direction that is the same, and
+    in one piece, leads the rotary axes to where the program has them.
     """
     shapes = [
         any(word.address in VECTOR or form_of(word) == SHORTEST_WAY for word in template.words)
