@@ -58,6 +58,7 @@ def flat(text: str, dialect: str, **options: object) -> str:
             "(TWICE)\nG0X3.\nY1.\nG91G3X2.Y2.J2.\nG90\nG1X0\nM30\n",
         ),
         ("fanuc", "G65P9A1.\nM30\nO9\nG0X#1\r\nM99\n", "G0X1.\nM30\n"),
+        ("fanuc", "G91 M8 G65P9A1.\nM30\nO9\nG0X#1\nM99\n", "G91 M8\nG0X1.\nM30\n"),
         (
             "fanuc",
             "N10 G65 P9810 Z5. F100. (SAFE)\n#1=0\nWHILE[#1LT2]DO1\nG65P9811Z0.S1\n#1=#1+1\nEND1\nM98 P9500\nM30\n",

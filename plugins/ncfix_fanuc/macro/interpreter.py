@@ -33,7 +33,9 @@ G65, G66_1, G67 = 650, 661, 670
 SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
 BY_ANGLE = "a line that is given by its angle (,A) is not followed"
 AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
-BESIDE_CALL = "G65 calls a program with other codes in its block, so the program cannot be written out flat"
+BEFORE_CALL = "GMFST"
+"""Words that take effect before a macro is called, where they stand before the call."""
+BESIDE_CALL = "a code before G65 is computed, so the program cannot be written out flat"
 MODAL_CALL = "G66 calls the program O{}, which is not at hand, so the program cannot be written out flat"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
 
@@ -127,8 +129,7 @@ class MacroInterpreter(RS274Interpreter):
         plan = self.without_vacant(plan)
         codes = plan.codes
         if codes is not None and codes.g.get(MACRO) and plan.fault is None:
-            self.before_call(plan, index)
-            self.macro(plan, codes)
+            self.macro(plan, codes, self.before_call(plan, index))
             return False
         refusal = self.control.refusal
         if ANGLE in plan.letters:
@@ -316,15 +317,22 @@ class MacroInterpreter(RS274Interpreter):
 
     # -- macros -------------------------------------------------------------------------------------------------------
 
-    def before_call(self, plan: RS274Plan, index: int) -> None:
-        """Execute what a block sets before it calls a macro: codes and variables; behind the call M is an argument."""
+    def before_call(self, plan: RS274Plan, index: int) -> str:
+        """Execute what a block sets before it calls a macro: codes and variables; behind the call M is an argument.
+
+        Returns the codes, for a flat program; raises `Fault` there if one is computed.
+        """
         items = plan.template.items
         call = next(place for place, item in enumerate(items) if isinstance(item, Word) and self.calls(item))
-        before = [item for item in items[:call] if not isinstance(item, Word) or item.address in "GM"]
-        if any(isinstance(item, (Word, Assignment)) for item in before):
-            if self.watcher:
-                raise Fault(RUNTIME, BESIDE_CALL)
+        before = [item for item in items[:call] if not isinstance(item, Word) or item.address in BEFORE_CALL]
+        words = [item for item in before if isinstance(item, Word)]
+        if words or any(isinstance(item, Assignment) for item in before):
+            watcher, self.watcher = self.watcher, None
             super().execute_words(plan_of(Template(tuple(before), plan.template.n_numbers), self.control.rules), index)
+            self.watcher = watcher
+        if self.watcher and not all(isinstance(word.value, (Constant, Literal)) for word in words):
+            raise Fault(RUNTIME, BESIDE_CALL)
+        return " ".join(self.flow.unit.program.slice(index, word.span) for word in words)
 
     def calls(self, word: Word) -> bool:
         """Whether a word is a code that calls a macro, or ends that."""
@@ -332,9 +340,11 @@ class MacroInterpreter(RS274Interpreter):
             return False
         return self.control.rules.g_groups.get(round(10 * word.value.value)) == MACRO
 
-    def macro(self, plan: RS274Plan, codes: Codes) -> None:
-        """G65 calls a macro once, G66 after every motion that follows, G67 ends that."""
+    def macro(self, plan: RS274Plan, codes: Codes, before: str) -> None:
+        """G65 calls a macro once, G66 after every motion that follows, G67 ends that; `before` stays if it is flat."""
         code = codes.g[MACRO]
+        if self.watcher and before and code != G65:
+            self.watcher.write(before)
         if code == G67:
             if self.modal_calls:
                 self.modal_calls.pop()
@@ -346,8 +356,11 @@ class MacroInterpreter(RS274Interpreter):
         store = local_variables(self.arguments(plan))
         if code == G65:
             self.flow.begin(label, times, store)
-            if self.is_outside() and self.watcher:
+            outside = self.is_outside()
+            if self.watcher and outside:
                 self.watcher.call(self.flow.unit, self.flow.block - 1)
+            elif self.watcher and before:
+                self.watcher.write(before)
             return
         if code == G66_1:
             self.control.refuse_rest("a macro is called by every block (G66.1)")
@@ -358,7 +371,7 @@ class MacroInterpreter(RS274Interpreter):
         words = plan.template.words
         behind = next(place for place, word in enumerate(words) if self.calls(word)) + 1
         for place, word in enumerate(words):
-            if word.address not in "NPL" and (place >= behind or word.address not in "GM"):
+            if word.address not in "NPL" and (place >= behind or word.address not in BEFORE_CALL):
                 value = self.argument(word)
                 if not math.isnan(nominal(value)):
                     yield word.address, value
