@@ -132,8 +132,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         angle = words(self.program.numbers, first, self.lanes.axes[shapes, letter])
         before, other = np.concatenate(([np.nan], angle[:-1])), np.concatenate(([False], shortest[:-1])) != shortest
         near = (angle >= 0.0) & (angle < 360.0) & (np.abs(angle - before) < HALF_A_TURN)
-        found: NDArray[np.int64] = rows[other | (shortest & ~near)]
-        return found
+        return rows[other | (shortest & ~near)]
 
     def shortest_ways(self, block: int, stop: int) -> Iterator[tuple[int, float]]:
         """The axes that go the shortest way in these blocks, and to which angle first, degrees."""
