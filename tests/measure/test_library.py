@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, plan
-from ncfix.machine import dumps, loads
+from ncfix.machine import GaugeLine, dumps, loads
 from ncfix.machine.effects import library
 from ncfix.measure.calibrate import calibrate
 from ncfix.measure.instruments import Faults, simulate
@@ -72,3 +72,11 @@ def test_they_are_selected_by_name_and_survive_the_file():
     assert [effect.name for effect in chosen.estimated] == ["EZS", "EAY", "EC0Y"]
     known = chosen.machine(THREE, [1e-3, 1e-6, 2e-6, 1e-5])
     assert loads(dumps(known)).effects == known.effects
+
+
+@pytest.mark.parametrize(("way", "names"), [((0, 0, 1), "XYAB"), ((0, -1, 0), "XZAC"), ((1, 0, 0), "YZBC")])
+def test_the_spindle_is_off_and_tilted_across_itself(way, names):
+    """Along it an offset is the length of the tool, and a turn is nothing."""
+    lying = THREE.replace(tool=GaugeLine(tuple(map(float, way)), (0.0, 0.0, 0.0)))
+    chosen = [effect.name for effect in select(lying, "E?0S").estimated]
+    assert chosen == [f"E{name}0S" for name in names]

@@ -168,7 +168,8 @@ def candidate_effects(machine: Machine, knots: int = 0) -> list[Effect]:
         names = [f"E{component}0{axis.name}" for component in _located(machine, axis)]
         names += [f"E{component}{axis.name}" for component in COMPONENTS]
         found += [default(machine, name, knots) for name in names]
-    return found + [default(machine, f"E{component}0{SPINDLE}") for component in "XYAB"]
+    along = int(np.abs(np.asarray(machine.tool.direction)).argmax())  # there it is the length of the tool, or nothing
+    return found + [default(machine, f"E{c}0{SPINDLE}") for k, c in enumerate(COMPONENTS) if k % 3 != along]
 
 
 def _located(machine: Machine, axis: Axis) -> list[str]:
