@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
-from ncfix.tables.axis_tables import AxisTables, additive
+from ncfix.tables.axis_tables import AxisTables, additive, reversal_note
 from ncfix.tables.compensation import Compensation, Term, own_terms
 from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
@@ -133,7 +133,8 @@ class Heidenhain(FileControl):
         files[CONFIG] = cma_text(axes, tables)
         files[SIGN] = f"{settings['sign']}\n".encode()
         least = least_of_sums(machine, request.space, request.tool_length)
-        return Written(files, _notes(lines, most, both), least)
+        notes = (*_notes(lines, most), *play_left(request, self.examined(files)[0], both))
+        return Written(files, notes, least)
 
     def examined(self, files: Files) -> tuple[Compensation, list[Remarks]]:
         """The tables of the active line of the `.CMA`, with the sign that is kept beside them."""
@@ -225,7 +226,17 @@ def sign_of(text: str) -> float:
     return 1.0 if text == "correction" else -1.0
 
 
-def _notes(lines: tuple[AxisTables, ...], most: int, both: bool) -> tuple[str, ...]:
+def play_left(request: Request, done: Compensation, both: bool) -> Iterator[str]:
+    """What to say of play that tables leave, and of the setting that takes up that of axes along themselves."""
+    machine = request.machine
+    left = list(reversal_note(machine, request.space, request.tool_length, done))
+    yield from left
+    own = (each for each in machine.effects if each.basis.needs_direction and each.joint == each.name[1])
+    if left and not both and any(each.active for each in own):
+        yield "The mean of both ways is written; --set backlash=on writes what the way back needs."
+
+
+def _notes(lines: tuple[AxisTables, ...], most: int) -> tuple[str, ...]:
     notes = [
         "A sum of tables over one axis each cannot follow angular errors, whose lever changes as another axis moves: "
         "that part of the error is left, unless the control has KinematicsComp (heidenhain-kinematics)."
@@ -234,8 +245,4 @@ def _notes(lines: tuple[AxisTables, ...], most: int, both: bool) -> tuple[str, .
     full = [line.input for line in lines if len(line.nodes) >= most > 2]
     if full:
         notes.append(f"With {most} rows the target is not reached along {', '.join(full)}.")
-    if not both and any(
-        np.abs(line.values[:, line.outputs.index(line.input)] - line.reverse).max() > 0 for line in lines
-    ):
-        notes.append("The mean of both ways is written; --set backlash=on writes what the way back needs.")
     return tuple(notes)

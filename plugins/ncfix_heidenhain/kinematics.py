@@ -10,7 +10,6 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.machine import Machine
-from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import Compensation, Tables, Term, own_terms
 from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.grid import Array, Grid
@@ -26,7 +25,7 @@ from ncfix_heidenhain.chain import (
     over_limits,
     read_rows,
 )
-from ncfix_heidenhain.control import MOST, SIGNS, sign_of
+from ncfix_heidenhain.control import MOST, SIGNS, play_left, sign_of
 from ncfix_heidenhain.table_files import CONFIG, LARGE, ComTable, cma_text, old_text, read_cma, read_com
 
 TABLE = "kinematics.tab"
@@ -141,11 +140,7 @@ class KinematicsComp(FileControl):
         files[UNITS] = f"{settings['sign']} {settings['angle_unit']}\n".encode()
         notes = _notes(components, [flag for _, flag in found], most)
         done = Compensation(self.examined(files)[0].own)
-        left = list(reversal_note(machine, request.space, request.tool_length, done))
-        own = (each for each in machine.effects if each.basis.needs_direction and each.joint == each.name[1])
-        if left and not play and any(each.active for each in own):
-            left.append("The mean of both ways is written; --set backlash=on writes what the way back needs.")
-        return Written(files, (*notes, *left))
+        return Written(files, (*notes, *play_left(request, done, play)))
 
     def examined(self, files: Files) -> tuple[ErrorChain, list[Remarks]]:
         """The chain, as the control would follow it."""

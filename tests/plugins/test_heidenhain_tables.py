@@ -12,6 +12,7 @@ import pytest
 from ncfix.diagnostics import ConfigError, RefusedError, UsageError
 from ncfix.machine import Effect, dumps, loads
 from ncfix.machine.basis import Polynomial
+from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import ranges_of
 from ncfix.tables.export import export
@@ -189,3 +190,14 @@ def test_a_file_without_its_sign_is_not_read() -> None:
 
 def test_good_files_are_not_remarked_on() -> None:
     assert not CONTROL.lint(files())
+
+
+def test_play_that_is_left_is_said_with_the_setting_that_takes_it_up() -> None:
+    curves = {"positive": (0.004, -0.002), "negative": (0.007, 0.003)}
+    effects = tuple(Effect("EXX", curve, PiecewiseLinear((-200.0, 300.0), way)) for way, curve in curves.items())
+    machine = single_error("EXX").replace(effects=effects)
+    for setting, left in (("off", ["What the way changes", "The mean of both ways"]), ("on", [])):
+        settings = {"sign": "error", "backlash": setting}
+        request = Request(machine, ranges_of(machine), 0.0, 0.001, settings)
+        found = [note for note in CONTROL.write(request).notes if " way" in note]
+        assert [note[: len(begin)] for note, begin in zip(found, left, strict=True)] == left
