@@ -254,7 +254,7 @@ class WordAddressFollower(AxisFollower):
             elif name == "M":
                 self.auxiliary(word)
             elif name == "D" and self.family is Family.SINUMERIK:
-                self.new_length(self.length_of(self.tool) if word.value else 0.0)
+                self.choose_edge(word.value)
             elif name in ("TRAORI", "TRAFOOF"):
                 self.lead(name == "TRAORI")
                 self.unsay()
@@ -279,7 +279,7 @@ class WordAddressFollower(AxisFollower):
     def _change(self) -> None:
         """Another tool in the spindle of a SINUMERIK; its length holds at once where one was in force."""
         self.tool = self.next_tool
-        self.new_length(self.length_of(self.tool))
+        self.choose_edge(1)
         self.unsay()
 
     def _system(self, name: str) -> None:
@@ -292,7 +292,7 @@ class WordAddressFollower(AxisFollower):
         tool = int(number) if number is not None else self.tool
         if any(word.name == "H" and word.value is None for word in line.codes):
             self.lost["H"] = "a length offset is a formula"
-        if self.tcp and tcp:
+        if self.tcp and (tcp or self.given.tcp):
             self.at.update(dict.fromkeys("XYZ", NAN))  # the same place has other numbers for another tool
         self.tool, self.between = tool, False
         self.lead(tcp)

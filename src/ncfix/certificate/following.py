@@ -100,8 +100,8 @@ class AxisFollower:
             self.system = "G54"
         self.tool: int | str = 0
         self.next_tool: int | str = 0
-        self.length: float | None = self.length_of(0) if family is Family.SINUMERIK else 0.0
-        """The tool length that is in force in coordinates; a SINUMERIK begins with D1 of the tool in the spindle."""
+        self.length: float | None = 0.0 if family is Family.WORDS else self.length_of(self.tool)
+        """The tool length in force in coordinates; SINUMERIK and Klartext begin with that of the tool in place."""
         self.between = False
         """The length offset in force is not of the tool in the spindle: which of them counts is not sure."""
         self.tcp = given.tcp
@@ -242,8 +242,11 @@ class AxisFollower:
         return NAN if length is None else length
 
     def lead(self, on: bool) -> None:
-        """Tool-centre-point control goes on or off: the same place has other numbers."""
-        if on == self.tcp:
+        """Tool-centre-point control goes on or off: the same place has other numbers.
+
+        Where the setup says that X Y Z are those of the tip, only Klartext can say that they are not.
+        """
+        if on == self.tcp or (self.given.tcp and self.family is not Family.KLARTEXT):
             return
         if any(self.shifts.values()) or any(self.local.values()):
             self.lost["shift"] = "a shift under tool-centre-point control"
@@ -379,7 +382,7 @@ class AxisFollower:
                 self.between = self.family is Family.WORDS and bool(self.length) and self.next_tool != self.tool
                 self.tool = self.next_tool
                 if self.family is Family.SINUMERIK:
-                    self.new_length(self.length_of(self.tool))
+                    self.choose_edge(1)
                 self.unsay()
             case 2 | 30:
                 self.lost["end"] = "behind the end of the program"
@@ -389,6 +392,10 @@ class AxisFollower:
                 self.lost["M"] = "an M code is a formula"
             case _:
                 pass
+
+    def choose_edge(self, number: float | None) -> None:
+        """D of SINUMERIK: its length is in force, and none of T0 or D0."""
+        self.new_length(self.length_of(self.tool) if number and self.tool else 0.0)
 
     def new_length(self, length: float | None) -> None:
         """Another tool length is in force in coordinates."""

@@ -188,6 +188,7 @@ class Ways:
             a = self.start[here][:, columns] - self.centre[here]
             b = place[on][:, columns] - self.centre[here]
             turn = np.arctan2(b[each, two], b[each, one]) - np.arctan2(a[each, two], a[each, one])
-            turn = np.where(self.sweep[here] > 0, turn % (2 * np.pi), -((-turn) % (2 * np.pi)))
-            share[on] = turn / self.sweep[here]
+            whole, sweep = 2 * np.pi, np.abs(self.sweep[here])
+            turn = np.where(self.sweep[here] > 0, turn, -turn) % whole
+            share[on] = np.where(turn > (sweep + whole) / 2, turn - whole, turn) / sweep  # just before it begins
         return share

@@ -164,6 +164,7 @@ class Pairing:
             and self.followed(row)
             and self.followed(row + 1)
             and self.moves(row + 1)
+            and not self.original.lines[row].says(self.corrected.lines[at])
             and not self.nearness(row, at)
             and self.nearness(row + 1, at)
         )
@@ -250,7 +251,8 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
     if arc or (klartext and _begins(line, "CC")):
         motion = MOTION.get(pairing.original.family, MOTION[Family.WORDS])
         ours, theirs = motion.sub("", ours), motion.sub("", theirs)
-    circle = klartext and arc and (len(pieces) > 1 or _begins(head, "CC"))
+    turns = _begins(head, "CP") and not _begins(line, "CP")
+    circle = klartext and arc and (len(pieces) > 1 or _begins(head, "CC") or turns)
     if not circle and ours.rstrip() != theirs.rstrip() and not _paced(ours, theirs, line, timed):
         found.append("words that are no axes have changed")
     if circle:

@@ -8,10 +8,8 @@ numbers also stand in columns.
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from typing import NamedTuple, overload
 
 import numpy as np
@@ -36,13 +34,13 @@ class Text:
     def of(cls, source: bytes, family: Family) -> Text:
         """Read a program; the line of its stamp, if it has one, is kept apart."""
         text = source.decode("latin-1")
-        whole = LINE.findall(text)
-        rows = [line.rstrip("\r\n") for line in whole] if "\r" in text else text.split("\n")[: len(whole)]
+        rows = text.removesuffix(end := "\n" if "\n" in text else "\r").split(end) if text else []
         numbers, stamp = list(range(1, len(rows) + 1)), None
         if b"ncfix" in source.lower() and (found := STAMP.search(text)):
-            at = bisect_right(list(accumulate(map(len, whole))), found.start())
+            at = text.count(end, 0, found.start())
             stamp = StampFound(at + 1, found[1].lower(), found[2].lower(), float(found[3]))
             del rows[at], numbers[at]
+        rows = [row.rstrip("\r") for row in rows] if "\r" in text else rows
         if MARK in text:
             return cls(family, [READERS[family](*each) for each in zip(numbers, rows, strict=True)], stamp)
         lines = Lines(family, rows, numbers)
@@ -80,7 +78,6 @@ class StampFound(NamedTuple):
     tolerance_um: float
 
 
-LINE = re.compile(r"[^\r\n]*(?:\r\n|\n|\r)|[^\r\n]+$")
 STAMP = re.compile(r"\bncfix \d\S* machine ([0-9a-f]+) strategy ([\w-]+) tolerance ([\d.e-]+) um", re.IGNORECASE)
 RENUMBERED = {Family.KLARTEXT: (0, 1), Family.SINUMERIK: (10, 10)}
 """The first number that blocks get anew, and the step to the next."""

@@ -360,7 +360,7 @@ def equal(one: object, other: object) -> bool:
         return len(one) == len(other) and all(map(equal, one, other))
     if is_dataclass(one) and type(one) is type(other):
         return all(equal(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
-    return one == other
+    return type(one) is type(other) and bool(one == other)
 
 
 def _starting_elsewhere(moves: Sequence[Moves]) -> set[int]:

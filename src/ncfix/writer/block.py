@@ -33,8 +33,8 @@ STRAIGHT_AND_ARCS = (0, 10, 20, 30)
 
 CLOSED, EXACT = 1e-6, 1e-9
 """Program units: an arc whose ends are nearer is a full circle, and positions that are nearer are the same."""
-NEAR = 1.5
-"""Steps of the control, in any unit: full circles end no farther from where they begin, one point before rounding."""
+NEAR = 2.0
+"""Steps of the control, in any unit: full circles end no farther from where they begin; other arcs end farther."""
 
 INVERSE_TIME, PER_MINUTE = "93", "94"
 
@@ -213,7 +213,7 @@ class BlockWriter(BlockText):
             return closed
         plane, nominal = [target.spatial[index] for index in target.plane[:2]], self._xyz(target.nominal)
         if -1 not in plane and all(abs(nominal[index] - target.origin[index]) < CLOSED for index in target.plane[:2]):
-            closed[plane] = bool((np.abs(end - position)[plane] < NEAR * target.resolved[plane]).all())
+            closed[plane] = np.linalg.norm(((end - position) / target.resolved)[plane]) < NEAR
         return closed
 
     def _stay(self, position: FloatArray, column: int, word: Word | None) -> None:
