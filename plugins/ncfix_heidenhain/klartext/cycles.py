@@ -38,7 +38,8 @@ NO_CYCLE = "NCF272"
 DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
 """Cycles whose bottom is Q203 + Q201; back boring (204) counts otherwise."""
 
-MILLING = frozenset({251, 252, 253, 256, 257, 258, 262, 263, 264, 265, 267})
+OLD_MILLING = frozenset({3, 4, 5})
+MILLING = OLD_MILLING | {251, 252, 253, 256, 257, 258, 262, 263, 264, 265, 267}
 """Pockets, slots, studs and threads about the place where they are called, down to Q203 + Q201. A round slot (254) may
 have its place in the cycle."""
 
@@ -48,7 +49,8 @@ AS_A_WHOLE = "cycle {} is corrected where it is called, down to its bottom; what
 IN_SPACE = frozenset({*range(20, 26), 204, *range(210, 216), 225, *range(230, 234), 254, *range(270, 278)})
 """Cycles with a path of their own that move X, Y and Z only; others, on the shell of a cylinder, turn axes, too."""
 
-OLD_DRILLING = frozenset({1, 2, 17, 18})
+OLD = frozenset({1, 2, 17, 18}) | OLD_MILLING
+"""Cycles that count how deep they go from where they are called."""
 GAP_WORDS = frozenset({"SETUP", "AVST", "ABST", "DIST"})
 DEPTH_WORDS = frozenset({"DEPTH", "TIEFE"})
 ADJUSTING = frozenset({291, 800, 801, 880, *range(1000, 1100)})
@@ -126,7 +128,7 @@ def call(control: KlartextControl, step: Step) -> None:
     control.use()
     if cycle.number == CALLING:
         control.refuse_rest(CALLED)
-    if cycle.number not in DRILLING | MILLING | OLD_DRILLING:
+    if cycle.number not in DRILLING | MILLING | OLD:
         own_path(control, step)
         return
     control.use_start_positions(tuple(control.unknown))
@@ -135,7 +137,7 @@ def call(control: KlartextControl, step: Step) -> None:
     axes = polar_axes(control, step.words) if is_polar else step.words.axes
     height = where.inner[Z]
     bottom, clear, refusal = levels(control, height)
-    old, by_height = cycle.number in OLD_DRILLING, step.name == "cycl call pos"
+    old, by_height = cycle.number in OLD, step.name == "cycl call pos"
     if (old or by_height) and Z in where.unknown:
         refusal = refusal or where.unknown[Z].format("Z")
     if old and "IZ" in step.words.values:
@@ -152,7 +154,7 @@ def pattern(control: KlartextControl, places: tuple[HolePosition, ...] | None, n
     control.use()
     if control.cycle.number == 0:
         raise Fault(NO_CYCLE, "a pattern of holes, and no cycle is defined before")
-    if places is None or control.cycle.number not in DRILLING | MILLING:
+    if places is None or control.cycle.number not in (DRILLING | MILLING) - OLD:
         reason = PATTERN.format(name) if places is None else OWN_PATH.format(control.cycle.number)
         control.refuse_here(reason)
         return
@@ -174,7 +176,7 @@ def drill(control: KlartextControl, where: FramePosition, axes: int, heights: tu
         where.unknown.pop(Z, None)
     end = command_of(control, where, axes | 1 << Z)
     programmed = axes & ~(1 << Z)
-    code = FROM_START if control.cycle.number in OLD_DRILLING else BY_DEPTH
+    code = FROM_START if control.cycle.number in OLD else BY_DEPTH
     control.make(Motion(MotionKind.CYCLE, programmed, end, code, refusal=refusal))
     over.inner[Z] = clear
     over.unknown.pop(Z, None)
@@ -192,7 +194,7 @@ def drill(control: KlartextControl, where: FramePosition, axes: int, heights: tu
 def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
     """Bottom and clearance of the cycle in force along the tool axis of the frame, mm; and why they are not known."""
     cycle, unit = control.cycle, control.stretch
-    if cycle.number in OLD_DRILLING:
+    if cycle.number in OLD:
         depth, gap = value_of_any(cycle.steps, DEPTH_WORDS), value_of_any(cycle.steps, GAP_WORDS)
         if depth is None or gap is None or any(key.endswith(":?") for key in cycle.steps):
             return height, height, DEPTH_AT_RUN_TIME

@@ -15,7 +15,7 @@ from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Constant, Expression, Literal, Span, StringLiteral, Word
 from ncfix_heidenhain.klartext.contours import written_out
 from ncfix_heidenhain.klartext.control import HolePosition, KlartextControl
-from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING, ON_CIRCLE, ON_LINES, pattern_of_cycle
+from ncfix_heidenhain.klartext.cycles import DRILLING, MILLING, OLD, ON_CIRCLE, ON_LINES, pattern_of_cycle
 from ncfix_heidenhain.klartext.plans import KlartextPlan, compiled
 from ncfix_heidenhain.klartext.units import KlartextUnit
 
@@ -63,7 +63,7 @@ class KlartextFlattener(Flattener):
                 for place in control.cycle.places
             ]
             return [f"{texts[0]} {codes}".rstrip(), *texts[1:]]
-        if plan.name not in PATTERN_CYCLES or control.cycle.number not in DRILLING | MILLING:
+        if plan.name not in PATTERN_CYCLES or control.cycle.number not in (DRILLING | MILLING) - OLD:
             return []
         parameters = replace(control.scope.parameters, values=dict(control.scope.parameters.values))
         scope = replace(control.scope, parameters=parameters)

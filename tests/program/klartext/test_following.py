@@ -269,6 +269,21 @@ def test_holes_of_old_cycles_count_from_where_they_begin() -> None:
     assert ends(body)[1:] == [[1, 0, -7], [2, 0, -7]]
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "4.3 ZUSTLG3 F90\nCYCL DEF 4.4 X40\nCYCL DEF 4.5 Y20\nCYCL DEF 4.6 F150 DR- RADIUS 4",
+        "5.4 RADIUS 20\nCYCL DEF 5.5 DR+",
+    ],
+)
+def test_old_pockets_are_corrected_where_they_are_called(words: str) -> None:
+    number = words[0]
+    head = f"CYCL DEF {number}.0 P\nCYCL DEF {number}.1 ABST1\nCYCL DEF {number}.2 TIEFE-7\nCYCL DEF {words}"
+    moves = follow(f"{head}\nL X+5 Y+6 Z+1 FMAX\nCYCL CALL M3").moves
+    assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT]
+    assert moves.end[-1].tolist() == [5, 6, -7]
+
+
 def test_a_cycle_may_be_called_without_a_position() -> None:
     moves = follow("CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=10\nL X+1 Y+1 Z+20 FMAX\nCYCL CALL").moves
     assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT]
