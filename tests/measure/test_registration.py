@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from measure.poses import TARGETS, machine, plan
-from ncfix.machine import se3
+from ncfix.machine import Effect, loads, se3
 from ncfix.measure.calibrate import calibrate
 from ncfix.measure.instruments import Faults, observe, simulate
+from ncfix.measure.reader import reads
 
 PLACES = np.array([[0.0, 0.0, 0.0], [180.0, 30.0, -60.0], [-90.0, 165.0, 30.0]])
 
@@ -74,3 +75,57 @@ def test_targets_are_not_remarked_on_where_no_angle_acts_on_them():
     aim = replace(aim, headers=(("carried_by", "tool"), ("noise_um", "1")), labels=labels)
     found = calibrate([simulate(aim, clean, Faults(noise_um=1.0), seed=3)], clean, "EZZ")
     assert "NCF643" not in {message.code for message in found.remarks}
+
+
+ARM = """
+topology = "w F A B C D E G t"
+[axis.A]
+type = "rotary"
+direction = [0, 0, 1]
+range = [-160, 160]
+[axis.B]
+type = "rotary"
+direction = [0, 1, 0]
+point = [80, 0, 350]
+range = [-100, 100]
+[axis.C]
+type = "rotary"
+direction = [0, 1, 0]
+point = [80, 0, 700]
+range = [-100, 70]
+[axis.D]
+type = "rotary"
+direction = [1, 0, 0]
+point = [80, 0, 780]
+range = [-180, 180]
+[axis.E]
+type = "rotary"
+direction = [0, 1, 0]
+point = [460, 0, 780]
+range = [-115, 115]
+[axis.G]
+type = "rotary"
+direction = [1, 0, 0]
+point = [460, 0, 780]
+range = [-180, 180]
+[tool]
+direction = [1, 0, 0]
+point = [660, 1, 780.5]
+"""
+
+
+@pytest.mark.parametrize("noise", ["", "# noise_um: 200\n"])
+def test_an_arm_whose_target_is_nearly_on_its_last_axis_is_calibrated(noise):
+    """An offset of that axis and its tilt are seen apart by a millimetre's lever only, and would come out as metres."""
+    arm = loads(ARM)
+    random = np.random.default_rng(3)
+    low, high = (np.rad2deg([axis.range[k] for axis in arm.axes]) * 0.6 for k in (0, 1))
+    rows = (",".join(f"{each:.4f}" for each in pose) for pose in random.uniform(low, high, (40, 6)))
+    head = f"# ncfix-measurement: 1\n# kind: points\n# carried_by: tool\n{noise}A,B,C,D,E,G,target\n"
+    poses = reads("".join([head, *(f"{row},P\n" for row in rows)]).encode(), arm, plan=True)
+    sizes = {"EX0B": 1.5, "EZ0C": -1.2, "EB0D": 4e-3, "EX0E": 0.8, "EA0B": -1e-3, "EB0E": 2e-3}
+    real = arm.replace(effects=tuple(Effect(name, (size,)) for name, size in sizes.items()))
+    found = calibrate([simulate(poses, real, Faults(noise_um=200.0), seed=2)], arm, "E?0?")
+    assert found.before_um > 3 * found.after_um
+    assert found.after_um == pytest.approx(200.0, rel=0.25)  # 120 values, 25 unknowns: 10 % by chance, 11 % by the fit
+    assert np.nanmax(np.abs(found.estimate.coefficients)) < 20.0  # mm; all are known to a few

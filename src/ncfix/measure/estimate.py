@@ -18,7 +18,7 @@ from scipy.special import chdtrc
 from ncfix.diagnostics import Message, Place, UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.error_model import signals_of
-from ncfix.machine.plausible import functions, much
+from ncfix.machine.plausible import METRE, functions, much, reach
 from ncfix.machine.state import inputs_of
 from ncfix.measure import least_squares
 from ncfix.measure.instruments import observe
@@ -45,6 +45,9 @@ HOPELESS = 240.0
 """A coefficient whose standard deviation is so many times what is much is held. What is held leads the others astray by
 what it really is, so this is beyond what can be told together (Esmaeili 2021, 84 errors by 109 probings: 200 times),
 and before single ones come out as centimetres, since only their sum is seen."""
+WIDE = 0.05
+"""rad, and the same times the reach of the machine (of a metre at least): what is known to no better than this is held
+whatever is much, as on an arm, since steps by equations that are linear in it would not end."""
 
 
 @dataclass(frozen=True)
@@ -141,11 +144,15 @@ class Problem:
 
     @cached_property
     def limits(self) -> Array:
-        """`HOPELESS` times what is much for each coefficient, (p,), mm or rad: who knows no better knows nothing."""
-        parts = [np.zeros(0)]
+        """`HOPELESS` times what is much for each coefficient, (p,), mm or rad: who knows no better knows nothing.
+
+        No more than `WIDE`.
+        """
+        parts, far = [np.zeros(0)], WIDE * max(reach(self.machine), METRE)
         for effect in self.selection.estimated:
             largest = np.abs(functions(self.machine, effect)).max(axis=1)
-            parts.append(HOPELESS * much(self.machine, effect.name) / np.maximum(largest, TINY))
+            most = min(HOPELESS * much(self.machine, effect.name), WIDE if effect.name[1] in "ABC" else far)
+            parts.append(most / np.maximum(largest, TINY))
         return np.concatenate(parts)
 
     @cached_property
@@ -255,12 +262,18 @@ def fit(problem: Problem, loss: str = least_squares.AUTO) -> Estimate:
     Raises `UsageError` NCF630 and NCF637.
     """
     _enough(problem)
-    ones = np.ones(len(problem.values))
-    estimate = _iterate(problem, ones, loss)
+    ones, first = np.ones(len(problem.values)), 1.0
+    try:
+        estimate = _iterate(problem, ones, loss)
+    except UsageError:
+        if problem.noise_known:
+            raise
+        first = _first_scale(problem)
+        estimate = _iterate(problem, ones, loss, first)
     if loss == least_squares.AUTO:
         outlying = least_squares.outliers(estimate.solution) & ~problem.stated
         if outlying.any():
-            estimate = _iterate(problem, np.where(outlying, 0.0, ones), loss)
+            estimate = _iterate(problem, np.where(outlying, 0.0, ones), loss, first)
     scale = noise_scale(problem, estimate) or 1.0
     unknown = np.sqrt(np.diag(estimate.solution.covariance)) * scale > problem.limits[estimate.solution.kept]
     if unknown.any() or (scale < 1 and (estimate.solution.weak or estimate.solution.combinations)):
@@ -277,6 +290,14 @@ def _enough(problem: Problem) -> None:
     if m <= p + k:
         text = f"{m} values for {p} coefficients and {k} unknowns of the set-up"
         raise UsageError.of("NCF630", text, hint="measure more poses, or estimate fewer effects: --effects")
+
+
+def _first_scale(problem: Problem) -> float:
+    """How many times larger than it is taken to be an unknown noise is, by what the first linear step leaves."""
+    design, nuisance = np.split(problem.columns, [problem.design.shape[1]], axis=1)
+    target = problem.residual(problem.selection.start, problem.start) / problem.sigma
+    solution = solve(design, nuisance, target, problem.limits, problem.fleeting)
+    return float(np.linalg.norm(solution.residual) / np.sqrt(max(len(target) - solution.rank, 1)))
 
 
 def _iterate(problem: Problem, weight: Array, loss: str, scale: float = 1.0) -> Estimate:
