@@ -157,6 +157,24 @@ def test_a_unit_of_one_of_several_files(kind: str, repeated: bool, known: Machin
             assert undone.columns[name] == pytest.approx(values, rel=1e-12)
 
 
+READINGS = {"gauge": ("length",), "bar": ("length",), "tool": ("x", "y", "z"), "probe": ("mx", "my", "mz")}
+
+
+@pytest.mark.parametrize("beside", [0, 2])
+@pytest.mark.parametrize("factor", [1e3, 1e-3, 1 / 25.4])
+@pytest.mark.parametrize("kind", list(READINGS))
+def test_a_unit_of_readings(kind: str, factor: float, beside: int, known: Machine) -> None:
+    """Lengths, targets and positions of a probe are no deviations: in another unit they are off by metres."""
+    files = [simulate(plan(known, kind, 80, k), known, Faults(2.0), k) for k in range(3, 4 + beside)]
+    files = [replace(each, path=f"part{k}.csv") for k, each in enumerate(files)]
+    wrong = find([columns(files[0], factor, *READINGS[kind]), *files[1:]], known)
+    assert wrong is not None
+    assert wrong.sure
+    assert ("part0.csv" in wrong.title) == bool(beside)
+    for name in READINGS[kind]:
+        assert wrong.measurements[0].columns[name] == pytest.approx(files[0].columns[name], rel=1e-12)
+
+
 def test_a_sign_of_values_that_constants_could_explain_as_well(data: Measurement, known: Machine) -> None:
     """Six constants that all changed their signs over night explain it; one mistake is likelier."""
     constants = known.replace(effects=tuple(e for e in known.effects if is_free(e)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -26,10 +27,12 @@ from ncfix.diagnosis.evidence import (
 from ncfix.diagnosis.forms import unnamed_alternatives
 from ncfix.diagnosis.noise import estimated_background, everything_covariance
 from ncfix.diagnosis.residual_data import residual_data
-from ncfix.diagnosis.selection import likeliest, select, with_alternatives
+from ncfix.diagnosis.selection import TOLD_APART, Selected, likeliest, select, untold, with_alternatives
+from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Array
 
 DRAWS = 150
+LINE = re.compile("E[ABC]0[XYZ]")
 SIZE_UM = 10.0
 
 
@@ -95,6 +98,19 @@ def test_a_name_pays_for_what_it_was_chosen_from(world: World, evidence: Evidenc
     first = scale.evidence.alternatives[0]
     assert scale.price(first) > UNNAMED
     assert scale.free == ()
+
+
+def test_what_only_comes_with_an_effect_stands_in_no_names_place(five: World) -> None:
+    """The middle of a play may lie off the zero, which shows as a squareness does: without play it is none."""
+    bare = five.machine.replace(effects=())
+    world = replace(five, machine=bare, plain=simulate(five.plain, bare, Faults(0.0), 1))
+    lacking = {group.owner.name: group for group in world.visible.groups if LINE.fullmatch(group.owner.name)}
+    assert lacking
+    for name, group in lacking.items():
+        evidence = evidence_of(world, SIZE_UM * group.columns[:, 0])
+        chosen = Selected({name: Member(evidence.forms[name][0], 12.0)}, {name: 100.0}, {name: {}})
+        plays = [each for each in evidence.names if each.startswith("angular play")]
+        assert min(untold(Comparison(evidence), chosen, name, play) for play in plays) > TOLD_APART
 
 
 def test_members_that_are_free_are_no_names(evidence: Evidence) -> None:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, eigh, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
-from ncfix.diagnosis.evidence import MISSHAPEN, Background, entry_price, in_noise, log_odds, marginal
+from ncfix.diagnosis.evidence import MISSHAPEN, TOGETHER, Background, entry_price, in_noise, log_odds, marginal
 from ncfix.diagnosis.forms import (
     EffectForm,
     shape_variations,
@@ -251,29 +251,34 @@ def _beside_names(
     """
     forms = Counter(group.owner.name for group in named)
     prices = np.log([len(forms) * forms[group.owner.name] * len(sizes) for group in courses])
-    ends = np.cumsum([1, *(group.columns.shape[1] for group in courses)])
+    ends = np.cumsum([0, *(group.columns.shape[1] for group in courses)])
     gained, shown = 0.0, 0.0
     for count in range(1, MOST_COURSES + 1 if courses else 1):
-        odds = _odds(white, ends, freedom, sizes) - prices[:, None]
+        y, columns = white[:, 0], white[:, 1:]
+        odds = _odds(columns, columns, y, float(y @ y) + freedom, len(y) + freedom, ends, sizes) - prices[:, None]
         best, large = (int(k) for k in np.unravel_index(int(odds.argmax()), odds.shape))
         helped = float(odds[best, large]) - entry_price(count) + entry_price(count - 1)
         if helped <= 0:
             break
         gained, shown = gained + helped, max(shown, sizes[large])
-        white = _beside(white, sizes[large] * white[:, ends[best] : ends[best + 1]])
+        white = _beside(white, sizes[large] * columns[:, ends[best] : ends[best + 1]])
     return gained, shown
 
 
-def _odds(white: Array, ends: Array, freedom: float, sizes: Sequence[float]) -> Array:
-    """The log odds of every form in every size, (forms, sizes); data and columns are white, (n, 1 + p)."""
-    y, widths = white[:, 0], np.diff(ends)
+def _odds(
+    columns: Array, weighed: Array, y: Array, total: float, count: float, ends: Array, sizes: Sequence[float]
+) -> Array:
+    """The log odds of every form in every size, (forms, sizes), for values y (n,) of `total` squares.
+
+    columns  (n, p) of the forms, one beside the other, which begin and end at `ends`; weighed: the same times the
+             inverse of the covariance
+    """
+    widths = np.diff(ends)
     found = np.empty((len(widths), len(sizes)))
-    total, count = float(y @ y) + freedom, len(y) + freedom
     for width in np.unique(widths):
         alike = np.flatnonzero(widths == width)
-        stack = np.stack([white[:, ends[k] : ends[k + 1]] for k in alike])
-        turned = np.swapaxes(stack, 1, 2)
-        found[alike] = log_odds(turned @ stack, turned @ y, total, count, sizes)
+        own, other = (np.stack([each[:, ends[k] : ends[k + 1]].T for k in alike]) for each in (columns, weighed))
+        found[alike] = log_odds(own @ np.swapaxes(other, 1, 2), other @ y, total, count, sizes)
     return found
 
 
@@ -341,12 +346,14 @@ def _likeliest_effect(data: ResidualData, there: Array, wide: Array, groups: Seq
     precision, y = _precision(data, np.diag(wide**2) + there), data.y / data.relative
     total, count = float(y @ precision @ y), float(len(y) - data.base.shape[1])
     best, found = LIKELY, None
-    for group in groups:
-        columns = LARGE * group.columns / data.relative[:, None]
-        solved = precision @ columns
-        odds = log_odds(columns.T @ solved, solved.T @ y, total, count, data.sizes)
-        if odds.max() > best:
-            best, found = float(odds.max()), data.sizes[int(odds.argmax())] * columns
+    for start in range(0, len(groups), TOGETHER):
+        some = groups[start : start + TOGETHER]
+        columns = LARGE * side_by_side(group.columns for group in some) / data.relative[:, None]
+        ends = np.cumsum([0, *(group.columns.shape[1] for group in some)])
+        odds = _odds(columns, precision @ columns, y, total, count, ends, data.sizes)
+        form, size = (int(k) for k in np.unravel_index(int(odds.argmax()), odds.shape))
+        if odds[form, size] > best:
+            best, found = float(odds[form, size]), data.sizes[size] * columns[:, ends[form] : ends[form + 1]]
     if found is None:
         return None
     solved = precision @ found

@@ -6,6 +6,7 @@ A diagnosis as a JSON object, and its machine with provenance.
 from __future__ import annotations
 
 import datetime
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from ncfix.diagnosis.assessment import carriers, conditions
 from ncfix.diagnosis.compound import EffectFinding
 from ncfix.diagnosis.constants import MovedConstant, names_of
-from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis
+from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, LACKING, NOTHING, UNKNOWN, Diagnosis
 from ncfix.diagnosis.ladder import in_words, ladder
 from ncfix.diagnosis.next_poses import Proposal, as_objects
 from ncfix.diagnosis.selection import findable_in_words, shows_hardly_anything
@@ -34,6 +35,7 @@ SAID = {
     AMBIGUOUS: "the model lacks something, and these data leave more than one name for it",
     UNKNOWN: "the model lacks something that is not in the catalogue",
 }
+MISTAKEN = "a mistake of software or set-up explains the data"
 CHANGED = {
     NOTHING: "nothing changed that stands out of the noise",
     FOUND: "something changed that has a name",
@@ -57,7 +59,7 @@ def text(diagnosis: Diagnosis) -> str:
         f"gap: {gap.before:.2f} um before, {gap.after:.2f} um after, noise {gap.floor:.2f} um "
         f"({NOISE[diagnosis.floor.source]}); held out: {gap.holdout_before:.2f} -> {gap.holdout_after:.2f} um",
     ]
-    lines += ["", *_table(diagnosis)]
+    lines += ["", *_table(diagnosis), *noise(diagnosis)]
     if diagnosis.steady:
         lines += ["", f"there before, and unchanged: {', '.join(diagnosis.steady)}"]
     for finding in diagnosis.findings:
@@ -74,14 +76,16 @@ def text(diagnosis: Diagnosis) -> str:
             *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in diagnosis.patterns),
         ]
     if diagnosis.moved:
-        lines += ["", "constants of the machine file that the data put elsewhere (the gap before is after that):"]
+        lines += ["", "constants of the machine file that the data put elsewhere (the gap before has them there):"]
         lines += [f"  {constant(each)}" for each in diagnosis.moved]
         lines += [f"  {each}" for each in held(diagnosis)]
     if diagnosis.verdict == NOTHING:
         lines += ["", *silence(diagnosis)]
     lines += _next(diagnosis)
-    if diagnosis.case.outlying.any():
-        lines += ["", f"{int(diagnosis.case.outlying.sum())} rows put aside as outliers (--json lists them)"]
+    aside = int(diagnosis.case.outlying.sum())
+    if aside:
+        said = "1 row put aside as an outlier (--json lists it)"
+        lines += ["", said if aside == 1 else f"{aside} rows put aside as outliers (--json lists them)"]
     return "\n".join(lines) + "\n"
 
 
@@ -102,7 +106,23 @@ def verdict(diagnosis: Diagnosis) -> str:
         return CHANGED[diagnosis.verdict]
     if diagnosis.verdict == NOTHING and diagnosis.rest.lacking:
         return f"more than noise is left (p = {diagnosis.p_left:.1g}), but no more than the little that machines have"
-    return SAID[diagnosis.verdict]
+    if diagnosis.mistake is None:
+        return SAID[diagnosis.verdict]
+    return (
+        MISTAKEN
+        if len(diagnosis.findings) == 1
+        else f"{MISTAKEN} in part; once it is undone, {SAID[diagnosis.verdict]}"
+    )
+
+
+def noise(diagnosis: Diagnosis) -> list[str]:
+    """Why what is left counts as noise, though it is not quite the noise of the instrument."""
+    p = diagnosis.p_left
+    return (
+        []
+        if p is None or p < LACKING
+        else [f"what is left counts as noise: noise alone would leave as much with p = {p:.2g}"]
+    )
 
 
 def held(diagnosis: Diagnosis) -> list[str]:
@@ -134,9 +154,11 @@ def constants(finding: EffectFinding) -> str:
     if judged is None:
         return ""
     units = ("um", "urad")
-    usual = [f"{bound:g} {unit}" for bound, unit in zip(judged.bounds or (), units, strict=False) if bound]
+    there = [size >= SHOWN for size in judged.largest]
+    bounds = zip(judged.bounds or (0.0, 0.0), units, there, strict=True)
+    usual = [f"{bound:g} {unit}" for bound, unit, shown in bounds if bound and shown]
     limit = f" (machines have up to {', '.join(usual)})" if usual else ""
-    reached = [f"{size:.1f} {unit}" for size, unit in zip(judged.largest, units, strict=True) if size >= SHOWN]
+    reached = [f"{size:.1f} {unit}" for size, unit in compress(zip(judged.largest, units, strict=True), there)]
     return f"the joint's own error reaches {' and '.join(reached)} where it was measured{limit}" if reached else ""
 
 
@@ -154,7 +176,7 @@ def carried(diagnosis: Diagnosis, finding: EffectFinding) -> str:
     machine = diagnosis.data.machine
     named = ", ".join(carriers(machine, finding.effects))
     given = ", ".join(conditions(machine, finding.effects))
-    return f"can be carried by {named}" + (f", with {given} stated" if given else "") if named else ""
+    return f"can be corrected by {named}" + (f", with {given} stated" if given else "") if named else ""
 
 
 def rest(diagnosis: Diagnosis) -> str:
@@ -216,15 +238,13 @@ def hopeless(proposal: Proposal) -> str:
 def why(diagnosis: Diagnosis, finding: EffectFinding) -> str:
     """One sentence on why this name."""
     name = finding.candidate.name
-    chance = f"p = {finding.p_value:.1g}" if finding.p_value > LEAST_P else f"p < {LEAST_P:g}"
+    chance = f"p at most {max(finding.p_value, LEAST_P):.1g}"
     said = f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} ({chance})"
     runners_up = diagnosis.selected.runners_up.get(name, {})
     if not runners_up:
         return said
     best = max(runners_up, key=lambda each: runners_up[each])
-    less = finding.odds - runners_up[best]
-    beside = f"{abs(less):.0f} {'less' if less >= 0 else 'more'}"
-    return f"{said}; next best of {diagnosis.case.considered}: {best}, {beside}"
+    return f"{said}; next best of {diagnosis.case.considered} effects: {best}, log odds {runners_up[best]:.0f}"
 
 
 def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:

@@ -147,8 +147,9 @@ class ResidualData:
         free = np.concatenate([self.base, *of], axis=1) / self.relative[:, None]
         size = np.linalg.norm(free, axis=0)
         size = np.where(size > 0, size, 1.0)
-        shares = np.linalg.lstsq(free / size, columns / self.relative[:, None], rcond=UNTELLABLE)[0] / size[:, None]
-        return shares[self.base.shape[1] :]
+        inverse = np.linalg.pinv(free / size, rcond=UNTELLABLE)[self.base.shape[1] :] / self.relative
+        shares: Array = (inverse @ columns) / size[self.base.shape[1] :, None]
+        return shares
 
     @cached_property
     def q(self) -> Array:

@@ -63,7 +63,7 @@ def untold(scale: Comparison, selected: Selected, name: str, other: str) -> floa
 def _untold(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> float:
     share, largest = evidence.share(members), evidence.background.data.sizes[-1]
     shown = _white(evidence, own.group, share) @ evidence.numbers(members, share)[list(members).index(own)]
-    return min(_unexplained(shown, largest * _white(evidence, form, share)) for form in evidence.forms[other])
+    return min(_unexplained(shown, largest * _leading(evidence, form, share)) for form in evidence.forms[other])
 
 
 def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> bool:
@@ -77,6 +77,18 @@ def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: 
 def _white(evidence: Evidence, group: int, share: float) -> Array:
     """The columns of a form in units of noise and background, (n, p)."""
     return evidence.columns[:, evidence.part(group)] / np.sqrt(evidence.background.variance(share))[:, None]
+
+
+def _leading(evidence: Evidence, group: int, share: float) -> Array:
+    """The same of the effect itself: what only comes with it, as a constant with a play, stands in no name's place."""
+    form, background = evidence.groups[group], evidence.background
+    effects = form.owner.effects[: form.owner.lead]
+    if not effects:
+        return _white(evidence, group, share)
+    own = form.loading[: sum(effect.basis.size for effect in effects)]
+    there = (form.columns != 0).any(axis=1)  # of two dates those of the later one only
+    columns = np.where(there[:, None], background.data.design(effects) @ own, 0.0)
+    return background.seen(columns) / np.sqrt(background.variance(share))[:, None]
 
 
 def _unexplained(shown: Array, sized: Array) -> float:

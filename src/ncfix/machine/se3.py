@@ -17,13 +17,13 @@ _SERIES_BELOW = 0.02
 
 def rotation_factors(squared: Array) -> tuple[Array, Array]:
     """The factors of Rodrigues' formula for squared angles: sin a / a and (1 - cos a) / a^2."""
-    x = squared
+    x = np.minimum(squared, _SERIES_BELOW)
     first = 1 - x / 6 * (1 - x / 20 * (1 - x / 42 * (1 - x / 72)))
     second = 0.5 - x / 24 * (1 - x / 30 * (1 - x / 56 * (1 - x / 90)))
-    if x.size == 0 or x.max() < _SERIES_BELOW:
+    small = squared < _SERIES_BELOW
+    if small.all():
         return first, second
-    angle = np.sqrt(np.maximum(x, _SERIES_BELOW))
-    small = x < _SERIES_BELOW
+    angle = np.sqrt(np.maximum(squared, _SERIES_BELOW))
     return np.where(small, first, np.sin(angle) / angle), np.where(small, second, 2 * (np.sin(angle / 2) / angle) ** 2)
 
 

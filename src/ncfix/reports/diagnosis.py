@@ -115,7 +115,7 @@ def _p(value: float) -> str:
 def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
     """What the file says otherwise of where axes lie, and of gains."""
     if diagnosis.moved:
-        yield Paragraph("Constants of the machine file that the data put elsewhere (the gap before is after that):")
+        yield Paragraph("Constants of the machine file that the data put elsewhere (the gap before has them there):")
         yield Table((), [(constant(each),) for each in diagnosis.moved])
         yield from (Paragraph(f"{each[0].upper()}{each[1:]}.") for each in held(diagnosis))
 

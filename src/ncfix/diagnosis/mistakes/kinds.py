@@ -251,13 +251,22 @@ def points_of_axes(measurements: tuple[Measurement, ...], machine: Machine, now:
     return [each for each in moved if each is not None]
 
 
+def looking_like_constants(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
+    """Those of them that constants which moved explain as well: readings of a probe that shrink are all near a ball."""
+    yield from points_of_axes(measurements, machine, now)
+    if any(each.kind == "probe" for each in measurements):
+        yield from units(measurements, machine)
+
+
 def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
     """Mistakes of positions, tools and axes, whose effect is not of first order."""
     yield from points_of_axes(measurements, machine, now)
+    if any(each.kind not in DEVIATIONS for each in measurements):
+        yield from units_of_values(measurements, machine)
+    yield from units_of_one_file(measurements, machine)
     if any("radius" in each.columns for each in measurements):
         return  # circles: the bar's length says where the axes were
     yield from units(measurements, machine)
-    yield from units_of_one_file(measurements, machine)
     yield from _exchanged_axes(measurements, machine)
     for axis in machine.axes:
         if axis.rotary:

@@ -17,8 +17,8 @@ from ncfix.diagnosis.evidence import SURE
 from ncfix.diagnosis.mistakes.kinds import (
     PIVOT,
     at_first_sight,
+    looking_like_constants,
     not_of_first_order,
-    points_of_axes,
 )
 from ncfix.diagnosis.mistakes.mistake import Mistake
 from ncfix.diagnosis.mistakes.units import looks_typed
@@ -65,8 +65,8 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     left, typed = now.left(), any(looks_typed(effect) for effect in machine.effects)
     far, names = left >= SUSPECT * now.noise or typed, {plain(name) for name in refused}
     standing = now.left(AS_IT_STANDS_UM)
-    moved = standing >= SUSPECT * max(left, now.noise)  # constants that moved explain the data: or points of axes
-    kinds = not_of_first_order if far else points_of_axes
+    moved = standing >= SUSPECT * max(left, now.noise)  # constants, or points of axes, or units
+    kinds = not_of_first_order if far else looking_like_constants
     deep = [each for each in kinds(measurements, machine, now) if plain(each.name) not in names] if far or moved else []
     tried = _judged(measurements, machine, now, TIGHT_UM, deep, names)
     found = max(tried, key=lambda each: each.odds, default=None)

@@ -17,15 +17,19 @@ TURN_RAD = 6.6
 INCH = 25.4
 LENGTHS, DEVIATIONS = ("dx", "dy", "dz", "value"), ("tcp", "tcp6", "axis")
 """Columns of measured deviations in mm, and the kinds of files that have them."""
+READINGS = ("x", "y", "z", "length")
+"""Columns in mm of what is no deviation: where targets are, and how long a gauge is. Those of probes are positions."""
 
 
 def units_of_values(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Deviations in another unit than mm."""
+    """Measured values in another unit than mm."""
+    names = (*LENGTHS, *READINGS)
     values = sum(len(each) * len(each.measured) for each in measurements)
-    share = sum(len(each) * sum(name in LENGTHS for name in each.measured) for each in measurements) / max(values, 1)
-    for unit, factor in (("um", 1e-3), ("m", 1e3), ("inch", INCH)):
+    in_mm = sum(len(each) * sum(name in names for name in each.measured) for each in measurements)
+    share = in_mm / max(values, 1)
+    for unit, factor in (("um", 1e-3), ("m", 1e3), ("inch", INCH)) if in_mm else ():
         title = f"unit of values: the measured values are in {unit}, not in mm"
-        columns = {name: (name, factor) for name in LENGTHS}
+        columns = {name: (name, factor) for name in names}
         yield undone_by_columns("unit of values", title, machine, measurements, columns, factor**share)
 
 
@@ -40,9 +44,7 @@ def units_of_one_file(measurements: tuple[Measurement, ...], machine: Machine) -
     """The same mistakes of units in one of several files."""
     values = [len(each) * len(each.measured) for each in measurements]
     for k, each in enumerate(measurements) if len(measurements) > 1 else ():
-        offered = [*units((each,), machine)]
-        if each.kind in DEVIATIONS:
-            offered += units_of_values((each,), machine)
+        offered = [*units((each,), machine), *units_of_values((each,), machine)]
         if each.column("tool_length").any():
             offered += units_of_tools((each,), machine)
         for wrong in offered:
