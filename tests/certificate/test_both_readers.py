@@ -5,6 +5,7 @@ A disagreement is a fault of one of them, and looks like a fault of the program.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import pytest
@@ -15,6 +16,7 @@ from ncfix.cli.shop.certificates import given_of
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.control.setup import Setup, Tool
+from ncfix.machine import Machine
 from ncfix.text.dialect import get
 from ncfix.text.reader import read
 
@@ -78,3 +80,42 @@ def test_both_readers_follow_alike(case: Shop) -> None:
     proof = prove(text, fixed, known, given_of(setup, dialect), case.dialect)
     assert not proof.faults
     assert proof.proved_motions >= case.proved
+
+
+PLAIN = "G21 G90 G17 G54\nG0 X10 Y20 Z30\nG1 X50 Y60 F500\nG93\nG1 X90 F2.\nM2\n"
+
+
+def corrected() -> tuple[bytes, Machine]:
+    """`PLAIN` for a machine whose corrections lead X a little below 10 mm."""
+    known = machine("three")
+    fixed = fix_program(read(PLAIN.encode(), "part", get("linuxcnc")), known, Setup(assume_zero=True), FixOptions())
+    return fixed.text, known
+
+
+def faults_of(text: bytes, known: Machine) -> list[str]:
+    """What the second reader says of a correction of `PLAIN`."""
+    given = given_of(Setup(assume_zero=True), get("linuxcnc"))
+    return [fault.text for fault in prove(PLAIN.encode(), text, known, given, "linuxcnc").faults]
+
+
+def test_corrections_within_the_limits_of_the_machine() -> None:
+    text, known = corrected()
+    small = known.replace(max_correction=(0.001, 1.0))
+    short = known.replace(
+        axes=tuple(replace(axis, range=(10.0, 1000.0)) if axis.name == "X" else axis for axis in known.axes)
+    )
+    assert not faults_of(text, known)
+    assert "a correction is larger than the machine file allows" in faults_of(text, small)
+    assert "the corrected motion leaves the travel of an axis" in faults_of(text, short)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        (b"F500", b"F501", "words that are no axes have changed"),
+        (b"F2.", b"F2.1", "the pieces take another time than the block"),
+    ],
+)
+def test_feeds_are_those_of_the_original(old: bytes, new: bytes, fault: str) -> None:
+    text, known = corrected()
+    assert faults_of(text.replace(old, new), known) == [fault]
