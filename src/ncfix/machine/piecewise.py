@@ -56,8 +56,7 @@ def share_of(way: str, direction: Array) -> Array | float:
     """How much of what acts `way` there is for directions of motion (-1, 0, 1); half where they are not known."""
     if way == BOTH:
         return 1.0
-    share: Array = 0.5 * (1 + (1.0 if way == POSITIVE else -1.0) * direction)
-    return share
+    return 0.5 * (1 + (1.0 if way == POSITIVE else -1.0) * direction)
 
 
 def no_way(way: str) -> list[tuple[str, str]]:

@@ -135,8 +135,7 @@ def _lacking(problem: Problem, estimate: Estimate) -> Array:
     sizes = [much(machine, each.name) / np.abs(functions(machine, each)).max(axis=1) for each in others]
     held = np.setdiff1d(np.arange(problem.design.shape[1]), estimate.solution.kept)
     parts = [np.concatenate([each.design(others) for each in problem.observations]), problem.design[:, held]]
-    errors: Array = np.concatenate(parts, axis=1) * np.concatenate([*sizes, problem.limits[held] / HOPELESS])
-    return errors
+    return np.concatenate(parts, axis=1) * np.concatenate([*sizes, problem.limits[held] / HOPELESS])
 
 
 def _outlying(problem: Problem, estimate: Estimate) -> Iterator[Message]:

@@ -103,8 +103,7 @@ class DirectReading(Observation):
         """See `Observation`; the errors of one joint act linearly."""
         effects = [effect for effect in machine.effects if effect.active]
         coefficients = np.concatenate([np.zeros(0), *(effect.coefficients for effect in effects)])
-        read: Array = self.design(effects) @ coefficients + self.unknown_design(unknowns) @ unknowns
-        return read
+        return self.design(effects) @ coefficients + self.unknown_design(unknowns) @ unknowns
 
     def design(self, effects: Sequence[Effect]) -> Array:
         """See `Observation`."""
@@ -157,8 +156,7 @@ class DirectReading(Observation):
         arm = np.broadcast_to(np.asarray(self.point) - np.asarray(reference), (len(position), 3))
         if axis.rotary and not axis.moving_frame:
             arm = np.einsum("nij,nj->ni", axis.motion(position)[:, :3, :3], arm)
-        shifted: Array = (motion[:3] + np.cross(motion[3:], arm)) @ along
-        return shifted
+        return (motion[:3] + np.cross(motion[3:], arm)) @ along
 
 
 # -- figures of ISO 230-2 and 230-3 ------------------------------------------------------------------------------------

@@ -248,8 +248,7 @@ class Calibration:
         """
         left_out = self.estimate.left_out
         covariance = np.nan_to_num(self.covariance) if left_out is None else left_out.covariance * self.scale**2
-        deviation: Array = np.sqrt(np.einsum("...i,ij,...j->...", design, covariance, design))
-        return deviation
+        return np.sqrt(np.einsum("...i,ij,...j->...", design, covariance, design))
 
 
 def _followed(machine: Machine, effect: Effect) -> frozenset[str]:

@@ -99,8 +99,7 @@ class Solution:
     @property
     def leverage(self) -> Array:
         """How much each value determines its own prediction, (m,)."""
-        squares: Array = (self.orthogonal**2).sum(1) + (self.nuisance**2).sum(1)
-        return squares
+        return (self.orthogonal**2).sum(1) + (self.nuisance**2).sum(1)
 
     @property
     def rank(self) -> int:
@@ -127,8 +126,7 @@ def inverse(matrix: Array) -> Array:
     if failed:
         raise np.linalg.LinAlgError("not positive definite")
     half = dpotri(factor, lower=1, overwrite_c=1)[0]
-    whole: Array = np.tril(half) + np.tril(half, -1).T
-    return whole
+    return np.tril(half) + np.tril(half, -1).T
 
 
 def without(basis: Array, columns: Array) -> Array:

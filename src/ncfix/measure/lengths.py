@@ -79,8 +79,7 @@ class Gauge(Length):
         """See `Observation`."""
         first, last = (machine.actual_tip(q, self.state) for q in self.ends)
         distance: Array = np.linalg.norm(last - first, axis=1)
-        read: Array = self.nominal + distance - self.commanded + self._constant_design() @ unknowns
-        return read
+        return self.nominal + distance - self.commanded + self._constant_design() @ unknowns
 
     def design(self, effects: Sequence[Effect]) -> Array:
         """See `Observation`: the difference of the errors of both ends along the way (Soons, Eq. 4.5)."""
@@ -118,8 +117,7 @@ class BallBar(Length):
             size = 3 * len(self.set_names)
             arm = arm - unknowns[:size].reshape(-1, 3)[self.set_index]
             constant = self._constant_design() @ unknowns[size:]
-        read: Array = self.radius + np.linalg.norm(arm, axis=1) - self.commanded + constant
-        return read
+        return self.radius + np.linalg.norm(arm, axis=1) - self.commanded + constant
 
     def design(self, effects: Sequence[Effect]) -> Array:
         """See `Observation`."""
@@ -211,8 +209,7 @@ def _normal(way: Array) -> Array | None:
         return None
     normal: Array = axes[2]
     leading = next(k for k in (2, 1, 0) if abs(normal[k]) > 1e-6)
-    upward: Array = normal * np.sign(normal[leading])
-    return upward
+    return normal * np.sign(normal[leading])
 
 
 def _in_plane(normal: Array) -> Array:

@@ -271,5 +271,4 @@ def best_rotation(moved: Array, fixed: Array) -> Array:
     """The rotation R that takes vectors `fixed` nearest to `moved` (both (n, 3)), after Kabsch."""
     left, _, right = np.linalg.svd(moved.T @ fixed)
     sign = np.sign(np.linalg.det(left @ right))
-    rotation: Array = left @ np.diag([1.0, 1.0, sign]) @ right
-    return rotation
+    return left @ np.diag([1.0, 1.0, sign]) @ right

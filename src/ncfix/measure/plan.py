@@ -198,8 +198,7 @@ def _full_rank(nuisance: Array) -> Array:
     if not scaled.shape[1]:
         return scaled
     _, values, right = np.linalg.svd(scaled, full_matrices=False)
-    combined: Array = scaled @ right[values > NUISANCE_RANK * values[0]].T
-    return combined
+    return scaled @ right[values > NUISANCE_RANK * values[0]].T
 
 
 def _targets(
@@ -379,8 +378,7 @@ def _left(blocks: Array, white: Array, projected: Array, present: Array) -> Arra
     n, r, p = blocks.shape
     cross = white @ (blocks.reshape(n * r, p) @ projected).reshape(n, r, -1)
     gain = np.square(cross, out=cross).sum(axis=1)
-    result: Array = (present - gain).max(axis=1)
-    return result
+    return (present - gain).max(axis=1)
 
 
 def _whitening(small: Array) -> Array:
@@ -403,8 +401,7 @@ def information(pool: Pool, rows: Sequence[int]) -> Array:
 def variances(pool: Pool, rows: Sequence[int]) -> Array:
     """The variance of each target if these blocks are measured, (t,)."""
     inverse = np.linalg.inv(information(pool, rows))
-    variance: Array = np.einsum("tp,pq,tq->t", pool.targets, inverse, pool.targets, optimize=True)
-    return variance
+    return np.einsum("tp,pq,tq->t", pool.targets, inverse, pool.targets, optimize=True)
 
 
 # -- program -----------------------------------------------------------------------------------------------------------

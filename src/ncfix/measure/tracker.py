@@ -169,8 +169,7 @@ class Targets(Observation):
             points = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places) + self.poses[:, :3, 3]
             base = error[:, :3] + np.einsum("nij,njk->nik", -se3.skew(points - at), error[:, 3:])
         seen = np.einsum("nij,njk->nik", self.instrument_from_base[self.set_index][:, :3, :3], base)
-        result: Array = seen.reshape(-1, seen.shape[-1])
-        return result
+        return seen.reshape(-1, seen.shape[-1])
 
     def _stated(self) -> dict[str, list[float]]:
         """Where targets are nearly, by name, mm, as the header has it."""
@@ -210,8 +209,7 @@ class Sights:
 
     def seen(self, places: Array, turns: Array, shifts: Array) -> Array:
         """What instruments with these turns (s, 3, 3) and shifts (s, 3) read, (n, 3)."""
-        found: Array = np.einsum("nij,nj->ni", turns[self.sets], self.base(places)) + shifts[self.sets]
-        return found
+        return np.einsum("nij,nj->ni", turns[self.sets], self.base(places)) + shifts[self.sets]
 
     def design(self, places: Array, turns: Array) -> Array:
         """Derivatives of the readings by places, shifts and small further turns, (3 n, 3 t + 6 s)."""
@@ -238,8 +236,7 @@ class Sights:
         changes[:, free] = right[values < OPEN * values[0]] / size
         most = np.abs(changes[:, : places.size]).max(axis=1, initial=0.0)
         moving = most > OPEN * np.abs(changes).max(axis=1, initial=0.0)
-        found: Array = changes[moving] * (LEVER / most[moving])[:, None]
-        return found
+        return changes[moving] * (LEVER / most[moving])[:, None]
 
     def of_set(self, number: int) -> tuple[Sights, Index]:
         """Some readings of one set, as if there were no other, and which these are."""
@@ -253,8 +250,7 @@ class Sights:
         scale = np.concatenate([np.repeat(np.where(self.known, FIRM, 1.0), 3), scale])
         columns = len(scale) if turning else len(scale) - 3 * len(turns)
         design = self.design(places, turns)[:, :columns] * scale[:columns]
-        change: Array = scale[:columns] * np.linalg.lstsq(design, gap.ravel(), rcond=OPEN)[0]
-        return change
+        return scale[:columns] * np.linalg.lstsq(design, gap.ravel(), rcond=OPEN)[0]
 
 
 @dataclass(frozen=True)
@@ -350,8 +346,7 @@ def _linear_turn(sights: Sights, readings: Array) -> Array | None:
         return None
     back = np.linalg.lstsq(flat, sights.poses[:, :3, 3].ravel(), rcond=None)[0][:9].reshape(3, 3)
     left, _, right = np.linalg.svd(back.T)
-    turn: Array = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    return turn
+    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
 
 
 def _by(columns: Array, wanted: Array) -> Array:
