@@ -355,12 +355,14 @@ def _merged(found: Sequence[WrittenPlan], edits: Sequence[Mapping[int, Edits]]) 
 def equal(one: object, other: object) -> bool:
     """Whether two values are the same: numbers to the last bit, and what is not known like itself."""
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
-        return one.shape == other.shape and np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+        return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return False
     if isinstance(one, tuple) and isinstance(other, tuple):
         return len(one) == len(other) and all(map(equal, one, other))
     if is_dataclass(one) and type(one) is type(other):
         return all(equal(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
-    return type(one) is type(other) and bool(one == other)
+    return bool(one == other)
 
 
 def _starting_elsewhere(moves: Sequence[Moves]) -> set[int]:
