@@ -19,8 +19,8 @@ from ncfix import core
 from ncfix.control.lanes import lane
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.control.setup import Setup
+from ncfix.control.state import ControlState
 from ncfix.diagnostics import NcfixError
-from ncfix_iso.rs274 import arc_motion
 from program.arcs import full_of_arcs
 from program.tracing import KNOWN, ZERO, follow
 
@@ -280,7 +280,7 @@ def test_the_lane_takes_what_it_should() -> None:
 @pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc"])
 def test_the_lane_takes_arcs(dialect: str) -> None:
     body = [f"G{2 + i % 2} X{i}. I.25\nX{i + 0.5} R.25" for i in range(1, 100)]
-    with mock.patch.object(arc_motion, "circle", side_effect=arc_motion.circle) as one_by_one:
+    with mock.patch.object(ControlState, "circle", autospec=True, side_effect=ControlState.circle) as one_by_one:
         moves = follow("\n".join(["G0 X0. Y0. Z0. B0. C0. F100\nG3 X.5 R.25", *body]), "XYZBC", dialect=dialect).moves
     assert np.count_nonzero(moves.kind == MotionKind.ARC) == 199
     assert not one_by_one.called
