@@ -40,8 +40,8 @@ DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
 
 OLD_MILLING = frozenset({3, 4, 5})
 MILLING = OLD_MILLING | {251, 252, 253, 256, 257, 258, 262, 263, 264, 265, 267}
-"""Pockets, slots, studs and threads about the place where they are called, down to Q203 + Q201. A round slot (254) may
-have its place in the cycle."""
+"""Pockets, slots, studs and threads about the place where they are called, down to Q203 + Q201, or as `OLD` ones. A
+round slot (254) may have its place in the cycle."""
 
 MOVED_AS_A_WHOLE = "NCF280"
 AS_A_WHOLE = "cycle {} is corrected where it is called, down to its bottom; what it mills there is moved as a whole"

@@ -98,6 +98,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         self.directions = Directions()
         self._vector_stops: NDArray[np.int64] | None = None
         self._long_ways: NDArray[np.int64] | None = None
+        self._shortest: NDArray[np.int64] | None = None
         self._vectors: NDArray[np.int64] | None = None
         self._match_structures()
         self._read_procedure()
@@ -118,7 +119,9 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
 
     def all_shortest(self) -> NDArray[np.int64]:
         """(s,) the axes that go the shortest way in blocks of each shape, as bits."""
-        return np.array([plan.shortest for plan in self.all_plans()], dtype=np.int64)
+        if self._shortest is None:
+            self._shortest = np.array([plan.shortest for plan in self.all_plans()], dtype=np.int64)
+        return self._shortest
 
     def long_ways(self, letter: int) -> NDArray[np.int64]:
         """The blocks where an axis goes past a full turn, or beside which its words are in another form.
@@ -136,6 +139,8 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
 
     def shortest_ways(self, block: int, stop: int) -> Iterator[tuple[int, float]]:
         """The axes that go the shortest way in these blocks, and to which angle first, degrees."""
+        if not self.all_shortest().any():
+            return
         shapes = self.program.template[block:stop]
         bits = self.all_shortest()[shapes]
         for letter in range(N_LETTERS):
