@@ -12,7 +12,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow, placed
 from ncfix.compensate.plan.kinematics import joints_from_commands
-from ncfix.control.moves import MotionKind, Moves
+from ncfix.control.moves import MotionKind, Moves, Trace
 from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import State, load
 from ncfix.text.dialect import detect
@@ -42,9 +42,14 @@ def test_a_shipped_program_is_corrected(root: Path, name: str, strategy: str) ->
 
 def moves_of(root: Path, text: str) -> Moves:
     """A program on the machine of the examples."""
+    return trace_of(root, text).moves
+
+
+def trace_of(root: Path, text: str) -> Trace:
+    """The same, with what is said."""
     machine = load(str(root / "examples/machines/dmu50.toml"))
     setup = load_setup(str(root / "examples/programs/klartext.setup.toml"))
-    return follow(read(text.encode(), "t.h"), machine, setup).trace.moves
+    return follow(read(text.encode(), "t.h"), machine, setup).trace
 
 
 def xyz(moves: Moves) -> np.ndarray:
@@ -132,6 +137,22 @@ def test_cycle_19_is_understood_by_where_the_axes_stand(root: Path) -> None:
     )
     assert by_axes.rule[-1] == 0
     assert np.abs(by_plane.end[-1] - by_axes.end[-1]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("before", "angles", "said"),
+    [
+        ("L B+40 C+30 FMAX", "B+40 C+30", False),  # the axes stand so
+        ("L B+0 C+0 FMAX", "B+40 C+30", True),
+        ("L B+0 C+0 FMAX", "A+40 C+30", False),  # the machine has no A
+        ("L B+0 C+0 FMAX", "B+0 C+0", False),  # one plane either way
+        ("L B+0 C+0 FMAX", "", False),
+    ],
+)
+def test_it_is_said_how_the_angles_of_cycle_19_are_taken(root: Path, before: str, angles: str, said: bool) -> None:
+    body = (before, "CYCL DEF 19.0 W", f"CYCL DEF 19.1 {angles}", "L B+Q121 C+Q122 FMAX", "L X+5 Y+6 Z+7 FMAX")
+    codes = [message.code for message in trace_of(root, program(*body)).messages]
+    assert codes.count("NCF486") == said
 
 
 @pytest.mark.parametrize(

@@ -153,6 +153,28 @@ def test_statements_of_fagor_are_no_comments(dialect: str, line: str, foreign: b
         read(source, "part.nc", dialect)
 
 
+@pytest.mark.parametrize("dialect", ["iso", "fanuc", "linuxcnc"])
+@pytest.mark.parametrize(
+    ("line", "family"),
+    [
+        ("#RTCP ON", "code of Fagor or ISG controls"),
+        ("N10 #CS ON[1]", "code of Fagor or ISG controls"),
+        ("#1:=10.;", "Syntec code"),
+        ("%@MACRO", "Syntec code"),
+        ("#1=10.", ""),
+        ("(#RTCP ON)", ""),
+        ("(#1:=10.)", ""),
+    ],
+)
+def test_statements_that_begin_with_a_hash_name_their_control(dialect: str, line: str, family: str) -> None:
+    source = f"{line}\nG21 G90\nG1 X1 F100\nM30\n".encode()
+    if family:
+        with pytest.raises(NcfixError, match=f"NCF103: this is {family}"):
+            read(source, "part.nc", dialect)
+    else:
+        read(source, "part.nc", dialect)
+
+
 @pytest.mark.parametrize(
     ("text", "foreign"),
     [

@@ -414,6 +414,21 @@ def test_g53_1_turns_the_tool_square_to_the_plane(root: Path, name: str, angles:
     assert math.isclose(float(np.linalg.det(plane)), 1.0)
 
 
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "mitsubishi"])
+@pytest.mark.parametrize("code", ["G53.1", "G53.6"])
+@pytest.mark.parametrize("word", ["", "P0", "P1", "P2", "P#500"])
+def test_a_way_that_is_chosen_by_p_is_not_guessed(root: Path, dialect: str, code: str, word: str) -> None:
+    """What P chooses among the ways to stand square to the plane differs from control to control."""
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    text = f"G21G54G43H1G0X0.Y0.Z90.A0.C0.\nG68.2X1.Y2.Z3.I0.J30.K0.\n{code}{word}\nG1X0.Y0.Z9.F100.\nM30\n"
+    setup = Setup(assume_zero=True, no_point="IS-B", tools={1: Tool(80.0)})
+    trace = follow_on(read(text.encode(), "part", dialect), machine, setup).trace
+    known = word in ("", "P0")
+    assert (trace.moves.rule[-1] == Rule.CORRECT) == known
+    assert known or "which way P of" in trace.moves.reasons[trace.moves.reason[-1]]
+    assert ("NCF243" in [message.code for message in trace.messages]) == known
+
+
 @pytest.mark.parametrize(("length", "led"), [("", 0.0), ("G43H1", 80.0), ("G43H0", 0.0)])
 def test_a_tilted_plane_is_led_by_the_length_in_force(root: Path, length: str, led: float) -> None:
     """Without one the control leads the gauge point along the plane; the tip, 80 mm away, is what is corrected."""

@@ -126,6 +126,7 @@ NEARLY_SQUARE = 2e-3
 """rad. So far from square two vectors may be that are written with three decimals."""
 
 NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane is not known"
+WAY_BY_P = "which way P of {} turns the axis {} is for the control: name the rotary axes behind it"
 TURNED_TO = "NCF243"
 SQUARED = "the control's parameters decide; state the rotary axes in the program if they are others"
 ALIGNMENTS = {
@@ -250,16 +251,19 @@ def end(control: MacroControl) -> None:
 def align(control: MacroControl, block: Block, code: int) -> None:
     """The rotary axes turn so that the tool stands square to the plane.
 
-    In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece.
+    In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece. On
+    some controls P chooses among several ways (Mitsubishi, Mazak): then nobody knows where the axes stand.
     """
     control.use_start_positions(control.turning)
     found = control.postures(normal_of(control.rotation))
     target, lost = control.position[:], set[int]()
-    if found is not None and found.ways:
+    name = f"G{code / 10:g}"
+    by_word = found is not None and len(found.ways) > 1 and ("P" in block.unknown or bool(block.get("P")))
+    why = WAY_BY_P.format(name, "{}") if by_word else NOT_SOLVED
+    if found is not None and found.ways and not by_word:
         target = turned(control, found.chosen, about_tip=code == ABOUT_TIP)
         if len(found.ways) > 1:
             angles = angles_in_words(control.turning, [target[index] for index in control.turning])
-            name = f"G{code / 10:g}"
             control.warn(TURNED_TO, f"{name} is taken to turn to {angles}, the nearest of several ways", SQUARED)
         hidden = not control.unknown.keys().isdisjoint((X, Y, Z))
     else:
@@ -267,7 +271,7 @@ def align(control: MacroControl, block: Block, code: int) -> None:
         lost |= {*control.turning}
     if hidden or (code == ABOUT_TIP and is_moved_otherwise(control, block)):
         lost |= {X, Y, Z}
-    unknown = control.unknown | dict.fromkeys(lost.intersection(control.machine), NOT_SOLVED)
+    unknown = control.unknown | dict.fromkeys(lost.intersection(control.machine), why)
     control.make(
         Motion(MotionKind.RAPID, 0, MotionEnd(target, unknown), control.modal.motion, passing=ALIGNMENTS[code])
     )

@@ -296,6 +296,8 @@ WAY = "NCF279"
 WAY_HINT = "say SEQ+ or SEQ- in the program, or state the rotary axes"
 HOME = "PLANE RESET is taken to turn the rotary axes to zero, their basic position"
 RUNTIME = "the tilted plane depends on a Q parameter that is known only at run time"
+ANGLES = "NCF486"
+ANGLES_HINT = "a machine parameter decides: compare Q120 to Q122 on the control, or use PLANE"
 NO_KINEMATICS = "the tilted plane is given by the positions of rotary axes (PLANE AXIAL, cycle 19)"
 CALCULATED = ("Q120", "Q121", "Q122")
 """Where the control leaves the positions of A, B and C that it has worked out."""
@@ -377,15 +379,18 @@ def is_idle(control: KlartextControl, flags: frozenset[str]) -> bool:
 
 def by_axes(control: KlartextControl, values: Values, flags: frozenset[str]) -> None:
     """PLANE AXIAL: the plane to which rotary axes at these positions make the tool normal."""
+    plane = plane_of(control, values)
+    tilt_to(control, plane or control.frames.plane.rotation, flags, "" if plane else NO_KINEMATICS)
+
+
+def plane_of(control: KlartextControl, values: Values) -> Rotation | None:
+    """The plane to which rotary axes at positions in degrees make the tool normal; None if nobody knows."""
     turned = control.position[:]
     for letter in "ABC":
         if letter in values:
             turned[INDEX[letter]] = values[letter] * DEGREE
     found = control.posture.directions(turned)
-    if found is None or math.dist(found.tool, normal_of(found.axes)) > 1e-6:
-        tilt_to(control, control.frames.plane.rotation, flags, NO_KINEMATICS)
-        return
-    tilt_to(control, found.axes, flags)
+    return None if found is None or math.dist(found.tool, normal_of(found.axes)) > 1e-6 else found.axes
 
 
 def tilt_to(control: KlartextControl, tilt: Rotation | None, flags: frozenset[str], refusal: str = "") -> None:
@@ -479,9 +484,14 @@ def cycle_19(control: KlartextControl, words: MotionWords) -> None:
         and abs(control.position[INDEX[letter]] - value * DEGREE) < 1e-6
         for letter, value in values.items()
     )
-    if control.square_to(meant) is False and standing:
+    square = control.square_to(meant)
+    if square is False and standing:
         by_axes(control, values, frozenset())
         return
+    if not square and all(INDEX[letter] in control.machine for letter in values):
+        other = plane_of(control, values)
+        if other is not None and math.dist(normal_of(other), normal_of(meant)) > 1e-6:
+            control.warn(ANGLES, "cycle 19 is taken to name spatial angles, not positions of rotary axes", ANGLES_HINT)
     tilt_to(control, meant, frozenset())
 
 

@@ -381,7 +381,8 @@ def turn_square(control: Sinumerik, plane: SwivelPlane) -> dict[int, float]:
         return {}
     outer, inner = (control.machine[column] for column in control.posture.pointing.columns)
     here = [0.0 if index in control.unknown else control.position[index] for index in (outer, inner)]
-    found = control.postures(normal_of(control.rotation), WayRules(sense=plane.direction), (here[0], here[1]))
+    rules = WayRules(in_travel=True, sense=plane.direction)
+    found = control.postures(normal_of(control.rotation), rules, (here[0], here[1]))
     if found is None or not found.ways:
         return {}
     control.warn(WAY, f"CYCLE800 is taken to turn to {found}", "check it on the control: its swivel data decide")

@@ -230,15 +230,14 @@ class SinumerikWriter(BlockWriter):
 
     def _led_to(self, call: CycleCall, arguments: list[str] | None) -> FloatArray:
         """Behind a motion that leads to it: the words of the motion, and the call before and behind it."""
-        position = self._first_piece(self.target.start.copy(), self.target.ends[0])
         if arguments is not None:
             self._check(call)
             at, line_end = self.program.position(self.block, self.layout.begins), self.program.line_end.decode()
             opening = f"MCALL {call.name}({','.join(arguments)}){line_end}{self._apart()}"
-            self.out.edits.insert(0, (at, at, opening))
+            self.out.edits.append((at, at, opening))  # first, so that a word taken out keeps the blank before it
             self.out.opens = True
             self.out.closing = f"{self._apart()}MCALL {call.name}({','.join(map(argument, call.arguments))})"
-        return position
+        return self._first_piece(self.target.start.copy(), self.target.ends[0])
 
     def _check(self, call: CycleCall) -> None:
         """Whether lines may be put before and behind the block."""

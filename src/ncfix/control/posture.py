@@ -47,7 +47,7 @@ class WayRules(NamedTuple):
 
     in_travel  only ways within the travels of both axes, whole turns away if need be
     sign       the inner axis, which tilts the tool, stands at or above zero (1), or at or below (-1): SEQ+, SEQ-
-    sense      the way with the greater (1) or the lesser (-1) angle of the inner axis: _DIR
+    sense      the way with the greater (1) or the lesser (-1) angle of the inner axis, within half a turn: _DIR
     """
 
     in_travel: bool = False
@@ -146,7 +146,8 @@ class MachinePosture:
         ways, at_pole = pointing.angles(wanted, here), pointing.at_pole(wanted)
         if rules.in_travel:
             assert self.kinematics is not None, "they have shown how the tool is pointed"
-            ways = within(ways, [self.kinematics.travel[column] for column in pointing.columns], here)
+            near = (here[0], 0.0) if rules.sense else here
+            ways = within(ways, [self.kinematics.travel[column] for column in pointing.columns], near)
         if rules.sign:
             ways = [way for way in ways if abs(way[1]) < AT_ZERO or (way[1] > 0) == (rules.sign > 0)]
         if rules.sense and not at_pole:

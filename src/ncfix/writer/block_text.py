@@ -104,9 +104,9 @@ class BlockText:
         self.out.edits.append((start, stop, ""))
 
     def _take_back(self, span: Span) -> None:
-        """Forget the edits within a span."""
+        """Forget the edits within a span; what is put before it stays."""
         first, last = self.program.span(self.block, span)
-        self.out.edits = [edit for edit in self.out.edits if not first <= edit[0] < last]
+        self.out.edits = [edit for edit in self.out.edits if not first <= edit[0] < last or edit[1] == first]
 
     def _cased(self, address: str) -> str:
         """A letter in the case in which the block writes its addresses; longer addresses are upper case."""

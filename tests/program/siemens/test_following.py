@@ -534,3 +534,20 @@ def test_a_plane_in_inches_has_its_zero_point_in_inches(root: Path) -> None:
         for unit, before, after in (("G700", "1,2,3", "0,0,1"), ("G710", "25.4,50.8,76.2", "0,0,25.4"))
     ]
     assert ends_of[0] == pytest.approx(ends_of[1])
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("angles", ["-95,0,20", "30,40,0", "0,75,0", "95,0,20"])
+def test_a_plane_lies_the_same_wherever_the_axes_stood_before(root: Path, direction: int, angles: str) -> None:
+    """_DIR says which of the two ways is taken by the sign of the tilting axis, within its travel."""
+    machine = load(root / "examples" / "machines" / "wCAYFXZSt.toml")
+    where = [
+        follow(
+            f'G0 X0 Y0 Z9 A{start} C0\nCYCLE800(1,"T",200000,57,0,0,0,{angles},0,0,0,{direction})\nG0 X0 Y0 Z0',
+            "".join(machine.axis_names),
+            kinematics=kinematics_of(machine),
+        ).moves.end[-1][machine.axis_names.index("A")]
+        for start in (0, 100, -100, direction, -direction)
+    ]
+    assert where == pytest.approx([where[0]] * len(where))
+    assert 0.0 < direction * where[0] <= math.radians(120.0)
