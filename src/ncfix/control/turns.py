@@ -80,8 +80,8 @@ BESIDE_ZERO = 1e-9
 ROLLED = {
     "a rotary axis turns by half a turn or more here: a control with roll-over goes the other way, and such motions are"
     " corrected at their ends and not split": "write such a turn in two blocks, if it is meant to go the longer way",
-    "a rotary axis was led beyond a full turn or below zero, and here it comes back: a control that counts from 0 to 360"
-    " degrees may go another way, and such motions are corrected at their ends and not split": (
+    "a rotary axis was led beyond a full turn or below zero, and here it comes back: a control that counts from 0 to"
+    " 360 degrees may go another way, and such motions are corrected at their ends and not split": (
         "say which way it is meant to go: ACP, ACN or DC"
     ),
 }
