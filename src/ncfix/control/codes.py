@@ -269,9 +269,10 @@ CODES: dict[str, Code] = {
     "NCF247": Code(
         "A rotary axis may go the other way round",
         "A word turns a rotary axis by half a turn or more, or back from where increments or directions have led it "
-        "beyond a full turn or below zero. Whether a control goes there as written, the shorter way round (roll-over, Fanuc parameter 1008; "
-        "SINUMERIK MD30455), or from an angle between 0 and 360 degrees, cannot be seen in the program. The end is "
-        "corrected, and the motion is not split: pieces could lead the axis round against what the program did.",
+        "beyond a full turn or below zero. Whether a control goes there as written, the shorter way round (roll-over, "
+        "Fanuc parameter 1008; SINUMERIK MD30455), or from an angle between 0 and 360 degrees, cannot be seen in the "
+        "program. The end is corrected, and the motion is not split: pieces could lead the axis round against what the "
+        "program did.",
         "Write such a turn in two blocks, if it is meant to go the longer way; on SINUMERIK with ACP, ACN or DC.",
     ),
     "NCF248": Code(
