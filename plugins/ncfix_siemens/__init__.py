@@ -24,7 +24,10 @@ SIEMENS = Dialect(
     foreign=(
         *((family, pattern) for family, pattern in FOREIGN if family.startswith("Heidenhain")),
         ("Fanuc-like code (--dialect fanuc)", rb"\A\s*%[ \t]*\r?\n\s*O\d+"),
-        ("a program that goes over to SINUMERIK's ISO language (G291)", rb"(?im)^[^(;\"\n]*(?<![A-Z])(G[ \t]*291)(?!\d)"),
+        (
+            "a program that goes over to SINUMERIK's ISO language (G291)",
+            rb"(?im)^[^(;\"\n]*(?<![A-Z])(G[ \t]*291)(?!\d)",
+        ),
     ),
     comment="; {}",
     closure_mm=0.01,
