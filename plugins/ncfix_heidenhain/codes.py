@@ -62,9 +62,9 @@ KLARTEXT_CODES: dict[str, Code] = {
     ),
     "NCF486": Code(
         "Cycle 19: spatial angles, or positions of axes",
-        "A machine parameter decides whether the angles of cycle 19 are spatial angles or positions of the rotary axes. "
-        "Here the axes had not been turned before, which would have shown it, and the two are different planes. They "
-        "are taken as spatial angles.",
+        "A machine parameter decides whether the angles of cycle 19 are spatial angles or positions of the rotary "
+        "axes. Here the axes had not been turned before, which would have shown it, and the two are different planes. "
+        "They are taken as spatial angles.",
         "Turn the axes by numbers before the cycle, or use PLANE SPATIAL or PLANE AXIAL, which say what they are.",
     ),
 }
