@@ -47,12 +47,6 @@ KLARTEXT_CODES: dict[str, Code] = {
         "control takes one by its travels and parameters; here it is the nearest.",
         "Say SEQ+ or SEQ- in the program, or state the rotary axes.",
     ),
-    "NCF280": Code(
-        "A cycle that is moved as a whole",
-        "The control makes a pocket, a stud or a thread about the place of the call. That place and the bottom are "
-        "corrected; by how much the errors differ across what is milled stays, and is not in the figures.",
-        "Mill what has to be exact all round by blocks of its own.",
-    ),
     "NCF281": Code(
         "The program measures the tool",
         "TCH PROBE 31, 33, 481, 483 and their like write the length that they find into the tool table. Where the axes "

@@ -19,6 +19,8 @@ import numpy as np
 
 from differential.errors import LETTERS, Machine
 from differential.sinumerik_frames import PLANES, Floats, Frame, about, projected
+from differential.sinumerik_milling import NAMES as MILLING
+from differential.sinumerik_milling import milling
 from differential.sinumerik_motions import Path, Standing
 from differential.sinumerik_walk import Walk
 
@@ -63,7 +65,7 @@ class Control(Standing):
 
     def block(self, body: str) -> None:
         """One block."""
-        if found := re.fullmatch(r"(MCALL\s*)?((?:CYCLE|HOLES)\d+)?\s*(\(.*\))?", body):
+        if found := re.fullmatch(r"(MCALL\s*)?((?:CYCLE|HOLES|POCKET|SLOT)\d+|LONGHOLE)?\s*(\(.*\))?", body):
             self.cycle(found[1], found[2], found[3])
             return
         codes, words, names = [], {}, []
@@ -164,6 +166,15 @@ class Control(Standing):
                 self.drill(values[0], depth)
         elif name in ("HOLES1", "HOLES2"):
             self.holes(name, values)
+        elif name in MILLING:
+            call = milling(name, values)
+            if modal:
+                self.modes["drill"] = call.clear, call.bottom
+            else:
+                first, second, _ = PLANES[self.modes["plane"]]
+                places = zip((first, second), call.place, strict=True)
+                self.move({"XYZ"[index]: ("AC", value) for index, value in places}, False)
+                self.drill(call.clear, call.bottom)
         else:
             raise NotImplementedError(name)
 

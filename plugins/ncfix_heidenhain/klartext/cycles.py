@@ -43,9 +43,6 @@ MILLING = OLD_MILLING | {251, 252, 253, 256, 257, 258, 262, 263, 264, 265, 267}
 """Pockets, slots, studs and threads about the place where they are called, down to Q203 + Q201, or as `OLD` ones. A
 round slot (254) may have its place in the cycle."""
 
-MOVED_AS_A_WHOLE = "NCF280"
-AS_A_WHOLE = "cycle {} is corrected where it is called, down to its bottom; what it mills there is moved as a whole"
-
 IN_SPACE = frozenset({*range(20, 26), 204, *range(210, 216), 225, *range(230, 234), 254, *range(270, 278)})
 """Cycles with a path of their own that move X, Y and Z only; others, on the shell of a cylinder, turn axes, too."""
 
@@ -185,7 +182,7 @@ def drill(control: KlartextControl, where: FramePosition, axes: int, heights: tu
     if control.cycle.number in MILLING:
         over.unknown |= {X: AFTER_CYCLE, Y: AFTER_CYCLE}
         if not refusal:
-            control.warn(MOVED_AS_A_WHOLE, AS_A_WHOLE.format(control.cycle.number))
+            control.moved_as_a_whole(f"cycle {control.cycle.number}")
     above = command_of(control, over, axes | 1 << Z)
     control.stand(above.target, above.unknown, over.unknown)
     control.path.tangent = None

@@ -1,4 +1,4 @@
-"""Drilling cycles, called where the axes stand or, with MCALL, after every motion; and cycles that are not followed.
+"""Cycles, called where the axes stand, at a place of their own or, with MCALL, after every motion.
 
 A hole is one motion to its bottom, as in all languages: what leads to it under MCALL ends in a hole, and is no rapid.
 Its place is corrected for the bottom, in the block that leads to it. How deep it is stands in the call, so a hole that
@@ -14,14 +14,17 @@ import math
 from collections.abc import Sequence
 
 from ncfix.control.coordinates import LETTERS, mask_of, rotated
-from ncfix.control.expressions import Unknown, number
+from ncfix.control.expressions import number
 from ncfix.control.moves import CycleCall, MotionEnd, MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
+from ncfix_siemens.sinumerik.milling import MILLING, milling_of, said_in
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import (
     CALIBRATING,
+    DEEP,
     DP,
+    DPR,
     DRILLING,
     FIRST_DEPTH,
     MEASURING,
@@ -139,33 +142,32 @@ def drilling_of(control: Sinumerik, step: Calling) -> Drilling:
     mode = given[GEOMETRY_MODE][1] if len(given) > GEOMETRY_MODE else None
     if step.name == CENTRING and mode:
         fault = BY_DIAMETER.format(name)
-    sure = all(
-        not isinstance(value, Unknown) for part, value in zip(step.written, values, strict=True) if part is not None
-    )
-    said = tuple(
-        None if part is None or isinstance(value, Unknown) else value
-        for part, value in zip(step.written, values, strict=True)
-    )
-    return Drilling(step.name, clear, depth, fault, said, sure, control.external)
+    said, sure = said_in(control, step)
+    first, first_way = FIRST_DEPTH if step.name == DEEP else (DP, DPR)
+    heights = [(place, 1) for place in sorted({DP, first}) if said[place:] and said[place] is not None]
+    ways = [(place, -1) for place in sorted({DPR, first_way}) if said[place:] and said[place] not in (None, 0.0)]
+    depths = tuple(sorted(heights + ways))
+    return Drilling(step.name, clear, depth, fault, said, sure, control.external, depths)
 
 
 def call_of(control: Sinumerik, drilling: Drilling, block: int, *, modal: bool) -> CycleCall:
     """The call for a hole in a block of the program that is executed."""
-    depths = [(place, 1 if place in (DP, FIRST_DEPTH[0]) else -1) for place in drilling.depths]
     fixed = ALONE if block in control.solitary else ""
     if modal and drilling.external != control.external:
         fixed = fixed or ELSEWHERE
     if not modal:
         fixed = fixed or (UNDER_ANOTHER if control.modes.modal_cycle is not None else "")
         fixed = fixed or ("" if control.stated else UNSTATED)
-    across = LETTERS[control.modal.plane.across]
-    return CycleCall(drilling.name.upper(), drilling.values, tuple(depths), across, modal, fixed, not drilling.sure)
+    plane, name = control.modal.plane, drilling.name.upper()
+    points = tuple((place, plane.of(LETTERS)[axis]) for place, axis in drilling.points)
+    across, bound = LETTERS[plane.across], not (drilling.sure or points)
+    return CycleCall(name, drilling.values, drilling.depths, across, modal, fixed, bound, points)
 
 
 def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: bool) -> None:
     """A cycle of the control: kept for later (MCALL), or executed here."""
     name, block = step.name.upper(), words.block
-    if step.name not in DRILLING:
+    if step.name not in DRILLING and step.name not in MILLING:
         if points := points_of(control, step):
             pattern(control, block, name, points)
             return
@@ -175,14 +177,18 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
         holes = step.name.startswith(("holes", "cycle80"))
         made(control, block, refusal=(MADE_HOLES if holes else MADE).format(name))
         return
-    drilling = drilling_of(control, step)
+    drilling = milling_of(control, step, modal=modal) if step.name in MILLING else drilling_of(control, step)
     if modal:
         control.modes.modal_cycle = drilling
         return
     take_up(control)
     mind_carried(control)
     control.use_all_start_positions()
-    drill(control, BlockWordValues(block), control.here(), drilling, refusal=WITH_WORDS if words.axes else "")
+    named, over = BlockWordValues(block), control.here()
+    if drilling.place is not None:
+        named, over, _ = lead_to(control, block, drilling.place, name)
+        control.builder.rests(mask_of(index for index in control.machine if index not in GEOMETRY))
+    drill(control, named, over, drilling, refusal=WITH_WORDS if words.axes else "")
 
 
 def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
@@ -228,10 +234,15 @@ def drill(
     code = control.modal.motion
     control.go(MotionKind.CYCLE, words, bottom, code if code >= 0 else 10, refusal=refusal, placed=placed)
     control.heading = None
+    lost = control.lost_in_frame()
+    if drilling.name in MILLING:
+        lost = lost | dict.fromkeys(control.modal.plane.pair, AFTER_CYCLE)
+        if not refusal:
+            control.moved_as_a_whole(drilling.name.upper())
     if clear is None or depth is None:
-        up = control.here(control.lost_in_frame() | {across: AFTER_CYCLE})
+        up = control.here(lost | {across: AFTER_CYCLE})
     else:
-        up = at_height(control, control.here(), clear)
+        up = at_height(control, control.here(lost), clear)
         control.count_from_here(1 << across)
     control.stand(up.target, up.unknown, up.lost)
 

@@ -19,6 +19,7 @@ from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import set_pole
 from ncfix_siemens.sinumerik.expressions import compiled
 from ncfix_siemens.sinumerik.framing import into_spindle, set_length
+from ncfix_siemens.sinumerik.milling import MILLING
 from ncfix_siemens.sinumerik.orientation import swivel
 from ncfix_siemens.sinumerik.plans import LISTS, AssignedVariable, Calling, SinumerikPlan, evaluates, plain_text
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
@@ -254,7 +255,7 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         turn.handed += step.written[RESULTS.get(name, len(step.written)) :]
     elif name == "cycle800":
         swivel(control, turn.words.block, step)
-    elif name in DRILLING:
+    elif name in DRILLING or (name in MILLING and find(name) is None):
         cycle(control, turn.words, step, modal=turn.modal)
     else:
         subprogram(control, turn, step, find)

@@ -219,7 +219,7 @@ RESULTS = {"read": 4, "getselt": 0}
 DEEP, FIRST_DEPTH = "cycle83", (5, 6)
 """The cycle that drills in steps, and where the depth of the first one stands: a height (FDEP), a way down (FDPR)."""
 
-DP, DPR = 3, 4
+RTP, RFP, SDIS, DP, DPR = range(5)
 
 
 # -- what a block says -------------------------------------------------------------------------------------------------
@@ -265,7 +265,7 @@ class BlockWordValues:
 
 @dataclass(frozen=True, slots=True)
 class Drilling:
-    """A drilling cycle as it was called.
+    """A drilling or milling cycle as it was called.
 
     name    lower case
     clear   height at which it ends, in program units (RTP); None if known only at run time
@@ -274,6 +274,9 @@ class Drilling:
     values  of its arguments
     sure    all arguments that are written are known
     external  the file in which it is called; empty: the program itself
+    depths  see `CycleCall`
+    place   of a milling cycle: where it works, in program units; None: where the axes stand
+    points  (place, axis): its arguments that say so; 0 and 1 are the axes of the plane
     """
 
     name: str
@@ -283,13 +286,9 @@ class Drilling:
     values: tuple[float | str | None, ...]
     sure: bool
     external: str
-
-    @property
-    def depths(self) -> list[int]:
-        """The places of the arguments that say how deep the hole, or the first step to it, is."""
-        places = [DP, DPR, *(FIRST_DEPTH if self.name == DEEP else ())]
-        given = [place for place in places if place < len(self.values) and self.values[place] is not None]
-        return [place for place in given if place not in (DPR, FIRST_DEPTH[1]) or self.values[place] != 0.0]
+    depths: tuple[tuple[int, int], ...]
+    place: tuple[float, float] | None = None
+    points: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(slots=True)

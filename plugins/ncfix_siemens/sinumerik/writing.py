@@ -1,9 +1,9 @@
-"""What SINUMERIK adds to the writer of blocks: polar words, senses of rotation, CIP, and calls of drilling cycles.
+"""What SINUMERIK adds to the writer of blocks: polar words, senses of rotation, CIP, and calls of cycles.
 
 The call of a hole's cycle with a depth of its own goes in before the motion, in the same place of the flow: number and
 label of the block stay before it. Behind the hole the call of the program comes back, so what is executed next finds
 the depth that it knew. A cycle that is called where the axes stand, and shall drill a little beside, becomes a modal
-one for the motion to there.
+one for the motion to there. A milling cycle that names its place gets other arguments.
 
 Where things stand in a motion block of SINUMERIK: which words may be rewritten, and where a missing one goes.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +49,7 @@ from ncfix.writer.block import BlockWriter
 from ncfix.writer.target import LINE, TANGENTIAL, Target
 from ncfix_siemens.sinumerik.circles import VIA, circle_through
 from ncfix_siemens.sinumerik.destination import turned
+from ncfix_siemens.sinumerik.milling import MILLING
 from ncfix_siemens.sinumerik.scanning import has_partial
 from ncfix_siemens.sinumerik.vocabulary import (
     ANGLES,
@@ -58,6 +60,9 @@ from ncfix_siemens.sinumerik.vocabulary import (
     INCREMENTAL,
     MOTIONS,
     POLAR,
+    RFP,
+    RTP,
+    SDIS,
     TURNING,
     VECTOR,
 )
@@ -75,9 +80,6 @@ RAPID = 0
 
 PLAIN = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)\s*")
 CYCLE = re.compile(r"(?P<name>\w+)\s*\((?P<arguments>.*)\)", re.DOTALL)
-REFERENCE = 1
-"""The place of the height that the cycle counts from (RFP)."""
-
 ENDS_HERE = "the hole needs a line behind it, and the subprogram ends in its block"
 
 END_OF_SUBPROGRAM = frozenset({17.0})
@@ -224,9 +226,30 @@ class SinumerikWriter(BlockWriter):
         arguments, sunk = shifted(call, off, int(target.decimals[across]))
         if call.bound or self._is_inside_out(call, sunk):
             arguments, sunk = None, 0.0
-        position = self._led_to(call, arguments) if call.modal else self._called(call, arguments)
+        if call.points:
+            position = self._placed(call, arguments)
+        else:
+            position = self._led_to(call, arguments) if call.modal else self._called(call, arguments)
         position[across] = target.nominal[across] + sunk
         self.out.ends.append(position)
+
+    def _placed(self, call: CycleCall, arguments: list[str] | None) -> FloatArray:
+        """At a place that the call names: the arguments that say so and how deep."""
+        target, position = self.target, self.target.start.copy()
+        changed = {} if arguments is None else {place: arguments[place] for place, _ in call.depths}
+        for place, letter in call.points:
+            column = target.letters.index(letter)
+            position[column] = target.nominal[column]
+            off = float(target.ends[0][column] - target.nominal[column])
+            if abs(off) >= self.half[column]:
+                value = number_of(call, place)
+                changed[place] = BARE.short(value + off, int(target.decimals[column]))
+                position[column] = target.nominal[column] + float(changed[place]) - value
+        if changed:
+            assert self.layout.cycle is not None
+            text = with_arguments(self.program.slice(self.block, self.layout.cycle), changed)
+            self.out.edits.append((*self.program.span(self.block, self.layout.cycle), text))
+        return position
 
     def _led_to(self, call: CycleCall, arguments: list[str] | None) -> FloatArray:
         """Behind a motion that leads to it: the words of the motion, and the call before and behind it."""
@@ -246,8 +269,12 @@ class SinumerikWriter(BlockWriter):
         self.out.conflict = self.out.conflict or call.fixed or ends
 
     def _is_inside_out(self, call: CycleCall, sunk: float) -> bool:
-        """Whether the hole would end on the other side of the height that its cycle counts from."""
-        reference = call.arguments[REFERENCE] if len(call.arguments) > REFERENCE else None
+        """Whether the hole would end on the other side of the height that its cycle counts from; where that moves with
+        it, whether it would rise above that at which the cycle ends."""
+        if (RFP, 1) in call.depths:
+            clear, start, gap = (number_of(call, place) for place in (RTP, RFP, SDIS))
+            return sunk > max(clear - start - gap, 0.0)
+        reference = call.arguments[RFP] if len(call.arguments) > RFP else None
         nominal = float(self.target.nominal[self.across])
         return isinstance(reference, float) and (nominal - reference) * (nominal + sunk - reference) <= 0.0
 
@@ -263,7 +290,7 @@ class SinumerikWriter(BlockWriter):
         assert self.layout.cycle is not None
         text = self.program.slice(self.block, self.layout.cycle)
         if arguments is not None:
-            text = with_depths(text, call, arguments)
+            text = with_arguments(text, {place: arguments[place] for place, _ in call.depths})
         if self.added:
             text, led = f"MCALL {text}", "".join(self.added).strip()
             if target.active_code != RAPID and (target.active_code != LINE or target.inverse_time):
@@ -308,15 +335,15 @@ def number_of(call: CycleCall, place: int) -> float:
     return value
 
 
-def with_depths(text: str, call: CycleCall, arguments: list[str]) -> str:
-    """A call as the program writes it, with the depths of `arguments`, in the style of its numbers where it has any."""
+def with_arguments(text: str, changed: Mapping[int, str]) -> str:
+    """A call as the program writes it, with some other arguments (place -> number), in the style of its own numbers."""
     found = CYCLE.fullmatch(text)
     assert found is not None
     parts = in_parts(found["arguments"])
-    for place, _ in call.depths:
+    for place, number in changed.items():
         part = parts[place]
         blank = part[: len(part) - len(part.lstrip())]
-        value, decimals = float(arguments[place]), len(arguments[place].partition(".")[2])
+        value, decimals = float(number), len(number.partition(".")[2])
         shown = SPELLING.like(part, value, decimals) if PLAIN.fullmatch(part) else SPELLING.instead(value, decimals)
         parts[place] = blank + shown
     start, stop = found.span("arguments")
@@ -349,7 +376,7 @@ class SinumerikLayout(Layout):
     angle   AR
     polar   AP and RP by address
     partial_polar  blocks of the program rely on such a word of a block before
-    cycle   the call of a drilling cycle, where the block holds nothing else
+    cycle   the call of a drilling or milling cycle, where the block holds nothing else
     begins  where its words begin, behind block skip, number and label
     """
 
@@ -431,10 +458,10 @@ def without_form(program: Program, block: int, word: Word) -> Word:
 
 
 def drilling_call(words: BlockWords) -> Span | None:
-    """The call of a drilling cycle, if that is all that a block holds besides its number."""
+    """The call of a drilling or milling cycle, if that is all that a block holds besides its number."""
     items = [item for item in words.items if not (is_prefix(item) or isinstance(item, Comment))]
     match items:
-        case [Command(name) as call] if name in DRILLING:
+        case [Command(name) as call] if name in DRILLING or name in MILLING:
             return call.span
     return None
 

@@ -24,6 +24,7 @@ QUIET = frozenset((51, 80, 90, 150, 501, 600, 610, 611, 620, 640, 690, 800, 911,
     (4500, 4510, 6010, 6020, 6030, 6410, 6420, 6430, 6440, 6450)
 )
 """G codes in tenths that move nothing and change no coordinates, or whose use is seen to elsewhere."""
+CYCLES = re.compile("MCALL|CYCLE|HOLES|POCKET|SLOT|LONGHOLE")
 WORDS_QUIET = re.compile(
     r"MSG|SETMS|ORI(WKS|MKS|AXES|VECT|VIRT1)|SOFT|BRISK|DRIVE|FFWO(N|F)|COMP(OF|CAD|ON)|CFC|CFTCP|CFIN|"
     r"FNORM|FLIN|SUPA|ADIS|ADISPOS|CYCLE832|WALIMO(N|F)|STOPRE|PTP|CP|UPATH|SPOS|KONT|NORM"
@@ -264,7 +265,7 @@ class WordAddressFollower(AxisFollower):
                 pass  # no plane is swivelled that it could take back
             elif name == "MCALL":
                 if len(line.codes) - sum(each.name == "N" for each in line.codes) == 1:
-                    self.lost = {key: why for key, why in self.lost.items() if not re.match("MCALL|CYCLE|HOLES", key)}
+                    self.lost = {key: why for key, why in self.lost.items() if not CYCLES.match(key)}
                     self.forget()
                 else:
                     self.lost[name] = "a modal call"

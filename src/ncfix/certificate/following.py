@@ -70,7 +70,7 @@ MOST_SWITCHES = 4
 """Of block delete, as many as `fix` looks at."""
 LEAST = 6
 """So many straight lines one behind the other are followed in columns."""
-REWRITTEN = re.compile(r"jumps|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
+REWRITTEN = re.compile(r"jumps|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|LONGHOLE|G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
 """What a program uses, and is not followed behind; a correction may write further lines another way."""
 UNKNOWN_WORDS = "words that this reader does not know here"
 ROUND = 179.0

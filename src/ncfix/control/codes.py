@@ -299,6 +299,12 @@ CODES: dict[str, Code] = {
         "Correct the programs that call it with `--flatten`: it is written out in them. If it is a program of its own, "
         "which only begins anew at its end, name the file itself.",
     ),
+    "NCF280": Code(
+        "A cycle that is moved as a whole",
+        "The control makes a pocket, a stud, a face or a thread about the place of the call. That place and the bottom "
+        "are corrected; by how much the errors differ across what is milled stays, and is not in the figures.",
+        "Mill what has to be exact all round by blocks of its own.",
+    ),
     "NCF381": Code(
         "The setup file is no TOML",
         "The file cannot be read as TOML; the message says where.",

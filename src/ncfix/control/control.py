@@ -52,6 +52,9 @@ TAKEN = (
     "it is among passed_codes, but its block has words of axes or H, which it may take: give them a block of their own"
 )
 
+MOVED_AS_A_WHOLE = "NCF280"
+AS_A_WHOLE = "{} is corrected where it is called, down to its bottom; what it mills there is moved as a whole"
+
 UNPLACED = "the program has not said where the axis {} stands, and this motion would need a word for it"
 """Why a motion is left as it is, or refused, that moves an axis without naming it."""
 
@@ -167,6 +170,10 @@ class ProgramControl(ControlState):
     def take_length(self, number: int) -> None:
         """The length of a tool acts from here on, see `SetLength`; for languages that take codes of a plugin's."""
         raise NotImplementedError
+
+    def moved_as_a_whole(self, cycle: str) -> None:
+        """Say of a cycle with a path of its own that only its place and bottom are corrected."""
+        self.warn(MOVED_AS_A_WHOLE, AS_A_WHOLE.format(cycle))
 
     def suspend(self, mode: str, why: str) -> None:
         """Motions are refused until `resume` of the same mode."""

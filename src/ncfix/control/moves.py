@@ -109,7 +109,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class CycleCall:
-    """The call of a drilling cycle in a block by itself: what it takes to give one hole a depth of its own.
+    """The call of a cycle in a block by itself: what it takes to give one hole, or pocket, a depth or place of its own.
 
     name       as it is written
     arguments  their values when it was called; None where one is left out
@@ -118,6 +118,7 @@ class CycleCall:
     modal      it stands before the motion to the hole, and holds for others, too; else it drills where the axes stand
     fixed      why no other call may be written in its place, or beside it; empty: it may
     bound      an argument is known only at run time: the depth stays as the program has it
+    points     (place, letter): the arguments that are coordinates of where it works; empty: where the axes stand
     """
 
     name: str
@@ -127,6 +128,7 @@ class CycleCall:
     modal: bool
     fixed: str = ""
     bound: bool = False
+    points: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

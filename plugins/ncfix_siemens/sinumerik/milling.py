@@ -1,0 +1,185 @@
+"""Milling cycles that say at which place and how deep they work: pockets, slots, studs, faces, threads.
+
+Such a cycle is one motion to its bottom at the place that its call names, and is moved as a whole: its place, the
+height that it counts from (RFP) and its bottom by the same way. So it keeps its size and its steps in depth. What
+counts from RFP (DPR, a way down in DP, the depth of a chamfer) stays as it is written.
+Source: Siemens, "SINUMERIK 840D sl/828D, Job planning", "Programming cycles externally"; the shorter calls of older
+controls: "SINUMERIK, cycles".
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ncfix.control.coordinates import X, Y, Z
+from ncfix.control.expressions import Unknown
+from ncfix_siemens.sinumerik.plans import Calling
+from ncfix_siemens.sinumerik.state import Sinumerik
+from ncfix_siemens.sinumerik.vocabulary import DP, DPR, RFP, RTP, Drilling
+
+
+class MillingCycle(NamedTuple):
+    """Where the arguments of a milling cycle stand; the first are RTP, RFP, SDIS and DP, and there is no other at 0.
+
+    point    its place in the plane (PA, PO): the first of two arguments, as of all that stand for two axes
+    way      whether DPR stands behind DP; else DP itself may be the way down, by `mode`
+    variant  what is milled (VARI): the last digit says whether it is a chamfer; 0: never
+    mode     how lengths are meant (AMODE): the last digit says so of the depth, the hundreds of a chamfer's (ZFS).
+             Before it stands DMODE, whose last digit may choose a plane for the cycle. 0: it has neither
+    size     of a face, of which the place is a corner: length and width
+    corner   the hundreds and thousands of the mode may make these an opposite corner
+    angle    by which the face is turned about its corner; 0: it is not
+    """
+
+    point: int
+    way: bool = False
+    variant: int = 0
+    mode: int = 0
+    size: int = 0
+    corner: bool = False
+    angle: int = 0
+
+    @property
+    def places(self) -> set[int]:
+        """The arguments that say where and how deep it works."""
+        shown = {self.mode - 1} if self.mode else set[int]()
+        others = (self.point, self.point + 1, self.variant, self.mode, self.size, self.size + 1, self.angle)
+        return {*range(DPR + self.way), *others} | shown
+
+
+MILLING = {
+    "pocket1": MillingCycle(8, way=True),
+    "pocket2": MillingCycle(6, way=True),
+    "pocket3": MillingCycle(7, variant=16, mode=28),
+    "pocket4": MillingCycle(5, variant=13, mode=24),
+    "slot1": MillingCycle(8, way=True, variant=18, mode=30),
+    "slot2": MillingCycle(8, way=True, variant=18, mode=28),
+    "longhole": MillingCycle(7, way=True, mode=19),
+    "cycle61": MillingCycle(4, mode=15, size=6, corner=True),
+    "cycle70": MillingCycle(12, mode=23),
+    "cycle71": MillingCycle(4, size=6, angle=8),
+    "cycle76": MillingCycle(8, way=True, variant=17, mode=24),
+    "cycle77": MillingCycle(6, way=True, variant=14, mode=20),
+    "cycle79": MillingCycle(6, variant=17, mode=22),
+    "cycle90": MillingCycle(11, way=True),
+    "cycle899": MillingCycle(6, variant=15, mode=18),
+}
+
+ABSOLUTE, WAY_DOWN = 0, 1
+"""The last digit of AMODE; where there is DPR, 0 leaves it to the arguments, and 2 is for absolute."""
+CHAMFER = 5
+PLANES = {1: Z, 2: Y, 3: X}
+"""The last digit of DMODE, and the axis across the plane that it chooses."""
+
+AT_RUN_TIME = "where and how deep {} works is known only at run time"
+NO_PLACE = "{} does not say where it works (PA, PO)"
+OWN_PLACE = "{} is called by MCALL, and names a place of its own (PA, PO)"
+NO_DEPTH = "how deep {} goes is not clear: RTP, RFP and its bottom have to lie below each other"
+NO_WAY_DOWN = "how deep {} goes is not clear: its mode (AMODE) asks for a way down, a positive number"
+TWO_DEPTHS = "the depth of the cycle {} is given twice, DP and DPR, and they are not the same"
+OF_CHAMFER = "{} mills a chamfer, and its mode (AMODE) does not say that the depth (ZFS) is a way down"
+OTHER_PLANE = "{} chooses another plane (DMODE) than the one in force"
+IN_DIAMETERS = "{} is called while X counts as a diameter"
+
+ALIKE = 1e-6
+"""Program units; two depths that differ by less are one."""
+
+
+@dataclass(frozen=True, slots=True)
+class MillingCall:
+    """The numbers of a call, zero where nothing is written, and which arguments are written."""
+
+    form: MillingCycle
+    numbers: list[float]
+    written: frozenset[int]
+
+    def digit(self, place: int, power: int = 0) -> int:
+        """A digit of an argument: 0 the last one, 2 that of the hundreds; zero where the cycle has no such argument."""
+        return round(abs(self.numbers[place])) // 10**power % 10 if place > DP else 0
+
+    @property
+    def bottom(self) -> tuple[float, tuple[int, ...], str]:
+        """The height of the bottom, the arguments that are heights and lie at it, and what is wrong with them."""
+        mode, reference, deep = self.digit(self.form.mode), self.numbers[RFP], self.numbers[DP]
+        way = self.numbers[DPR] if self.form.way else deep if mode == WAY_DOWN else 0.0
+        by_way = mode == WAY_DOWN or (mode == ABSOLUTE and way != 0.0)
+        heights = (DP,) if DP in self.written and (self.form.way or not by_way) else ()
+        bottom, fault = reference - way if by_way else deep, ""
+        if mode > (2 if self.form.way else 1) or (by_way and way <= 0.0):
+            fault = NO_WAY_DOWN
+        elif by_way and heights and abs(deep - bottom) > ALIKE:
+            fault = TWO_DEPTHS
+        elif not (self.numbers[RTP] > reference >= bottom) or not (by_way or heights):
+            fault = NO_DEPTH
+        elif self.digit(self.form.variant) == CHAMFER and self.digit(self.form.mode, 2) != WAY_DOWN:
+            fault = OF_CHAMFER
+        return bottom, heights, fault
+
+    @property
+    def corners(self) -> tuple[bool, ...]:
+        """Of either axis, whether the size of a face is its opposite corner."""
+        return tuple(self.form.corner and self.digit(self.form.mode, power) == 1 for power in (2, 3))
+
+    @property
+    def points(self) -> tuple[tuple[int, int], ...]:
+        """The arguments that are places, and the axis of the plane of each."""
+        corners = [(self.form.size + axis, axis) for axis, own in enumerate(self.corners) if own]
+        return ((self.form.point, 0), (self.form.point + 1, 1), *corners)
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Where the cycle works: in the middle of a face, else at the place that the call names."""
+        x, y = self.numbers[self.form.point : self.form.point + 2]
+        if not self.form.size:
+            return x, y
+        far = [self.numbers[self.form.size + axis] - (own and (x, y)[axis]) for axis, own in enumerate(self.corners)]
+        u, v = far[0] / 2, far[1] / 2
+        turn = math.radians(self.numbers[self.form.angle]) if self.form.angle else 0.0
+        return x + u * math.cos(turn) - v * math.sin(turn), y + u * math.sin(turn) + v * math.cos(turn)
+
+
+def said_in(control: Sinumerik, step: Calling) -> tuple[tuple[float | str | None, ...], bool]:
+    """The arguments of a call, None where one is left out or not known; and whether all that are written are known."""
+    pairs = zip(step.arguments, step.written, strict=True)
+    values = [None if part is None else value(control) for value, part in pairs]
+    known = tuple(None if isinstance(value, Unknown) else value for value in values)
+    return known, not any(isinstance(value, Unknown) for value in values)
+
+
+def milling_of(control: Sinumerik, step: Calling, *, modal: bool) -> Drilling:
+    """A milling cycle as it is called; an argument that is left out is zero."""
+    form, name = MILLING[step.name], step.name.upper()
+    said, sure = said_in(control, step)
+    numbers = [
+        0.0 if part is None else value if isinstance(value, float) else None
+        for value, part in zip(said, step.written, strict=True)
+    ]
+    numbers += [0.0] * (1 + max(form.places) - len(numbers))
+    if any(numbers[place] is None for place in form.places):
+        return Drilling(step.name, numbers[RTP], None, AT_RUN_TIME.format(name), said, sure, control.external, ())
+    written = frozenset(place for place, part in enumerate(step.written) if part is not None)
+    call = MillingCall(form, [value or 0.0 for value in numbers], written)
+    bottom, heights, fault = call.bottom
+    chosen = call.digit(form.mode and form.mode - 1)
+    if modal and any(numbers[form.point : form.point + 2]):
+        fault = fault or OWN_PLACE
+    elif not modal and not written >= {form.point, form.point + 1}:
+        fault = fault or NO_PLACE
+    if chosen and PLANES.get(chosen) != control.modal.plane.across:
+        fault = fault or OTHER_PLANE
+    if control.modal.diameter:
+        fault = fault or IN_DIAMETERS
+    return Drilling(
+        step.name,
+        None if fault else numbers[RTP],
+        bottom,
+        fault.format(name),
+        (*call.numbers[:DP], *said[DP:]),
+        sure,
+        control.external,
+        tuple((place, 1) for place in (*heights, RFP)),
+        None if modal else call.place,
+        () if modal else call.points,
+    )

@@ -1,0 +1,107 @@
+"""Milling cycles: what of a call changes, and which calls are refused.
+
+The machine is off by a constant shift: -12.4, 21.3 and 8.5 um are its corrections.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from differential.sinumerik_milling import NAMES, OLDER
+from ncfix.testing.judging import SHIFT
+from program.siemens.test_holes import fixed, written
+
+NEAR = 0.00051
+"""Half an output step."""
+POCKET = "POCKET3(40,0,1,-10,40,30,5,20,30,0,5,0,0,1000,200,0,11)"
+STUD = "CYCLE77(40,0,1,{},{},20,5,5,4,0,0,200,100,0,1,25,1,2,{})"
+MOVED_STUD = STUD.replace("(40,0,", "(40,0.008,").replace("20,5,5", "20,4.988,5.021")
+FULL = "POCKET4(40,{},1,{},20,{},5,0,0,0.1,0.1,0,{},50,9,15,0,2,0,1,2,10100,{},{})"
+
+
+def arguments(name: str, count: int, **said: str) -> dict[str, str]:
+    """Arguments by name, each another number, but for what is said."""
+    found = {each: str(place + 100) for place, each in enumerate(NAMES[name][:count])}
+    found |= {"RTP": "40", "RFP": "0", "SDIS": "1", "DP": "-10", "PA": "20", "PO": "30", "VARI": "11", "DMODE": "1"}
+    return {each: (found | {"DPR": "", "AMODE": "110"} | said)[each] for each in NAMES[name][:count]}
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("older", [True, False])
+def test_place_and_heights_move_as_one_and_nothing_else_changes(name: str, older: bool) -> None:
+    count = OLDER.get(name, len(NAMES[name])) if older else len(NAMES[name])
+    before = arguments(name, count, **({"AMODE": "10"} if name == "CYCLE61" else {}))
+    line = written(f"{name}({','.join(before.values())}) ; as it was")
+    found, _, behind = line.removeprefix(f"{name}(").partition(")")
+    after = dict(zip(before, found.split(","), strict=True))
+    assert behind == " ; as it was"
+    changed = {each: float(after[each]) - float(before[each]) for each in before if after[each] != before[each]}
+    assert changed.keys() == {"RFP", "DP", "PA", "PO"}
+    for each, axis in (("PA", "X"), ("PO", "Y"), ("RFP", "Z"), ("DP", "Z")):
+        assert abs(changed[each] - SHIFT[axis]) <= NEAR
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        (FULL.format("0", "5", "1.,2.50", 21, 1, 111), FULL.format("0.008", "5", "0.988,2.521", 21, 1, 111)),
+        (FULL.format("", "-5", "1,2", 25, 1, 110), FULL.format("0.008", "-4.992", "0.988,2.021", 25, 1, 110)),
+        (
+            "CYCLE61(40,1,1,-7,1,2,50,60,5,5,0,100,31,0,1,1110)",
+            "CYCLE61(40,1.008,1,-6.992,0.988,2.021,49.988,60.021,5,5,0,100,31,0,1,1110)",
+        ),
+        (STUD.format("", "6", "1,1,110"), MOVED_STUD.format("", "6", "1,1,110")),
+        ("G18\nPOCKET2(40,0,1,-4,,9,5,6)\nG17", "G18\nPOCKET2(40,0.021,1,-3.979,,9,5.008,5.988)\nG17"),
+        ("G91\nPOCKET2(40,0,1,-4,,9,5,6)\nG90", "G91\nPOCKET2(40,0.008,1,-3.992,,9,4.988,6.021)\nG90"),
+        ("N5 R1=5\nN6 POCKET2(40,0,1,-4,,R1,R1+1,6,R9)", "N5 R1=5\nN6 POCKET2(40,0.008,1,-3.992,,R1,5.988,6.021,R9)"),
+        (
+            "MCALL POCKET2(40,0,1,-4,,9)\nX5 Y6\nMCALL",
+            "MCALL POCKET2(40,0,1,-4,,9)\nMCALL POCKET2(40,0.008,1,-3.992,,9)\nX4.988 Y6.021\n"
+            "MCALL POCKET2(40,0,1,-4,,9)\nMCALL",
+        ),
+        ("POCKET2(2,1,1,-4,,9,5,6)", "POCKET2(2,1,1,-4,,9,4.988,6.021)"),
+    ],
+)
+def test_how_it_is_written(body: str, expected: str) -> None:
+    """A way down, an opposite corner, another plane, formulas, and a cycle that would begin above where it ends."""
+    assert written(body) == expected
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        (POCKET.replace(",20,30,", ",R9,30,"), "known only at run time"),
+        (POCKET.replace("-10", "R9"), "known only at run time"),
+        (POCKET.replace(",20,30,", ",,30,"), "does not say where"),
+        ("POCKET3(40,0,1,-10,40,30)", "does not say where"),
+        (POCKET.replace("(40,", "(0,"), "below each other"),
+        (POCKET.replace("-10", "3"), "below each other"),
+        (POCKET.replace("-10", ""), "below each other"),
+        (FULL.format("0", "-5", "1,2", 21, 1, 111), "a positive number"),
+        (FULL.format("0", "-5", "1,2", 21, 1, 112), "a positive number"),
+        (FULL.format("0", "-5", "1,2", 15, 1, 10), "a chamfer"),
+        (FULL.format("0", "-5", "1,2", 21, 2, 110), "another plane"),
+        (STUD.format("-5", "6", "1,1,0"), "given twice"),
+        (f"MCALL {POCKET}\nX5 Y6\nMCALL", "a place of its own"),
+        (f"DIAMON\n{POCKET}\nDIAMOF", "a diameter"),
+        (f"X5 {POCKET}", "in one block"),
+        (f"{POCKET} M8", "more than words"),
+        (f"{POCKET}\nG1 X5 F100", "after a cycle"),
+        (f"FOR R1=1 TO 2\n{POCKET.replace(',20,', ',20*R1,')}\nENDFOR", "several states"),
+        ('CYCLE72("CONTOUR",40,0,1,-10,5,0,0,1000,200,11,41,1,5,200,1,5)', "the control makes up"),
+    ],
+)
+def test_what_is_refused(body: str, why: str) -> None:
+    reasons = [each.reason for each in fixed(body).report.refused]
+    assert any(why in reason for reason in reasons), reasons
+
+
+def test_what_it_mills_is_said_to_move_as_a_whole() -> None:
+    messages = fixed(f"{POCKET}\n{POCKET}").report.warnings
+    assert [each.code for each in messages].count("NCF280") == 1
+
+
+def test_a_subprogram_of_that_name_is_no_cycle() -> None:
+    """It is followed, as the control would."""
+    body = f"{POCKET}\nM30\n%_N_POCKET3_SPF\nPROC POCKET3(REAL A)\nG1 X5 F100\nM17"
+    assert "G1 X4.988 F100" in fixed(body).text.decode()
