@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -36,6 +36,7 @@ from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lower_bounds import least_of_even_nodes, least_of_functions
 from ncfix.tables.table_files import Remarks
 from ncfix.tables.volume import AIM, Mesh, Volume, search, unseen_axes
+from ncfix.values import frozen
 from ncfix_fanuc.parameters import (
     BACKLASH_ASSUMPTION,
     BACKLASH_OPTIONS,
@@ -193,7 +194,7 @@ class Fanuc(FileControl):
         return name.lower() in (VOLUME_JSON, VOLUME_CSV) or (content.lstrip()[:1] == b"{" and b'"start_no"' in content)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GridFilling:
     """What a grid is made of.
 

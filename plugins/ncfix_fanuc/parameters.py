@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Assumption, Files, Option, Request, SettingForm, number, one_of
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import DEGREE, Remarks
+from ncfix.values import frozen
 from ncfix_fanuc import json_values
 
 SIGNS = ("correction", "error")
@@ -114,7 +114,7 @@ def _short(value: float) -> str:
     return f"{value:.0f}" if value == round(value) else f"{value:.4f}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PunchedParameter:
     """A parameter as punched: kind "A" for axes, "S" spindles, "L" paths, "" for a plain one; values by their index."""
 
@@ -218,7 +218,7 @@ def anchors(request: Request, settings: Mapping[str, str], inputs: Sequence[str]
     return tuple(given.get(name, 0.0) for name in inputs)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Placing:
     """A grid as the control's parameters put it, each along its axes.
 
@@ -283,7 +283,7 @@ def placed(
     return first, placing
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BacklashAmounts:
     """Amounts of X, Y and Z in detection units, and the axes that go home towards minus."""
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from ncfix.tables.compensation import Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import TURNING, Remarks, as_number, unit_of
+from ncfix.values import frozen
 from ncfix_fanuc.parameters import SIGNS, entries_of, read_records, sense_of
 
 LARGEST_INCREMENT = 7
@@ -31,7 +32,7 @@ FAR = 1e6
 """mm or degree: no interval is that long."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pitch:
     """The increments of one axis.
 

@@ -10,7 +10,6 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from string import Formatter
 from typing import Any
 
@@ -21,6 +20,7 @@ from ncfix.diagnostics import RefusedError
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid, full_grid
 from ncfix.tables.table_files import DEGREE, Remarks, unit_of
+from ncfix.values import frozen
 from ncfix_fanuc import json_values
 from ncfix_fanuc.json_values import SMALLEST
 from ncfix_fanuc.parameters import LINEAR, SIGNS, Placing, placed, sense_of
@@ -41,7 +41,7 @@ LARGEST_VALUE = 127
 ANGLES = ("A", "B", "C")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PointNumbering:
     """What no public text says of the numbering and the text file.
 
@@ -59,7 +59,7 @@ class PointNumbering:
     home_minus: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Volc:
     """A grid in whole numbers.
 
@@ -262,7 +262,7 @@ def _data(record: Mapping[str, Any], first: int, remarks: Remarks) -> list[int]:
     return data
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WholeNumberScale:
     """What whole numbers stand for.
 
@@ -289,7 +289,7 @@ class WholeNumberScale:
         return length, angle
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Lattice:
     """Records over some axes.
 

@@ -14,7 +14,7 @@ times the distance from where it is said to be about: six numbers for all positi
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from typing import ClassVar
 
@@ -29,6 +29,7 @@ from ncfix.tables.correction import corners, exact_correction, linear_axes, resi
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import DEGREE, Remarks, in_order
 from ncfix.tables.volume import AIM, Mesh, Volume, inputs_that_matter, search, unseen_axes
+from ncfix.values import frozen
 from ncfix_fanuc.control import LEVEL
 from ncfix_fanuc.parameters import (
     BACKLASH_ASSUMPTION,
@@ -56,7 +57,7 @@ TRIES = ((False, False), (True, True))
 """How a lattice is filled, until it will do: fitted to what is around points, with points only where it bends."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Turning:
     """Lattices of lengths and angles, both corrections; the tool is along Z.
 
@@ -285,7 +286,7 @@ def _notes(
     yield from reversal_note(request.machine, request.space, request.tool_length, play)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LatticeFilling:
     """How lattices are filled, under these settings."""
 
@@ -374,7 +375,7 @@ def table_axes(request: Request) -> tuple[str, ...]:
     return tuple(sorted(found)) if found and all(name in on_table for name in found) else ()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TurningTable:
     """What the rotary axes of a table add to the correction.
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -32,11 +31,12 @@ from ncfix.plugin import (
     Written,
     exact_correction,
 )
+from ncfix.values import frozen
 
 MACHINE, HOW = "machine.toml", "fix.toml"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rewriting:
     """What the programs of a machine are corrected by; there are no tables in it."""
 

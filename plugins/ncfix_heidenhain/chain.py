@@ -12,7 +12,6 @@ it has gained.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.correction import even_poses, poses_along
 from ncfix.tables.grid import Array, Grid, projector
 from ncfix.tables.table_files import DEGREE, TURNING, Remarks, unit_of
+from ncfix.values import frozen
 from ncfix_heidenhain.table_files import TableColumn, TextTable, cell_number, read_table
 
 KEYS = ("Trans", "MachAxis", "MachBase")
@@ -40,7 +40,7 @@ REACH = 1000.0
 NOTHING = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ChainRow:
     """A row: key, letter, COORD in mm or degree (None where empty), and under COMPTAB a number or (axis, column)."""
 
@@ -50,7 +50,7 @@ class ChainRow:
     error: float | tuple[str, str] | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ErrorChain:
     """What the control works out of a kinematics table and the axis tables that it names.
 
@@ -205,7 +205,7 @@ def _row(remarks: Remarks, expected: int, line: int, nr: str, key: str, axis: st
     return ChainRow(key, axis, cell_number(remarks, line, coord, "COORD") if coord else None, found)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class AxisErrors:
     """The errors of an axis in its own frame: what stands before it in the chain, and what is looked up by itself.
 

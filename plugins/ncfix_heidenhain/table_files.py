@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array
 from ncfix.tables.table_files import ORDER, Remarks, as_number
+from ncfix.values import frozen
 
 END = "[END]"
 NAME = re.compile(r"\S+")
@@ -37,7 +37,7 @@ STEEP = 1 / 64
 """Change of a value per distance that the older controls allow."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TableColumn:
     """A column: its name, and its width in characters."""
 
@@ -45,7 +45,7 @@ class TableColumn:
     width: int
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TextTable:
     """A table as text.
 
@@ -183,7 +183,7 @@ def read_cma(files: Files) -> tuple[tuple[str, ...], dict[str, str], Remarks]:
     return axes, {axis: name for axis, name in named.items() if name in files}, remarks
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ComTable:
     """A table as it is in the file, mm and degree.
 

@@ -10,7 +10,7 @@ each. Play, of which grids know nothing, goes into the leadscrew compensation of
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 from ncfix.plugin import (
@@ -39,6 +39,7 @@ from ncfix.plugin import (
 from ncfix.tables.control import SettingForm
 from ncfix.tables.grid_sums import faces, searched
 from ncfix.tables.volume import AIM, Volume, inputs_that_matter, search
+from ncfix.values import frozen
 from ncfix_isg.volcomp_files import (
     LETTERS,
     MOST_SCREW_POINTS,
@@ -213,7 +214,7 @@ class Isg(FileControl):
         return messages_of(remarks)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GridSet:
     """Grids, with the axis whose error the parameters of each are called, and what they miss together, mm."""
 

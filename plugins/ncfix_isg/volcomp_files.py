@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 
 import numpy as np
 
 from ncfix.plugin import Array, Files, Grid, Remarks, Reversal, Term, as_number, full_grid, own_terms, unit_of
+from ncfix.values import frozen
 
 LETTERS = tuple("XYZABC")
 HEAD = {"workpiece_axes": "0"}
@@ -87,7 +88,7 @@ def config_text(
     return "".join(f"{name:<24}{value}\n" for name, value in entries.items()).encode()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Configuration:
     """What the list says: the grid files in their order, the logical number of each axis, and what is turned round.
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -40,6 +39,7 @@ from ncfix.plugin import (
     wrong_setting,
 )
 from ncfix.tables.table_files import ALONE, DEGREE, NUMBER, ORDER, TURNING
+from ncfix.values import frozen
 
 MOST = 256
 """EMCMOT_COMP_SIZE of LinuxCNC."""
@@ -61,7 +61,7 @@ LOADS = re.compile(rb"(?im)^[ \t]*COMP_FILE[ \t]*=")
 Entries = dict[str, tuple[int, str]]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class JointTable:
     """One table: corrections (added) over the position of a joint, in mm or degree, (n,) each."""
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ncfix.tables.grid import Array
 from ncfix.tables.table_files import Remarks
+from ncfix.values import frozen
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][xX]?[-+]?[0-9]+)?")
 ASSIGNMENT = re.compile(
@@ -41,7 +42,7 @@ BOOLS = ("FALSE", "TRUE")
 KEEPS = "the control keeps what it had"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ArrayAssignment:
     """`$NAME[index, ...]=value`, with what stands before it in its line, and the blanks and the comment after it."""
 
@@ -75,7 +76,7 @@ class ArrayAssignment:
             yield replace(self, indices=(*self.indices[:-1], str(place)), value=value.strip())
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class OtherRow:
     """Any other line, as it is."""
 

@@ -7,7 +7,7 @@ The files of a folder are taken as the control would: CEC and EEC tables, with w
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import Remarks, unit_of
+from ncfix.values import frozen
 from ncfix_siemens.assignments import VALUE_FILES, parsed, settings
 from ncfix_siemens.settings import SIGNS, TERMS
 from ncfix_siemens.tables import BOTH, DIGITS, PLACES, CecTable, read_cec, read_eec
@@ -22,7 +23,7 @@ from ncfix_siemens.tables import BOTH, DIGITS, PLACES, CecTable, read_cec, read_
 UNSAID = "ncfix writes it as a comment: ; ncfix: value_sign=error product_terms=only X=AX1 ..."
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TableReading:
     """How the control takes tables.
 
@@ -118,7 +119,7 @@ def _grid(table: CecTable, letters: Mapping[str, str], reading: TableReading, pl
     return table.grid(own, output, 1.0 if plain else reading.sign * unit_of(output), unit_of(own))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Folder:
     """Tables of each kind, what comments say, and remarks on every file."""
 

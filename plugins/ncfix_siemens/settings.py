@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from ncfix.machine import Machine
 from ncfix.tables.control import Assumption, Option, Properties, one_of, whole, wrong_setting
 from ncfix.tables.scheme import Limits
 from ncfix.tables.table_files import DEGREE, in_order
+from ncfix.values import frozen
 from ncfix_siemens.tables import PLACES, CecStyle, CecTable, cec_text
 
 PROPERTIES = Properties(
@@ -138,7 +138,7 @@ PROBE_READINGS = {"only": 0.02, "plus_multiplier": 0.22, "plus_base": 0.12, "plu
 """What X moves by in the second probe, mm."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Settings:
     """All of them, in a form to work with."""
 

@@ -7,12 +7,12 @@ are errors.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.table_files import Remarks
+from ncfix.values import frozen
 from ncfix_siemens.assignments import ArrayAssignment, Assigned, FileRow, assignments
 
 DIGITS = 7
@@ -36,7 +36,7 @@ EEC_FIELDS = ("STEP", "MIN", "MAX", "IS_MODULO")
 EEC_VALUE = "AA_ENC_COMP"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CecTable:
     """Values at evenly spaced positions of an axis.
 
@@ -83,7 +83,7 @@ def number(value: float, digits: int = DIGITS) -> str:
     return f"{text}0" if text.endswith(".") else text
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CecStyle:
     """What is left open: axis names in brackets, a METRIC line, a path line."""
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any
 
 from ncfix.diagnostics import UsageError
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class NumberRange:
     """The finite numbers from `low` to `high`.
 

@@ -11,6 +11,8 @@ import codecs
 import re
 from dataclasses import dataclass
 
+from ncfix.values import frozen
+
 MARKS = ",;\t"
 """What may part cells, besides blanks."""
 WORD = re.compile(r'"[^"]*"|\S+')
@@ -51,7 +53,7 @@ def other_form(source: bytes) -> tuple[str, str]:
     return next((said for begin, said in OTHERS.items() if start.startswith(begin)), ("", ""))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Cell:
     """A cell's text with its line and column from 1."""
 

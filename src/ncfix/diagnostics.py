@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import ClassVar, Self
 
+from ncfix.values import frozen
 
-@dataclass(frozen=True, slots=True)
+
+@frozen
 class Code:
     """What `ncfix explain` says about a message code: a title, what it means, and what to do about it.
 
@@ -64,7 +66,7 @@ class ExitCode(IntEnum):
     FAULT = 5
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Place:
     """Where in a file: path as the user wrote it, line and column from 1 (0 = the whole file), and that line's text."""
 
@@ -82,7 +84,7 @@ class Place:
         return ":".join(parts)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Message:
     """One coded remark: what is the matter, where, and what to do about it."""
 

@@ -10,10 +10,11 @@ import os
 import re
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import reduce
 from importlib import import_module
 from typing import Any, Protocol
+
+from ncfix.values import frozen
 
 INFO = (".dist-info", ".egg-info")
 """How the folder of a distribution ends."""
@@ -37,7 +38,7 @@ class EntryPoint(Protocol):
     def load(self) -> Any: ...  # noqa: D102
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class InstalledDistribution:
     """A distribution, by its folder of metadata."""
 
@@ -57,7 +58,7 @@ class InstalledDistribution:
         return found
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class InstalledEntryPoint:
     """An entry point of an installed distribution."""
 

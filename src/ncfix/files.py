@@ -15,7 +15,6 @@ import os
 import stat
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import IO
@@ -24,6 +23,7 @@ from ncfix import inputs
 from ncfix.diagnostics import Place, SourceError, UsageError
 from ncfix.inputs import FileIdentity
 from ncfix.outputs import check_folder, check_output, check_own, check_target, exists_already, linked, way_to
+from ncfix.values import frozen
 
 READING = {
     errno.EACCES: "get the right to read it",
@@ -54,7 +54,7 @@ UNKNOWN = frozenset(
 """What systems and file systems say that have no links, no files without a name, or no way to name one."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WholeFile:
     """All that stands in an open file."""
 

@@ -29,6 +29,7 @@ from ncfix.text.dialect import FOREIGN as FOREIGN
 from ncfix.text.dialect import TURNING as TURNING
 from ncfix.text.dialect import CycleTable as CycleTable
 from ncfix.text.dialect import Dialect as Dialect
+from ncfix.values import frozen as frozen
 
 if TYPE_CHECKING:
     from ncfix.control.operations import ALL_AXES as ALL_AXES
@@ -94,7 +95,7 @@ if TYPE_CHECKING:
     from ncfix.tables.table_files import messages_of as messages_of
     from ncfix.tables.table_files import unit_of as unit_of
 
-HERE = ("FOREIGN", "TURNING", "CycleTable", "Dialect", "Register", "family", "hookimpl", "made_by")
+HERE = ("FOREIGN", "TURNING", "CycleTable", "Dialect", "Register", "family", "frozen", "hookimpl", "made_by")
 ELSEWHERE = {
     "ncfix.control.operations": (
         *("ALL_AXES", "Like", "Lose", "MakeUp", "Operation", "Rapid", "Refuse", "Resume", "SetLength", "SetTool"),

@@ -18,7 +18,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import field, fields, is_dataclass
 from functools import cache, lru_cache
 from importlib import import_module
 from types import TracebackType
@@ -28,6 +28,7 @@ import pluggy
 
 from ncfix.diagnostics import Message, NcfixError, PluginError
 from ncfix.entry_points import EntryPoint, entry_points
+from ncfix.values import frozen
 
 hookspecs = import_module("ncfix.hookspecs")
 """The contract speaks of things of all floors, so it stands above them, and the ground takes it by its name."""
@@ -49,7 +50,7 @@ class PluginWarning(UserWarning):
         self.message = message
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Plugin:
     """A plugin that is in: its entry point's name, where it comes from, and what it registered."""
 
@@ -65,7 +66,7 @@ class Plugin:
         return tuple(f"register_{kind}" for kind in self.things)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Plugins:
     """All plugins that are in, and why others are not."""
 
@@ -256,7 +257,7 @@ def registrations(point: EntryPoint, hooks: Iterable[pluggy.HookCaller]) -> Thin
     return things
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Registrar:
     """The `register` function of one hook of one plugin."""
 

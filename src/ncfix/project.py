@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import PurePath
@@ -31,6 +31,7 @@ from ncfix.files import read_bytes
 from ncfix.inputs import MOST_SAID
 from ncfix.toml_text import decoded, key_lines, line_of, parsed, place_of
 from ncfix.toml_text import written as table_written
+from ncfix.values import frozen
 
 NAME = "ncfix.toml"
 CODE = "NCF028"
@@ -38,7 +39,7 @@ TEXTS = ("machine", "setup", "output", "dialect", "tool_table")
 """Keys that are options of their own, each a text."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Project:
     """A project file.
 

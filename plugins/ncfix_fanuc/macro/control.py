@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
 
 from ncfix.control.coordinates import INDEX, Vector
 from ncfix.control.setup import POINTLESS, Run
 from ncfix.diagnostics import Message
 from ncfix.text.dialect import Dialect
 from ncfix.text.tree import Template
+from ncfix.values import frozen
 from ncfix_fanuc.macro.variables import MacroVariables
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.groups import Rules
@@ -24,7 +24,7 @@ COMPONENTS = "IJK"
 """The words of the direction of the tool (G43.5)."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Scaling:
     """A scaling in force: its centre, mm in the program's frame, all letters, and its factor."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from ncfix.control.coordinates import LETTERS, PLANES, Z, mask_of
 from ncfix.control.expressions import Fault, Unknown, Value, nominal
@@ -13,6 +12,7 @@ from ncfix.control.interpreter import RUNTIME
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.text.tree import Assignment, Constant, Literal, Opaque, Program, Span, Template, Word
+from ncfix.values import frozen
 from ncfix_fanuc.macro import coordinates, system, tilt
 from ncfix_fanuc.macro.blocks import CORNER, G15, G16, is_angle, is_scaled
 from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl
@@ -46,7 +46,7 @@ def is_called(program: Program) -> bool:
     return RETURN in codes and codes.isdisjoint(PROGRAM_ENDS)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ModalCall:
     """A macro that is called after every motion (G66)."""
 

@@ -9,13 +9,13 @@ A step is one motion block while it is executed, and what all path functions do 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from ncfix.control.arcs import CLOCKWISE, COUNTER, Point, centre_from_radius, check_closure, sweep_angle
 from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot
 from ncfix.control.expressions import Fault
 from ncfix.control.frames import handed
 from ncfix.control.moves import Arc, Motion, MotionEnd, MotionKind
+from ncfix.values import frozen
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.targets import (
     BAD_POLE,
@@ -35,7 +35,7 @@ from ncfix_heidenhain.klartext.targets import (
 IN_PLANE = 1 << X | 1 << Y
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Step:
     """One motion block while it is executed.
 

@@ -13,6 +13,7 @@ from ncfix.control.moves import AT_START, Motion, MotionEnd, MotionKind, Pass, P
 from ncfix.control.setup import WORK_OFFSET, Run, Setup, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
+from ncfix.values import frozen
 from ncfix_heidenhain.klartext.free import ContourElement
 from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING, FormulaScope, QParameters
 
@@ -43,7 +44,7 @@ LED_BY_CONTROL = frozenset({SPATIAL, RETRACTED, MOVED_ALONG, DEPARTED, AFTER_PRO
 next block that names the axis is corrected."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HolePosition:
     """Where a hole is, and by how much its surface is above that of the cycle."""
 

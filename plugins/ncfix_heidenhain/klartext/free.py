@@ -12,12 +12,14 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+
+from ncfix.values import frozen
 
 FLAT = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Element:
     """What the program says of one element.
 
@@ -60,7 +62,7 @@ class Element:
         return DirectedCircle(self.centre, self.radius, self.sense)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DirectedCircle:
     """A circle with the sense in which it is gone round."""
 
@@ -78,7 +80,7 @@ class DirectedCircle:
         return self.centre - self.sense * 1j * self.radius * heading
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ContourElement:
     """An element that is worked out: its end, the direction there, and its circle if it is an arc."""
 

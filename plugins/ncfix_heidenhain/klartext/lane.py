@@ -10,7 +10,6 @@ where a circle lies is worked out arc by arc, with what `arcs` uses.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from ncfix.control.expressions import Fault
 from ncfix.control.lanes.block_rows import LONGEST, filled, followed, words
 from ncfix.control.lanes.lane import SHORTEST, before_placing
 from ncfix.control.moves import Arc, FeedMode, MotionKind
+from ncfix.values import frozen
 from ncfix_heidenhain.klartext.arcs import BAD_ARC, FLAT, direction_at_end
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.layout import CORNERS
@@ -38,7 +38,7 @@ PLANE = PLANES[170]
 ODD = "of this arc the interpreter has more to say"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class KlartextBlockRows:
     """A stretch as the control takes it, one row per block.
 

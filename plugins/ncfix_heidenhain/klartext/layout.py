@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -26,6 +26,7 @@ from ncfix.text.tree import (
     Template,
     Word,
 )
+from ncfix.values import frozen
 from ncfix_heidenhain.klartext.arc_text import in_lines
 from ncfix_heidenhain.klartext.plans import POLAR, VECTOR, opens_block, own_words
 
@@ -45,7 +46,7 @@ RELATIVE_POLE = re.compile(rb"(?im)\n[ \t]*/?[ \t]*\d*[ \t]*CC(?![A-Z])(?:[^\r\n
 """A pole that counts from where the tool stands."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen(kw_only=True)
 class KlartextLayout(Layout):
     """The writable parts of a motion block; the words of its axes may be increments (IX), its R is that of CR.
 

@@ -27,6 +27,7 @@ from ncfix.text.tree import (
     Template,
     Word,
 )
+from ncfix.values import frozen
 
 PATH_FUNCTIONS = frozenset({"l", "lp", "ln", "c", "cp", "cr", "ct", "ctp", "cc", "rnd", "chf"})
 OPENING = ("tool ", "cycl ", "plane ", "trans ", "appr ", "dep ")
@@ -48,7 +49,7 @@ EQUAL = 1e-9
 """Two numbers are equal that differ by less."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class KlartextPlan:
     """One shape.
 

@@ -15,6 +15,7 @@ from ncfix.control.control import UNPLACED
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import AT_START, MotionEnd, UnknownAxes
+from ncfix.values import frozen
 from ncfix_heidenhain.klartext.control import SPATIAL, KlartextControl
 from ncfix_heidenhain.klartext.plans import MOVING
 
@@ -26,7 +27,7 @@ PLANE_OF = {frozenset((X, Y)): PLANES[170], frozenset((Z, X)): PLANES[180], froz
 """Planes by their axes; the angle is counted from the first axis (X, Z, Y) towards the second."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MotionWords:
     """The words of one motion as numbers.
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from ncfix.control.interpreter import TextUnit
 from ncfix.control.lanes import block_rows as shared
 from ncfix.control.lanes.block_rows import Lane
 from ncfix.text.tree import Constant, Literal, Program, Template
+from ncfix.values import frozen
 from ncfix_heidenhain.klartext.arcs import IN_PLANE
 from ncfix_heidenhain.klartext.plans import LETTERS, KlartextPlan, plan_of
 
@@ -41,7 +41,7 @@ NOTHING = Lane((), -1, -1)
 RAPID, FEED = 0, 10
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class KlartextLaneTables:
     """The shapes of a program as columns.
 

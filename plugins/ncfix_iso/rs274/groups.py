@@ -7,12 +7,13 @@ and Okuma programming manuals. Codes are in tenths: G38.2 is 382.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any, cast
 
 from ncfix.control.expressions import Evaluate
 from ncfix.text.dialect import CodeOperation, CycleTable, tenths
 from ncfix.text.tree import Expression
+from ncfix.values import frozen
 from ncfix_iso.rs274.parameters import compiled
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ TOOL_CHANGE = 60
 DRILLING = tuple(code for code in CYCLES if code >= 810)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Uses:
     """Which codes use an address: motion codes, other G codes of the block, M codes of the block; in tenths."""
 
@@ -158,7 +159,7 @@ def unused_word(letters: Set[str], motion: int | None, g_codes: Set[int], m_code
     return None
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rules:
     """What a dialect makes of codes.
 

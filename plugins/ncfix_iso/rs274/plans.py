@@ -33,6 +33,7 @@ from ncfix.text.tree import (
     Template,
     Word,
 )
+from ncfix.values import frozen
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.control import POLAR
 from ncfix_iso.rs274.groups import TOOL_CHANGE, Rules
@@ -70,7 +71,7 @@ P_USERS = frozenset((*(40, 100, 300, 650, 660, 661, 682), *groups.CYCLES, *(190,
 """G and M codes that have a use for P."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Codes:
     """The codes of a block, by group.
 
@@ -92,7 +93,7 @@ class Codes:
     unknown: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FlowLine:
     """A flow-control line: its label, as text or as a function, its keyword, and the functions of its arguments."""
 

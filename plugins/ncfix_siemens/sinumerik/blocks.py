@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import reduce
 
 from lark import Token, UnexpectedInput
@@ -54,6 +53,7 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
+from ncfix.values import frozen
 from ncfix_siemens.sinumerik.vocabulary import SETTERS
 
 BRACKET = "("
@@ -80,7 +80,7 @@ def value_of(number: Token) -> float:
     return float(str(number).upper().replace("EX", "E"))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SinumerikBuilder(TreeBuilder):
     """Makes items of trees."""
 

@@ -10,11 +10,11 @@ controls: "SINUMERIK, cycles".
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from ncfix.control.coordinates import X, Y, Z
 from ncfix.control.expressions import Unknown
+from ncfix.values import frozen
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import DP, DPR, RFP, RTP, Drilling
@@ -87,7 +87,7 @@ ALIKE = 1e-6
 """Program units; two depths that differ by less are one."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MillingCall:
     """The numbers of a call, zero where nothing is written, and which arguments are written."""
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -37,6 +37,7 @@ from ncfix.control.pointing import Pointing, Triple, Ways, dot, nearest
 from ncfix.control.posture import FAR, WayRules, normal_of
 from ncfix.control.tcp import rotary_at_zero
 from ncfix.text.tree import StringLiteral
+from ncfix.values import frozen
 from ncfix_siemens.sinumerik.plans import Calling, plain_text
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.unit import NO_LENGTH, SinumerikUnit
@@ -276,7 +277,7 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
         level(control, plane)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SwivelPlane:
     """The arguments of CYCLE800.
 

@@ -28,6 +28,7 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
+from ncfix.values import frozen
 from ncfix_siemens.sinumerik.blocks import BRACKET, STATEMENT
 from ncfix_siemens.sinumerik.expressions import FUNCTIONS_OF_NUMBERS, TEXT_FUNCTIONS, compiled
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, SHORTEST_WAY, VECTOR
@@ -44,7 +45,7 @@ RADIUS = "CR"
 ARC_LETTERS = frozenset({*CENTRE_LETTERS, RADIUS})
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Setting:
     """A word: its address, its value, and how it is meant (`ac`, `ic`, `dc`, ... or nothing)."""
 
@@ -58,7 +59,7 @@ class Setting:
         return replace(self, value=left_out)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class AssignedVariable:
     """A variable that gets a value: its name, the index if it is an element, and the value (None: a list).
 
@@ -74,7 +75,7 @@ class AssignedVariable:
     repeated: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Calling:
     """A name with the values of its arguments, and these as written."""
 
@@ -85,7 +86,7 @@ class Calling:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Branching:
     """A control structure or jump; `composed`: the label of a jump, where it is put together (`"MARK"<<R1`)."""
 

@@ -25,6 +25,7 @@ from ncfix.control.lanes.block_rows import words
 from ncfix.control.pointing import FloatArray, Pointing, Ways, to_each
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.text.tree import StringLiteral as Label
+from ncfix.values import frozen
 from ncfix_siemens.sinumerik.expressions import INITIAL, constant
 from ncfix_siemens.sinumerik.plans import Branching, SinumerikPlan, plan_of
 from ncfix_siemens.sinumerik.vocabulary import HALF_A_TURN
@@ -45,7 +46,7 @@ NO_LENGTH = 1e-9
 """A shorter vector says nothing."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProcParameter:
     """A parameter of a `PROC`: its type and name, and its value where the call leaves it out.
 

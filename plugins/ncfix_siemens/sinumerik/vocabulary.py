@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from ncfix.control.coordinates import INDEX, LETTERS
 from ncfix.control.frames import ZEROS
+from ncfix.values import frozen
 
 _SETTERS = """
     movt ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos
@@ -263,7 +264,7 @@ class BlockWordValues:
         return any(address in self.values and self.values[address] is None for address in addresses)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Drilling:
     """A drilling or milling cycle as it was called.
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +44,7 @@ from ncfix.text.tree import (
     Tape,
     Word,
 )
+from ncfix.values import frozen
 from ncfix.writer.block import BlockWriter
 from ncfix.writer.target import LINE, TANGENTIAL, Target
 from ncfix_siemens.sinumerik.circles import VIA, circle_through
@@ -367,7 +367,7 @@ def in_parts(text: str) -> list[str]:
 # -- where things stand in a motion block of SINUMERIK -----------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen(kw_only=True)
 class SinumerikLayout(Layout):
     """The writable parts of a motion block.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ncfix.api.sources import (
@@ -18,6 +17,7 @@ from ncfix.api.sources import (
     write_output,
 )
 from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.api.sources import Measured
@@ -74,7 +74,7 @@ def plan(
     return found
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False)
 class Calibrated:
     """What measurements say of the errors of a machine.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any, overload
 
 from ncfix.api.sources import (
@@ -22,6 +22,7 @@ from ncfix.api.sources import (
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.files import read_bytes
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -121,7 +122,7 @@ def _remark_of_stamp(program: Program) -> Iterator[Message]:
         yield stamp.remark(program.place(block))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False)
 class PathErrors:
     """How far the tool tip of a machine is from where a program means it to be, n samples along the path.
 

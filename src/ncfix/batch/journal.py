@@ -18,12 +18,13 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from time import monotonic, sleep
 from typing import Any
 
 from ncfix import files
 from ncfix.diagnostics import Place, UsageError
+from ncfix.values import frozen
 
 JOURNAL = ".ncfix-journal.jsonl"
 SCHEMA = 2
@@ -72,7 +73,7 @@ class RecordingFinder:
         return text
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class JournalRecord:
     """A program that is done, or that failed.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from ncfix import files
 from ncfix.diagnostics import Message, Place, UsageError
 from ncfix.plugins import registry
 from ncfix.text.dialect import goes_back
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup
@@ -27,7 +27,7 @@ CODE = re.compile(rb"[ \t]*(?:\([^)]*\)[ \t]*)*[^%;(\s\0-\x1f]")
 PROGRAM_END = re.compile(rb"(?i)(?:[^(;]|\([^)]*\))*?(?<![A-Z])M[ \t]*0*(?:2|30)(?![\d.])")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProgramFile:
     """A program, and the name under which its output is written in an output folder.
 
@@ -109,7 +109,7 @@ def is_subprogram(path: str) -> bool:
         return False  # whoever reads it says why
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SubprogramFiles:
     """Finds the files of subprograms in folders, the first first, by their name with or without a suffix.
 

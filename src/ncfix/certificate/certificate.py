@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 from ncfix.certificate.findings import BlockProof
@@ -13,6 +13,7 @@ from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
 from ncfix.diagnostics import Place, SourceError
 from ncfix.machine import Machine
+from ncfix.values import frozen
 from ncfix.version import __version__
 
 SCHEMA = 1
@@ -25,7 +26,7 @@ FOUND = ("verdict", "blocks", "motions", "proved", "proved_motions")
 """What has to come out again."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Subject:
     """What a certificate is about: names and contents of the files, and what the program cannot know."""
 

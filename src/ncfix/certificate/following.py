@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import combinations
 
 import numpy as np
@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind, ModesInForce, ProgramSteps, StraightRun
 from ncfix.certificate.text import Lines, StraightLines, Text
+from ncfix.values import frozen
 
 INCH = 25.4
 PLANES = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}
 CENTRES = {"X": "I", "Y": "J", "Z": "K"}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Given:
     """What a program cannot know: offsets, tool lengths, start and reference points by axis letter, mm and degree.
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.steps import Kind, ProgramSteps
 from ncfix.machine import Machine, State
+from ncfix.values import frozen
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -23,7 +23,7 @@ SHORT_MM, SHORT_RAD = 2.0, 0.02
 """Straight motions that lead no axis farther are short."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TipModel:
     """A calibrated machine with the workpiece in its place."""
 
@@ -126,7 +126,7 @@ class TipModel:
         return gap
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Ways:
     """Motions as the control makes them: straight in all axes, or X Y Z on a circle; commands in mm and rad."""
 

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.reading import AXES, DECIMAL, NUMBER, PATH_WORDS, READERS, Family, TextLine, TextWord
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Text:
     """A program as lines.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from ncfix.cli import console
 from ncfix.text.spelling import MINUS, ZERO, without_zeros
+from ncfix.values import frozen
 
 DIGITS = 9
 """Decimals that are kept: what is below has no meaning on any machine."""
@@ -30,7 +30,7 @@ TIE = 4e-16
 rounded over to the other side: twice its rounding error, and that of the constant, which is a whole number, is none."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WordColumn:
     """A column of words: which of some names each row has, (n,)."""
 
@@ -51,7 +51,7 @@ Columns = dict[str, NDArray[Any] | WordColumn]
 """Name -> values, all of one length; whole numbers from 0 on, and others, of which those not known are NaN."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RowForm:
     """How the rows of a table are written.
 

@@ -8,7 +8,6 @@ import re
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from ncfix.cli import console
 from ncfix.cli.options import json_option
 from ncfix.diagnostics import ExitCode, NcfixError, visible
 from ncfix.plugins import load_plugins
+from ncfix.values import frozen
 from ncfix.version import __version__
 
 EXTRAS = {
@@ -34,7 +34,7 @@ NEEDS = re.compile(r"([A-Za-z0-9_.-]+)(?:[^;]*?>=\s*([0-9.]+))?[^;]*(;.*\bextra\
 OLDEST_PYTHON = (3, 11)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostFinding:
     """Something that was looked at.
 

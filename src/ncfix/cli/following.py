@@ -6,7 +6,7 @@ Long programs are gone through part by part while they are read, if that can be,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from ncfix import core
@@ -17,6 +17,7 @@ from ncfix.cli.setup_options import SetupOptions
 from ncfix.cli.streams import Source, part_bytes
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import DifferenceError, NcfixError, UsageError
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.compensate.checking import Checked
@@ -34,7 +35,7 @@ PARALLEL = ("U", "V", "W")
 Found = TypeVar("Found")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FollowingSetup:
     """What is needed to follow programs. Without errors to correct, what is not given may be zero."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,6 +18,7 @@ from ncfix.cli.shop.projects import ProjectCommand, TableCommand, after_next_gro
 from ncfix.cli.streams import HeldOutput, Source, source_of
 from ncfix.cli.targets import Outputs, shown, targets
 from ncfix.diagnostics import ExitCode, Message, NcfixError, UsageError, visible
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.cli.columns import Columns
@@ -147,7 +147,7 @@ class TableTexts(NamedTuple):
     json: Iterable[bytes]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Motions:
     """The motions of a program, to be written as a table: `csv`, `json`, or both."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ import click
 from ncfix.cli.console import tell
 from ncfix.cli.options import PATH
 from ncfix.diagnostics import Message, Place
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.control.setup import Setup
@@ -193,7 +194,7 @@ OPTIONS = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SetupOptions:
     """What was said on the command line about the setup."""
 

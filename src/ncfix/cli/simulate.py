@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -21,6 +20,7 @@ from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import TableCommand, project_options
 from ncfix.cli.streams import HeldOutput, Source, source_of
 from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, read, shown, targets
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.cli.columns import Columns
@@ -113,7 +113,7 @@ def _check_apt(of_plan: bool, of_program: bool) -> None:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Errors:
     """The errors along the path of a program; `keep`: with a table of them."""
 

@@ -14,6 +14,7 @@ from ncfix import files, inputs
 from ncfix.cli import console
 from ncfix.cli.targets import STREAM, OutputTarget, shown, stdin
 from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.compensate.driver import Stamp
@@ -41,7 +42,7 @@ def long_bytes() -> int:
     return part_bytes() if os.environ.get("NCFIX_PART_BYTES") else LONG_BYTES
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FixedText:
     """A corrected program: what of it is not written yet, whether it differs from the original, and the report.
 
@@ -219,7 +220,7 @@ class Outlet:
         return text[self.sent :]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StampedText:
     """A text with the stamp as it has to be."""
 
@@ -248,7 +249,7 @@ def room_for(output: str | None) -> Iterator[IO[bytes]]:
         yield spool
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HeldOutput:
     """Keeps the parts of a long output until they are all there; `opened`: what is to be closed then."""
 

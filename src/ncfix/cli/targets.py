@@ -6,7 +6,7 @@ import errno
 import os
 import sys
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import IO
 from weakref import WeakSet
 
@@ -16,6 +16,7 @@ from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
 from ncfix.inputs import identities, identity
 from ncfix.outputs import check_named, check_output, check_target, folded_name
+from ncfix.values import frozen
 
 STREAM = "-"
 """Standard input or output as a file name."""
@@ -56,7 +57,7 @@ def shown(path: str) -> str:
     return "<stdin>" if path == STREAM else path
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class OutputTarget:
     """Where the output for one input goes.
 
@@ -117,7 +118,7 @@ class OutputTarget:
             files.write_whole(self.path, data, self.force, self.root, mode)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Outputs:
     """Where the outputs are to go, as the command line says.
 

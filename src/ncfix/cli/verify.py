@@ -6,7 +6,6 @@ Long programs are compared while they are read, if they can be.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
@@ -20,6 +19,7 @@ from ncfix.cli.shop.projects import ProjectCommand, project_options
 from ncfix.cli.streams import Source, source_of
 from ncfix.cli.targets import STREAM, shown
 from ncfix.diagnostics import ExitCode, Message
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.compensate.figures.comparison import RunningComparison
@@ -33,7 +33,7 @@ FEW = 5
 """Lines that are named by their numbers."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProgramPair:
     """The two texts, and what is needed to follow them."""
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ncfix.arguments import BLOCK_NUMBERS, TOLERANCE_UM, check_choice
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FixOptions:
     """Options of `fix`.
 

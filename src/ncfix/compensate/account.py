@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.control.moves import PASS_RULES, MotionKind, Moves, Pass, Rule
 from ncfix.diagnostics import Message, Place
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 
 REFUSED = "refused"
 LEFT = "an axis is left where it stands"
@@ -92,7 +93,7 @@ FEW = 4
 HINT = "name it in one of the first blocks, and again after a change of tool or offsets, or after machine coordinates"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LeftAxis:
     """One axis that was left where it stands.
 
@@ -155,7 +156,7 @@ class LeftAxis:
         return {"axis": self.axis, "motions": self.motions, "cuts": self.cuts, "lines": lines, **most}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Lacking:
     """Which axes of motions were left, (n, n_axes), and how far they are from where they should be, mm or rad."""
 
@@ -232,7 +233,7 @@ def in_order(found: Mapping[str, LeftAxis]) -> dict[str, LeftAxis]:
     return dict(sorted(found.items(), key=lambda item: (item[1].first, item[0])))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Reason:
     """Why a block is refused: a code that `ncfix explain` knows, a sentence, and the block that causes it (or -1)."""
 
@@ -241,7 +242,7 @@ class Reason:
     cause: int = -1
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Account:
     """Motion blocks by what became of them; every one is in exactly one of the three.
 

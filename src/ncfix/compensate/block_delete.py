@@ -37,6 +37,7 @@ from ncfix.machine import Machine
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Skip
 from ncfix.text.writer import Edit, Splices
+from ncfix.values import frozen
 from ncfix.writer.pieces import SecondReading
 
 DIFFERS = "NCF451"
@@ -55,7 +56,7 @@ Edits = tuple[Edit, ...]
 Readings = Sequence[SecondReading | None]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SwitchSetting:
     """How the switches stand: `on` are those that are; None where the program asks none. And what the control does.
 
@@ -208,7 +209,7 @@ def stamped(positions: Sequence[SwitchSetting]) -> str:
 # -- one text for all positions ---------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class JointPlan:
     """The plan for each position, and the text of all.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from ncfix.compensate.plan.arrays import Array, Index, picked
 from ncfix.compensate.plan.kinematics import reached_joints, signs
 from ncfix.machine import Machine, State
 from ncfix.text.writer import Edit, Splices, spliced
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.compensate import FixOptions
@@ -35,7 +36,7 @@ LEAST_SHARE = 0.05
 """None is named that moves the tip by less than this part of what the largest does."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MotionChange:
     """The command of an axis at the end of a motion, before and after.
 
@@ -63,7 +64,7 @@ class MotionChange:
         return f"{named}; in {self.pieces} pieces" if self.pieces > 1 else named
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Changes:
     """What a correction changes.
 

@@ -31,6 +31,7 @@ from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
 from ncfix.text import stamp
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 
 SUSPECTED = "NCF438"
 """A program that seems to have been corrected: what nobody needs to guess of one that says so."""
@@ -38,7 +39,7 @@ OPTIONS = FixOptions(force=True, verify=False)
 """What is asked for of the correction that tells what it would refuse."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Checked:
     """What was looked at, and what was found."""
 

@@ -66,6 +66,7 @@ from ncfix.text import stamp
 from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Edit, Splices, spliced
+from ncfix.values import frozen
 from ncfix.writer.emit import Emission
 from ncfix.writer.language import WrittenLanguage
 
@@ -90,7 +91,7 @@ class Proof(Protocol):
 # -- one part ---------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProvedPart:
     """A part that has been corrected and proved.
 
@@ -215,7 +216,7 @@ def strays(errors: PathError) -> bool:
 # -- a whole program --------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Fixed:
     """The corrected program, whether it differs from the original, and what there is to report.
 
@@ -230,7 +231,7 @@ class Fixed:
     made: Made | None = field(default=None, repr=False, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Made:
     """What a program was corrected with.
 
@@ -395,7 +396,7 @@ class PartCorrector(Corrector):
         return tally.report(self.task.path, (*suspicion, *self.parts.follower.messages), self.task.options)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Stamp:
     """Where the stamp stands in what was written, what it is now, and what it has to be (empty: there is none)."""
 
@@ -404,7 +405,7 @@ class Stamp:
     wanted: bytes
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Streamed:
     """What was done, and the stamp, which may say more at the end than could be known at the beginning."""
 

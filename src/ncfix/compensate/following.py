@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -36,13 +36,14 @@ from ncfix.text import stamp
 from ncfix.text.dialect import Dialect, beginning_without_comments
 from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 from ncfix.version import __version__
 
 Resolve = Callable[[str], bytes | None]
 FORCE = "fix the original program, or say --force if this is it"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Followed:
     """What the machine does with a program.
 
@@ -70,7 +71,7 @@ def traced(program: Program, machine: Machine, setup: Setup, resolve: Resolve | 
     return trace(program, setup, names, rotary, resolve, kinematics=kinematics_of(machine))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Positions:
     """What a machine's kinematics say about positions of its axes."""
 
@@ -179,7 +180,7 @@ PART_BYTES = 1 << 20
 """How much text is a part: its columns take about forty times as much memory, and stay in the processor's cache."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Task:
     """What all parts of a program have in common.
 

@@ -28,6 +28,7 @@ from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices, left_alone
+from ncfix.values import frozen
 from ncfix.writer.pieces import SecondReading
 
 FRAMES = "the program takes frames or values from where the machine stands"
@@ -35,7 +36,7 @@ MOST_PENDING = 64
 """Parts that may be put together before one of them ends where it may."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Part:
     """Text that can be worked on: a program that ends where it may, its motions, and whether it is the last.
 
@@ -207,7 +208,7 @@ def _ends_clean(program: Program, moves: Moves) -> bool:
     return bool(straight and known and moves.rule[-1] == Rule.CORRECT)
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class ContinuedPart:
     """A part, and the last motion of the one before, which is written already.
 
@@ -339,7 +340,7 @@ class MachineParts(Parts):
         return head, direction
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Attempt:
     """A text of a part that did not mean what was planned, its motions, and the rounds of its plan."""
 

@@ -14,7 +14,7 @@ program with the motion before it and the one behind it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,11 +43,12 @@ from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import MORE
 from ncfix.text.dialect import Dialect
+from ncfix.values import frozen
 from ncfix.writer.emit import Emission
 from ncfix.writer.pieces import Pieces
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MotionEnds:
     """Axis positions and commands at the ends of motions that go on from each other, (n + 1, n_axes) each.
 
@@ -107,7 +108,7 @@ FEW = 16
 """Of so many motions at most one may be other than plain."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MorePieces:
     """What is to be written of some motions.
 
@@ -178,7 +179,7 @@ NEARLY = 1 - 1e-6
 """Of a limit; what comes so close to one is for the long way to judge."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PlainPlan:
     """The plan of a part of plain motions.
 
@@ -226,7 +227,7 @@ class PlainPlan:
         return of_pieces if self.single else picked(of_pieces, self.first[1:] - 1)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Planner:
     """Plans parts of plain motions.
 

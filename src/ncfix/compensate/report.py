@@ -26,6 +26,7 @@ from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.control.flatten import Flat
@@ -43,7 +44,7 @@ NOTHING_SEEN: Mapping[str, None] = {"max": None, "rms": None}
 """The figures where nothing was looked at."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Refusal:
     """A motion block that was left as it was although it is not right, and why."""
 
@@ -56,7 +57,7 @@ class Refusal:
         return {"line": self.line, "code": self.code, "reason": self.reason}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FixReport:
     """What was done to one program, as figures.
 

@@ -15,7 +15,7 @@ What was written is read again. The new text must say what the plan meant (`diff
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -37,12 +37,13 @@ from ncfix.machine import Machine, State
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import language_of
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 from ncfix.writer.emit import Emission, emit
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import BEYOND_TRAVEL, PINNED, SecondReading, closure_of_refusals
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Round:
     """The last motion of a part in one round: the plans that are made until nothing speaks against one, and its text.
 
@@ -80,7 +81,7 @@ def same_rounds(one: tuple[Round, ...], other: tuple[Round, ...]) -> bool:
     return first == second
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PrecedingMotion:
     """The last motion of the part before, with which a part begins once more.
 
@@ -130,7 +131,7 @@ class SelfCheckError(Exception):
     """The text that was written does not mean what was planned: a fault of ncfix. Nothing may be written."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WrittenPlan:
     """A plan that can be written, and its text.
 
@@ -192,7 +193,7 @@ class WrittenPlan:
         return Lacking(lacking, off)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class AcceptedPlan:
     """A plan that nothing speaks against but, perhaps, its text.
 

@@ -33,6 +33,7 @@ from ncfix.compensate.solve import PrecedingMotion
 from ncfix.control.trace import Checkpoint
 from ncfix.host import tie
 from ncfix.plugins import blamed
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -129,7 +130,7 @@ def own_connections(connections: Connections, process: int) -> dict[int, Connect
     return {other: connection for (owner, other), connection in connections.items() if owner == process}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PartCheckpoint:
     """A part that left little behind: only its last block has still to be read and followed.
 
@@ -163,7 +164,7 @@ class PartResult(Protocol):
         """The same with the text put into a file, from a byte on; instead of it there is how long it is."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class OpenFiles:
     """Files that all processes have open.
 

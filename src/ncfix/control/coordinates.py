@@ -16,6 +16,8 @@ from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from ncfix.values import frozen
+
 LETTERS = "XYZABCUVW"
 """The axis letters of RS274NGC in the order of its parameters; every position here is a list in this order."""
 
@@ -35,7 +37,7 @@ IDENTITY: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Plane:
     """A plane of arcs and cycles: its two axes in right-handed order, and the one across it."""
 

@@ -8,7 +8,6 @@ them only. In the flat program each execution is a block of its own. It is writt
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from ncfix.diagnostics import RefusedError, SourceError
 from ncfix.text.language import language_of
 from ncfix.text.reader import read
 from ncfix.text.tree import Assignment, Command, Item, Opaque, OWordLine, Program, Span, Word
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.control.interpreter import TextUnit
@@ -141,7 +141,7 @@ class Flattener:
         return text + program.source[at:stop].decode("latin-1")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Flat:
     """A flat program.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from ncfix.control.coordinates import (
     IDENTITY,
@@ -26,6 +26,7 @@ from ncfix.control.coordinates import (
 )
 from ncfix.control.moves import UnknownAxes
 from ncfix.control.pointing import Triple, cross
+from ncfix.values import frozen
 
 ZEROS = (0.0,) * N_LETTERS
 AROUND = {"X": PLANES[190], "Y": PLANES[180], "Z": PLANES[170]}
@@ -42,7 +43,7 @@ def mixed_into(unknown: UnknownAxes, rotation: Rotation) -> UnknownAxes:
     return mixed
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Affine:
     """One frame.
 
@@ -82,7 +83,7 @@ WORLD = Affine()
 """The frame that changes nothing."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FrameStack:
     """The frames in force.
 

@@ -15,7 +15,6 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
@@ -34,6 +33,7 @@ from ncfix.text.dialect import goes_back
 from ncfix.text.language import Language
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Span, Template, view
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect
@@ -379,7 +379,7 @@ class FlatLine(NamedTuple):
     line: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen(kw_only=True)
 class FollowedLanguage(Language):
     """How the programs of one family of controls are followed.
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from ncfix.control.coordinates import LETTERS, Vector
 from ncfix.control.pointing import Pointing
 from ncfix.diagnostics import Message
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,7 +65,7 @@ class FeedMode(IntEnum):
     PER_REVOLUTION = 95
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TcpState:
     """Whether tool-centre-point control is on, and the length of the tool that the control knows of, mm."""
 
@@ -88,7 +89,7 @@ class Kinematics(Protocol):
         """A command (one number per axis) as it is under one state, said as it is under another."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Frame:
     """How the numbers in the program become a command: `command = offset + rotation @ (unit * program)`.
 
@@ -107,7 +108,7 @@ class Frame:
     increments: tuple[float, float] = (1.0, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CycleCall:
     """The call of a cycle in a block by itself: what it takes to give one hole, or pocket, a depth or place of its own.
 
@@ -131,7 +132,7 @@ class CycleCall:
     points: tuple[tuple[int, str], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Moves:
     """The motions of a program, struct of arrays; n rows, one per motion, in order of execution.
 
@@ -298,7 +299,7 @@ class Moves:
         return moved
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Trace:
     """A program followed as the control would: its motions and what there is to say about them."""
 

@@ -21,12 +21,12 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Set
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from ncfix.control.coordinates import INDEX, LETTERS, X, Y, Z, mask_of
 from ncfix.control.moves import Motion, MotionEnd, MotionKind
 from ncfix.text.dialect import NO_WORDS, is_letters
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.control.control import ProgramControl
@@ -61,7 +61,7 @@ class BlockValues(Protocol):
         """The axis words, as a bit mask of their letters."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Operation(ABC):
     """Something that a code does before the motion of its block."""
 
@@ -87,7 +87,7 @@ def source(given: Given) -> tuple[str | None, float | None]:
     return (given, None) if isinstance(given, str) else (None, given)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Like(Operation):
     """It does what a code of the family does. See `like`.
 
@@ -138,7 +138,7 @@ def like(code: str, **words: Given) -> Like:
     return Like(code, tuple(sorted(words.items())))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SetTool(Operation):
     """The tool that a word names comes into the spindle, as with M6.
 
@@ -166,7 +166,7 @@ class SetTool(Operation):
         return f"the tool {self.address} comes into the spindle"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Lose(Operation):
     """Axes go where the program does not say: motions at feed are refused until each is brought to a known place.
 
@@ -193,7 +193,7 @@ class Lose(Operation):
         return f"where {axes} stand after {self.after} is not known"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rapid(Operation):
     """The axes go to the words of the block in rapid, whatever motion code is in force."""
 
@@ -221,7 +221,7 @@ def make_up(control: ProgramControl, block: BlockValues, what: str, turned: Coll
     control.make(Motion(MotionKind.FEED, block.axes, MotionEnd(control.position[:], unknown), 0, refusal=what))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MakeUp(Operation):
     """The control makes up the motion of this block, a pocket, say: it is refused, and no other is.
 
@@ -242,7 +242,7 @@ class MakeUp(Operation):
         return f"the control makes up its motion, which is refused: {self.what}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SetLength(Operation):
     """The length of the tool acts from here on, as with G43, which many controls have no code for.
 
@@ -268,7 +268,7 @@ class SetLength(Operation):
         return f"the length {whose} acts"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Suspend(Operation):
     """A mode begins that ncfix does not follow: motions are refused until `Resume` of the same mode."""
 
@@ -282,7 +282,7 @@ class Suspend(Operation):
         return f"motions are refused from here: {self.mode}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Resume(Operation):
     """The mode ends; where it has led the axes is not known."""
 
@@ -297,7 +297,7 @@ class Resume(Operation):
         return f"the end of {self.mode}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Refuse(Operation):
     """Every motion from here on is refused, those before it are not; `why` is told for each."""
 

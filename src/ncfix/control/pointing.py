@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.coordinates import TURN
+from ncfix.values import frozen
 
 FloatArray = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ LEAST = 1e-3
 """A smaller circle, relative to the tool's length, says nothing about its axis."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pointing:
     """How a machine with two rotary axes points its tool.
 

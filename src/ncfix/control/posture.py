@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -21,6 +20,7 @@ import numpy as np
 from ncfix.control.coordinates import Rotation, Vector, X, Y, Z, angles_in_words, as_rotation
 from ncfix.control.moves import Kinematics, TcpState
 from ncfix.control.pointing import FloatArray, Pair, Pointing, Triple
+from ncfix.values import frozen
 
 PROBE = 128.0
 """mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""
@@ -58,7 +58,7 @@ class WayRules(NamedTuple):
 NEAREST = WayRules()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Postures:
     """The ways of two rotary axes to point the tool along a direction.
 
@@ -94,7 +94,7 @@ class Postures:
         return angles_in_words(self.letters, self.ways[0])
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MachineDirections:
     """Directions in the workpiece, with the rotary axes at some positions.
 

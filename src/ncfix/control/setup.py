@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.diagnostics import Message, Place, UsageError
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.control.moves import Kinematics
@@ -38,7 +39,7 @@ CALCULATOR = "calculator"
 """A number means the same with and without a decimal point."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Tool:
     """A tool as the control's table has it, mm.
 
@@ -51,7 +52,7 @@ class Tool:
     aside: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Setup:
     """What is on the machine when the program starts. Angles here are in degrees, as on the control.
 
@@ -192,7 +193,7 @@ Resolve = Callable[[str], bytes | None]
 """Gives the text of a subprogram file by its name; None if there is none."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Run:
     """What a program is followed with; see `trace`, which has the same arguments."""
 

@@ -38,6 +38,7 @@ from ncfix.control.setup import Run, SetupLookup
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect
 from ncfix.text.reach import Deletable
+from ncfix.values import frozen
 
 NO_MOTION = 800
 """G80: no motion code is in force; the state at the start of a program."""
@@ -104,7 +105,7 @@ class Modal:
     cycle: Cycle = field(default_factory=Cycle)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Saved:
     """A modal state that M70 or M73 has saved; `at_return`: it is restored when the subprogram returns."""
 

@@ -26,6 +26,7 @@ from ncfix.text.language import Language, language_of
 from ncfix.text.layout import AXIS_LETTERS
 from ncfix.text.reader import ProgramReading, moved_by
 from ncfix.text.tree import Program, Skip, Template
+from ncfix.values import frozen
 
 TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles", "calls"})
 """The fields of `Moves` that are the same for all rows."""
@@ -200,7 +201,7 @@ def taken(moves: Moves, rows: NDArray[np.intp]) -> Moves:
     return replace(moves, **{name: column.take(rows, axis=0) for name, column in columns if column is not None})
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Checkpoint:
     """The state in which a part leaves a control, before its last block, where it has changed nothing else for good.
 

@@ -13,7 +13,6 @@ those of ISO/TR 16907 as docs/controllers.md lists them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from ncfix.machine.axes import SPINDLE
 from ncfix.machine.basis import Backlash
 from ncfix.machine.effects import runs_ahead
 from ncfix.machine.state import SUM
+from ncfix.values import frozen
 
 BOUNDS: dict[str, tuple[float, float]] = {
     "curve": (100.0, 100.0),
@@ -75,7 +75,7 @@ TURNING = ("fanuc-rotary", "isg", "siemens", "heidenhain-kinematics")
 """Those over rotary axes."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Plausibility:
     """What the fitted constants amount to.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.machine import Effect
 from ncfix.machine.basis import Polynomial
 from ncfix.measure.measurement import Array
+from ncfix.values import frozen
 
 LIKE = 0.25
 """Share of their mean by which scales may differ and still be one temperature's."""
@@ -28,7 +29,7 @@ SCALE = re.compile(r"(?:scale |constant E(?=[XYZ][XYZ]$))([XYZ])\1?$")
 LINE = re.compile(r"(constant )?E([ABC])0([XYZ])$")
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class EffectFinding:
     """One named effect.
 

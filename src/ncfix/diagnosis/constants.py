@@ -13,7 +13,7 @@ mistakes are on one scale.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +27,7 @@ from ncfix.measure.least_squares import Combination, Solution, orthonormal, solv
 from ncfix.measure.measurement import Array, Index
 from ncfix.measure.observation import Mask
 from ncfix.measure.selection import Selection
+from ncfix.values import frozen
 
 FIRST_UM, TIMES, STEPS = 1.5, 3.0, 10
 """Sizes of a change at the tool tip that are considered, um: from the first on, each so many times the one before."""
@@ -40,7 +41,7 @@ HELPS = 0.1
 """Log odds by which a change of the set must help."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MovedConstant:
     """A constant of the machine file that the data put elsewhere, surely: mm or rad, with its standard deviation.
 
@@ -64,7 +65,7 @@ class MovedConstant:
         return abs(self.file) > DOUBT * self.sigma and abs(self.file + self.data) < DOUBT * self.sigma
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class ConstantsVerdict:
     """What the data say of all constants of the file together.
 
@@ -112,7 +113,7 @@ class ConstantsVerdict:
         return kept
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class FileLikelihood:
     """Likelihoods of the values about the machine file as it stands, with some constants or names there.
 

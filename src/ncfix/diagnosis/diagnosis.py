@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,7 @@ from ncfix.machine.axes import component_title
 from ncfix.measure.least_squares import orthonormal
 from ncfix.measure.least_squares import without as without_base
 from ncfix.measure.measurement import Array, Measurement
+from ncfix.values import frozen
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
 EXCESS_UM = 2.0
@@ -82,7 +83,7 @@ CLEAR = float(np.log(1e6))
 NO_PATTERN = "something that follows no pattern that was looked for"
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Case:
     """What was asked.
 
@@ -103,7 +104,7 @@ class Case:
         return ~self.outlying[np.maximum(self.data.row, 0)] & (self.data.row >= 0)
 
 
-@dataclass(frozen=True, repr=False, eq=False)
+@frozen(repr=False, eq=False, slots=False)
 class Diagnosis:
     """What was found, and everything a report needs.
 
@@ -168,7 +169,7 @@ class Diagnosis:
         return self.rest.p_left
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Unexplained:
     """What the names leave.
 

@@ -6,7 +6,6 @@ Each name in turn taken for the true one, and every other refitted to old and ne
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import compress
 
@@ -21,6 +20,7 @@ from ncfix.diagnosis.selection import ALIKE
 from ncfix.measure.instruments import observe
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
+from ncfix.values import frozen
 
 COUNT = 12
 """Poses that are chosen."""
@@ -38,7 +38,7 @@ WEAK = 1e-6
 """Prior on what is free, so that unseen combinations do no harm."""
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Discrimination:
     """One name against another that imitates it: information of the old rows, and the blocks of every pose on offer.
 
@@ -146,7 +146,7 @@ def climbed(rounds: Sequence[Round], chosen: list[int]) -> list[int]:
     return chosen
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Hypothesis:
     """A name with what it would be: its likeliest form, the numbers behind it, and all forms with their sizes in um."""
 
@@ -155,7 +155,7 @@ class Hypothesis:
     forms: tuple[tuple[EffectForm, float], ...]
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class HypothesisPairs:
     """All contests between some names, over poses on offer.
 

@@ -44,6 +44,7 @@ from ncfix.diagnosis.forms import EffectForm, shape_variations, side_by_side
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse
 from ncfix.measure.measurement import Array, Index
+from ncfix.values import frozen
 
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
 """Size of everything else together, against the noise of one value."""
@@ -70,7 +71,7 @@ USUAL_SHARE = SHARES[2]
 """The share of the background at which it is asked what the members show."""
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Background:
     """The coordinates and the likelihoods in them.
 
@@ -127,7 +128,7 @@ def marginal(squares: float, log_determinant: float, count: int, freedom: float)
     return -0.5 * log_determinant - 0.5 * (count + freedom) * float(np.log((squares + freedom) / (count + freedom)))
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Member:
     """An effect that is taken to be there: a form and its size."""
 
@@ -135,7 +136,7 @@ class Member:
     size: float
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class DataProducts:
     """Inner products of the data with the covariance of the background at one share.
 
@@ -148,7 +149,7 @@ class DataProducts:
     determinant: float
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class CandidateOdds:
     """Log odds of every group per size (um) beside some members, (groups, sizes)."""
 
@@ -387,7 +388,7 @@ def entry_price(count: int) -> float:
     return SURE + (count - 1) * FURTHER if count else 0.0
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Comparison:
     """Weighs sets of effects; remembers what it has weighed.
 

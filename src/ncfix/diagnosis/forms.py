@@ -20,7 +20,7 @@ same, the effect is not in the catalogue.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate, combinations, pairwise, product
 from typing import Any
 
@@ -45,6 +45,7 @@ from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
 from ncfix.measure.observation import Observation, base_from_workpiece
+from ncfix.values import frozen
 
 VISIBLE = 0.05
 """Share of an effect's squares that must be left beside what is free."""
@@ -103,7 +104,7 @@ CHANGE, CAME = "change of ", "came since: "
 """Of two dates: how the names begin of what is at the later one only, and their titles."""
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class EffectForm:
     """One form of a candidate.
 
@@ -117,7 +118,7 @@ class EffectForm:
     columns: Array
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class VisibleForms:
     """The groups that the data show, and the candidates that they cannot show, with the share that is left."""
 

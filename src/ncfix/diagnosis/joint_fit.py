@@ -8,7 +8,7 @@ What a name must show besides evidence: that it predicts, and that it matters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +23,7 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis, Fourier, Polynomial
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index
+from ncfix.values import frozen
 
 Mask = NDArray[np.bool_]
 WIDE = 1e3
@@ -40,7 +41,7 @@ RATHER = 0.5
 """An effect smaller than this share of what has no name is as good as part of it."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class JointFit:
     """Everything fitted at once.
 
@@ -161,7 +162,7 @@ def _fewer(basis: Basis, own: Array) -> tuple[Basis, Array]:
     return basis, np.ones(len(own), dtype=bool)
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class HeldOut:
     """Prediction errors of all values while they were held out, um, (m,); NaN where none was possible."""
 
@@ -187,7 +188,7 @@ def _folds(data: ResidualData) -> tuple[Index, list[NDArray[np.bool_]]]:
     return cell, [(cell % FOLDS == fold) & (data.row >= 0) for fold in range(FOLDS)]
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Gap:
     """Root mean square of residual lengths, um: before, after, the noise floor, and the first two on held-out poses.
 

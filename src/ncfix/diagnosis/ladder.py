@@ -7,11 +7,10 @@ far as noise leaves so much by chance; else what exceeds the noise is not explai
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ncfix.diagnosis.diagnosis import CONSTANT_FAMILY, Diagnosis
+from ncfix.values import frozen
 
 GIVEN, MISTAKES, CONSTANTS, NAMED, UNNAMED, UNEXPLAINED, NOISE = (
     "file as given",
@@ -24,7 +23,7 @@ GIVEN, MISTAKES, CONSTANTS, NAMED, UNNAMED, UNEXPLAINED, NOISE = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rung:
     """One step down.
 

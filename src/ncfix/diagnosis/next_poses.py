@@ -11,7 +11,7 @@ Poses on offer for a further measurement, where axes and tool have been or may g
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from ncfix.machine import Machine
 from ncfix.machine.state import SUM
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import STATES, Array, Measurement
+from ncfix.values import frozen
 
 NEAR = 10.0
 """Log odds within which another name is near enough to ask for poses that tell them apart."""
@@ -56,7 +57,7 @@ ROUNDED = 1e-3
 Span = tuple[float, float]
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Proposal:
     """Poses to be measured.
 

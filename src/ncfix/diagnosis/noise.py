@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,7 @@ from ncfix.diagnosis.forms import (
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse, orthonormal
 from ncfix.measure.measurement import Array, Measurement, groups
+from ncfix.values import frozen
 
 DRIFT_TIME = 900.0
 """s: how long an instrument's wandering lasts."""
@@ -75,7 +76,7 @@ ENOUGH_REPEATS = 10
 """Degrees of freedom of repeats from which on they say something."""
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Contrasts:
     """An orthonormal basis of what is orthogonal to the base, (m, n), as the last columns of 1 - V T V': of the
     reflections that make it V (m, k) are the vectors, and T (k, k) is what makes one product of them.
@@ -188,7 +189,7 @@ def _drift_correlation(data: ResidualData, relative: Array) -> Array | None:
     return in_noise(lasting, relative)
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class DriftLikelihood:
     """How much does it wander?
 
@@ -361,7 +362,7 @@ def _likeliest_effect(data: ResidualData, there: Array, wide: Array, groups: Seq
     return np.concatenate([found, MISSHAPEN * shown[:, None] * shape_variations(data)], axis=1)
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class NoiseFloor:
     """The noise floor.
 

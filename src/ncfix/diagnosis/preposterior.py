@@ -10,7 +10,6 @@ the old rows happen to say is not counted a second time, and a prediction that i
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -22,6 +21,7 @@ from ncfix.diagnosis.noise import everything_at
 from ncfix.diagnosis.selection import ALIKE, ASSUMED, TOLD_APART, Selected, untold
 from ncfix.measure.measurement import Array
 from ncfix.measure.observation import Observation
+from ncfix.values import frozen
 
 FORMS = 2
 """Forms of each name that are considered, as where names are weighed."""
@@ -33,7 +33,7 @@ WIDE_UM = 1e3
 """How far what is free may be off."""
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class PredictedValues:
     """What a name, in one form and shape, says of the new values.
 
@@ -70,7 +70,7 @@ def shown_at(new: Observation, groups: Sequence[EffectForm]) -> list[Array]:
     ]
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Prospect:
     """What may come of further poses.
 

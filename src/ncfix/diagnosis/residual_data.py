@@ -10,7 +10,7 @@ How well a machine file as it stands agrees with data: its constants nearly fixe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,7 @@ from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import gauss_newton, solve
 from ncfix.measure.measurement import Array, Index, Measurement, groups
 from ncfix.measure.selection import Selection
+from ncfix.values import frozen
 
 STEPS = 6
 SETTLED_UM = 1e-3
@@ -56,7 +57,7 @@ EXACT_SETTLED_UM = 0.05
 """A step that changes no prediction by so much is the last one."""
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class ResidualData:
     """One entry per value.
 
@@ -352,7 +353,7 @@ def rows_of(problem: Problem) -> Index:
     return np.concatenate(rows)
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Misfit:
     """A machine file against data.
 

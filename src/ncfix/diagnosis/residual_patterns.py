@@ -7,7 +7,6 @@ that grows along an axis, time, a temperature, a tool. They only show; they do n
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
@@ -16,6 +15,7 @@ from ncfix.diagnosis.evidence import Background
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index
+from ncfix.values import frozen
 
 SHOWN = 6
 UNLIKELY = 1e-3
@@ -25,7 +25,7 @@ NEAR, BLOCK = 6, 500
 """Neighbours of a pose, and poses whose neighbours are sought together."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class ResidualPattern:
     """One pattern: in words, its size (rms, um) and how unlikely it is by chance, all looked at considered."""
 

@@ -19,13 +19,14 @@ a size of one, over the variance of noise and background, its log odds are 1/2 s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from ncfix.diagnosis.evidence import Comparison, Evidence, Member, Members, entry_price
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array
+from ncfix.values import frozen
 
 OVERLAP = 0.25
 """Share of what a name shows that another must be able to show to be an alias, however likely it is in its place."""
@@ -105,7 +106,7 @@ def _shared(columns: Array, by: Array) -> float:
     return 1.0 - float((without(orthonormal(by), columns) ** 2).sum() / (columns**2).sum())
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Selected:
     """The effects that are there, likeliest first, with what was considered.
 

@@ -7,7 +7,7 @@ change it by parts in ten thousand only, so each pass gains about as many digits
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from ncfix.machine.route import Route, SplitRoute, Turns, batch_of
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, behind_each_other, some
 from ncfix.machine.steps import SMALL, dot, has_arrived, volume
+from ncfix.values import frozen
 
 Mask = NDArray[np.bool_]
 Tips = Callable[[Poses, Turns], tuple[Array, Array]]
@@ -33,7 +34,7 @@ WHOLE_STEPS = 8
 """After so many passes the steps are halved: whole steps jump to and fro where the error has a jump or a kink."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Aim:
     """Where the axes have to be, in columns.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from ncfix.machine import se3
 from ncfix.machine.basis import Basis, ConstantBasis
 from ncfix.machine.se3 import Array
+from ncfix.values import frozen
 
 Vector = tuple[float, float, float]
 Triad = tuple[Vector, Vector, Vector]
@@ -33,7 +34,7 @@ def degrees(angle: float) -> float:
     return next((each for each in candidates if each * DEGREE == angle), near)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Axis:
     """A prismatic or revolute joint. Geometry in the base frame with all axes at zero.
 
@@ -112,7 +113,7 @@ class Axis:
         }
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GaugeLine:
     """The end of the tool branch, base frame with all axes at zero: the gauge line, and the way from the tip to it."""
 
@@ -124,7 +125,7 @@ class GaugeLine:
         return np.asarray(self.point) - np.asarray(length)[..., None] * np.asarray(self.direction)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Topology:
     """The axes on both branches, in the order of the string."""
 
@@ -174,7 +175,7 @@ NAME = re.compile(r"E([XYZABC])(0?)([A-Z])")
 Matrix = tuple[tuple[float, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Effect:
     """A component of the error of one joint: `sum coefficients * basis(u)`, u = (x - center) / scale.
 
@@ -195,7 +196,7 @@ class Effect:
 
     name: str
     coefficients: tuple[float, ...]
-    basis: Basis = ConstantBasis()  # noqa: RUF009
+    basis: Basis = ConstantBasis()
     center: float = 0.0
     scale: float = 1.0
     covariance: Matrix | None = None

@@ -11,13 +11,14 @@ these declarations, so a plugin's basis needs no code for that. Register one wit
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ncfix.machine.se3 import Array
+from ncfix.values import frozen
 
 REQUIRED = object()
 
@@ -122,7 +123,7 @@ def check_shapes(basis: Basis) -> None:
             raise ValueError(f"{name} gives shape {shape} for three places and {basis.size} coefficients")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ConstantBasis(Basis):
     """One number, whatever the signal."""
 
@@ -147,7 +148,7 @@ class ConstantBasis(Basis):
         return abs(coefficients[0]), 0.0, 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Polynomial(Basis):
     """Powers of u."""
 
@@ -190,7 +191,7 @@ class Polynomial(Basis):
         return distinct("degree", self.degree, lowest=0)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Backlash(Polynomial):
     """Half the play that opens when the axis reverses: +1/2 when it comes moving up, -1/2 when it comes moving down."""
 
@@ -209,7 +210,7 @@ class Backlash(Polynomial):
         return 0.5 * direction * columns_like(self.degree, u) * powers(u, tuple(max(p - 1, 0) for p in self.degree))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Fourier(Basis):
     """Harmonics of the turn of a rotary axis."""
 
@@ -256,7 +257,7 @@ class Fourier(Basis):
         return distinct("order", self.order, lowest=1)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Periodic(Fourier):
     """Harmonics of a period: a screw's pitch, a scale's grating, a gear."""
 

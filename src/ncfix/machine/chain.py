@@ -11,7 +11,6 @@ a direction, shape () or (m, 1). A pose is carried as four columns, three direct
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from ncfix.machine.error_model import ErrorModel, Slot, SmallMotionKind
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.steps import dot
+from ncfix.values import frozen
 
 Weight = float | Array
 
@@ -99,7 +99,7 @@ def cross_with(direction: Sequence[float], arm: Array) -> Array:
     return out
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SmallMotion:
     """A proper rigid motion near the identity: a rotation about `center`, then a translation. None is none.
 
@@ -196,7 +196,7 @@ OF_FRAME = np.array([0.0, 0.0, 0.0, 1.0])[:, None]
 """Weights of the columns of a frame: three directions, which translations leave alone, and a point."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class JointModel:
     """A joint with the slots of its small motions; the spindle has no axis."""
 
@@ -250,7 +250,7 @@ def turned_with(axis: Axis, position: Array, small: Array) -> Array:
     return np.concatenate([turned[:, 0], turned[:, 1]])
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class JointPose:
     """A joint at its positions, with its errors."""
 
@@ -281,7 +281,7 @@ class JointPose:
         return moved if self.location is None else self.location.forth(moved, weight)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class JointChain:
     """The joints from the tool back to the foundation, then out to the workpiece; all of them with their errors.
 

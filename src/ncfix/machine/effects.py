@@ -9,7 +9,7 @@ section 2.5, rule 1).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations
 from math import nan
@@ -25,6 +25,7 @@ from ncfix.machine.piecewise import PIECEWISE
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import SUM, State, flatten
 from ncfix.plugins import called, handed, registry
+from ncfix.values import frozen
 
 WARM = 20.0
 """Degree C at which thermal effects are zero."""
@@ -47,7 +48,7 @@ class PluginEffect(Protocol):
         """The effects that it is made of on this machine; none if the machine cannot have it."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PhysicalEffect:
     """A physical effect of one machine.
 
@@ -356,7 +357,7 @@ def depends_on(effect: Effect) -> str:
     return f"{effect.basis.name} of {', '.join(signals)}" if signals else "constant"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class EffectCurve:
     """An effect over the axis that it depends on.
 
@@ -374,7 +375,7 @@ class EffectCurve:
     direction: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TipCurve:
     """How the error of the tool tip changes as one axis moves over its travel, the others in the middle of theirs.
 

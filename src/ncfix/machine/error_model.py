@@ -8,7 +8,7 @@ reference point.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from functools import cached_property, reduce
 
@@ -19,6 +19,7 @@ from ncfix.machine.axes import BASE_AXES, SPINDLE, Axis, Effect, GaugeLine, Vect
 from ncfix.machine.basis import Basis
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal, inputs_of, middle_of_gap, signal_called
+from ncfix.values import frozen
 
 
 class SmallMotionKind(Enum):
@@ -29,7 +30,7 @@ class SmallMotionKind(Enum):
     CARRIED = "moves the axis line and what it carries"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Slot:
     """Where contributions are summed. `joint` is an index (n_axes: the spindle); `reference`: base frame, at zero."""
 
@@ -38,7 +39,7 @@ class Slot:
     reference: Vector
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Dependence:
     """How an error depends on the state, whichever component it is: functions of one signal, perhaps times another.
 
@@ -82,7 +83,7 @@ class Dependence:
         return self.times_factor(self.basis.rows(np.broadcast_to(u, shape), np.broadcast_to(way, shape)), poses)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class EffectGroup(Dependence):
     """Effects evaluated together: `gains[s, 6, k] @ basis(u)` is added to slot `slots[s]`, times the factor's u.
 
@@ -94,7 +95,7 @@ class EffectGroup(Dependence):
     gains: Array
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class ErrorModel:
     """The compiled effects of a machine."""
 
@@ -282,7 +283,7 @@ TWICE = 2.0
 """A location error acts before the motion of its axis and, the other way, behind it."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviationBounds:
     """Bounds of all small motions of a machine together, and how far the error of the tip may bow on straight motions.
 

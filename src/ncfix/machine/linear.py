@@ -11,7 +11,6 @@ nearer to the foundation at zero; the joint's Jacobian wants it at its reference
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,9 +27,10 @@ from ncfix.machine.error_model import (
 )
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Jacobians:
     """Derivatives at the nominal pose.
 
@@ -116,7 +116,7 @@ def _joined(bundle: Array, weight: Array, own: Array, own_weight: Array) -> tupl
     return np.concatenate(both, axis=1), np.concatenate([weight, own_weight])
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Dependences:
     """How many effects depend on the state: each way once, and the number of every effect's own."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -23,6 +23,7 @@ from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal, State, flatten, inputs_of, poses_first, with_lags
 from ncfix.machine.steps import SMALL
 from ncfix.toml_text import written
+from ncfix.values import frozen
 
 DEFAULT_INCREMENT = (0.001, 0.001 * np.pi / 180)
 """What controls resolve, linear and rotary axes: 1 um, in mm, and 0.001 degree, in rad."""
@@ -30,7 +31,7 @@ DEFAULT_CORRECTION = (0.5, 0.05 * np.pi / 180)
 """Corrections that are refused are larger: 0.5 mm, and 0.05 degree, in rad."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Machine:
     """A serial machine tool with its errors. Immutable; `replace` makes another.
 
@@ -54,7 +55,7 @@ class Machine:
     name: str
     topology: str
     axes: tuple[Axis, ...]
-    tool: GaugeLine = GaugeLine()  # noqa: RUF009
+    tool: GaugeLine = GaugeLine()
     effects: tuple[Effect, ...] = ()
     control: str | None = None
     least_increment: tuple[float, float] = DEFAULT_INCREMENT

@@ -9,7 +9,7 @@ Outside the first and last place of a table, spline or step the end values hold.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ncfix.machine.basis import Basis, columns_like, distinct, key, powers
 from ncfix.machine.se3 import Array
+from ncfix.values import frozen
 
 
 def splines(knots: Array, degree: int, coefficients: Array, u: Array) -> Array:
@@ -64,7 +65,7 @@ def no_way(way: str) -> list[tuple[str, str]]:
     return [] if way in (BOTH, POSITIVE, NEGATIVE) else [("direction", f"{way!r} is none of both, positive, negative")]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PiecewiseLinear(Basis):
     """Values at given positions, straight lines between them: what a control's own table holds."""
 
@@ -125,7 +126,7 @@ class PiecewiseLinear(Basis):
         return index, np.clip(fraction, 0.0, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Spline(Basis):
     """B-splines on a full knot vector (repeat the end knots degree times more); degree 3 is twice smooth."""
 
@@ -187,7 +188,7 @@ class Spline(Basis):
         return evaluated(np.asarray(self.knots), self.degree, gains, np.clip(u, *self.domain))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PiecewiseConstant(Basis):
     """One value below the first position, one between each pair, one above the last."""
 
@@ -244,7 +245,7 @@ def _at(index: Any, values: Array | float, size: int) -> Array:
     return np.where(columns_like(range(size), index) == index, values, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Truncated(Basis):
     """Powers of u, and for each knot t the power of u - t above it: degree 2 is once smooth, 3 twice (Soons, Eq. 3.2).
 

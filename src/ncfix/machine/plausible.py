@@ -10,7 +10,7 @@ machine of a metre.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State
 from ncfix.toml_text import decoded, key_lines, line_of, parsed, place_of
+from ncfix.values import frozen
 
 BEYOND = 10.0
 """Times what is much: no machine that runs is so wrong."""
@@ -62,7 +63,7 @@ LEAST = 1e-3
 """Of what is much: nobody writes down less, so no unit was meant that makes it of a number."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Doubt:
     """What is odd about a machine, and whether it is more than odd: no machine is so."""
 

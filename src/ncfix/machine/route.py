@@ -11,7 +11,7 @@ whatever they are, and are added up with the rest.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
 from ncfix.machine.steps import BACK, FORTH, GIVEN, PARTS, POWERS, SHIFT, TURN, WAVES, Functions, Number, Steps
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.core.chain import PoseBatch, RouteSteps
@@ -43,7 +44,7 @@ ClampedAngle = tuple[int, float, float]
 """An axis whose harmonics are held at the ends of a range, and these, rad."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SmallMotionPlace:
     """Where a small motion is done: the slots whose sum it is, and the rotation from base axes to those of the step."""
 
@@ -51,7 +52,7 @@ class SmallMotionPlace:
     turn: Array
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Terms:
     """What has to be given besides the positions.
 
@@ -76,7 +77,7 @@ class Terms:
         return found
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Part:
     """A group as numbers: its functions, and the gains (parts, functions) by which they add to the small motions."""
 
@@ -173,7 +174,7 @@ Turns = tuple[Array, Array]
 """Sines and versines (1 - cosine) of rotary axes, see `Route.turns`."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Route:
     """The steps of a machine in two forms: lists, to go through with columns, and arrays for the compiled core.
 
@@ -289,7 +290,7 @@ def batch_of(poses: Poses, turns: Turns, given: Sequence[Array], *routes: Route)
     return chain.PoseBatch(q, sine, versine, others, length, work, functions, small)
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class SplitRoute:
     """A route in two, for those who bring the tip to a point by linear axes.
 
@@ -378,7 +379,7 @@ def _written_out(
     return Route(listed, (legs, functions), terms, tuple(i for i, axis in enumerate(axes) if axis.rotary))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Link:
     """One step, not yet as numbers; `axis`, `direction`, `point` and `center` as in `Steps`.
 

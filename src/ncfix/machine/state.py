@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,7 @@ from ncfix import core
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine.axes import Axis
 from ncfix.machine.se3 import Array
+from ncfix.values import frozen
 
 CHUNK = 8192
 """Poses handled at a time: few enough that the intermediate columns stay in the processor's cache."""
@@ -19,7 +20,7 @@ LARGE = 1 << 15
 """The same where compiled loops go through them, which take them by the handful."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class State:
     """The rest of the state. Everything broadcasts with the leading dimensions of the axis positions.
 
@@ -33,7 +34,7 @@ class State:
     inputs: Mapping[str, ArrayLike] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Poses:
     """Poses with their leading dimensions flattened and their axes first: columns of n numbers.
 
@@ -145,7 +146,7 @@ SUM = "+"
 """Between rotary axes whose angles add: B+C is how an arm leans behind two parallel joints."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Signal:
     """One number per pose, made ready for a basis: u = (x - center) / scale, x held at the ends of the axis range.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Mask
 from ncfix.measure.refine import pruned, with_time_constants
 from ncfix.measure.selection import Selection, select
+from ncfix.values import frozen
 from ncfix.version import __version__
 
 ALIKE = 0.02
@@ -247,7 +248,7 @@ def _what(combination: Combination, held: str, names: Sequence[str]) -> str:
 # -- how well the tip is known -----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False)
 class Prediction:
     """The standard deviation of the predicted tip error, um, the largest of three directions at each pose.
 

@@ -7,7 +7,7 @@ distances: an error that repeats with a screw's pitch cannot hide (Soons, sectio
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.axes import Axis
 from ncfix.measure.measurement import Array, Measurement
+from ncfix.values import frozen
 
 DECIMALS = 3
 CORNERS = 0.4
@@ -45,7 +46,7 @@ FINEST = 2.0**-54
 """Digits count down to this: below it a number next to one cannot be told from one."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Room:
     """Where measuring is possible.
 

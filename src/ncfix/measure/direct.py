@@ -10,7 +10,7 @@ is how a straightness instrument's line is aligned: a constant, and a slope acro
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +21,7 @@ from ncfix.machine.error_model import dependence_of, unit_motion
 from ncfix.machine.state import flatten, with_lags
 from ncfix.measure.measurement import Array, Index, Measurement, component_of, groups
 from ncfix.measure.observation import DEFAULT_NOISE, LEVER, Mask, Observation, Unknowns, repeatability
+from ncfix.values import frozen
 
 ANGLE = 1e-4
 """rad: how far an angle instrument's zero may be off, in simulations."""
@@ -162,7 +163,7 @@ class DirectReading(Observation):
 # -- figures of ISO 230-2 and 230-3 ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Positioning:
     """One error motion in one set; um, or urad for angles. From both sides unless only one was measured.
 

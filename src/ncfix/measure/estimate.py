@@ -9,7 +9,6 @@ and does not change where the iteration ends.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +25,7 @@ from ncfix.measure.least_squares import Solution, gauss_newton, solve
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.observation import Mask, Observation
 from ncfix.measure.selection import Selection
+from ncfix.values import frozen
 
 STEPS = 25
 """Most steps of the iteration."""
@@ -50,7 +50,7 @@ WIDE = 0.05
 whatever is much, as on an arm, since steps by equations that are linear in it would not end."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Estimate:
     """Where the iteration ended.
 
@@ -91,7 +91,7 @@ class Estimate:
         return full
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class LeftOut:
     """Coefficients that were left out of a model as if they were zero, which nobody knows for certain.
 
@@ -105,7 +105,7 @@ class LeftOut:
     covariance: Array
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Problem:
     """Several observations of one machine, stacked."""
 
@@ -195,7 +195,7 @@ class Problem:
         return columns
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False, slots=False)
 class Calibration:
     """A calibrated machine and how well it is known.
 
@@ -342,7 +342,7 @@ def noise_scale(problem: Problem, estimate: Estimate) -> float:
     return float(np.sqrt(chi_square)) if improbable or not problem.noise_known else 1.0
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Residuals:
     """One entry per value, (m,).
 

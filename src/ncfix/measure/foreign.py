@@ -24,6 +24,7 @@ from ncfix.machine import Axis, Machine
 from ncfix.measure import checks
 from ncfix.measure.measurement import Measurement
 from ncfix.plugins import called, registry
+from ncfix.values import frozen
 
 LINEAR = "XYZ"
 SLANTED = 1e-6
@@ -246,7 +247,7 @@ def _first_words(text: str) -> list[str]:
 # -- Renishaw ----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Deviation:
     """One deviation: run and target from 1, mm, and the line of the file."""
 

@@ -7,8 +7,6 @@ either; the set-up is drawn at random and nobody is told.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ncfix.arguments import FAULT, SEED
@@ -20,6 +18,7 @@ from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.tip_errors import Probing, TipErrors
 from ncfix.measure.tracker import Targets
+from ncfix.values import frozen
 
 UNKNOWNS = 6
 """Of a set, at most: a shift and a turn."""
@@ -60,7 +59,7 @@ def observe(measurement: Measurement, machine: Machine) -> Observation:
     return VIEWS[measurement.kind](measurement, machine)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Faults:
     """How a measurement goes wrong.
 

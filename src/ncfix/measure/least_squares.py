@@ -8,7 +8,6 @@ reweighted least-squares" (1977).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -18,6 +17,7 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import chdtr, ndtri, stdtrit
 
 from ncfix.measure.measurement import Array, Index
+from ncfix.values import frozen
 
 NUISANCE_RANK = 1e-10
 """Singular values of the scaled nuisance columns below this are zero."""
@@ -58,7 +58,7 @@ def gauss_newton(step: Callable[[At], tuple[At, float]], start: At, most: int, s
     return at, size
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Combination:
     """A column that equals a combination of others: raising `held` by 1 is raising each of `others` by its factor."""
 
@@ -67,7 +67,7 @@ class Combination:
     factors: tuple[float, ...]
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Solution:
     """What least squares say of p coefficients.
 

@@ -14,7 +14,6 @@ it are told apart, and compared.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +21,7 @@ import numpy as np
 from ncfix.machine import Effect, Machine
 from ncfix.measure.measurement import CENTRE, Array, Measurement
 from ncfix.measure.observation import Observation, Unknowns, linear_axes
+from ncfix.values import frozen
 
 SHORT = 1e-9
 """mm: a length that has no direction."""
@@ -137,7 +137,7 @@ class BallBar(Length):
 # -- figures of a ball-bar test ----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CircularDeviations:
     """ISO 230-4, um. `G` circular deviation of each way round, `Gb` of both, `H` hysteresis, `F` radial deviation.
 
@@ -154,7 +154,7 @@ class CircularDeviations:
     D: float
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BallBarFigures:
     """One set of a ball-bar test, um.
 

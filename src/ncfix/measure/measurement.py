@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
 from ncfix.machine.axes import COMPONENTS, NAME
+from ncfix.values import frozen
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -28,7 +29,7 @@ NOTES = ("instrument", "date", "origin", "operator", "note")
 COMMON = ("ncfix-measurement", "kind", "noise_um", "noise_urad", *NOTES)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MeasurementKind:
     """The columns of a kind of measurement besides axes and state.
 
@@ -111,7 +112,7 @@ CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
 """What a header line may say, by kind; the first is the default."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False, slots=False)
 class Measurement:
     """One measurement file.
 

@@ -8,7 +8,7 @@ wrongly is a tenth of a file of ten, and what all the others leave, or do not le
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import combinations, permutations, product
 
 import numpy as np
@@ -20,6 +20,7 @@ from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Mask
+from ncfix.values import frozen
 
 ODD = {"NCF614", "NCF615", "NCF616"}
 """Remarks on a file that are mistakes where the model does not describe the data: positions out of range or like
@@ -52,7 +53,7 @@ TURN_RAD = 2 * np.pi + 0.01
 OTHER_SIGN = "which way was the instrument set up there?"
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Suspect:
     """A mistake that may have been made in a file, or in several alike: what it is, how to repair it, and the files
     without it.
@@ -141,7 +142,7 @@ def _spread(measurement: Measurement, machine: Machine) -> float:
     return float(np.median([np.sqrt((each**2).sum(axis=1).mean()) for each in large])) if large else np.inf
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class _Left:
     """What a fit leaves: squares (m,) in units of the noise, and the share of the values that are free.
 
@@ -266,7 +267,7 @@ def _series(file: int, measurement: Measurement, files: int) -> Iterator[Suspect
             yield Suspect(text, OTHER_SIGN, file, measurement.with_columns(columns), rows={file: rows})
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class _Readings:
     """What is left of other readings of the same positions: positions, effects and set-ups stay, so this is linear."""
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +22,7 @@ from ncfix.machine import Effect, GaugeLine, Machine, se3
 from ncfix.machine.axes import SPINDLE
 from ncfix.machine.plausible import reach
 from ncfix.measure.measurement import Array, Index, Measurement, groups
+from ncfix.values import frozen
 
 Mask = NDArray[np.bool_]
 
@@ -35,7 +35,7 @@ DEFAULT_NOISE = 1e-3
 TOOL, WORKPIECE = "tool", "workpiece"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Unknowns:
     """What is unknown about a set-up besides the machine's errors.
 

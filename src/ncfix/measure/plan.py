@@ -10,7 +10,6 @@ tell is left out beforehand. To separate two effects, the variances of their coe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +24,7 @@ from ncfix.measure.least_squares import NUISANCE_RANK, solve
 from ncfix.measure.measurement import Array, Index, Measurement, number
 from ncfix.measure.observation import Observation
 from ncfix.measure.selection import Selection, form, select
+from ncfix.values import frozen
 
 CANDIDATES = 800
 POOR = 10.0
@@ -53,7 +53,7 @@ WORTHWHILE = 5e-3
 READ = dict(zip("XYZ", ("mx", "my", "mz"), strict=True))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False, slots=False)
 class Planned:
     """A plan and how good it is.
 
@@ -233,7 +233,7 @@ def _columns(machine: Machine, selection: Selection, name: str) -> list[int]:
 # -- exchange ----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Pool:
     """Candidates as rows of a design.
 
@@ -304,7 +304,7 @@ def _passed(pool: Pool, start: list[int], fixed: int) -> list[int]:
     return chosen
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Measured:
     """What is known once some blocks are measured, with M their information.
 

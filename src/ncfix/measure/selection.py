@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -25,6 +25,7 @@ from ncfix.machine.basis import Backlash, Basis, ConstantBasis, Fourier, Polynom
 from ncfix.machine.effects import library
 from ncfix.machine.piecewise import Truncated
 from ncfix.toml_text import did_you_mean
+from ncfix.values import frozen
 
 ALL = "all"
 TERM = re.compile(r"([XYZABC][A-Z])(\d|b)(?:-(\d))?")
@@ -32,7 +33,7 @@ RADIAN = 180 / np.pi
 """The file's unit of a rotary axis is the degree: this scale makes u radians."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Selection:
     """The effects of a machine and which of them are to be estimated.
 
@@ -109,7 +110,7 @@ def select(
     return _with_new(machine.effects, [meant.has(effect) for effect in machine.effects], new)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Wanted:
     """What a list of names means: names and patterns of errors, and the effects of names of the library."""
 
@@ -224,7 +225,7 @@ def _along(axis: Axis, name: str) -> bool:
 # -- named models ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Model:
     """A named set: location errors, and terms of error motions such as `YX2-3` or `BBb`."""
 

@@ -16,7 +16,7 @@ than 63 degrees from all of them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from itertools import permutations, product
 
@@ -37,6 +37,7 @@ from ncfix.measure.observation import (
     branch,
     vector_columns,
 )
+from ncfix.values import frozen
 
 STEPS = 40
 """Gauss-Newton steps from one start; a good one takes some ten."""
@@ -190,7 +191,7 @@ class Targets(Observation):
 # -- registration ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Sights:
     """What belongs to each of n readings: base_from_body (n, 4, 4), and the numbers of the target and of the set.
 
@@ -253,7 +254,7 @@ class Sights:
         return scale[:columns] * np.linalg.lstsq(design, gap.ravel(), rcond=OPEN)[0]
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Registration:
     """Places (t, 3) of the targets, turns (s, 3, 3) and shifts (s, 3) of the instrument, and the rms they leave."""
 
@@ -278,7 +279,7 @@ def register(sights: Sights, readings: Array, places: Array, along_base: bool) -
     return _registered(_Same(b"".join(each.tobytes() for each in arrays), sights, readings, places, along_base))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False, slots=False)
 class _Same:
     """What is asked, told apart by its numbers: files are asked again and again with other errors of the machine."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -33,6 +32,7 @@ from ncfix.machine.basis import Periodic
 from ncfix.machine.effects import with_unit
 from ncfix.measure.measurement import Array
 from ncfix.reports.document import ArrowMap, Bars, Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
+from ncfix.values import frozen
 
 HOUR = 3600.0
 CURVES = 4
@@ -144,7 +144,7 @@ def _finding(diagnosis: Diagnosis, finding: EffectFinding) -> ReportSection:
     )
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class MeasuredCurve:
     """What was measured against what a finding shows: means of neighbouring rows.
 

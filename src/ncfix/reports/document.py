@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from ncfix.machine.se3 import Array
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Paragraph:
     """A paragraph."""
 
     words: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Table:
     """Rows of cells under a header; a header of no names has none."""
 
@@ -23,7 +23,7 @@ class Table:
     rows: Sequence[Sequence[str]]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Line:
     """A curve of a plot.
 
@@ -38,7 +38,7 @@ class Line:
     label: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Dots:
     """Single values in a plot: (n,) where, (n,) how much, and what they are."""
 
@@ -47,7 +47,7 @@ class Dots:
     label: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Plot:
     """Curves and single values over one axis; the caption says what is up and what is across, with the units."""
 
@@ -55,7 +55,7 @@ class Plot:
     drawn: Sequence[Line | Dots]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Bars:
     """Values that are compared, a horizontal bar each: their names, and the caption with their unit."""
 
@@ -64,7 +64,7 @@ class Bars:
     values: Sequence[float]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ArrowMap:
     """Small shifts at places of a plane, a panel for each title, all to one scale.
 
@@ -85,7 +85,7 @@ class ArrowMap:
 Part = Paragraph | Table | Plot | Bars | ArrowMap
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ReportSection:
     """A heading and what belongs to it."""
 
@@ -93,7 +93,7 @@ class ReportSection:
     parts: Sequence[Part]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Document:
     """A report."""
 

@@ -16,7 +16,7 @@ that do not know the way.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from ncfix.tables.correction import (
     random_ways,
 )
 from ncfix.tables.grid import Array, Grid, projector
+from ncfix.values import frozen
 
 MEAN_POSES = 64
 """Poses of the other axes over which a node's value is averaged: half of them, and those opposite."""
@@ -97,7 +98,7 @@ def nodes_needed(fine: Array, curve: Array, most: int, limit: float) -> int:
     return most
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class AxisTables:
     """The tables over one axis: corrections of `outputs` at its positions `nodes`, (n_nodes, n_outputs) mm or rad.
 
@@ -142,7 +143,7 @@ def additive(
     return tuple(_with_constant(each, machine, total) for each in tables)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Region:
     """A machine in the space (n_axes, 2) that tables are to cover, mm and rad, with a tool length, mm."""
 
@@ -212,7 +213,7 @@ def _with_constant(table: AxisTables, machine: Machine, total: Array) -> AxisTab
     return replace(table, values=values, reverse=table.reverse + constant)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Reversal:
     """What is added to an axis while it moves towards plus, and taken off it while it moves towards minus.
 

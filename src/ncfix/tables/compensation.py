@@ -10,17 +10,17 @@ what a control could hold, but what was written. One table of X over itself is L
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from ncfix.tables.grid import Array, Grid
+from ncfix.values import frozen
 
 LINEAR = ("X", "Y", "Z")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Term:
     """One summand: a table, or the product of tables with the same outputs.
 
@@ -77,7 +77,7 @@ class Tables(Protocol):
         """The nodes of all its tables."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Compensation:
     """All tables of a machine: their sum is the correction."""
 
@@ -119,7 +119,7 @@ NOTHING = Compensation(())
 """No tables at all."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Lookup:
     """An axis that a table or a product of tables corrects, over these."""
 

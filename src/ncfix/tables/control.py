@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from typing import Any, ClassVar
 
 from ncfix.arguments import TARGET_UM, TOOL_LENGTH
@@ -21,12 +21,13 @@ from ncfix.plugins import called, nearest, registry, useless
 from ncfix.tables.compensation import Compensation, Tables, class_of
 from ncfix.tables.grid import Array
 from ncfix.tables.table_files import Remarks, check_all, messages_of
+from ncfix.values import frozen
 
 Files = Mapping[str, bytes]
 """File name (no folder) -> content."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SettingForm:
     """What the text of a setting may be: `fits` decides, `hint` says it."""
 
@@ -62,7 +63,7 @@ def wrong_setting(settings: Mapping[str, str], key: str, hint: str) -> UsageErro
     return UsageError.of("NCF485", f"{key}={settings[key]}", hint=hint)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Properties:
     """What a format is, as data.
 
@@ -90,7 +91,7 @@ class Properties:
     combine: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Assumption:
     """Something that no public text settles: what is taken for true, and how to find out on the machine."""
 
@@ -101,7 +102,7 @@ class Assumption:
     verify: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Option:
     """A setting of a control, `--set name=value`.
 
@@ -121,7 +122,7 @@ class Option:
         return self.form is not None and text != self.default and not self.form.fits(text)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Request:
     """What to make tables of.
 
@@ -147,7 +148,7 @@ class Request:
         TARGET_UM.check("target_um", 1e3 * self.target)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Least:
     """No tables of this kind leave less than `value` (mm) at the worst; `why`, in words."""
 
@@ -160,7 +161,7 @@ class Least:
         return f"No tables of this kind can leave less than {1e3 * self.value:.2f} um at the worst: {self.why}."
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Written:
     """The files of a control.
 

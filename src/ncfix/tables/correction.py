@@ -8,7 +8,6 @@ error of the tool tip over random poses, with the tables off and with them on.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.tables.compensation import Tables
 from ncfix.tables.grid import Array, full_grid
+from ncfix.values import frozen
 
 SPATIAL = ("X", "Y", "Z")
 ARRIVED = 1e-7
@@ -173,7 +173,7 @@ def poses_along(axis: int, positions: Array, rest: Array) -> Array:
     return q.reshape(-1, rest.shape[-1])
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Residual:
     """Tip errors at poses q (n, n_axes), before and after (n,), mm; `largest` correction per axis (n_axes,)."""
 

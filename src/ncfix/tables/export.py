@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from ncfix.tables.control import Control, Files, Least, Request, Written
 from ncfix.tables.correction import POSES, Residual, random_poses, ranges_of, residual
 from ncfix.tables.grid import Array
 from ncfix.tables.sheet import as_html, as_markdown
+from ncfix.values import frozen
 from ncfix.version import __version__
 
 SIDE_FILE = "ncfix-tables.json"
@@ -37,7 +38,7 @@ LEVER = 100.0
 """mm: at which an angle counts as a length."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Manifest:
     """What is known of a set of files.
 
@@ -59,7 +60,7 @@ class Manifest:
 
     def as_bytes(self, **more: Any) -> bytes:
         """The file, with more that people may want to know."""
-        fields = {name: getattr(self, name) for name in Manifest.__slots__}
+        fields = {name: getattr(self, name) for name in Manifest.__match_args__}
         return (json.dumps({"ncfix-tables": SCHEMA, **fields, **more}, indent=1) + "\n").encode()
 
     def changed(self, files: Mapping[str, bytes], folder: str) -> tuple[Message, ...]:
@@ -119,7 +120,7 @@ def check_origin(manifest: Manifest, control: str, machine: Machine | None, path
         raise RefusedError.of("NCF487", text, place, hint)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProgramWithTables:
     """A program as a control with tables runs it, or as one without tables has it rewritten.
 
@@ -138,7 +139,7 @@ class ProgramWithTables:
         return {"path": self.path, **figures, "remarks": self.remarks}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False)
 class Exported:
     """Files with what they leave.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from itertools import pairwise
 
@@ -19,6 +19,7 @@ from ncfix.plugins import called
 from ncfix.tables.control import Control, Files, controls, get_control
 from ncfix.tables.export import SHEET, SIDE_FILE, linted, read_manifest
 from ncfix.tables.table_files import AGAIN, BYTE_ORDER, NUMBER, Remarks
+from ncfix.values import frozen
 
 N = f"({NUMBER})"
 GAP = r"[ \t]+"
@@ -30,7 +31,7 @@ ASIDE = r"(?:#.*|/\*.*\*/[ \t]*)?"
 LIST = {"entry": rf"[\w.\[\]]+{GAP}{N}{BLANK}{ASIDE}", "word": rf"[\w.\[\]]+{GAP}\S+{BLANK}{ASIDE}"}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FileLine:
     """A line: what it is, its text with a slot for every number, and the numbers with the width of their slots.
 
@@ -51,7 +52,7 @@ class FileLine:
         return "".join(part for pair in zip(self.text.split("\0"), [*words, ""], strict=True) for part in pair)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TableFile:
     """A file of a known form. `eol` after each line; `last` whether also after the last; `start` a byte order mark."""
 
@@ -93,7 +94,7 @@ PMAC_MOTOR, PMAC_END = r"(?:#\d+ *)?", rf"{BLANK}(?:;.*)?"
 Check = Callable[[TableFile, Remarks], None]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FileForm:
     """What lines a kind of file has: name -> pattern, whose groups are numbers; and what must hold between them.
 
@@ -403,7 +404,7 @@ def recognised(path: str, content: bytes) -> TableFile | None:
     return None
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Linted:
     """What was said of one file.
 

@@ -22,6 +22,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.values import frozen
+
 Array = NDArray[np.float64]
 WITHIN = 4
 """Places looked at in each cell along each axis."""
@@ -45,7 +47,7 @@ MANY = 200
 """Uneven nodes, at most."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Grid:
     """Values of some axes over the positions of some axes.
 

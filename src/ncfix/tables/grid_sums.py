@@ -11,7 +11,7 @@ middle of their range, the second what it lacks there, and so on: where the sum 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ncfix.tables.correction import random_poses
 from ncfix.tables.grid import Array, Grid, on_full_grid
 from ncfix.tables.volume import CHECKS, Volume, search
+from ncfix.values import frozen
 
 COARSE = 6
 """Positions of each axis at which the correction is taken apart."""
@@ -42,7 +43,7 @@ Set = frozenset[int]
 """Axes by their number among the inputs."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Face:
     """A set of inputs (their numbers), and the outputs (their numbers) that have a grid over it.
 
@@ -54,7 +55,7 @@ class Face:
     outputs: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Sum:
     """Grids whose sum is the correction, with what they miss at random poses, mm."""
 

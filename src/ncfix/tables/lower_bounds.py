@@ -12,7 +12,6 @@ function of the kind leaves less at the worst than the weighted root mean square
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache, reduce
 from itertools import combinations, pairwise
 from math import comb
@@ -35,6 +34,7 @@ from ncfix.tables.correction import (
 )
 from ncfix.tables.grid import Array, hats, on_full_grid, spline_weights
 from ncfix.tables.volume import Volume, even_line
+from ncfix.values import frozen
 
 ROUNDS = 40
 SWEEPS = 2
@@ -54,7 +54,7 @@ NODES = 7
 """Positions of each axis on a full grid."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Remainder:
     """What functions of pairs of axes leave of a function on a full grid.
 

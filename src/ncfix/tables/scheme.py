@@ -32,6 +32,7 @@ from ncfix.tables.separable import (
     taken_apart,
     taken_apart_along,
 )
+from ncfix.values import frozen
 
 MANY_MORE = 12
 """Tables than there are: down to so many, parts are left out by their size alone."""
@@ -215,7 +216,7 @@ def needed(output: int, layouts: Sequence[TableLayout], free: frozenset[int], be
     return tables_of(layouts, beside) - int(output in free and ways == {None})
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Limits:
     """What a control can hold.
 
@@ -229,7 +230,7 @@ class Limits:
     beside: tuple[int, int] = (0, 0)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Scheme:
     """Tables with one input each, sums and pairs; the second factor of a pair has no unit and is at most 1.
 
@@ -248,7 +249,7 @@ class Scheme:
     bound: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SchemeTask:
     """A machine, where its tables are to hold, for which tool, how well (mm), and in which limits."""
 

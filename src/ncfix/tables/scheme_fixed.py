@@ -15,7 +15,6 @@ The coefficients are the least squares of the exact correction over the working 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from ncfix.tables.grid import Array
 from ncfix.tables.scheme import LEVER, Scheme, SchemeTask, lines_of, moving, turning
 from ncfix.tables.scheme_tables import Corrections, StagedTables, checked
 from ncfix.tables.separable import Star, TableLayout
+from ncfix.values import frozen
 
 POSES = 6000
 CHAIN = ("C", "A", "Y", "X", "Z")
@@ -65,7 +65,7 @@ def _cubic(rotary: bool, constant: bool) -> Basis:
     return lambda q: np.stack([(q / unit) ** degree for degree in degrees], axis=1)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Piece:
     """A table of a form that is given: functions of an axis, times a known function of another axis if there is one."""
 

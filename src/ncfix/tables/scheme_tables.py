@@ -11,7 +11,7 @@ among the positions that are known. A file can say them exactly: the first one, 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.correction import poses_along, random_poses, random_ways
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.separable import Star, TableLayout
+from ncfix.values import frozen
 
 SCALE = 10**4
 """Positions and steps have four decimals, mm or degree."""
@@ -51,7 +52,7 @@ Corrections = Callable[[Array, Array], Array]
 """What to add to some axes at commands (n, n_axes) reached in directions (n, n_axes) or (n_axes,): (n, n_outputs)."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class AxisPositions:
     """The positions of an axis that tables cover, in its file unit (mm, degree).
 
@@ -100,7 +101,7 @@ class AxisPositions:
         return float(np.abs(np.interp(place, place[::stride], curve[::stride]) - curve).max())
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TableSample:
     """Where functions of one axis are looked for: combinations of nodes of all axes, (m, n_axes), their numbers."""
 
@@ -219,7 +220,7 @@ def checked(lines: Sequence[AxisPositions], correct: Corrections) -> tuple[Array
     return q, ways, correct(q, ways)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StagedTables:
     """Axes that are corrected together.
 

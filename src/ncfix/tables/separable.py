@@ -14,13 +14,14 @@ as a multiple of another, and hiding a sum in a factor, (a + f(q)) g(p) = a g(p)
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 from itertools import combinations, product
 
 import numpy as np
 
 from ncfix.tables.grid import Array
+from ncfix.values import frozen
 
 NOISE = 2e-6
 """mm: below what is solved for, and far below what any control resolves."""
@@ -34,7 +35,7 @@ SURELY = 1 + 1e-6
 """One column that misses by more than this times what it may does not fit, however its share is rounded."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Single:
     """A function of one axis with mean zero: its values at the nodes (m,). `size` is its rms."""
 
@@ -47,7 +48,7 @@ class Single:
         return float(np.sqrt(np.mean(self.values**2)))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Product:
     """size * first * second: functions of two axes with rms 1, at their nodes."""
 
@@ -68,7 +69,7 @@ class Product:
 Part = Single | Product
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Separation:
     """What a function consists of, largest first; `rest` is the rms of what no pair of axes can say."""
 
@@ -118,7 +119,7 @@ def products(both: Array, pair: tuple[int, int]) -> list[Product]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Star:
     """A table over `axis` that others are multiplied by: centre (m,), no unit; leaves: axis -> values, mm or rad."""
 
@@ -127,7 +128,7 @@ class Star:
     leaves: Mapping[int, Array]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TableLayout:
     """A function as tables: a constant, sums (axis -> values) and stars.
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ncfix.machine import Machine, State
 from ncfix.tables.correction import corners, even_poses, exact_correction, linear_axes, random_poses
 from ncfix.tables.grid import WITHIN, Array, Bending, Grid, between, fitted, on_full_grid
+from ncfix.values import frozen
 
 LINES = 32
 """Random lines along an axis on which its bending is judged."""
@@ -297,7 +298,7 @@ def unseen_axes(machine: Machine, space: Array, tool_length: float, inputs: Sequ
     return ", ".join(name for name in inputs_that_matter(machine, space, tool_length) if name not in inputs)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Mesh:
     """A grid that was searched for.
 

@@ -7,7 +7,7 @@ before, in whatever frame it is written; a block that is passed or refused keeps
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ncfix.machine import Machine, loads
 from ncfix.text.dialect import Dialect, get
 from ncfix.text.reader import read
 from ncfix.text.stamp import find
+from ncfix.values import frozen
 
 SHIFT = {"X": -0.0124, "Y": 0.0213, "Z": 0.0085}
 """mm, added to commands: minus the errors of the machine."""
@@ -96,7 +97,7 @@ def check_places(
             assert abs(found[axis] - value) < CLOSE, f"{told}: {axis} stands at {found[axis]:.6g}, not at {value:g}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Judged:
     """What became of a program.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import combinations, product
 
 from ncfix.compensate.driver import fix_program
@@ -23,6 +23,7 @@ from ncfix.testing.judging import OPTIONS, SETUP, Judged, judged, shifted_machin
 from ncfix.text.dialect import Dialect, get
 from ncfix.text.reader import read, shapes_of, texts_of
 from ncfix.text.tree import Opaque
+from ncfix.values import frozen
 
 NUMBERS: dict[str, float] = {
     "5.": 5.0,
@@ -49,7 +50,7 @@ Leads = Callable[[str, Sequence[str], int], bool]
 """(head, words, index of the mode) -> whether the manual says that the block moves axes, or that the control stops."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pair:
     """What puts something in force, and what ends it: a line each, or several."""
 
@@ -60,7 +61,7 @@ class Pair:
 NOTHING = Pair()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Statements:
     """How a language writes what `check_language` puts together; a block a line.
 
@@ -157,7 +158,7 @@ def gcode_statements(dialect: Dialect) -> Statements:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Sample:
     """A program; `statement`: the line of the block that is asked for, `leads`: it must not come to nothing."""
 

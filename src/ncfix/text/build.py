@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import isfinite
 
 from lark import Token, Tree
@@ -34,6 +34,7 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
+from ncfix.values import frozen
 
 NUMBERS = frozenset({"NUMBER", "UNSIGNED"})
 """The terminals whose text is a number of the block; every other digit belongs to its shape."""
@@ -53,7 +54,7 @@ class TooDeepError(Exception):
         self.position = position
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Parsed:
     """One block, understood.
 
@@ -113,7 +114,7 @@ def tokens_of(tree: Branch) -> Iterator[Token]:
             stack.extend(reversed(node.children))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TreeBuilder:
     """Makes items of trees; knows where the numbers of the block stand.
 

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from pathlib import PurePath
 from typing import Any, ClassVar, Literal, Protocol
 
 from ncfix.diagnostics import Message, Place, SourceError, UsageError
 from ncfix.plugins import nearest, registry, working
+from ncfix.values import frozen
 
 FAGOR = (
     rb"[ \t]*(?:RPT[ \t]+N\d+[ \t]*,[ \t]*N\d+|GOTO[ \t]+N\d+|P\d+[ \t]*=[^()\r\n]*P\d[^()\r\n]*"
@@ -110,7 +111,7 @@ class CodeOperation(Protocol):
         """Do it, before the motion of the block."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CycleTable:
     """A drilling cycle: from the level to the depth and back, at each hole that the words of the plane name.
 
@@ -161,7 +162,7 @@ def is_letters(text: object, but: str = "") -> bool:
     return isinstance(text, str) and re.fullmatch("[A-Z]+", text) is not None and not {*text} & {*but}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Dialect:
     """One control's language, as data; the grammar says what a block is, this says what the control makes of it.
 

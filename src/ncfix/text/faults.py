@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from lark import UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
 from ncfix.text.grammar import UnspacedBlock
+from ncfix.values import frozen
 
 FLOW = re.compile(r"/?(n[\d.]*)?o(<[^<>]*>|\d+|\[.*?\](?=[a-z])|#\d+)(?P<keyword>[a-z]*)", re.IGNORECASE | re.DOTALL)
 """The start of a squeezed block of flow control."""
@@ -41,7 +42,7 @@ BARE = re.compile(r"#(\d+|<[^<>]*>)=[^=]+\Z")
 """A parameter and its value, behind which an expression goes on that has no brackets."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BlockError(Exception):
     """What is the matter in a block, and where in it (from 0)."""
 
@@ -67,7 +68,7 @@ def position_of(error: UnexpectedInput, code: str) -> int:
     return len(code)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Stop:
     """Where the parser stopped in a block.
 

@@ -10,7 +10,6 @@ import os
 import re
 import sys
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.host import cache_folders
 from ncfix.plugins import describe, working
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree
@@ -33,7 +33,7 @@ PIECE = re.compile(r"\([^()]*\)|;.*|[^ \t]", re.DOTALL)
 """What squeezing keeps: comments whole, and single characters that are not blank."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class UnspacedBlock:
     """A block without the blanks outside comments.
 

@@ -8,13 +8,13 @@ what a block means and how a corrected motion is put into words is a family's ow
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from ncfix.plugins import called, handed, nearest, useless
 from ncfix.text.reach import runs_straight_on
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,7 +35,7 @@ class BlockLayout(Protocol):
         """The word that says which kind of motion it is, if the block has one."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ArcLayout:
     """Where the words that say where the centre of an arc is stand in the blocks of one shape.
 
@@ -51,7 +51,7 @@ class ArcLayout:
     alone: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BulkLayout:
     """Where things stand in the blocks of one shape, for motions that are written many at a time.
 
@@ -81,7 +81,7 @@ class BulkLayout:
     arc: ArcLayout | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen(kw_only=True)
 class Language:
     """How the texts of one family of controls are read.
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.tree import Anchor, Constant, Literal, Opaque, OWordLine, Program, Skip, Span, Tape, Word
+from ncfix.values import frozen
 
 #: In the order in which programs write them.
 AXIS_LETTERS = "XYZABCUVW"
@@ -24,7 +25,7 @@ EXACT_STOP = frozenset((9.0,))
 """G9: the control comes to a stop at the end of the block, that of its last piece."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen(kw_only=True)
 class Layout:
     """The writable parts of a motion block; what a control does not have is empty.
 

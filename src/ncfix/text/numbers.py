@@ -6,11 +6,12 @@ reader compares the two for every shape, and goes by the grammar where they diff
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ncfix.values import frozen
 
 EXACT_DIGITS = 15
 """Up to so many digits a number and its power of ten are exact in a double, and so is their rounded quotient."""
@@ -36,7 +37,7 @@ UNSIGNED_AFTER = table(b"0123456789.]>Nn#")
 """After these a sign does not belong to the number: it is an operator, or wrong."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Numbers:
     """The numbers of a text in order.
 
@@ -100,7 +101,7 @@ def fill(cells: NDArray[Any], spans: NDArray[np.int64], value: int) -> None:
         cells[start:stop] = value
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LastBefore:
     """The last character before each of some places that is no blank: where it is, and what; 0 at the text's start."""
 
@@ -195,7 +196,7 @@ POWERS: NDArray[np.float64] = (10.0 ** np.arange(23)).astype(np.float64)
 """Those powers of ten that a double holds exactly."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Digits:
     """Up to sixteen characters each, columns.
 

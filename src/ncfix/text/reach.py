@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.text.tree import Comment, Constant, OWordLine, Skip, Template, Word
+from ncfix.values import frozen
 
 UNREAD = "unread"
 """The kind of an `Opaque` that could not be read where nobody may need it."""
@@ -61,7 +62,7 @@ def runs_straight_on(template: Template) -> bool:
     return not any(isinstance(item, OWordLine) for item in template.items) and CALL not in template.m_codes
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Deletable:
     """What blocks that may be skipped have in common.
 

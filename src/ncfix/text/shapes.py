@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial, reduce
 from itertools import pairwise
 
@@ -34,6 +34,7 @@ from ncfix.text.numbers import (
     is_numeric,
     table,
 )
+from ncfix.values import frozen
 
 NUMBER_MARK = 1
 COMMENT_MARK = 2
@@ -53,7 +54,7 @@ COMMENT = re.compile(rb"(?:\([^()\r\n]*\)|;[^\r\n]*)(?P<last>(?=[ \t]*(?:[\r\n]|
 """A comment; group `last` takes part if nothing but blanks follows on the line."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Scan:
     """What the scan of a text found, columns over its n blocks and m numbers.
 

@@ -10,7 +10,7 @@ outputs that a product of doubles cannot tell which of them is nearer is marked,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ncfix import core
 from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.core.words import NumberRules
@@ -36,7 +37,7 @@ def decimals_for(step: float) -> int:
     return max(0, math.ceil(-math.log10(step) - 1e-9))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen(kw_only=True)
 class NumberStyle:
     """The manner of one written number.
 
@@ -84,7 +85,7 @@ class NumberStyle:
         return sign + whole + ("." + fraction if fraction or self.point else "")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Spelling:
     """How a control, or one program for it, spells what is put into a program.
 
@@ -160,7 +161,7 @@ def rules() -> NumberRules:
     return core.loops("words").NumberRules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Styles:
     """The manner of m numbers, as in `spelling.NumberStyle`; `clear` (m,): nothing but a sign, digits and a point."""
 
@@ -196,7 +197,7 @@ def styles_of(text: NDArray[np.uint8], spans: IntArray, *, signed: bool = False)
     )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class NumberColumns:
     """How m numbers are to be written, columns.
 
@@ -221,7 +222,7 @@ class NumberColumns:
         return NumberColumns(*(np.concatenate((getattr(self, k), getattr(other, k))).take(order) for k in names))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Texts:
     """Numbers as text: their bytes, one number after the other, and how many each of them takes, (m,)."""
 

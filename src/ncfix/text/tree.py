@@ -13,13 +13,14 @@ every block of the shape, however long its numbers are, and however long the com
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import Place
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect
@@ -49,7 +50,7 @@ class Span(NamedTuple):
 # -- expressions ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Literal:
     """A number written in the block: the value of number `slot` of the block.
 
@@ -61,28 +62,28 @@ class Literal:
     pointless: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Constant:
     """A number that every block of the shape has: a plain, unsigned number after G or M."""
 
     value: float
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class NumberedParameter:
     """A numbered parameter, `#5`, `##5`, `#[1+2]`."""
 
     index: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class NamedParameter:
     """A named parameter, `#<depth>`, `#<_global>`; the name is lower case without blanks."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Unary:
     """`-x`, `+x`, or a function of one argument: `sin`, `cos`, `fix`, ... (lower case)."""
 
@@ -90,7 +91,7 @@ class Unary:
     operand: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Binary:
     """`left operator right`; the operator in lower case: `+ - * / ** mod and or xor eq ne gt ge lt le atan`."""
 
@@ -99,21 +100,21 @@ class Binary:
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Exists:
     """`EXISTS[#<name>]` or `EXISTS[#5]`."""
 
     parameter: NumberedParameter | NamedParameter
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StringLiteral:
     """A string, `"DRILL 8.5"`, without its quotation marks."""
 
     value: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FunctionCall:
     """A name with something in brackets, lower case: a function, `SIN(R1)`, or an element of an array, `BORE[2]`.
 
@@ -133,7 +134,7 @@ Expression = (
 # -- the items of a block ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Word:
     """An address with its value, `X12.5`, `G[#1]`; the address in upper case. `value_span` covers the value only.
 
@@ -146,7 +147,7 @@ class Word:
     value_span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Assignment:
     """`#1=...`, `#<name>=...`: takes effect after the whole block."""
 
@@ -155,7 +156,7 @@ class Assignment:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Command:
     """A name that stands for itself or takes arguments in brackets, lower case: `SUPA`, `CYCLE81(10,0,2,-5)`.
 
@@ -168,14 +169,14 @@ class Command:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Comment:
     """`( ... )`, `; ...` or another form of the dialect; delimiters included in the span."""
 
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Skip:
     """Block skip `/` with its level: if none is written, the first there is (0 on SINUMERIK, else 1)."""
 
@@ -183,7 +184,7 @@ class Skip:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class OWordLine:
     """A flow-control line of RS274NGC: `o100 while [...]`, `o<name> call [..]`.
 
@@ -198,14 +199,14 @@ class OWordLine:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Tape:
     """The `%` that starts and ends a tape."""
 
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Opaque:
     """Text that is understood to mean no motion and is passed through: program names, text after the end, ..."""
 
@@ -220,7 +221,7 @@ BEYOND = 1e9
 """A G or M code with a larger number is none, and all such are the same."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Template:
     """What every block of one shape has in common.
 
@@ -256,7 +257,7 @@ class Template:
 # -- the program ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False)
 class Program:
     """An NC program, lossless. One row per block (a line of the source, or several where the dialect continues lines).
 

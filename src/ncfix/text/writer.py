@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Edit:
     """Replace the source's bytes from `start` up to `stop` by `text`; with start == stop, insert it there."""
 
@@ -44,7 +45,7 @@ def line_end(source: bytes) -> bytes:
     return b"\r\n" if at > 0 and source[at - 1 : at] == b"\r" else b"\n"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Splices:
     """Many edits as columns.
 

@@ -6,7 +6,7 @@ two together. An arc qualifies if it stays one, by G2 or G3, and has a plain R o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.spelling import Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
+from ncfix.values import frozen
 from ncfix.writer.bulk_layouts import NONE, Layouts, places_of
 from ncfix.writer.pieces import Pieces
 from ncfix.writer.target import FrameMap
@@ -66,7 +67,7 @@ def _spatial(moves: Moves) -> IntArray:
     return np.array([moves.axes.index(letter) for letter in "XYZ"])
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class OutputSteps:
     """How numbers are written: the text they stand in, digits that the least increment needs, half output steps.
 
@@ -80,7 +81,7 @@ class OutputSteps:
     signed: bool
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CentreWords:
     """The centre words of arcs in order: k rows, a column for each of the two axes of an arc's plane.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import START, Program
+from ncfix.values import frozen
 from ncfix.writer.language import WrittenLanguage
 
 IntArray = NDArray[np.int64]
@@ -25,7 +26,7 @@ VECTOR_HEAD = 1
 """The letter of one that other words of the block lead to where it shall be."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Layouts:
     """The layouts of a program's shapes, one row for each template; columns by axis.
 

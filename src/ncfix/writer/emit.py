@@ -8,7 +8,6 @@ the same each time; where it does not, the block is reported as a conflict, and 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +19,7 @@ from ncfix.control.turns import UNTIMED, minutes, turn_alone, turns_alone
 from ncfix.text.language import BlockLayout, language_of
 from ncfix.text.tree import Program, view
 from ncfix.text.writer import Edit, Splices, overlong
+from ncfix.values import frozen
 from ncfix.writer.block import STRAIGHT_AND_ARCS
 from ncfix.writer.bulk import Bulk, write_alone
 from ncfix.writer.language import WrittenLanguage
@@ -35,7 +35,7 @@ TOO_LONG = "the corrected line would have {} characters, and the control takes {
 MODE_LOST = "written as lines it would leave G1 in force, and a block behind it that stays as it was has no G code"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Emission:
     """What was written.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ncfix.control.interpreter import FollowedLanguage
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,7 +26,7 @@ class Writer(Protocol):
         """What is written; called once."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen(kw_only=True)
 class WrittenLanguage(FollowedLanguage):
     """One family of controls: how its programs are read, followed, and written. That is what a dialect names.
 

@@ -9,16 +9,17 @@ an end or centre of its own no longer closes, so what is before it must end wher
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import Frame, MotionKind, Moves, Rule
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pieces:
     """The corrected path, struct of arrays; m rows in order, at least one per motion.
 
@@ -76,7 +77,7 @@ class Pieces:
         return np.ones(len(self), dtype=np.bool_) if finite.all() else np.asarray(finite.all(axis=1))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SecondReading:
     """What a control made of an earlier attempt, one row per motion of the original.
 
@@ -106,7 +107,7 @@ STILL = 1e-9
 """A component of a unit normal so near to 1 is 1."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Refusals:
     """Motions that have to be left as they were.
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ncfix.control.moves import CycleCall, Frame, Moves
 from ncfix.control.pointing import Pointing
 from ncfix.text.spelling import decimals_for
+from ncfix.values import frozen
 from ncfix.writer.pieces import Pieces
 
 FloatArray = NDArray[np.float64]
@@ -39,7 +40,7 @@ DIGITS = 6
 """Significant digits of an F word of ours."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Level:
     """What the level R of a canned cycle shall be, in program numbers.
 
@@ -59,7 +60,7 @@ class Level:
     address: str = "R"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Target:
     """What one motion shall become, in program numbers.
 

@@ -9,7 +9,7 @@ import gc
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -27,6 +27,7 @@ from ncfix.cli.targets import STREAM, OutputTarget, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
 from ncfix.host import limited
 from ncfix.plugins import load_plugins
+from ncfix.values import frozen
 from ncfix.version import __version__
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ LASTING = frozenset({"NCF017", "NCF024", "NCF030"})
 """Programs that take too much time or memory: that would come again, and cost as much again."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FixOutcome:
     """What became of one program.
 
@@ -86,7 +87,7 @@ class FixOutcome:
         return cls(ExitCode.DONE, {**entry, "refused": [reason]})
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProgramLimits:
     """How much time and memory a program may take; None: as much as there is."""
 
@@ -97,7 +98,7 @@ class ProgramLimits:
         return self != ProgramLimits()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FixJob:
     """What is the same for all programs.
 
@@ -338,7 +339,7 @@ def _summary(entry: dict[str, Any], refused: bool, errors: bool) -> list[str]:
     return lines
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Batch:
     """Programs that are fixed one after another, or several at a time.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ncfix import files
@@ -10,6 +9,7 @@ from ncfix.cli import console
 from ncfix.cli.options import dialect_of
 from ncfix.cli.targets import read, shown
 from ncfix.diagnostics import ExitCode, Message, Place
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.certificate.following import Given
@@ -44,7 +44,7 @@ def given_of(setup: Setup, dialect: Dialect) -> Given:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Proving:
     """What the correction of a program is proved by; `dialect`: if it was said."""
 

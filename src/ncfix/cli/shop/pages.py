@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ncfix import files
@@ -16,12 +15,13 @@ from ncfix.cli.targets import STREAM, OutputTarget
 from ncfix.diagnostics import Place, UsageError
 from ncfix.inputs import identities
 from ncfix.outputs import check_target, exists_already, folded_name
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.reports.program_page import ProgramPage
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pages:
     """Pages of programs.
 

@@ -19,6 +19,7 @@ from ncfix.cli import console
 from ncfix.cli.options import FOLDER, PATH, PathName, force_option
 from ncfix.diagnostics import ConfigError, UsageError, visible
 from ncfix.outputs import exists_already
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.project import Project
@@ -34,7 +35,7 @@ STATE = "ncfix.groups"
 """Where a context keeps the groups of programs."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProgramGroup:
     """Programs for which the same holds.
 

@@ -24,6 +24,7 @@ from ncfix.cli.targets import STREAM, Outputs, targets
 from ncfix.diagnostics import ExitCode, NcfixError, Place, UsageError, visible
 from ncfix.inputs import identities
 from ncfix.outputs import check_target
+from ncfix.values import frozen
 
 if TYPE_CHECKING:
     from ncfix.cli.shop.batch import FixJob
@@ -217,7 +218,7 @@ def watch(
     return worst
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Watching:
     folder: str
     output: str

@@ -10,8 +10,6 @@ such an axis turns round where its rounded numbers do; so close to a turn both s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,12 +20,13 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import REST, Signs, carried, signs
 from ncfix.compensate.plan.sampling import BISECTIONS
 from ncfix.machine import State
+from ncfix.values import frozen
 
 LATERAL = 1e-5
 """mm or rad: an axis with less play is off across its way, if at all, where it turns round."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Runs:
     """An axis along a path: k runs in order; on each it goes one way, or rests.
 
@@ -68,7 +67,7 @@ class Runs:
         return run, needed[run]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BacklashBodies:
     """The bodies of the axes on which errors depend on the direction, along a program.
 
@@ -231,7 +230,7 @@ WINDOW = 24
 """Samples on both sides of a turn that are looked at."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Flank:
     """A path of k parabolas, and where the tip may be besides: as each begins, half-way, as it ends.
 

@@ -40,12 +40,13 @@ from ncfix.control.trace import taken as motions_taken
 from ncfix.diagnostics import DifferenceError, Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 
 BESIDE = 64
 """Motions on both sides of one that are looked at to find out whether an axis turns round near it."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CutPath:
     """What a part of a program cuts; motions are called by their lines.
 
@@ -107,7 +108,7 @@ def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False)
     yield CutPath.of(Intent(machine, moves, State()), program.lines(moves.block), slice(None), True, meant)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PartEnd:
     """The last motions of a part, where it matters which way axes go next.
 
@@ -130,7 +131,7 @@ class PartEnd:
         return cls(last, lines[start:], bodies.came(start), bodies.before(start))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CutPaths:
     """What a program cuts, part after part while it is read.
 

@@ -6,7 +6,7 @@ Motions are divided into stretches so short that a parabola is near enough to th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -29,6 +29,7 @@ from ncfix.compensate.plan.sampling import (
     with_kinks,
 )
 from ncfix.control.moves import MotionKind
+from ncfix.values import frozen
 
 ROUND, TWISTED = 1e-6, 2e-5
 """mm; so far a parabola may be from a circle on which the tip goes, and from a path on which it goes on besides."""
@@ -40,7 +41,7 @@ JUMP = 1e-6
 """Fraction of a motion on both sides of a kink or jump of the errors where a parabola ends."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Stretches:
     """Of the motions of a program that cut, k stretches in order.
 
@@ -153,7 +154,7 @@ ROUNDING = 1e-9
 """mm: what begins no farther from where the one before ends begins there."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Curve:
     """k parabolas in the order in which they are gone along; a hole is one that has no length.
 
@@ -280,7 +281,7 @@ COLUMNS = [each.name for each in fields(Curve) if each.name != "first"]
 """The fields of a curve that have a row for each parabola."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CurvePoints:
     """Points of a curve at which it is looked at: half-way and at the end of each parabola, and where a cut begins.
 

@@ -24,6 +24,7 @@ from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, length
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places, ranges, stacked, taken
 from ncfix.control.trace import NotInPartsError
+from ncfix.values import frozen
 
 ALONG = 0.02
 """A point that is so much shorter or longer along the path counts as this share of that farther away."""
@@ -49,7 +50,7 @@ class NearestNotHereError(NotInPartsError):
     """The nearest point may lie on a part of the path that is not at hand."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Nearest:
     """Where a curve is nearest to points.
 
@@ -320,7 +321,7 @@ HALVINGS = 24
 """How often a way is halved at most: to some nanometres of the longest."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class NearestInterval:
     """Ways (n,) along parabolas, and what is nearest to where they begin and end.
 

@@ -22,6 +22,7 @@ from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.compensate.solve import WrittenPlan
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 
 CUT, RAPID, REFUSED, PASSED = range(4)
 """What leads to a place: a corrected cut, a rapid, a refused motion, one passed by rule."""
@@ -44,7 +45,7 @@ EDGES = np.logspace(-4, 4, 97)
 COLUMNS = {"x": "f4", "y": "f4", "z": "f4", "way": "f4", "before": "f4", "after": "f4", "line": "i4", "kind": "u1"}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ListedPlace:
     """A place of the path that a list names: line, way along the path and tip (mm), error before and after (um)."""
 
@@ -55,7 +56,7 @@ class ListedPlace:
     after: float
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ListedBlock:
     """A block that stayed as it was, why, and where its motion ends; None: nobody knows."""
 
@@ -64,7 +65,7 @@ class ListedBlock:
     spot: ListedPlace | None
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Extent:
     """The corrections of an axis: smallest and largest, mm or rad, and the line of the larger one."""
 
@@ -101,7 +102,7 @@ class PathRecord:
     share: Array = field(default_factory=lambda: np.zeros((2, len(EDGES) - 1)))
     worst: list[ListedPlace] = field(default_factory=list)
     corrections: dict[str, Extent] = field(default_factory=dict)
-    linear: Extent = Extent()
+    linear: Extent = Extent()  # noqa: RUF009
     refused: list[ListedBlock] = field(default_factory=list)
     passed: list[ListedBlock] = field(default_factory=list)
     _parts: list[tuple[dict[str, Array], Array]] = field(default_factory=list)
@@ -234,7 +235,7 @@ class PathRecord:
         self.linear = replace(self.linear, line=at(self.linear.line))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Places:
     """Places in the order of the path: motion, tip (k, 3), errors and way (mm); `lifted`: over a hole."""
 

@@ -27,6 +27,7 @@ from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 
 
 @dataclass(slots=True)
@@ -117,7 +118,7 @@ Tip = Callable[[Intent, Index, Array], Array]
 """Motions (k,) and how far they are done (k,) -> where the tip is, (k, 3) mm."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TipError:
     """The tool tip along a path, k samples in order.
 

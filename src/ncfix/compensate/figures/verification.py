@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ncfix.arguments import TOLERANCE_UM
@@ -16,9 +16,10 @@ from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Compared:
     """Two programs on one machine: figures of the original, of the other along its own path, and along the original's.
 

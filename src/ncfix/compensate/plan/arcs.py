@@ -7,13 +7,14 @@ centre moved by the mean correction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask, picked, slices, stacked, vector_product
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import ArcColumns, Segments, sweep_between
+from ncfix.values import frozen
 
 LOOKS = np.arange(1, 13) / 13
 """Fractions of each arc at which the corrected path is looked at to find the centre."""
@@ -33,7 +34,7 @@ would make it one."""
 Pair = tuple[Array, Array]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Closure:
     """What difference between an arc's radii at start and end a control accepts: any below `mm`, any below `relative`
     times the radius."""
@@ -46,7 +47,7 @@ class Closure:
         return max(self.mm, self.relative * radius)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Fitted:
     """Corrected arcs.
 

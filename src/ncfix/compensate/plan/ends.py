@@ -18,7 +18,7 @@ axes and spindles", R2, MD30455; Fanuc 30i parameter manual, No. 1008.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,10 +43,11 @@ from ncfix.compensate.plan.kinematics import Correction, commands_from_joints, r
 from ncfix.compensate.plan.strategies import PoseSequence, Strategy
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
+from ncfix.values import frozen
 from ncfix.writer.target import FrameMap
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class EndCommands:
     """Commands at which each motion really starts and ends, (n, n_axes) mm and rad, before rounding; NaN if unknown."""
 
@@ -279,7 +280,7 @@ BATCH = 32_768
 """Ends corrected at a time."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Ends:
     """Where motions shall end.
 

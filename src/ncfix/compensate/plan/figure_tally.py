@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Figures:
     """Tip errors along a path.
 
@@ -25,7 +24,7 @@ class Figures:
     fraction: float
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PathError:
     """Before and after a correction.
 
@@ -40,7 +39,7 @@ class PathError:
     way: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PathSamples:
     """Places on a path, flat: motion, fraction, tip error before and after (mm), share of the way (mm)."""
 

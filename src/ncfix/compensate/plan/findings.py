@@ -14,12 +14,13 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 
 MOST = 20
 """So many messages are written out; the rest is counted."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Finding:
     """One kind of trouble and the motions that have it.
 

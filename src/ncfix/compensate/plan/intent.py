@@ -17,7 +17,6 @@ Deviations are taken without that part: no splitting, and no other word, could t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -43,6 +42,7 @@ from ncfix.compensate.plan.kinematics import (
 from ncfix.compensate.plan.segments import Segments
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
+from ncfix.values import frozen
 
 INSTANT, WHILE = 1e-4, 1e-3
 """Fractions of a motion over which it is looked at which way its axes go: around an instant, and for a while before."""
@@ -50,7 +50,7 @@ NOISE = 1e-11
 """mm or rad; what axis positions may differ by for rounding of the arithmetic."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Intent:
     """A program on a machine.
 

@@ -14,8 +14,6 @@ taken to keep the side of its play that it last had.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -25,6 +23,7 @@ from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import FLAT
 from ncfix.machine.steps import dot, volume
+from ncfix.values import frozen
 
 Signs = NDArray[np.int8]
 
@@ -204,7 +203,7 @@ def common(values: Array) -> Array:
     return values
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Correction:
     """Corrected axis positions.
 

@@ -12,8 +12,6 @@ rays of the other one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, owners, picked, stacked, taken
@@ -21,6 +19,7 @@ from ncfix.compensate.plan.intent import Intent, correctable
 from ncfix.compensate.plan.sampling import interior
 from ncfix.compensate.plan.segments import Segments
 from ncfix.control.moves import MotionKind, Moves
+from ncfix.values import frozen
 
 NO_WAY = 1e-9
 """mm in the plane; a motion that goes no farther makes no corner."""
@@ -37,7 +36,7 @@ LOOKS = 4
 LEAST = 5
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class OffsetPoints:
     """Places of the tool beside a contour, flat.
 
@@ -55,7 +54,7 @@ class OffsetPoints:
     rounding: Array
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ContactPath:
     """A path of tool contact in columns: rows are those motions of a program that make a way beside a contour.
 

@@ -10,7 +10,7 @@ are split only if asked. Canned cycles are corrected at their end. Nothing is sp
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -49,13 +49,14 @@ from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.plan.written import Known
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine
+from ncfix.values import frozen
 from ncfix.writer.pieces import Pieces
 
 LEAST_SHARE = 1e-6
 """Of a motion's time, for a piece that goes nowhere: inverse-time feed is divided by it."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Plan:
     """What to write, and what there is to say about it.
 
@@ -133,7 +134,7 @@ distance over which the model bends, an eighth of a wave: a wave's peak between 
 less than 1 - cos(pi / 32) = 0.5 % of its height, and a parabola's over its chord by less than 1 / 64 of the arrow."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PathTolerance:
     """A path tolerance, and what rounding does besides.
 
@@ -155,7 +156,7 @@ class PathTolerance:
         return self.rounding <= self.tolerance / 2
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Requirements:
     """What the corrected program has to meet.
 

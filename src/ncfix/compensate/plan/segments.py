@@ -10,8 +10,6 @@ of it from its chord. A straight way in the workpiece is nowhere farther from a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ncfix.compensate.plan.arrays import Array, Index, Mask, every, lengths, owners, picked, spread, vector_product
@@ -20,9 +18,10 @@ from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
 from ncfix.machine.chain import turn
 from ncfix.machine.steps import dot
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Segments:
     """Motions as the control interpolates them: every axis linear in the fraction; X Y Z of an arc on a circle.
 
@@ -109,7 +108,7 @@ class Segments:
         return result
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ArcColumns:
     """Arcs in columns, X Y Z first: at their starts and at their ends where these are, and two ways from the axis.
 

@@ -20,7 +20,7 @@ that bend the other way than the arc turns: a control would go the long way roun
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Protocol
 
@@ -48,6 +48,7 @@ from ncfix.compensate.plan.kinematics import regular
 from ncfix.compensate.plan.sampling import MOST, bends, crossed, merged, reversals
 from ncfix.compensate.plan.segments import Segments, sweep_between
 from ncfix.compensate.plan.strategies import Strategy
+from ncfix.values import frozen
 from ncfix.writer.target import TANGENTIAL
 
 STRETCH = 1024
@@ -68,7 +69,7 @@ class Splittable(Protocol):
         """Which pieces are arcs (p,), and their centres (p, 3)."""
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class PathNodes:
     """Nodes of motions, flat, all nodes of a motion next to each other.
 
@@ -198,7 +199,7 @@ def radii(intent: Intent, rows: Index) -> Array:
     return np.linalg.norm(across(spoke, moves.normal[rows]), axis=1)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RoundGrid:
     """Nodes of arcs, as `PathNodes` has them, between which pieces are arcs.
 
@@ -301,7 +302,7 @@ BATCH = 100_000
 """Nodes worked on at a time."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Split:
     """Motions made of pieces, flat, the pieces of a motion next to each other.
 
@@ -321,7 +322,7 @@ class Split:
     worst: Array
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Cutter:
     """What motions are cut for.
 

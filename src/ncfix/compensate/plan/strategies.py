@@ -7,7 +7,6 @@ the machine. A strategy is stateless; `solve` tells for each pose how it went, `
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -26,12 +25,13 @@ from ncfix.compensate.plan.kinematics import (
 )
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Axis, Effect, Machine, State
+from ncfix.values import frozen
 
 APART = 1.0
 """rad of allowance between stretches that have nothing to do with each other; above any rotary correction."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PoseSequence:
     """How poses follow each other, for limits on rates.
 

@@ -14,7 +14,7 @@ arm has changed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import product
 
@@ -27,11 +27,12 @@ from ncfix.compensate.plan.segments import Segments, sweep_between
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine
 from ncfix.text.spelling import decimals_for
+from ncfix.values import frozen
 from ncfix.writer.emit import Emission
 from ncfix.writer.pieces import Pieces
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class WrittenPieces:
     """Pieces on a program on a machine.
 
@@ -99,7 +100,7 @@ TURNED = 1e-12
 """rad; a rotary axis that is so close to its number in the program stands there."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Known:
     """Ends of motions, found by bringing the tip there on the exact model.
 

@@ -17,6 +17,7 @@ from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import N_LETTERS
 from ncfix.control.moves import FeedMode
 from ncfix.text.tree import Program
+from ncfix.values import frozen
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -29,7 +30,7 @@ LONGEST = 1 << 16
 """Blocks that are taken at once."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Lane:
     """A block that is nothing but a straight motion, or an arc, with plain numbers.
 
@@ -54,7 +55,7 @@ class Lane:
         return self.radius >= 0 or max(self.centre) >= 0
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LaneTables:
     """The lanes of all shapes as columns; -1 for what a shape lacks, and for all of a shape that has no lane.
 
@@ -108,7 +109,7 @@ class ProgramText(Protocol):
         """The lanes of all shapes as columns."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BlockRows:
     """Consecutive blocks as the control takes them, one row per block.
 

@@ -10,7 +10,7 @@ Shapes: bases with priors on their coefficients. A curve is smooth, harmonics de
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 from typing import Any
 
@@ -20,6 +20,7 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
 from ncfix.machine.piecewise import Spline
 from ncfix.measure.measurement import Array
+from ncfix.values import frozen
 
 LETTERS = "XYZ"
 TURNS = "ABC"
@@ -35,7 +36,7 @@ LOST = (1.0, 0.15, 0.1)
 """Variance of play: constant, growing, bowed along the travel."""
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Candidate:
     """A physical effect that may be missing.
 
@@ -77,7 +78,7 @@ class Candidate:
         return bool(signals) and all(signal == "time_s" or signal.startswith("temp_") for signal in signals)
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class MeasuredRange:
     """What was measured: where the axes were, and which state columns there are.
 

@@ -10,7 +10,6 @@ likely theirs, and in how slow they are.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -34,6 +33,7 @@ from ncfix.machine.axes import SPINDLE
 from ncfix.machine.basis import Polynomial
 from ncfix.machine.piecewise import PiecewiseConstant
 from ncfix.measure.measurement import Array
+from ncfix.values import frozen
 
 LAGS = (None, 600.0, 1800.0, 5400.0)
 """s: at once, a spindle, a slide, a frame; what lies between is a mixture."""
@@ -64,7 +64,7 @@ WARM_UP = "warm up before measuring and cutting"
 Parts = Sequence[tuple[str, Mapping[str, Any]]]
 
 
-@dataclass(frozen=True)
+@frozen(slots=False)
 class Body:
     """What becomes warm.
 
@@ -83,7 +83,7 @@ PLATE = Body(28800.0, 28800.0)
 """One that is held at a point nobody knows: all ways at once with courses of their own would be anything."""
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Drive:
     """What drives a thermal effect: options of effects, and the loadings of their coefficients, one for each form."""
 

@@ -10,7 +10,7 @@ of it holds, keeping them costs the squares of two unrelated curves where one wo
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -23,6 +23,7 @@ from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.selection import Selection
+from ncfix.values import frozen
 
 SMOOTH = 0.3
 """How far the values of a table know of each other, of its length."""
@@ -52,7 +53,7 @@ def without_foreign_tables(
     yield fitted, len(own), foreign - curves.as_given + now.count * float(np.log(now.left() / now.free))
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class CurvesOfFile:
     """The curves of a machine file against the data, beside set-up and constants, in units of the noise.
 

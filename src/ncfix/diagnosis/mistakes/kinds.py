@@ -7,7 +7,7 @@ are undone is seen to first order. Of positions and axes it is not.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -30,6 +30,7 @@ from ncfix.machine.plausible import much, times_a_machining_centre
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Array, Index, Measurement
+from ncfix.values import frozen
 
 DOUBTED, OFF = 0.3, 3.0
 """Times what is much of a machine of its size and kind: an axis point that is further off may be wrong in the file
@@ -182,7 +183,7 @@ def _of_values(
             yield rest.left(rest.of_values(each.measurements)), each
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class FirstOrder:
     """The misfit of a file to first order: its set-up free, its constants nearly fixed.
 

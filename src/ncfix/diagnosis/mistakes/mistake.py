@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ncfix.machine import Machine
 from ncfix.measure.measurement import Measurement
+from ncfix.values import frozen
 
 
-@dataclass(frozen=True, repr=False)
+@frozen(repr=False, slots=False)
 class Mistake:
     """A mistake, and machine and measurements as they are without it.
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from enum import Enum
 from itertools import combinations_with_replacement
 from math import prod
@@ -21,6 +21,7 @@ from typing import Self, TypeAlias
 import sympy as sp
 
 from ncfix.diagnostics import ConfigError
+from ncfix.values import frozen
 
 TAKEN = (
     "np", "shape", "map", "v", "locals", "float", "pi", "sin", "cos", "tan", "sqrt", "branch", *"xyzijk",
@@ -38,7 +39,7 @@ class Size(Enum):
     SMALL = "small"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Variable:
     """A variable of a chain.
 
@@ -107,7 +108,7 @@ UNITS: dict[str, Vector] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Transformation:
     """What all steps have in common; their fields are vectors and expressions."""
 
@@ -124,7 +125,7 @@ class Transformation:
         return replace(self, **{n: vectors[n] if n in vectors else part.xreplace(values) for n, part in parts.items()})
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Translation(Transformation):
     """A shift along the coordinate axes, mm; each component a polynomial in the Small variables."""
 
@@ -136,7 +137,7 @@ class Translation(Transformation):
         return Translation(negated(self.vector))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rotation(Transformation):
     """A right-handed rotation about a unit vector through the origin; the angle, rad, is linear in the errors."""
 
@@ -149,7 +150,7 @@ class Rotation(Transformation):
         return Rotation(self.direction, -self.angle)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Screw(Transformation):
     """The exponential of a small twist about the origin: rotation vector, rad, and velocity of the origin, mm."""
 
@@ -233,7 +234,7 @@ def polynomial_part(expression: Expr, smalls: Sequence[Expr], order: int) -> dic
     return found
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Chain:
     """What a derivation starts from.
 

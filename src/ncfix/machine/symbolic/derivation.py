@@ -12,7 +12,6 @@ second-order terms out.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import product
 
@@ -38,11 +37,12 @@ from ncfix.machine.symbolic.chain import (
     skew,
 )
 from ncfix.machine.symbolic.from_machine import DEFAULT, from_machine
+from ncfix.values import frozen
 
 Series = dict[Monomial, DomainMatrix]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Expansion:
     """How far, and in what."""
 
@@ -127,7 +127,7 @@ COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
 Terms = dict[Monomial, sp.Expr]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Derivation:
     """Formulas of a chain.
 

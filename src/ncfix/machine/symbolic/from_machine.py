@@ -10,7 +10,7 @@ What is not recognised, or what the reader wants to see as a letter, becomes a L
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from math import atan2, pi
@@ -43,6 +43,7 @@ from ncfix.machine.symbolic.chain import (
     rodrigues,
     scaled,
 )
+from ncfix.values import frozen
 
 CLOSE = 1e-14
 """How near an exact constant a number must be: well below what the fast engine resolves."""
@@ -123,7 +124,7 @@ GROUPS = ("motions", "locations", "spindle", "machine")
 """Error motions of the axes; location errors of the axes; location errors of the spindle; what the machine file has."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ErrorSymbol:
     """An error component of a joint as a variable, with what the machine file says of it.
 

@@ -12,7 +12,6 @@ of the tool tip, nominal part included.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import combinations, product
 
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from ncfix.machine.symbolic.algebra import Algebra, Poly
 from ncfix.machine.symbolic.derivation import POSITION, Derivation
+from ncfix.values import frozen
 
 Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-9
@@ -125,7 +125,7 @@ def independent_columns(matrix: Array) -> list[int]:
 TIP = ("dx", "dy", "dz")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Identifiable:
     """What measurements of all poses can say.
 
@@ -198,7 +198,7 @@ Pose = tuple[int, ...]
 """Degrees, one per rotary axis."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False, slots=False)
 class Equation:
     """A difference or sum of one coordinate at two poses, as a linear equation in the unknown errors.
 
@@ -287,7 +287,7 @@ def shortest(candidates: Sequence[Equation]) -> Equation:
     return min(candidates, key=lambda equation: equation.terms)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Identification:
     """A step of the protocol: measure, and find an error from those found before.
 

@@ -8,13 +8,13 @@ linear axes then follow from a linear system. Every axis is turned or shifted by
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import sympy as sp
 
 from ncfix.machine.symbolic.algebra import Algebra, Poly
 from ncfix.machine.symbolic.chain import Chain, Expr, Rotation, linear_part, rodrigues
 from ncfix.machine.symbolic.derivation import DIRECTION, POSITION, Derivation
+from ncfix.values import frozen
 
 BRANCH = sp.Symbol("branch", real=True)
 """Which of two solutions: +1 or -1."""
@@ -22,7 +22,7 @@ TARGET = sp.Matrix([sp.Symbol(name, real=True) for name in DIRECTION])
 TIP = sp.Matrix([sp.Symbol(name, real=True) for name in POSITION])
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Inverse:
     """Formulas per axis, in the order in which they can be evaluated, and what could not be had or must be known."""
 
@@ -35,7 +35,7 @@ class Inverse:
         yield from self.notes
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Turn:
     """A rotary axis: its direction with all axes at zero, with the sign in which it turns the tool."""
 

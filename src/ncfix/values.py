@@ -1,0 +1,129 @@
+"""Values that travel: `frozen` is `dataclass(frozen=True, slots=True)`, made in a tenth of the time.
+
+For each class `dataclasses` writes six methods as text and compiles every one while the module is imported. ncfix has
+hundreds of such classes: that took a third of a short run. Here five of the six methods are functions that need no
+text, and `__init__` is written when a class is first called, which most classes of a run never are.
+
+All else is left to `dataclasses`: its `field`, `fields`, `replace` and `asdict`, and `match`, take these classes for
+what they are. One thing differs: a subclass of one that is a dataclass itself has to be `frozen`, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import MISSING, Field, FrozenInstanceError, dataclass, field, fields
+from typing import Any, TypeVar, dataclass_transform, overload
+
+T = TypeVar("T")
+PUT = object.__setattr__
+
+
+@overload
+def frozen(cls: type[T], /) -> type[T]: ...
+
+
+@overload
+def frozen(
+    *, slots: bool = True, eq: bool = True, repr: bool = True, kw_only: bool = False
+) -> Callable[[type[T]], type[T]]: ...
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(Field, field))
+def frozen(
+    cls: type[T] | None = None, /, *, slots: bool = True, eq: bool = True, repr: bool = True, kw_only: bool = False
+) -> type[T] | Callable[[type[T]], type[T]]:
+    """Make a class a frozen dataclass; the options are those of `dataclasses.dataclass`.
+
+    A method that the class writes itself stays. Setting or deleting an attribute of an object raises
+    FrozenInstanceError.
+    """
+
+    def made(cls: type[T]) -> type[T]:
+        written = {name for name, method in vars(cls).items() if method is not None}
+        cls = dataclass(init=False, repr=False, eq=False, slots=slots, kw_only=kw_only)(cls)
+        methods: dict[str, object] = {"__init__": _Init(cls), "__setattr__": _refuse, "__delattr__": _refuse}
+        if repr:
+            methods["__repr__"] = _in_words
+        if eq:
+            methods["__eq__"], methods["__hash__"] = _comparing(cls)
+        if slots:
+            methods["__getstate__"], methods["__setstate__"] = _items, _set_items
+        for name in methods.keys() - written:
+            setattr(cls, name, methods[name])
+        return cls
+
+    return made if cls is None else made(cls)
+
+
+class _Init:
+    """The `__init__` of a class, until it is first asked for: then it is written, and takes this one's place."""
+
+    def __init__(self, cls: type) -> None:
+        self.cls = cls
+
+    def __get__(self, instance: object, owner: type | None = None) -> object:
+        init: Any = _init_of(self.cls)
+        setattr(self.cls, "__init__", init)  # noqa: B010  (mypy: a method is put in its place)
+        return init.__get__(instance, owner)
+
+
+def _init_of(cls: Any) -> Callable[..., None]:
+    """The `__init__` that `dataclasses` would write."""
+    names: dict[str, Any] = {"put": PUT, "MISSING": MISSING}
+    positional, by_name, lines = ["self"], list[str](), list[str]()
+    for each in fields(cls):
+        name, preset, item = each.name, f"preset_{each.name}", each.name
+        made = each.default_factory is not MISSING
+        if each.default is not MISSING or made:
+            names[preset] = each.default_factory if made else each.default
+        if each.init:
+            parameter = name if preset not in names else f"{name}=MISSING" if made else f"{name}={preset}"
+            (by_name if each.kw_only else positional).append(parameter)
+            if made:
+                item = f"{preset}() if {name} is MISSING else {name}"
+        elif preset in names:
+            item = f"{preset}()" if made else preset
+        else:
+            continue
+        lines.append(f"put(self, {name!r}, {item})")
+    if hasattr(cls, "__post_init__"):
+        lines.append("self.__post_init__()")
+    parameters = ", ".join([*positional, *(["*", *by_name] if by_name else [])])
+    exec(f"def __init__({parameters}):\n " + "\n ".join(lines or ["pass"]), names)
+    init: Callable[..., None] = names["__init__"]
+    init.__annotations__ = {each.name: each.type for each in fields(cls) if each.init}
+    init.__qualname__ = f"{cls.__qualname__}.__init__"
+    return init
+
+
+def _comparing(cls: Any) -> tuple[Callable[..., object], Callable[..., int]]:
+    """`__eq__` and `__hash__`, by the fields that are compared."""
+    names = [each.name for each in fields(cls) if each.compare]
+
+    def equal(self: object, other: object) -> object:
+        if type(self) is not type(other):
+            return NotImplemented
+        return [getattr(self, name) for name in names] == [getattr(other, name) for name in names]
+
+    def hashed(self: object) -> int:
+        return hash(tuple([getattr(self, name) for name in names]))
+
+    return equal, hashed
+
+
+def _refuse(self: object, name: str, *_: object) -> None:
+    raise FrozenInstanceError(f"field {name!r} of a frozen {type(self).__name__}")
+
+
+def _in_words(self: Any) -> str:
+    shown = ", ".join(f"{each.name}={getattr(self, each.name)!r}" for each in fields(self) if each.repr)
+    return f"{type(self).__qualname__}({shown})"
+
+
+def _items(self: Any) -> list[object]:
+    return [getattr(self, each.name) for each in fields(self)]
+
+
+def _set_items(self: Any, items: list[object]) -> None:
+    for each, item in zip(fields(self), items, strict=True):
+        PUT(self, each.name, item)
