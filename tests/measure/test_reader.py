@@ -343,6 +343,18 @@ def test_interferometers_files_that_cannot_be_taken_for_positioning(old: str, ne
     assert said in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["x.rta", "X.RTS", "straight/x.rtq"])
+def test_a_file_of_angles_or_straightness_is_not_taken_for_positioning(name: str):
+    """It has the same sections; only its ending, and maybe a free text, say what was measured."""
+    with pytest.raises(ConfigError, match="another error than positioning"):
+        reads(RTL.encode(), THREE, name)
+
+
+def test_an_interferometers_file_that_ends_before_its_deviations_is_known_all_the_same():
+    with pytest.raises(ConfigError, match="there are no readings"):
+        reads(RTL.partition("DEVIATIONS::\n")[0].replace("DEVIATIONS", "").encode(), THREE, "x.rtl")
+
+
 def moving(direction: tuple[float, float, float]) -> Machine:
     """The three-axis machine, whose X and Y are in the table, with X moving along this and Y along y."""
     x, y, z = THREE.axes

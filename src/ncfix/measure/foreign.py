@@ -16,6 +16,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from pathlib import PurePath
 
 import numpy as np
 
@@ -40,6 +41,8 @@ LETTER = re.compile(
 """A letter that stands alone among words of any language: `X-axis`, `Eje X`, `X\u8f74`."""
 OTHER = re.compile(r"straight|square|angular|flatness|diagonal|(?<![a-z])(?:pitch|yaw|roll)(?![a-z])", re.IGNORECASE)
 """Words of a title that speak of another error than positioning."""
+ANOTHER_ERROR = re.compile(r"\.rt[a-km-z]")
+"""Endings of files of angles (.rta), straightness (.rts) and others, which have the same sections as `.rtl`."""
 MICROMETRE = 1e-3
 SMALL = 1e-4
 """mm; no run of an axis has such small deviations."""
@@ -137,7 +140,7 @@ def _by_plugin(text: str, path: str) -> Measurement | None:
 
 
 def _reader(text: str) -> Callable[[str, str], Measurement] | None:
-    if text.lstrip().startswith("HEADER::") and "DEVIATIONS::" in text:
+    if text.lstrip().startswith("HEADER::"):
         return renishaw
     if "Gridpoints" in text or re.search(r"^\[[ABC]0[A-Z]\]", text, re.MULTILINE):
         return etalon
@@ -276,6 +279,9 @@ class Rtl:
         if letter in "ABC":
             said = "the unit of a rotary axis's deviations is not public: give them as kind axis, in rad"
             raise self.odd(said, line, "docs/formats.md, Measurement file")
+        if ANOTHER_ERROR.fullmatch(suffix := PurePath(self.path).suffix.lower()):
+            said = f"a file {suffix} holds another error than positioning, in a unit that nobody says"
+            raise self.odd(said, line, "give the readings as kind axis, with their component")
         for key in ("title", "filetype", "location"):
             other, where = self.texts.get(key, ("", 0))
             if OTHER.search(other):
