@@ -161,6 +161,7 @@ def test_statements_of_fagor_are_no_comments(dialect: str, line: str, foreign: b
         ("N10 #CS ON[1]", "code of Fagor or ISG controls"),
         ("#1:=10.;", "Syntec code"),
         ("%@MACRO", "Syntec code"),
+        ("%PM9001", "code of Philips or MAHO controls"),
         ("#1=10.", ""),
         ("(#RTCP ON)", ""),
         ("(#1:=10.)", ""),

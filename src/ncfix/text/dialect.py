@@ -41,6 +41,7 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
         rb"(?im)^[ \t]*(?:N\d+[ \t]*)?(G[ \t]*9[89](?=[^(;\n]*X)(?=[^(;\n]*I)(?=[^(;\n]*J)(?=[^(;\n]*K)"
         rb"[ \t]*(?:[XYZIJK][ \t]*[-+]?[\d.]+[ \t]*)+\r?$)",
     ),
+    ("code of Philips or MAHO controls", rb"(?im)\A[ \t\r\n]*(%[ \t]*PM[ \t]*\d)"),
     (
         "NUM code",
         rb"(?i)\A[ \t\r\n]*(%[ \t]*\d+)(?=(?s:.*?)(?<![A-Z])"
