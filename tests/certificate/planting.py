@@ -12,7 +12,7 @@ import random
 import re
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -46,7 +46,11 @@ def machine(name: str) -> Machine:
 
 @dataclass(slots=True)
 class Writer:
-    """Writes random motions as one language does; `numbered`: every block has its number."""
+    """Writes random motions as one language does.
+
+    numbered  every block has its number
+    frame     "turned" or "tilted": now and then the coordinates are turned in their plane, or a plane is tilted
+    """
 
     language: str
     rng: random.Random
@@ -54,6 +58,7 @@ class Writer:
     five: bool
     at: dict[str, float]
     lines: list[str]
+    frame: str = ""
 
     @property
     def klartext(self) -> bool:
@@ -110,7 +115,9 @@ class Writer:
         every = "XYZAC" if self.five else "XYZ"
         self.motion(True, every)
         self.motion(False, every, "F500")
-        for _ in range(blocks):
+        for k in range(blocks):
+            if self.frame and k % 9 == 3:
+                self.turn()
             choice = rng.random()
             if choice < 0.12 and not self.five:
                 self.arc()
@@ -125,6 +132,41 @@ class Writer:
                 self.motion(False, "".join(axes), rng.choice(("", "", "F800", "F1200")))
         self.put({"heidenhain": "END PGM PART MM"}.get(self.language, "M30"))
         return ("\n".join(self.lines) + "\n").encode()
+
+    def turn(self) -> None:
+        """Coordinates are turned, or a plane is tilted, and the tool goes there; or they are not turned any more."""
+        x, y, z, first, tilt, last = (round(self.rng.uniform(-most, most), 3) for most in (20, 20, 20, 90, 60, 90))
+        for line in self._turn_lines(self.rng.random() < 0.2, (x, y, z), (first, tilt, last)):
+            self.put(line)
+        self.motion(True, "XY")
+        self.motion(True, "Z")
+
+    def _turn_lines(self, ends: bool, origin: Sequence[float], angles: Sequence[float]) -> list[str]:
+        (x, y, z), (first, tilt, last), tilted = origin, angles, self.frame == "tilted"
+        match self.language:
+            case "heidenhain" if tilted:
+                begin = f"PLANE SPATIAL SPA{tilt:+} SPB{first / 4:+} SPC{last:+} "
+                sign = self.rng.choice(("SEQ+", "SEQ-"))
+                if ends:
+                    return ["PLANE RESET STAY"]
+                if self.rng.random() < 0.5:
+                    return [f"{begin}TURN FMAX {sign}"]
+                return [f"{begin}STAY {sign}", "L A+Q120 C+Q122 R0 FMAX"]
+            case "heidenhain":
+                return ["CYCL DEF 10.0 ROTATION", f"CYCL DEF 10.1 ROT{0.0 if ends else first:+}"]
+            case "siemens" if tilted:
+                places = f"{x},{y},{z},{tilt},{first / 4},{last},0,0,{z / 2}"
+                call = f'CYCLE800(0,"TABLE",200000,57,{places},{self.rng.choice((-1, 1))})'
+                return ["CYCLE800()" if ends else call]
+            case "siemens":
+                shift = [] if ends or self.rng.random() < 0.5 else [f"TRANS X{x} Y{y}"]
+                angle = f" RPL={first}" if self.rng.random() < 0.5 else f" Z{first}"
+                return [*shift, ("AROT" if shift else "ROT") + ("" if ends else angle)]
+            case _ if tilted:
+                plane = f"G68.2 X{x} Y{y} Z{z} I{first} J{tilt} K{last}"
+                return ["G69", *([] if ends else [plane, "G53.1"])]
+            case _:
+                return ["G69", *([] if ends else [f"G68 X{x} Y{y} R{first}"])]
 
     def head(self) -> None:
         match self.language:
@@ -178,9 +220,11 @@ def cases(count: int, seed: int) -> Iterator[Case]:
         language = LANGUAGES[made % len(LANGUAGES)]
         five = rng.random() < 0.3 and language in ("fanuc", "iso", "siemens", "heidenhain")
         numbered = rng.random() < 0.6
-        writer = Writer(language, rng, numbered, five, {}, [])
+        turns = {"linuxcnc": ("",), "iso": ("", "turned")}.get(language, ("", "turned", "tilted"))
+        frame = "" if five or rng.random() < 0.6 else rng.choice(turns)
+        writer = Writer(language, rng, numbered, five, {}, [], frame)
         original = writer.program(rng.randint(8, 40))
-        known = machines[five]
+        known = machines[five or frame == "tilted"]
         program = read(original, "part", get(language))
         fixed = fix_program(program, known, SETUP, FixOptions(verify=False, allow_refused=True))
         made += 1

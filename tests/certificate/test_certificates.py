@@ -140,11 +140,12 @@ def test_a_certificate_needs_a_file(example: Example, ncfix: Ncfix) -> None:
 
 def test_the_certificate_says_what_it_does_not_know(ncfix: Ncfix, tmp_path: Path) -> None:
     arguments = ("-m", ROOT / "examples" / "machines" / "wCAYFXZSt.toml", "--setup", PROGRAMS / "fanuc.setup.toml")
-    output = tmp_path / "fixed.nc"
-    found = ncfix("fix", PROGRAMS / "fanuc_tilted.nc", "-o", output, "--json", "--certificate", *arguments)
+    program, output = tmp_path / "part.nc", tmp_path / "fixed.nc"
+    program.write_bytes((PROGRAMS / "fanuc_tilted.nc").read_bytes().replace(b"G53.1", b"G53.6"))
+    found = ncfix("fix", program, "-o", output, "--json", "--certificate", *arguments)
     (entry,) = found.json()["files"]
     assert entry["certificate"]["verdict"] == "proved in part"
-    assert "G68.2 is not known to this reader" in [each["reason"] for each in entry["certificate"]["not_proved"]]
+    assert "G53.6 is not known to this reader" in [each["reason"] for each in entry["certificate"]["not_proved"]]
 
 
 @pytest.mark.parametrize("part", [1 << 20, 1024])

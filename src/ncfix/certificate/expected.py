@@ -46,8 +46,7 @@ class Expected:
         self.machine = machine.replace(workpiece_offset=(x, y, z), conditions=dict(given.inputs))
         self.model = TipModel.of(self.machine)
         self.strategy = second.stamp.strategy if second.stamp else "rotary-then-linear"
-        turned = self.model.turned if self.model else lambda numbers, length, on: [math.nan] * len(numbers)
-        ours, theirs = (follower_of(text.family, machine.axis_names, given, turned) for text in (first, second))
+        ours, theirs = (follower_of(text.family, machine.axis_names, given, self.model) for text in (first, second))
         self.ours, self.theirs = ours.run(first), theirs.run(second)
         self.foreign = ours.foreign
         self.tolerance = (second.stamp.tolerance_um if second.stamp else tolerance_um) / 1e3
@@ -137,6 +136,7 @@ class Expected:
         near = np.empty((len(ours), len(self.machine.axes)))
         for unit in set(units.tolist()):
             near[units == unit] = self._reach(unit)
+        near = self.along(near, ours)
         turns = np.abs(self.ours.sweep[ours]) > WHOLE_TURN
         near[turns] = np.maximum(near[turns], self.tolerance)
         rapid = (self.ours.kind[ours] == Kind.RAPID) == (self.theirs.kind[theirs] == Kind.RAPID)
@@ -195,8 +195,9 @@ class Expected:
 
         added  the number stands in an added line, which has the digits of the control only
         """
+        at = np.array([self.ours.at[step.row]])
         if added:
-            return self.control_halves(step.unit)
+            return self.along(self.control_halves(step.unit)[None], at)[0]
         named = step.named
         written = tuple(
             named[name].decimals if name in named and named[name].value is not None else 0
@@ -205,6 +206,15 @@ class Expected:
         found = self._halves.get((step.unit, written))
         if found is None:
             found = self._halves[step.unit, written] = self.halves(np.array([step.unit]), np.array([written]))[0]
+        return self.along(found[None], at)[0]
+
+    def along(self, numbers: Array, at: Indices) -> Array:
+        """How far off numbers of X Y Z (k, n_axes) of steps (k,), which may be turned, lead commands at most."""
+        turn = self.ours.turn[at]
+        if self.model is None or not turn.any():
+            return numbers
+        found, columns = numbers.copy(), list(self.model.columns)
+        found[:, columns] = np.einsum("kij,kj->ki", np.abs(self.ours.rotations[turn]), numbers[:, columns])
         return found
 
     def control_halves(self, unit: float) -> Array:

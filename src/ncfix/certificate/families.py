@@ -14,13 +14,14 @@ from ncfix.certificate.following import (
     UNKNOWN_WORDS,
     AxisFollower,
     Given,
-    Turned,
 )
 from ncfix.certificate.klartext import KlartextFollower
+from ncfix.certificate.model import TipModel
 from ncfix.certificate.reading import AXES, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind
+from ncfix.certificate.turning import SwivelCall, turned
 
-QUIET = frozenset((51, 80, 90, 150, 501, 600, 610, 611, 620, 640, 690, 800, 911, 960, 970, 980, 990)) | frozenset(
+QUIET = frozenset((51, 80, 90, 150, 501, 600, 610, 611, 620, 640, 800, 911, 960, 970, 980, 990)) | frozenset(
     (4500, 4510, 6010, 6020, 6030, 6410, 6420, 6430, 6440, 6450)
 )
 """G codes in tenths that move nothing and change no coordinates, or whose use is seen to elsewhere."""
@@ -41,8 +42,8 @@ class WordAddressFollower(AxisFollower):
     variables  of SINUMERIK, with plain numbers that the program gave them
     """
 
-    def __init__(self, axes: Sequence[str], family: Family, given: Given, turned: Turned) -> None:
-        super().__init__(axes, family, given, turned)
+    def __init__(self, axes: Sequence[str], family: Family, given: Given, model: TipModel | None) -> None:
+        super().__init__(axes, family, given, model)
         self.variables: dict[str, float | None] = {}
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
@@ -52,7 +53,7 @@ class WordAddressFollower(AxisFollower):
         codes = [round(10 * word.value) for word in line.codes if word.name == "G" and word.value is not None]
         if line.odd and (codes or line.path):
             self.lost["odd"] = line.odd
-        if self._shifted(line, codes) or self._smooths(line, codes):
+        if self._shifted(line, codes) or self._smooths(line, codes) or self._turned(line, codes):
             return None
         apart, fixed = self._modes(line, codes)
         words = {word.name: word for word in line.path if word.name in AXES}
@@ -96,7 +97,10 @@ class WordAddressFollower(AxisFollower):
         else:
             how = {"TRANS": 1, "ATRANS": 2}.get(" ".join(names), 0)
         values = {word.name: word.value for word in line.path if not word.counted}
-        if not how or self.lost or line.odd or self.tcp or self.beside or self.counting or line.doubled():
+        tilted = self.turn is not None and self.turn.tilted
+        if not how or self.lost or line.odd or self.beside or self.counting or line.doubled():
+            return False
+        if (self.tcp and not tilted) or (words and self.turn is not None):
             return False
         if len(values) < len(line.path) or not values.keys() <= self.at.keys() or None in values.values():
             return False
@@ -113,6 +117,8 @@ class WordAddressFollower(AxisFollower):
                 self.shifts = {}
                 self.unsay()
             case 1:
+                if not tilted:
+                    self.end_turn()
                 self.shifts = numbers
             case 2:
                 for axis, value in numbers.items():
@@ -121,6 +127,75 @@ class WordAddressFollower(AxisFollower):
                 return False
         if words:
             self._other_words(line)
+        return True
+
+    def _turned(self, line: TextLine, codes: Sequence[int]) -> bool:
+        """Take in a turn of the coordinates: G68, G68.2, G53.1, ROT, AROT or CYCLE800; False if it is none."""
+        names = [word.name for word in line.codes if word.name != "N"]
+        values = {word.name: word.value for word in line.path if not word.counted}
+        if self.lost or line.odd or self.beside or line.doubled() or len(values) < len(line.path):
+            return False
+        if None in values.values():
+            return False
+        plain = {name: value or 0.0 for name, value in values.items()}
+        if self.family is Family.SINUMERIK:
+            return self._turned_frame(line, names, plain)
+        axes = PLANES[self.plane]
+        match sorted(codes):
+            case [680] | [170, 680] | [680, 900] if names == ["G"] * len(codes) and not self.counting:
+                if values.keys() != {"R", *axes[:2]} or (170 in codes and self.plane != 17) or self.turn is not None:
+                    return False
+                centre = {axis: self.offset(axis) + plain[axis] * self.unit for axis in axes[:2]}
+                self.begin_turn_about(turned((axes[2], plain["R"])), centre)
+            case [682] if names == ["G"] and values.keys() <= {*"XYZIJK"}:
+                turns = zip("ZXZ", (plain.get(letter, 0.0) for letter in "IJK"), strict=True)
+                self.begin_turn(turned(*turns), [plain.get(axis, 0.0) * self.unit for axis in "XYZ"], tilted=True)
+            case [531] if names == ["G"] and not values and self.turn is not None and self.turn.tilted:
+                self.at |= self.square_to(self.turn.rotation)
+                self.forget_place()
+            case _:
+                return False
+        return True
+
+    def _turned_frame(self, line: TextLine, names: Sequence[str], values: Mapping[str, float]) -> bool:
+        """The same of SINUMERIK."""
+        angle = line.code("RPL")
+        match sorted(names):
+            case ["ROT" | "AROT" as name] if values.keys() <= {*"XYZ"}:
+                return self._turn_on(name, [(axis, values.get(axis, 0.0)) for axis in "ZYX"])
+            case ["ROT" | "AROT" as name, "RPL"] | ["RPL", "ROT" as name] if not values and angle is not None:
+                return self._turn_on(name, [(PLANES[self.plane][2], angle)])
+            case [call] if call.startswith("CYCLE800(") and not values and not any(self.shifts.values()):
+                return self._swivel(call)
+            case _:
+                return False
+
+    def _turn_on(self, name: str, turns: Sequence[tuple[str, float]]) -> bool:
+        """ROT in place of all that the program has shifted and turned, AROT on top of what it has shifted."""
+        if self.tcp or (name == "AROT" and self.turn is not None):
+            return False
+        if name == "ROT":
+            self.end_turn()
+            self.shifts = {}
+        if any(angle for _, angle in turns):
+            self.begin_turn(turned(*turns), tilted=False)
+        return True
+
+    def _swivel(self, call: str) -> bool:
+        """CYCLE800: into a tilted plane, or out of it."""
+        if self.turn is not None and not self.turn.tilted:
+            return False
+        if re.match(r'CYCLE800\([^,]*,[ \t]*"0"', call):
+            self.forget_place()
+            self.end_turn()
+            return True
+        found = SwivelCall.of(call)
+        if found is None:
+            return False
+        self.begin_turn(found.rotation, (found.origin * self.unit).tolist(), tilted=True)
+        if self.turn is not None:
+            self.at |= self.square_to(found.rotation, sense=found.sense)
+            self.forget_place()
         return True
 
     def _leads_straight(self, line: TextLine) -> bool:
@@ -218,6 +293,8 @@ class WordAddressFollower(AxisFollower):
                 self._system(f"G{code // 10}")
             case 5000:
                 self._system("G500")
+            case 690:
+                self.end_turn()
             case 490 if self.family is Family.WORDS:
                 self.lead(False)
                 self.new_length(0.0)
@@ -262,7 +339,10 @@ class WordAddressFollower(AxisFollower):
             elif name == "G" and word.value is None:
                 self.lost["G"] = "a G code is a formula"
             elif name == "CYCLE800()" and not any(self.shifts.values()):
-                pass  # no plane is swivelled that it could take back
+                if self.turn is None or self.turn.tilted:
+                    self.end_turn()
+                else:
+                    self.lost["frame"] = "CYCLE800 in turned coordinates"
             elif name == "MCALL":
                 if len(line.codes) - sum(each.name == "N" for each in line.codes) == 1:
                     self.lost = {key: why for key, why in self.lost.items() if not CYCLES.match(key)}
@@ -286,6 +366,8 @@ class WordAddressFollower(AxisFollower):
     def _system(self, name: str) -> None:
         if name != self.system:
             self.system = name
+            if self.turn is not None:
+                self.lost["frame"] = "another work offset in turned coordinates"
         self.unsay()
 
     def _length_offset(self, line: TextLine, tcp: bool) -> None:
@@ -293,7 +375,9 @@ class WordAddressFollower(AxisFollower):
         tool = int(number) if number is not None else self.tool
         if any(word.name == "H" and word.value is None for word in line.codes):
             self.lost["H"] = "a length offset is a formula"
-        if self.tcp and (tcp or self.given.tcp):
+        if self.turn is not None and self.turn.tilted:
+            self.forget_place("XY" if self.is_square() else "")  # the tip moves along the tool
+        elif self.tcp and (tcp or self.given.tcp):
             self.at.update(dict.fromkeys("XYZ", NAN))  # the same place has other numbers for another tool
         self.tool, self.between = tool, False
         self.lead(tcp)
@@ -308,7 +392,9 @@ class WordAddressFollower(AxisFollower):
             for axis in named or self.axes:
                 end[axis] = point.get(axis, NAN)
         else:
-            end = self.target(named, machine=True) if not self.tcp else dict.fromkeys(self.at, NAN)
+            end = self.target(named, machine=True)
+        if self.tcp or self.turn is not None:
+            end |= dict.fromkeys("XYZ", NAN)
         step = self.step(row, Kind.FIXED, end, line)
         self.unsay(tuple(named) or self.axes)
         return step
@@ -341,7 +427,7 @@ class WordAddressFollower(AxisFollower):
         return step
 
 
-def follower_of(family: Family, axes: Sequence[str], given: Given, turned: Turned) -> AxisFollower:
+def follower_of(family: Family, axes: Sequence[str], given: Given, model: TipModel | None) -> AxisFollower:
     """What follows programs of a family."""
     kind = KlartextFollower if family is Family.KLARTEXT else WordAddressFollower
-    return kind(axes, family, given, turned)
+    return kind(axes, family, given, model)

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.certificate.model import TipModel
 from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
-from ncfix.certificate.steps import NAN, AxisStep, Kind, ModesInForce, ProgramSteps, StraightRun
+from ncfix.certificate.steps import NAN, AxisStep, Floats, Kind, ModesInForce, ProgramSteps, StraightRun
 from ncfix.certificate.text import Lines, StraightLines, Text
+from ncfix.certificate.turning import TurnedFrame
 from ncfix.values import frozen
 
 INCH = 25.4
@@ -64,9 +66,6 @@ def positions(text: Text, given: Given) -> list[Given]:
     return [replace(given, skip=frozenset(on)) for on in every]
 
 
-Turned = Callable[[Sequence[float], float, bool], Sequence[float]]
-"""A command (mm, degree), the tool length, and whether tool-centre-point control goes on: the same as it is then."""
-
 MOST_SWITCHES = 4
 """Of block delete, as many as `fix` looks at."""
 LEAST = 6
@@ -76,6 +75,8 @@ REWRITTEN = re.compile(r"jumps|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|LONGHO
 UNKNOWN_WORDS = "words that this reader does not know here"
 ROUND = 179.0
 """Degrees from which on the shorter way may be the other one: half a turn, less what a correction may be."""
+SQUARE = 2e-4
+"""rad; rotary words have three decimals of a degree."""
 NO_POLE, NO_CENTRE, NO_CIRCLE = "the pole is not known", "an arc without a centre", "an arc that does not close"
 
 
@@ -88,8 +89,8 @@ class AxisFollower:
 
     shortest = by_vector = False
 
-    def __init__(self, axes: Sequence[str], family: Family, given: Given, turned: Turned) -> None:
-        self.axes, self.family, self.given, self.turned = tuple(axes), family, given, turned
+    def __init__(self, axes: Sequence[str], family: Family, given: Given, model: TipModel | None) -> None:
+        self.axes, self.family, self.given, self.model = tuple(axes), family, given, model
         start = 0.0 if given.assume_zero else NAN
         self.at = {axis: given.initial.get(axis, start) for axis in axes}
         self.said = {axis: axis in given.initial and not given.assume_zero for axis in axes}
@@ -105,7 +106,9 @@ class AxisFollower:
         """The tool length in force in coordinates; SINUMERIK and Klartext begin with that of the tool in place."""
         self.between = False
         """The length offset in force is not of the tool in the spindle: which of them counts is not sure."""
-        self.tcp = given.tcp
+        self.tcp = self.asks_tip = given.tcp
+        self.turn: TurnedFrame | None = None
+        """Where the coordinates are turned; `at` holds numbers then, not commands."""
         self.beside = False
         self.feed: float | None = None
         self.feed_mode = 94
@@ -155,6 +158,10 @@ class AxisFollower:
             return
         found = self.block(row, line)
         if found is not None:
+            if self.turn is not None and not found.why and found.kind is not Kind.FIXED:
+                found = self.turn.step(found)
+                if self.turn.tilted and self.length != found.length:
+                    found.why = "the length of the tool is not in force in a tilted plane"
             log.append(found)
             if found.why:
                 self.forget()
@@ -172,6 +179,8 @@ class AxisFollower:
         """The steps of lines that only bring axes straight to places; None if that takes more than columns."""
         klartext = self.family is Family.KLARTEXT
         if not klartext and (self.kind is None or self.kind > Kind.FEED) and lines.code[row] < 0:
+            return None
+        if self.turn is not None and self.turn.tilted and self.length != self.tip_length():
             return None
         modes = ModesInForce(
             np.array([self.offset(axis) for axis in self.axes]),
@@ -195,6 +204,8 @@ class AxisFollower:
             self.kind = Kind.RAPID if run.rapid[-1] else Kind.FEED
             feed = float(run.feed[-1])
             self.feed = None if math.isnan(feed) else feed
+            if self.turn is not None:
+                return self.turn.run(run)
         return run
 
     def _goes_round(self, places: NDArray[np.float64]) -> bool:
@@ -247,15 +258,90 @@ class AxisFollower:
 
         Where the setup says that X Y Z are those of the tip, only Klartext can say that they are not.
         """
+        self.asks_tip = on
+        on = on or (self.turn is not None and self.turn.tilted)
         if on == self.tcp or (self.given.tcp and self.family is not Family.KLARTEXT):
             return
-        if any(self.shifts.values()) or any(self.local.values()):
+        if self.turn is not None:
+            self.lost["frame"] = "tool-centre-point control in turned coordinates"
+        if self.family is not Family.KLARTEXT and (any(self.shifts.values()) or any(self.local.values())):
             self.lost["shift"] = "a shift under tool-centre-point control"
         self.tcp = on
         known = [self.at[axis] for axis in self.axes]
-        numbers = self.turned(known, self.tip_length(), on)
-        self.at.update(zip(self.axes, numbers, strict=True))
+        numbers = self.model.turned(known, self.tip_length(), on) if self.model else [NAN] * len(known)
+        self.at.update((axis, number) for axis, number in zip(self.axes, numbers, strict=True) if axis in "XYZ")
         self.unsay("XYZ")
+
+    def begin_turn(self, rotation: Floats, origin: Sequence[float] = (0.0, 0.0, 0.0), *, tilted: bool) -> None:
+        """Coordinates are turned about the zero point, and moved to an origin (3,), mm from there.
+
+        tilted  in a plane of the workpiece: then X Y Z are those of the tip
+        """
+        self.end_turn()
+        if self.model is None or (tilted and not self.model.leads):
+            self.lost["frame"] = "turned coordinates on a machine whose axes do not lead the tip everywhere"
+            return
+        if tilted:
+            asked = self.asks_tip
+            self.lead(True)
+            self.asks_tip = asked
+        zero = np.array([self.offset(axis) for axis in "XYZ"])
+        self._enter(TurnedFrame(self.model.columns, rotation, zero, zero + np.array(origin), tilted))
+
+    def begin_turn_about(self, rotation: Floats, centre: Mapping[str, float]) -> None:
+        """Coordinates are turned, and the numbers of some axes stay as they are at a centre, mm."""
+        self.end_turn()
+        middle = np.array([centre.get(axis, 0.0) for axis in "XYZ"])
+        if self.model is None or self.tcp:
+            self.lost["frame"] = "turned coordinates under tool-centre-point control"
+        else:
+            self._enter(TurnedFrame(self.model.columns, rotation, middle, middle, False))
+
+    def end_turn(self) -> None:
+        """Coordinates are not turned any more."""
+        before, self.turn = self.turn, None
+        if before is not None:
+            self._stand_at(before.commands(np.array([[*self.at.values()]]))[0], before)
+            self.lead(self.asks_tip)
+
+    def _enter(self, turn: TurnedFrame) -> None:
+        self.turn = turn
+        self._stand_at(turn.numbers(np.array([*self.at.values()])), turn)
+
+    def _stand_at(self, place: Floats, turn: TurnedFrame) -> None:
+        """The same place has these numbers (n_axes,) now; those that a turn changes the program has not said."""
+        for k, axis in enumerate("XYZ"):
+            number = float(place[turn.columns[k]])
+            if number != self.at[axis]:
+                self.at[axis], self.said[axis] = number, False
+
+    def forget_place(self, but: str = "") -> None:
+        """Where X, Y and Z stand, but for some of them, is not known until the program says it."""
+        for axis in "XYZ":
+            if axis not in but:
+                self.at[axis], self.said[axis] = NAN, False
+
+    def is_square(self) -> bool:
+        """Whether the tool is square to the tilted plane in force."""
+        way, here = None if self.model is None else self.model.rotary_way, self._turns()
+        if way is None or self.turn is None or not np.isfinite(here).all():
+            return False
+        return bool(np.abs(way.directions(here[None])[0] - self.turn.rotation[:, 2]).max() < SQUARE)
+
+    def _turns(self) -> Floats:
+        """Where the rotary axes stand, rad."""
+        return np.radians([self.at[axis] for axis in self.axes if axis in "ABC"])
+
+    def square_to(
+        self, rotation: Floats, *, sense: int = 0, sign: int = 0, inside: bool = False, stays: bool = True
+    ) -> dict[str, float]:
+        """Where the rotary axes go to square the tool to a plane, degrees, as `RotaryWay.to`; NaN if not known."""
+        turning = [axis for axis in self.axes if axis in "ABC"]
+        way, here = None if self.model is None else self.model.rotary_way, self._turns()
+        if way is None or not np.isfinite(here).all():
+            return dict.fromkeys(turning, NAN)
+        found = way.to(rotation[:, 2], here, sense=sense, sign=sign, inside=inside, stays=stays)
+        return dict(zip(turning, [NAN, NAN] if found is None else np.degrees(found).tolist(), strict=True))
 
     def scale(self, axis: str) -> float:
         """Mm, or degree, in a unit of the words of an axis."""
@@ -401,7 +487,7 @@ class AxisFollower:
     def new_length(self, length: float | None) -> None:
         """Another tool length is in force in coordinates."""
         self.length, self.between = length, False
-        self.unsay("XYZ")
+        self.unsay("Z" if not self.tcp or (self.turn is not None and self.is_square()) else "XYZ")
 
 
 def _stops(flags: NDArray[np.bool_]) -> list[int]:

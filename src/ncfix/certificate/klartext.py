@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from ncfix.certificate.following import INCH, NO_POLE, AxisFollower
-from ncfix.certificate.reading import AXES, RETRACTS, TextLine, TextWord
+import numpy as np
+
+from ncfix.certificate.following import INCH, NO_POLE, AxisFollower, Given
+from ncfix.certificate.model import TipModel
+from ncfix.certificate.reading import AXES, RETRACTS, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind
+from ncfix.certificate.turning import PlaneBlock, about
 
 FRAMES = re.compile(r"CYCL DEF (?:7|8|9|10|11|13|19|26)\b|PLANE|TRANS|FUNCTION")
 """Lines of Klartext that this reader does not follow, behind which blocks keep their form."""
 
 
+TRANSFORMS = re.compile(r"CYCL DEF (7|10)\.[1-9][ \t]*(.*)")
+TRANSFORM_WORD = re.compile(r"(I?(?:[XYZ]|ROT))[ \t]*([+-]?[\d.,]+)")
 DATUM = re.compile(r"Q339 ?= ?\+?(\d+)[ \t]*(?:[;~]|$)")
 """Which datum CYCL DEF 247 sets."""
 TOOL = re.compile(r'TOOL CALL (?:(\d+)|"([^"]*)")')
@@ -28,10 +35,15 @@ class KlartextFollower(AxisFollower):
 
     datum     CYCL DEF 247 has begun, and its number is still to come
     oversize  mm, what the last tool call adds to the length of the tool (DL)
+    worked_out  Q120 to Q122, the positions of A, B and C for the last plane, degrees
     """
 
     datum = False
     oversize = 0.0
+
+    def __init__(self, axes: Sequence[str], family: Family, given: Given, model: TipModel | None) -> None:
+        super().__init__(axes, family, given, model)
+        self.worked_out: dict[str, float] = {}
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
@@ -47,6 +59,8 @@ class KlartextFollower(AxisFollower):
                 self.lost["frame" if FRAMES.match(lead) else "odd"] = line.odd
             return self.step(row, Kind.FEED, dict(self.at), line, line.odd) if line.path else None
         self._klartext_words(line)
+        if any(word.value is None for word in line.path):
+            line = replace(line, path=[self._settled(word) for word in line.path])
         words = {word.name: word for word in line.path if word.name in AXES}
         if lead == "CC":
             self._set_pole(words)
@@ -54,7 +68,9 @@ class KlartextFollower(AxisFollower):
         if not words and line.word("PA") is None:
             return None
         if any(word.name == "M" and word.value in (91, 92) for word in line.codes):
-            end = self.target(words, machine=True) if not self.tcp else dict.fromkeys(self.at, NAN)
+            end = self.target(words, machine=True)
+            if self.tcp or self.turn is not None:
+                end |= dict.fromkeys("XYZ", NAN)
             step = self.step(row, Kind.FIXED, end, line)
             self.unsay(tuple(words))
             return step
@@ -73,12 +89,71 @@ class KlartextFollower(AxisFollower):
             self.lead(False)
         elif lead.startswith("BEGIN PGM"):
             self.unit = INCH if lead.endswith("INCH") else 1.0
+        elif lead.startswith("PLANE"):
+            self._tilt(lead)
+        elif found := TRANSFORMS.match(lead):
+            self._transform(*found.groups())
         elif lead in ("M128", "M129"):
             self.by_vector = False
             self.lead(lead == "M128")
         else:
-            return lead.startswith(("BLK FORM", "END PGM", "TOOL DEF", "LBL ", "CYCL DEF 32", "FN", "Q"))
+            return lead.startswith(
+                ("BLK FORM", "END PGM", "TOOL DEF", "LBL ", "CYCL DEF 32", "FN", "Q", "CYCL DEF 7.0", "CYCL DEF 10.0")
+            )
         return True
+
+    def _settled(self, word: TextWord) -> TextWord:
+        """A word whose value is a position that the control has worked out, if that is known."""
+        known = self.worked_out.get(word.number.lstrip("+-").upper())
+        return (
+            word
+            if word.value is not None or known is None
+            else word._replace(value=-known if word.number.startswith("-") else known)
+        )
+
+    def _tilt(self, lead: str) -> None:
+        """PLANE SPATIAL or RESET: into a tilted plane, or out of it; with TURN and MOVE the rotary axes turn."""
+        plane = PlaneBlock.of(lead)
+        if plane is None or (self.turn is not None and not self.turn.tilted):
+            self.lost["frame"] = "a plane that this reader does not know"
+            return
+        turning = [axis for axis in self.axes if axis in "ABC"]
+        rotation = np.eye(3) if plane.rotation is None else plane.rotation
+        if plane.rotation is None and self.turn is None and plane.positions == "STAY":
+            return
+        home = plane.rotation is None and plane.positions != "STAY"
+        around = plane.table and rotation[2, 2] == 1.0 and rotation[0, 0] != 1.0
+        way = self.square_to(rotation, sign=plane.sign, inside=True, stays=False)
+        if home or around:
+            unshifted = home and not any(self.offset(axis) for axis in turning)
+            way = dict.fromkeys(turning, 0.0 if unshifted else NAN)
+        self.worked_out = {f"Q{120 + 'ABC'.index(axis)}": value for axis, value in way.items()}
+        if plane.rotation is None:
+            self.end_turn()
+        else:
+            self.begin_turn(rotation, tilted=True)
+        if plane.positions != "STAY":
+            self.at |= way
+            self.said |= dict.fromkeys(way, False)
+            self.forget_place()
+
+    def _transform(self, cycle: str, text: str) -> None:
+        """A line of cycle 7, a shift of the zero point, or of cycle 10, a turn about it."""
+        numbers = TRANSFORM_WORD.findall(text)
+        if self.lost or self.tcp or "".join(map("".join, numbers)) != re.sub(r"[ \t]", "", text.partition(";")[0]):
+            self.lost["frame"] = f"cycle {cycle} in a form that this reader does not know"
+        elif cycle == "10" and "I" not in text:
+            self.end_turn()
+            if numbers and float(numbers[-1][1].replace(",", ".")):
+                self.begin_turn(about("Z", float(numbers[-1][1].replace(",", "."))), tilted=False)
+        elif self.turn is not None or any("ROT" in name for name, _ in numbers):
+            self.lost["frame"] = f"cycle {cycle} in turned coordinates"
+        else:
+            for name, number in numbers:
+                counted, axis = name.startswith("I"), name[-1]
+                value = float(number.replace(",", ".")) * self.scale(axis)
+                self.shifts[axis] = value + (self.shifts.get(axis, 0.0) if counted else 0.0)
+            self.unsay()
 
     def _call_tool(self, lead: str) -> None:
         found, more = TOOL.match(lead), OVERSIZE.search(lead)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.steps import Kind, ProgramSteps
+from ncfix.certificate.turning import RotaryWay
 from ncfix.machine import Machine, State
 from ncfix.values import frozen
 
@@ -23,7 +25,7 @@ SHORT_MM, SHORT_RAD = 2.0, 0.02
 """Straight motions that lead no axis farther are short."""
 
 
-@frozen
+@frozen(slots=False)
 class TipModel:
     """A calibrated machine with the workpiece in its place."""
 
@@ -84,6 +86,22 @@ class TipModel:
         result: list[float] = found[0].tolist()
         return result
 
+    @cached_property
+    def rotary_way(self) -> RotaryWay | None:
+        """How two rotary axes point the tool; None for machines with others."""
+        axes = np.flatnonzero(self.machine.rotary)
+        if len(axes) != 2:
+            return None
+
+        def directions(positions: Array) -> Array:
+            q = np.zeros((len(positions), len(self.machine.axes)))
+            q[:, axes] = positions
+            tips = [self.machine.tip(q, np.full(len(q), length)) for length in (0.0, PROBE)]
+            found: Array = (tips[0] - tips[1]) / PROBE
+            return found
+
+        return RotaryWay(directions, self.machine.ranges[axes])
+
     def aimed(self, meant: Array, tcp: Mask, length: Array, direction: Array, turned: Array | None = None) -> Array:
         """The commands that are right for what is meant, both (n, n_axes); NaN where there are none.
 
@@ -137,10 +155,13 @@ class Ways:
     across: NDArray[np.intp]
     sweep: Array
     columns: tuple[int, int, int]
+    turn: Array | None
+    """(n, 3, 3), how the coordinates are turned in which arcs lie; None where none are."""
 
     @classmethod
     def of(cls, model: TipModel, steps: ProgramSteps, at: NDArray[np.intp]) -> Ways:
         """Those of steps (n,)."""
+        turn = steps.turn[at]
         return cls(
             model.internal(steps.start[at]),
             model.internal(steps.end[at]),
@@ -149,7 +170,12 @@ class Ways:
             steps.across[at],
             steps.sweep[at],
             model.columns,
+            steps.rotations[turn] if turn.any() else None,
         )
+
+    def _numbers(self, here: NDArray[np.intp], places: Array) -> Array:
+        """X Y Z (k, 3) in the coordinates of the arcs that motions (k,) are."""
+        return places if self.turn is None else np.einsum("kji,kj->ki", self.turn[here], places)
 
     def is_short(self, rotary: Mask) -> Mask:
         """Which motions are straight and lead no axis far, (n,)."""
@@ -165,14 +191,18 @@ class Ways:
             here, part = row[on], share[on]
             one, two = (self.across[here] + 1) % 3, (self.across[here] + 2) % 3
             columns, each = np.array(self.columns), np.arange(len(on))
-            middle = self.centre[here]
-            a = begin[on][:, columns] - middle
-            b = end[on][:, columns] - middle
+            middle = self._numbers(here, self.centre[here])
+            places = self._numbers(here, found[on[:, None], columns])
+            a = self._numbers(here, begin[on][:, columns]) - middle
+            b = self._numbers(here, end[on][:, columns]) - middle
             first, last = np.hypot(a[each, one], a[each, two]), np.hypot(b[each, one], b[each, two])
             angle = np.arctan2(a[each, two], a[each, one]) + part * self.sweep[here]
             radius = first + part * (last - first)
-            found[on, columns[one]] = middle[each, one] + radius * np.cos(angle)
-            found[on, columns[two]] = middle[each, two] + radius * np.sin(angle)
+            places[each, one] = middle[each, one] + radius * np.cos(angle)
+            places[each, two] = middle[each, two] + radius * np.sin(angle)
+            if self.turn is not None:
+                places = np.einsum("kij,kj->ki", self.turn[here], places)
+            found[on[:, None], columns] = places
         return found
 
     def share(self, row: NDArray[np.intp], place: Array, rotary: Mask) -> Array:
@@ -185,8 +215,8 @@ class Ways:
         if on.size:
             here, each, columns = row[on], np.arange(len(on)), np.array(self.columns)
             one, two = (self.across[here] + 1) % 3, (self.across[here] + 2) % 3
-            a = self.start[here][:, columns] - self.centre[here]
-            b = place[on][:, columns] - self.centre[here]
+            a = self._numbers(here, self.start[here][:, columns] - self.centre[here])
+            b = self._numbers(here, place[on][:, columns] - self.centre[here])
             turn = np.arctan2(b[each, two], b[each, one]) - np.arctan2(a[each, two], a[each, one])
             whole, sweep = 2 * np.pi, np.abs(self.sweep[here])
             turn = np.where(self.sweep[here] > 0, turn, -turn) % whole

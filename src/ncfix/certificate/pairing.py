@@ -25,15 +25,26 @@ FAR = 30
 SEVERAL = 3
 """So many lines are looked at one by one before those behind them are compared at once."""
 MOTION = {
-    Family.WORDS: re.compile(r"[ \t]*\bG[ \t]*0?[0-3](?![\d.])", re.IGNORECASE),
+    Family.WORDS: re.compile(r"[ \t]*(?<![A-Z])G[ \t]*0?[0-3](?![\d.])", re.IGNORECASE),
     Family.KLARTEXT: re.compile(r"[ \t]*(?<![\w.])(?:L|CC|CP|CR|C|DR[+-])(?![\w.+-])", re.IGNORECASE),
 }
-STOPS = re.compile(r"[ \t]*\bM[ \t]*0*(?:0|1|2|30|60)(?![\d.])", re.IGNORECASE)
+STOPS = re.compile(r"[ \t]*(?<![A-Z])(?:M[ \t]*0*(?:0|1|2|30|60)|G[ \t]*0*9)(?![\d.])", re.IGNORECASE)
+"""Words that hold the program or the tool at the end of a motion."""
+LATE = {
+    Family.WORDS: re.compile(rf"{STOPS.pattern}|[ \t]*(?<![A-Z])M[ \t]*0*(?:5|9|99)(?![\d.])", re.IGNORECASE),
+    Family.SINUMERIK: re.compile(rf"{STOPS.pattern}|[ \t]*(?<![A-Z])M[ \t]*0*17(?![\d.])", re.IGNORECASE),
+    Family.KLARTEXT: re.compile(
+        rf"{STOPS.pattern}|[ \t]*(?<![A-Z])M[ \t]*0*(?:5|6|9|111|115|117|127|129|135|137|145|149)(?![\d.])",
+        re.IGNORECASE,
+    ),
+}
+"""Words that act at the end of a motion, with those of `STOPS`: the last of its pieces may have them."""
 ARCS = ("C", "CP", "CR")
 """Arcs of Klartext."""
 SKIP = re.compile(r"[ \t]*/\d?")
 PACE = re.compile(
-    r"[ \t]*(?:\bF(?:[ \t]*=)?[ \t]*(?:[\d.]+|MAX)|\bG9[34](?![\d.])|\bP[ \t]*\d+(?![\d.])|(?<![\w.])R[0LR](?![\w.]))",
+    r"[ \t]*(?:(?<![A-Z])(?:F(?:[ \t]*=)?[ \t]*(?:[\d.]+|MAX)|(?:G9[34]|P[ \t]*\d+)(?![\d.]))"
+    r"|(?<![\w.])R[0LR](?![\w.]))",
     re.IGNORECASE,
 )
 
@@ -111,7 +122,7 @@ class Pairing:
             return None
         motion = MOTION.get(self.original.family, MOTION[Family.WORDS])
         rest = SKIP.sub("", line.rest, 1) if line.skipped else line.rest
-        bare = motion.sub("", STOPS.sub("", rest)) if line.path else line.rest
+        bare = motion.sub("", LATE[self.original.family].sub("", rest)) if line.path else line.rest
         if not PACE.sub("", bare).strip() and (line.path or PACE.search(line.rest)):
             return None
         return PACE.sub("", bare) if line.path else bare
@@ -125,15 +136,18 @@ class Pairing:
             stop += 1
         if self.pairs and self.pairs[-1].row == i - 1 and self.original.lines[i - 1].path:
             i, j = i - 1, self.pairs.pop().first
+        ours, theirs = self.original.lines, self.corrected.lines
         more = (stop - j) - (end - i)
-        row = i - 1
+        row, astray = i - 1, False
         while (row := row + 1) < end:
             count = min(end - row, stop - j) - 1
             if count > SEVERAL and (count := self._one_by_one(row, j, count)):
                 self.pairs.extend(LinePair(row + k, j + k, j + k) for k in range(count))
-                row, j = row + count, j + count
-            if more > 0 and not self.followed(row):
-                self.unsure.update(range(row, end))
+                row, j, astray = row + count, j + count, False
+            if more > 0 and not self.followed(row) and not (j < stop and ours[row].says(theirs[j])):
+                astray = True  # until a line leads where it should
+            if astray:
+                self.unsure.add(row)
             whole = row == end - 1 and not (more > 0 and end < len(own) and self.foreign(end))
             if j >= stop or (not whole and self._is_gone(row, j, end)):
                 self._lost(row)
@@ -147,6 +161,7 @@ class Pairing:
                     put_back and not _begins(following, "CC", *ARCS)  # a pole before an arc belongs to that one
                 )
             self.pairs.append(LinePair(row, j, last))
+            astray = astray and not (self.moves(row) and self.followed(row) and self.nearness(row, last))
             more -= last - j
             j = last + 1
         if i == end or more > 0:
@@ -245,9 +260,12 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
     klartext = pairing.original.family is Family.KLARTEXT
     ours, theirs = line.rest, head.rest
     if len(pieces) > 1:
-        if [*map(str.strip, STOPS.findall(line.rest))] != [*map(str.strip, STOPS.findall(last.rest))]:
+        late = LATE[pairing.original.family]
+        if _words(STOPS, line.rest) != _words(STOPS, last.rest):
             found.append("a stop is not at the end of the pieces of its block")
-        ours, theirs = STOPS.sub("", ours), STOPS.sub("", theirs)
+        elif sorted(_words(late, line.rest)) != sorted(word for piece in pieces for word in _words(late, piece.rest)):
+            found.append("a word that acts at the end of the block is lost, or there twice")
+        ours, theirs = late.sub("", ours), late.sub("", theirs)
     if arc or (klartext and _begins(line, "CC")):
         motion = MOTION.get(pairing.original.family, MOTION[Family.WORDS])
         ours, theirs = motion.sub("", ours), motion.sub("", theirs)
@@ -268,6 +286,10 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
     if klartext and head.block != line.block:
         found.append("the block has another number")
     return found
+
+
+def _words(which: re.Pattern[str], text: str) -> list[str]:
+    return [found.strip() for found in which.findall(text)]
 
 
 def _paced(ours: str, theirs: str, line: TextLine, timed: bool) -> bool:

@@ -314,7 +314,7 @@ class Prover(Deviations):
         single = moved.stop - moved.begin == 1
         units = ours.unit[moved.ours]
         written = np.where(single[:, None], ours.decimals(moved.ours, self.control_digits(units)), 0)
-        halves = self.halves(units, written)
+        halves = self.along(self.halves(units, written), moved.ours)
         right = (np.abs(done - expected) <= halves * 1.002 + np.where(rotary, TURNED, SLACK)).all(axis=1)
         right &= (ours.said[moved.ours] | rotary).all(axis=1)
         added = np.where(rotary, 0.0, np.abs(done - meant))
@@ -368,7 +368,7 @@ class Prover(Deviations):
             expected = np.where(rotary, done, expected)
         said = np.array(step.said) | (rotary if not full else False)  # no other strategy turns rotary axes
         if step.kind == Kind.RAPID and pair.row in self.begin_apart:
-            said &= [name in step.named for name in self.machine.axis_names]
+            said &= [name in step.named for name in self.machine.axis_names] if step.turn is None else False
         off = np.where(said, np.abs(done - expected), 0.0)
         loose = full or any(row in self.polar for row in range(pair.first, pair.last + 1))
         loose = loose or abs(step.sweep) > WHOLE_TURN
@@ -381,7 +381,7 @@ class Prover(Deviations):
             left = [
                 name in step.named and pieces[0].named.get(name) == step.named[name] for name in self.machine.axis_names
             ]
-            halves = np.where(left, self.half_steps(step, True), halves)
+            halves = np.where(left if step.turn is None else all(left), self.half_steps(step, True), halves)
         allowed = halves * 1.002 + np.where(rotary, TURNED, self.tolerance if loose else SLACK)
         added = np.where(said & ~rotary, np.abs(done - meant), 0.0)
         if (off > allowed).any():

@@ -205,7 +205,7 @@ def _sinumerik(number: int, text: str) -> TextLine:
                 line.odd = JUMPS
             elif re.match(r"[A-Z]\d", key):
                 line.odd = line.odd or f"{key!r} is no plain word"
-            elif "(" in key:
+            elif "(" in key and not key.startswith("CYCLE800("):
                 line.odd = line.odd or f"{key.partition('(')[0].strip()} is not known to this reader"
         elif found[10] is not None and found[10] not in "/%:" and start >= marked:
             line.odd = line.odd or f"{_piece(text, start)!r} is no plain word"
@@ -215,14 +215,16 @@ def _sinumerik(number: int, text: str) -> TextLine:
 
 DECIMAL = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)"
 KLARTEXT_WORD = re.compile(
-    rf"(;.*)|(R0|RL|RR|FMAX|F ?AUTO|DR[+-])(?![\w.,])|(I?(?:[XYZABCUVW]|P[AR])|R|FQ?|LA|M|S)({DECIMAL})(?![\w.,])"
+    rf"(;.*)|(R0|RL|RR|FMAX|F ?AUTO|DR[+-])(?![\w.,])"
+    rf"|(I?(?:[XYZABCUVW]|P[AR])|R|FQ?|LA|M|S)({DECIMAL}|[+-]?Q12[0-2])(?![\w.,])"
     rf"|([A-Z]+)|([^ \t])",
     re.IGNORECASE,
 )
 KLARTEXT_LEAD = frozenset(("L", "C", "CC", "CP", "CR", "M", "STOP"))
 KLARTEXT_STATEMENT = re.compile(
     r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$|CYCL DEF (?:32|247)\b|FN ?[0-8]\b"
-    r"|Q[LRS]?\d+ ?=|FUNCTION (?:TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (?:AXIS|VECTOR)|RESET TCPM)[ \t]*(?:;|$)"
+    r"|Q[LRS]?\d+ ?=|PLANE (?:SPATIAL|RESET)\b|CYCL DEF (?:7|10)\.\d"
+    r"|FUNCTION (?:TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (?:AXIS|VECTOR)|RESET TCPM)[ \t]*(?:;|$)"
 )
 """Blocks of Klartext that say something and lead no axis, as the follower knows them."""
 KLARTEXT_FLOW = re.compile(r"^(?:CALL (?:LBL|PGM)|FN ?(?:9|1[0-2])\b|SEL PGM|CALL SELECTED|PATTERN|CYCL CALL)")
@@ -253,7 +255,7 @@ def _klartext(number: int, text: str) -> TextLine:
         start, end = found.span()
         if found[3] is not None:
             name, digits = found[3].upper(), found[4]
-            value = float(digits.replace(",", "."))
+            value = None if "Q" in digits.upper() else float(digits.replace(",", "."))
             counted = name.startswith("I")
             name = name.removeprefix("I")
             if name in AXES or name in ("R", "PA", "PR"):

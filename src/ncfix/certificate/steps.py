@@ -66,6 +66,8 @@ class AxisStep:
     """Cutter radius compensation is on: the control offsets the contour."""
     by_vector: bool = False
     """The tool turns in a plane, not its axes at even rates."""
+    turn: Floats | None = None
+    """(3, 3), how the coordinates of the program are turned; None: they are not."""
 
 
 class ModesInForce(NamedTuple):
@@ -80,6 +82,7 @@ class ModesInForce(NamedTuple):
     unit: float
     unsteady: bool
     by_vector: bool
+    turn: Floats | None = None
 
 
 class StraightRun(NamedTuple):
@@ -154,6 +157,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
     feed      NaN for none
     across    0 1 2 for X Y Z
     unsaid    a word is an increment from where the program has not brought the axis
+    turn      (n,) which of `rotations` (t, 3, 3) the coordinates have; 0: they are not turned
     """
 
     def __init__(
@@ -177,6 +181,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         self.length, self.feed, self.unit = np.empty(n), np.empty(n), np.empty(n)
         self.feed_mode, self.across = np.empty(n, dtype=np.intp), np.full(n, 2, dtype=np.intp)
         self.centre, self.sweep = np.full((n, 3), NAN), np.zeros(n)
+        self.turn, self.rotations = np.zeros(n, dtype=np.intp), np.eye(3)[None]
         self._made: list[AxisStep | None] = [None] * n
         single: list[int] = []
         first = 0
@@ -201,6 +206,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         modes = run.modes
         self.tcp[at], self.length[at], self.unit[at] = modes.tcp, modes.length, modes.unit
         self.feed_mode[at], self.unsteady[at], self.by_vector[at] = modes.feed_mode, modes.unsteady, modes.by_vector
+        self.turn[at] = self._turn_of(modes.turn)
 
     def _enter_each(self, at: Indices, steps: Sequence[AxisStep]) -> None:
         self.rows[at] = [step.row for step in steps]
@@ -221,6 +227,17 @@ class ProgramSteps(Mapping[int, AxisStep]):
         self.across[at] = ["XYZ".index(step.across) for step in steps]
         self.centre[at] = [step.centre for step in steps]
         self.sweep[at] = [step.sweep for step in steps]
+        self.turn[at] = [self._turn_of(step.turn) for step in steps]
+
+    def _turn_of(self, rotation: Floats | None) -> int:
+        """Which of `rotations` one is, a new one if need be."""
+        if rotation is None:
+            return 0
+        same = (self.rotations[1:] == rotation).all(axis=(1, 2))
+        if not same.any():
+            self.rotations = np.concatenate([self.rotations, rotation[None]])
+            return len(self.rotations) - 1
+        return 1 + int(np.argmax(same))
 
     def step_of(self, row: int) -> int:
         """Which step a line is; -1: none."""
@@ -262,6 +279,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
             float(self.unit[at]),
             unsteady=bool(self.unsteady[at]),
             by_vector=bool(self.by_vector[at]),
+            turn=self.rotations[self.turn[at]] if self.turn[at] else None,
         )
 
     def decimals(self, at: Indices, least: NDArray[np.intp]) -> NDArray[np.intp]:
