@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ncfix.control.coordinates import LETTERS
-from ncfix.control.expressions import Fault, Unknown, number
+from ncfix.control.expressions import Fault, Unknown, Value, number
 from ncfix.control.flatten import Change, Flattener
 from ncfix.control.interpreter import RUNTIME
 from ncfix.text.spelling import decimals_for
@@ -142,15 +142,24 @@ class SinumerikFlattener(Flattener):
         if all(part is None or is_plain(part) for part in command.arguments):
             return None
         step = next(step for step in turn.plan.steps if isinstance(step, Calling) and step.span == command.span)
-        values = [
-            None if part is None else value(scope) for value, part in zip(step.arguments, step.written, strict=True)
+        given = [
+            "" if part is None else self.given(value(scope), part)
+            for value, part in zip(step.arguments, step.written, strict=True)
         ]
-        known = [None if isinstance(value, Unknown) else value for value in values]
-        if all(value is not None or part is None for value, part in zip(known, step.written, strict=True)):
-            return self.replaced(command.span, f"{command.name.upper()}({','.join(map(argument, known))})")
+        if all(text is not None for text in given):
+            return self.replaced(command.span, f"{command.name.upper()}({','.join(map(str, given))})")
         if command.name in HARMLESS:
             return self.dropped(command)
         raise Fault(RUNTIME, f"an argument of {command.name.upper()} is known only at run time")
+
+    def given(self, value: Value, written: Expression) -> str | None:
+        """An argument as it is written: a name that the program has not defined is the control's (_ORI_FINISH), and
+        stays; None where its value is known only at run time."""
+        if not isinstance(value, Unknown):
+            return argument(value)
+        if isinstance(written, NamedParameter) and self.control.variables.scope_of(written.name) is None:
+            return written.name.upper()
+        return None
 
 
 def is_plain(value: Expression) -> bool:

@@ -49,3 +49,11 @@ def test_what_is_handed_over_has_its_value_of_before() -> None:
     assert flat("R1=2\nR2=R1\nMYCYCLE(R1,R2+1)") == ["R1=2", "R2=2", "MYCYCLE(2,3)"]
     with pytest.raises(RefusedError, match="an argument of MYCYCLE is known only at run time"):
         flat("DEF REAL LIST[2]=(1,2)\nMYCYCLE(LIST)")
+
+
+def test_names_of_the_control_are_handed_over_as_they_are() -> None:
+    """Posts write `CYCLE832(tolerance,_ORI_FINISH,0.5)`: nothing in the program defines `_ORI_FINISH`."""
+    text = "DEF REAL TOL\nTOL=0.02\nCYCLE832(TOL,_ori_finish,0.5)"
+    assert flat(text) == ["CYCLE832(0.02,_ORI_FINISH,0.5)"]
+    with pytest.raises(RefusedError, match="an argument of CYCLE832 is known only at run time"):
+        flat("DEF REAL TOL\nTOL=$AA_IW[X]\nCYCLE832(TOL,_ORI_FINISH)")
