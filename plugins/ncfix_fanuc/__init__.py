@@ -50,6 +50,8 @@ FANUC = Dialect(
         "M98 M99 M198, G65 G66 G67, Macro B: variables, vacancy, IF GOTO THEN WHILE DO END, functions, modal system "
         "variables; blocks executed from several states with --flatten",
         "polar coordinates (G15 G16) and scaling (G50 G51, one factor) with --flatten",
+        "circular pockets (G12 G13) of Haas and Mitsubishi as a whole; patterns of holes (Haas: G70 G71, Mitsubishi: "
+        "G34 ... G37.1) with --flatten",
         "G41 G42: the programmed contour is corrected, the control offsets it",
     ),
     passes=(
@@ -59,7 +61,7 @@ FANUC = Dialect(
     refuses=(
         "G68.3, G68.4, G68.2 P4, G54.2, G54.4, G12.1 while in force, threads, lines by their angle (,A)",
         "arcs and rotary words under G43.5, and its Q",
-        "G29, and pockets and texts that the control mills by itself (Haas: G12, G13, G47, G150)",
+        "G29, and pockets and texts that the control mills by itself (Haas: G47, G150)",
         "a block that names one axis of the plane only, the first after G68 or G69",
         "what is computed from positions (#5001 ...), inputs and clocks: compensation or the machine changes it",
         "everything after a G code, a command or a setting (G10 L50, #5201) that is not known",

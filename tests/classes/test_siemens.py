@@ -155,7 +155,7 @@ FLOW = [
         L6=R,
     ),
     case("a subprogram that only the control knows", "L=R5\nG0 X1 Y1 Z1", L4=N),
-    case("a modal pocket", "MCALL POCKET3(50,0,2,-20)\nX5 Y5\nMCALL\nG1 X7 F100\nG0 X1 Y1 Z1", L4=N, L6=N, L7=R),
+    case("a modal pocket", "MCALL POCKET3(50,0,2,-20)\nX5 Y5\nMCALL\nG1 X7 F100\nG0 X1 Y1 Z1", L4=R, L6=N, L7=R),
     case("a macro of the program", "DEFINE MILL AS G1 F100\nMILL X5\nG0 X1 Y1 Z1", L4=N, L5=N),
     case("a cycle of the control", "CYCLE830(50,0,2,-20)\nG0 X5 Y5 Z5", L3=N, L4=R),
     case("a subprogram that is called like a cycle", "POCKET7\nM30\n%_N_POCKET7_SPF\nG1 X5 F100\nM17", L6=R),

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import DEGREE, LETTERS, Z, mask_of
 from ncfix.control.expressions import Unknown, Value, nominal
+from ncfix.control.moves import Motion, MotionKind
 from ncfix.control.operations import make_up
 from ncfix_iso.rs274.control import Block, RS274Control
+from ncfix_iso.rs274.motion import destination
 from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.systems import (
     AFTER_UNFOLLOWED,
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from ncfix_iso.rs274.plans import RS274Plan
 
 WORK_OFFSETS = 6
+G17, STRAIGHT = 170, (0, 10)
 FIRST_EXTENDED, ALL_EXTENDED = 1100, 1540
 MADE = {
     470: "engraving of text (G47)",
@@ -36,13 +39,7 @@ MADE = {
     130: "a circular pocket (G13)",
     1500: "a pocket (G150)",
     290: "return from the reference point (G29)",
-    700: "holes on a bolt circle (G70)",
-    710: "holes on an arc (G71)",
     720: "holes along a line (G72)",
-    340: "holes on a bolt circle (G34)",
-    350: "holes along a line (G35)",
-    360: "holes on an arc (G36)",
-    371: "a grid of holes (G37.1)",
     2530: "the turn of the tool square to a feature coordinate system (G253)",
 }
 """Motions that the control makes up."""
@@ -84,6 +81,31 @@ def setting_error(control: RS274Control, block: Block, code: int) -> None:
 def made(control: RS274Control, block: Block, code: int) -> None:
     """A text or a pocket that the control mills by itself, and the way back from a reference point."""
     make_up(control, block, MADE[code], control.turning if code == SQUARE else ())
+
+
+def circular_pocket(control: RS274Control, block: Block, code: int) -> None:
+    """G12 and G13 of Haas: at feed to the middle of the pocket, at its depth, where they end, too.
+
+    The circles about it move with it. Passes of other depths (L, in G91) have no one bottom.
+    Source: Haas, "Mill operator's manual": G12 and G13, X and Y in their block.
+    """
+    modal = control.modal
+    turned = modal.incremental or modal.plane.code != G17 or modal.compensated or control.tilted
+    if turned or modal.motion not in STRAIGHT or block.get("L", 1.0) != 1.0:
+        make_up(control, block, MADE[code])
+        return
+    with control.in_one_piece():
+        control.make(Motion(MotionKind.FEED, block.axes, destination(control, block), modal.motion))
+    control.moved_as_a_whole(f"G{code // 10}")
+
+
+def circular_pocket_here(control: RS274Control, block: Block, code: int) -> None:
+    """G12 and G13 of Mitsubishi: about where the tool stands; nothing is known of axis words beside them."""
+    if block.axes:
+        make_up(control, block, MADE[code])
+        return
+    control.builder.rests(mask_of(control.machine))
+    circular_pocket(control, block, code)
 
 
 def set_data(control: MacroControl, block: Block, code: int) -> None:

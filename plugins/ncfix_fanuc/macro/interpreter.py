@@ -19,6 +19,7 @@ from ncfix_fanuc.macro.control import ANGLE, COMPONENTS, MacroControl
 from ncfix_fanuc.macro.data import is_data
 from ncfix_fanuc.macro.flow import BAD_JUMP, LENGTHS, MacroFlow, local_variables
 from ncfix_fanuc.macro.lengths import LENGTH_IN_STEPS, lone_number
+from ncfix_fanuc.macro.patterns import PATTERNS, check_points
 from ncfix_fanuc.macro.rules import MACRO
 from ncfix_fanuc.macro.variables import is_system, is_vacant, variable_number
 from ncfix_iso.rs274.control import Block
@@ -179,6 +180,8 @@ class MacroInterpreter(RS274Interpreter):
             block = coordinates.cartesian(self.control, block)
         if coordinates.ON in codes and "P" in plan.pointless:
             block.unknown |= {"P"}  # thousandths or hundred-thousandths, as a parameter says
+        for code in codes & PATTERNS.keys():
+            check_points(self.control, plan, block, code)
         return block if plan.codes is None else coordinates.scaled(self.control, block, plan.codes)
 
     def take_points(self, plan: RS274Plan, block: Block) -> None:

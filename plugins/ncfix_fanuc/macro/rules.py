@@ -16,7 +16,7 @@ from dataclasses import replace
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.expressions import Fault
 from ncfix.control.operations import Refuse
-from ncfix_fanuc.macro import coordinates, data, lengths, references, tilt
+from ncfix_fanuc.macro import coordinates, data, lengths, patterns, references, tilt
 from ncfix_fanuc.macro.variables import compiled, is_lasting, is_system
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.control import Block, RS274Control
@@ -149,7 +149,9 @@ FANUC = Rules(
 HAAS_OFFSETS = (1540, *range(1100, 1300, 10))
 """G154 P, and its first twenty by their own names G110 to G129."""
 
-HAAS_MADE = (120, 130, 470, 700, 710, 720, 1500, data.SQUARE)
+CIRCULAR_POCKETS = (120, 130)
+HAAS_PATTERNS, MITSUBISHI_PATTERNS = (700, 710), (340, 350, 360, 371)
+HAAS_MADE = (*CIRCULAR_POCKETS, *HAAS_PATTERNS, 470, 720, 1500, data.SQUARE)
 """Circular pockets, engraving, rows of holes, pockets, the turn to a feature: G12, G13, G47, G70 to G72, G150, G253."""
 HAAS_FEATURE = (2680, 2690)
 """A feature coordinate system: G268 to G269."""
@@ -168,6 +170,8 @@ HAAS = replace(
     steps={
         **FANUC.steps,
         **dict.fromkeys(HAAS_MADE, data.made),
+        **dict.fromkeys(CIRCULAR_POCKETS, data.circular_pocket),
+        **dict.fromkeys(HAAS_PATTERNS, patterns.pattern),
         **dict.fromkeys(HAAS_OFFSETS, data.extended),
         **dict.fromkeys(HAAS_FEATURE, unfollowed),
         **dict.fromkeys(HAAS_MIRRORS, coordinates.mirror_about_zero),
@@ -185,12 +189,16 @@ HAAS = groups.with_m_code(HAAS, HAAS_JUMP, (Refuse(BY_INPUT),))
 """Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), mills texts and pockets by itself,
 pecks by I J K, and M96 P Q jumps while an input is off."""
 
-MITSUBISHI_MADE = (120, 130, 340, 350, 360, 371)
+MITSUBISHI_MADE = (*CIRCULAR_POCKETS, *MITSUBISHI_PATTERNS)
 """Circular pockets and rows of holes: G12, G13, G34 to G37.1."""
 MITSUBISHI = replace(
     FANUC,
     g_groups=FANUC_G | dict.fromkeys(MITSUBISHI_MADE, groups.NON_MODAL),
-    steps={**FANUC.steps, **dict.fromkeys(MITSUBISHI_MADE, data.made)},
+    steps={
+        **FANUC.steps,
+        **dict.fromkeys(CIRCULAR_POCKETS, data.circular_pocket_here),
+        **dict.fromkeys(MITSUBISHI_PATTERNS, patterns.pattern),
+    },
     takes=FANUC.takes | set(MITSUBISHI_MADE),
     scales_named=True,
     offset_group=12,

@@ -76,6 +76,7 @@ class RS274Control(shared.ProgramControl):
     unnamed    axes of the plane of which a rotation has gone on or off since the program named them
     set_length what the dialect does for G43
     left_out   the block just followed has no place in a flat program
+    pattern    the code of it that has drilled a pattern of holes, in tenths; 0: none
     unwritten  why a flat program cannot say what the program means; empty if it can
     saved      the modal states that M70 saved, one place for each call level
     """
@@ -93,6 +94,7 @@ class RS274Control(shared.ProgramControl):
         self.tip_control = False
         self.unnamed: frozenset[int] = frozenset()
         self.left_out = False
+        self.pattern = 0
         self.unwritten = ""
         self.set_length: Callable[[Any, Block, int], None] = lambda _control, _block, _code: None
         if not self.rules.strict:

@@ -26,6 +26,8 @@ AT_RUN_TIME = "a word of the cycle is known only at run time"
 NO_DEPTH = "the retract plane (R) lies at the bottom of the hole"
 NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
 """Words without which LinuxCNC refuses to begin a cycle."""
+PATTERN_WORDS = frozenset("IJKLPXY")
+"""Words of a code that drills a pattern of holes."""
 
 
 def cycle(control: RS274Control, block: Block, code: int) -> None:

@@ -17,7 +17,7 @@ from ncfix.control.interpreter import RUNTIME, TextUnit
 from ncfix.text.spelling import Spelling, decimals_for
 from ncfix.text.tree import Assignment, Comment, Constant, Literal, NumberedParameter, Opaque, Word
 from ncfix_iso.rs274.control import POLAR, RUNTIME_BRANCH, Block, RS274Control
-from ncfix_iso.rs274.cycles import repeat_letters
+from ncfix_iso.rs274.cycles import PATTERN_WORDS, repeat_letters
 from ncfix_iso.rs274.plans import Codes, RS274Plan
 
 DROPPED_CODES = {"G": frozenset({150, 160, 670}), "M": frozenset({970, 980, 990, 1980})}
@@ -98,6 +98,10 @@ class RS274Flattener(Flattener):
             self.control.left_out = False
             return
         holes, self.control.ends = self.control.ends or [], []
+        if self.control.pattern:
+            self.pattern(self.control.pattern, holes)
+            self.control.pattern = 0
+            return
         made = [*self.changes(), *self.absent()]
         motion = self.control.modal.motion if codes.motion is None else codes.motion
         drills = holes and motion in self.control.rules.cycles and not codes.takes
@@ -239,6 +243,15 @@ class RS274Flattener(Flattener):
             self.write(self.place(hole, over).strip())
         if incremental:
             self.write("G91")
+
+    def pattern(self, code: int, holes: list[Vector]) -> None:
+        """The holes of a code that works out where they are, one block each, behind what else stands in its own."""
+        words = self.template_words()
+        own = [word for word in words if isinstance(word.value, Constant) and round(10 * word.value.value) == code]
+        taken = {*PATTERN_WORDS, "N"}
+        self.put([self.dropped(word) for word in words if word in own or word.address in taken])
+        for hole in holes:
+            self.write(self.place(hole, "XY").strip())
 
     def letters_of_holes(self, block: Block) -> tuple[str, str]:
         """The letters that say where a hole is in the plane, and what else the first one needs, its depth last.

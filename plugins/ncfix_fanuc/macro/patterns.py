@@ -1,0 +1,117 @@
+"""Rows of holes that Haas and Mitsubishi work out by themselves: the canned cycle in force at each place.
+
+One text cannot correct them all, so they are refused as they stand, and `--flatten` writes them out.
+Source: Haas, "Mill operator's manual": G70, G71; Mitsubishi, "M800/M80, programming manual (machining centre)",
+"Special fixed cycle": G34 to G37.1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+from ncfix.control.expressions import Fault
+from ncfix.control.operations import make_up
+from ncfix.control.setup import POINTLESS
+from ncfix_fanuc.macro.control import NO_POINT
+from ncfix_iso.rs274.control import Block, RS274Control
+from ncfix_iso.rs274.cycles import PATTERN_WORDS, cycle
+
+if TYPE_CHECKING:
+    from ncfix_fanuc.macro.control import MacroControl
+    from ncfix_iso.rs274.plans import RS274Plan
+
+Words = dict[str, float]
+Places = Iterator[tuple[float, float]]
+"""From the middle or the first place of a pattern, in program units."""
+
+
+def around(words: Words, step: float, count: int) -> Places:
+    """On a circle with the radius I, from the angle J on, counter-clockwise."""
+    radius, start = words.get("I", 0.0), words.get("J", 0.0)
+    turns = (math.radians(start + step * place) for place in range(count))
+    return ((radius * math.cos(turn), radius * math.sin(turn)) for turn in turns)
+
+
+def bolt_circle(words: Words, count: int) -> Places:
+    """Evenly round a circle; a negative number of holes means clockwise."""
+    return around(words, 360.0 / count, abs(count))
+
+
+def line(words: Words, count: int) -> Places:
+    """At the distance I of each other, at the angle J, the first at the place itself."""
+    along, turn = words.get("I", 0.0), math.radians(words.get("J", 0.0))
+    return ((along * place * math.cos(turn), along * place * math.sin(turn)) for place in range(count))
+
+
+def grid(words: Words, count: int) -> Places:
+    """P by K places, I and J from each other, the first at the place itself; every other row runs back."""
+    across = round(words.get("P", 0.0))
+    for row in range(count):
+        columns = range(across) if row % 2 == 0 else range(across - 1, -1, -1)
+        yield from ((column * words.get("I", 0.0), row * words.get("J", 0.0)) for column in columns)
+
+
+class Pattern(NamedTuple):
+    """A code: what it makes, how many (the address of that number), the words it needs, and where they lie."""
+
+    name: str
+    many: str
+    needs: str
+    places: Callable[[Words, int], Places]
+
+
+PATTERNS = {
+    700: Pattern("holes on a bolt circle (G70)", "L", "IL", bolt_circle),
+    710: Pattern("holes on an arc (G71)", "L", "IKL", lambda words, count: around(words, words["K"], count)),
+    340: Pattern("holes on a bolt circle (G34)", "K", "IJK", bolt_circle),
+    350: Pattern("holes along a line (G35)", "K", "IJK", line),
+    360: Pattern("holes on an arc (G36)", "K", "IJPK", lambda words, count: around(words, words["P"], count)),
+    371: Pattern("a grid of holes (G37.1)", "K", "IPJK", grid),
+}
+EITHER_WAY, GRID = 340, 371
+G17, MOST = 170, 1000
+FLATTEN = "{}: the control works out where they are; --flatten writes them out"
+PATTERN = "pattern"
+AFTER_PATTERN = "where the axis {} stands after a pattern of holes is not followed"
+
+
+def pattern(control: RS274Control, block: Block, code: int) -> None:
+    """The canned cycle in force at each place; the middle or the first is in the block, or where the axes stand."""
+    made, modal = PATTERNS[code], control.modal
+    count = block.get(made.many)
+    plain = not (modal.incremental or modal.diameter or block.unknown) and modal.plane.code == G17
+    plain = plain and modal.motion in control.rules.cycles and modal.cycle.initial is not None
+    known = not any(index in control.lost_in_frame() for index, letter in enumerate("XY") if letter not in block.values)
+    counts = [abs(count) if code == EITHER_WAY else count, block.get("P") if code == GRID else 1.0]
+    said = frozenset(made.needs) <= block.values.keys() <= PATTERN_WORDS | {*"FS"}
+    said = said and all(each == round(each) and 1 <= each <= MOST for each in counts)
+    if not (plain and known and said):
+        make_up(control, block, made.name)
+        return
+    program = control.program_position()
+    middle = [block.get(letter, program[index] / modal.unit) for index, letter in enumerate("XY")]
+    control.suspend(PATTERN, FLATTEN.format(made.name))
+    for x, y in made.places(block.values, round(count)):
+        hole = Block(block.index, {"X": middle[0] + x, "Y": middle[1] + y}, frozenset(), 0b11)
+        cycle(control, hole, modal.motion)
+    control.resume(PATTERN)
+    control.pattern = code
+    control.lose(range(2), AFTER_PATTERN)
+
+
+def check_points(control: MacroControl, plan: RS274Plan, block: Block, code: int) -> None:
+    """Lengths and angles of a pattern without a decimal point mean what they say, or are asked for.
+
+    Raises `Fault` where numbers without a point count increments: which of these words do so too is not sure.
+    """
+    counts = {PATTERNS[code].many, "P" if code == GRID else ""}
+    for letter in sorted({*plan.pointless} & {*"IJKP"} - counts):
+        value = block.values[letter]
+        if value == 0.0 or control.setup.no_point == "calculator":
+            continue
+        if control.setup.no_point in POINTLESS:
+            text = f"{letter} of {PATTERNS[code].name} has no decimal point, and what it counts is not sure"
+            raise Fault(NO_POINT, text, "give it a decimal point")
+        control.without_point(letter, value)
