@@ -56,7 +56,7 @@ SIEMENS = Dialect(
         "and G codes named by variables",
         "LEAD and TILT, ORIPATH, directions under ORIMKS in turned frames; CYCLE800 by rotary axes, or without turning",
         "increments after a frame or tool length has changed; programmed frames over TRAORI; DIAM90 with increments",
-        "contours (CYCLE63, CYCLE72), and patterns of holes but HOLES1 and HOLES2 with --flatten",
+        "contours (CYCLE63, CYCLE72), and patterns of holes but HOLES1, HOLES2, CYCLE802 with --flatten",
         "everything after a block or synchronized action that is not understood",
         "blocks executed from several states, without --flatten",
     ),

@@ -17,7 +17,7 @@ from ncfix.control.coordinates import LETTERS, mask_of, rotated
 from ncfix.control.expressions import number
 from ncfix.control.moves import CycleCall, MotionEnd, MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
-from ncfix_siemens.sinumerik.milling import MILLING, milling_of, said_in
+from ncfix_siemens.sinumerik.milling import MILLING, PLANES, milling_of, said_in
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import (
@@ -41,45 +41,64 @@ WRITE_OUT = "holes whose places the control makes up ({}): --flatten writes them
 AFTER_PATTERN = "where the axis {} stands after a pattern of holes is not followed"
 
 
-def row(values: Sequence[float]) -> Points:
+def row(values: Sequence[float | None]) -> Points:
     """HOLES1."""
-    x, y, angle, first, step, count = values
+    x, y, angle, first, step, count = (value or 0.0 for value in values)
     ways = (first + step * k for k in range(round(count)))
     turn = math.radians(angle)
     return tuple((x + way * math.cos(turn), y + way * math.sin(turn)) for way in ways)
 
 
-def circle(values: Sequence[float]) -> Points:
+def circle(values: Sequence[float | None]) -> Points:
     """HOLES2; an angle between holes of zero means that they divide the circle evenly."""
-    x, y, radius, angle, step, count = values
-    step = step or 360.0 / count
+    x, y, radius, angle, step, count = (value or 0.0 for value in values)
+    step = step or 360.0 / max(count, 1.0)
     turns = (math.radians(angle + step * k) for k in range(round(count)))
     return tuple((x + radius * math.cos(turn), y + radius * math.sin(turn)) for turn in turns)
 
 
-PATTERNS = {"holes1": row, "holes2": circle}
+def listed(values: Sequence[float | None]) -> Points:
+    """CYCLE802: up to nine places; the first two arguments have a digit for each, one where it is absolute."""
+    across, along, *places = values
+    known = [value for value in places if value is not None]
+    absolute = all(mode is not None and {*f"{mode:.0f}"} == {"1"} for mode in (across, along))
+    if not absolute or places[: len(known)] != known or len(known) % 2:
+        return ()
+    return tuple(zip(known[::2], known[1::2], strict=True))
+
+
+PATTERNS = {"holes1": (6, row), "holes2": (6, circle), "cycle802": (20, listed)}
+"""How many arguments say where the holes are, and what they mean."""
+SAYS_IT_AGAIN = {True: 2000.0, False: 1000.0}
+"""VARI of HOLES2 where the circle is one in part, and where it is a full one."""
 
 
 def points_of(control: Sinumerik, step: Calling) -> Points:
     """The places of a pattern in the order in which they are drilled; empty if that cannot be followed.
 
-    Further arguments hide places or say how to go from one to the next; G0 must be in force, so that it still is when
-    the holes have been written out.
+    Behind them stand VARI (not in CYCLE802), UMODE, HIDE and NSP, which say how to go on or leave places out, and
+    DMODE, whose last digit may choose a plane. G0 must be in force, so that it still is when the holes have been
+    written out.
     """
-    modal = control.modal
+    modal, (count, places) = control.modal, PATTERNS.get(step.name, (0, row))
     plain = modal.motion == 0 and not (modal.incremental or modal.diameter) and control.modes.modal_cycle is not None
-    if step.name not in PATTERNS or not plain or len(step.arguments) < ARGUMENTS:
+    said, sure = said_in(control, step)
+    values = [value for value in said[:count] if not isinstance(value, str)]
+    if not (count and plain and sure) or not ARGUMENTS <= len(said) == len(values) + len(said[count:]):
         return ()
-    values = [
-        number(each(control)) if part is not None else 0.0
-        for each, part in zip(step.arguments, step.written, strict=True)
-    ]
-    known = [value for value in values if value is not None]
-    if len(known) < len(values) or any(known[ARGUMENTS:]) or not 1 <= known[ARGUMENTS - 1] <= MOST:
+    others = [*said[count:], *[None] * 5]
+    others = others[: 4 if places is listed else 5]
+    if places is circle and others[0] == SAYS_IT_AGAIN[bool(values[4])]:
+        others[0] = None
+    *hiding, mode = others
+    chosen = round(mode) % 10 if isinstance(mode, float) else 0
+    if any(hiding) or (chosen and PLANES.get(chosen) != modal.plane.across):
         return ()
-    control.budget.spend(round(known[ARGUMENTS - 1]))
-    points = PATTERNS[step.name](known[:ARGUMENTS])
-    return points[::-1] if step.name == "holes1" and is_nearer(control, points[-1], points[0]) else points
+    if places is not listed and not 1 <= (values[ARGUMENTS - 1] or 0.0) <= MOST:
+        return ()
+    points = places([*values, *[None] * (count - len(values))])
+    control.budget.spend(len(points))
+    return points[::-1] if places is row and is_nearer(control, points[-1], points[0]) else points
 
 
 def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float, float]) -> bool:

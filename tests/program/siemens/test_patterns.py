@@ -52,6 +52,26 @@ def test_a_row_from_its_nearer_end() -> None:
     assert sum(found, ()) == pytest.approx(sum(far + far[::-1], ()), abs=1e-5)
 
 
+def test_places_one_by_one() -> None:
+    listed = "CYCLE802(111111111,111111111,10,20,-5,6.5,0,0,,,,,,,,,,,,,0,,,1)"
+    assert places(listed) == [(10, 20), (-5, 6.5), (0, 0)]
+
+
+def test_pockets_at_places_of_a_pattern(machine: Machine) -> None:
+    head = HEAD.replace("CYCLE81(10,0,2,-5)", "POCKET4(10,0,2,-5,8)")
+    program = read(f"{head}HOLES2(0,0,20,0,0,3)\n{TAIL}".encode(), "part.mpf", "siemens")
+    fixed = fix_flat(program, machine, SETUP, FixOptions(verify=False, flatten=True))
+    assert not fixed.report.refused
+    assert fixed.text.count(b"\nG0 X") == 5  # before, at three places, and behind
+    assert b"HOLES2" not in fixed.text
+
+
+@pytest.mark.parametrize("tail", ["", ",1000", ",1000,0,,,1", ',,,"",0,111'])
+def test_what_the_last_arguments_may_say(tail: str) -> None:
+    """A full circle, in the plane in force, of which no hole is left out."""
+    assert len(places(f"HOLES2(0,0,10,0,0,4{tail})")) == 4
+
+
 def test_in_another_plane() -> None:
     """The first axis of G18 is Z."""
     head = HEAD.replace("G17", "G18").replace("T1 D1 M6", "T1 D0 M6")
@@ -69,6 +89,12 @@ def test_in_another_plane() -> None:
     ("head", "body"),
     [
         (HEAD, "HOLES2(0,0,10,0,0,6,1010)"),
+        (HEAD, "HOLES2(0,0,10,0,30,6,1000)"),
+        (HEAD, "HOLES2(0,0,10,0,0,6,,,,,2)"),
+        (HEAD, "CYCLE802(111111111,111111112,0,0,5,5)"),
+        (HEAD, "CYCLE802(111111111,111111111,0,0,,,5,5)"),
+        (HEAD, "CYCLE802(111111111,111111111,0,0,5)"),
+        (HEAD, 'CYCLE802(111111111,111111111,0,0,5,5,,,,,,,,,,,,,,,0,"2",,1)'),
         (HEAD, 'HOLES1(0,0,0,5,5,3,,,"2")'),
         (HEAD, "HOLES1(0,0,0,5,5)"),
         (HEAD + "G1 F100\n", "HOLES1(0,0,0,5,5,3)"),
@@ -79,7 +105,7 @@ def test_in_another_plane() -> None:
 def test_patterns_that_are_refused(head: str, body: str, machine: Machine) -> None:
     program = read(f"{head}{body}\n{TAIL}".encode(), "part.mpf", "siemens")
     fixed = fix_flat(program, machine, SETUP, FixOptions(verify=False, flatten=True))
-    assert any("HOLES" in refusal.reason for refusal in fixed.report.refused)
+    assert any("places the control makes up" in refusal.reason for refusal in fixed.report.refused)
 
 
 def test_as_it_stands_it_is_refused_and_what_follows_must_name_its_axes(machine: Machine) -> None:
