@@ -1,4 +1,4 @@
-"""`frozen` makes what `dataclass(frozen=True, slots=True)` makes."""
+"""`frozen` and `mutable` make what `dataclass` makes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import pytest
 
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 Maker = Callable[..., Any]
 STANDARD: Maker = partial(dataclass, frozen=True, slots=True)
@@ -111,3 +111,38 @@ def test_values_are_hashed_pickled_and_matched() -> None:
     match line:
         case Line(Point(x), Point(_, y)):
             assert (x, y) == (1.0, 1.0)
+
+
+@mutable
+class Count:
+    """What changes."""
+
+    number: int = 0
+    seen: list[int] = field(default_factory=list)
+    last: int = field(init=False)
+
+
+@mutable(slots=False, eq=False)
+class Open:
+    """Takes more than its fields."""
+
+    number: int
+
+
+def test_what_changes() -> None:
+    count, other = Count(1), Count(1)
+    assert repr(Open(1)) == "Open(number=1)"
+    count.last = other.last = 3
+    assert count == other
+    assert pickle.loads(pickle.dumps(count)) == count
+    count.number += 1
+    assert count != other
+    assert count.seen is not other.seen
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(count)
+    with pytest.raises(AttributeError):
+        count.more = 1
+    unequal = Open(1)
+    unequal.more = 2
+    assert unequal != Open(1)
+    assert hash(unequal) == object.__hash__(unequal)

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from ncfix.tables.grid import Array
 from ncfix.tables.table_files import Remarks
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][xX]?[-+]?[0-9]+)?")
 ASSIGNMENT = re.compile(
@@ -166,7 +166,7 @@ def settings(lines: Iterable[FileRow]) -> dict[str, str]:
     return found
 
 
-@dataclass(slots=True)
+@mutable
 class Assigned:
     """The assignments of one table.
 

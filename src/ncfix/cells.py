@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import codecs
 import re
-from dataclasses import dataclass
 
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 MARKS = ",;\t"
 """What may part cells, besides blanks."""
@@ -62,7 +61,7 @@ class Cell:
     column: int
 
 
-@dataclass(slots=True)
+@mutable
 class SeparatedText:
     """How the cells of a file are parted, and how its numbers are written.
 

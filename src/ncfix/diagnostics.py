@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import ClassVar, Self
 
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 
 @frozen
@@ -129,7 +128,7 @@ def _excerpt(text: str, column: int) -> list[str]:
     return [shown, " " * (len(head) + column - 1 - start) + "^"] if column else [shown]
 
 
-@dataclass(eq=False)
+@mutable(eq=False, slots=False)
 class NcfixError(Exception):
     """A failure with a remedy. `messages` holds coded remarks: one, or all that were found in a config file."""
 

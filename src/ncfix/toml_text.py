@@ -15,11 +15,12 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from difflib import get_close_matches
 from typing import Any, NamedTuple, TypeGuard
 
 from ncfix.diagnostics import ConfigError, Message, Place
+from ncfix.values import mutable
 
 Path = tuple[str | int, ...]
 BARE = r"[A-Za-z0-9_-]+"
@@ -145,7 +146,7 @@ class KeyCodes(NamedTuple):
 MACHINE_FILE = KeyCodes("NCF302", "NCF303", "NCF304", "NCF305", "NCF308")
 
 
-@dataclass(slots=True)
+@mutable
 class Report:
     """The faults found so far, with their places in the text.
 
@@ -167,7 +168,7 @@ class Report:
         self.messages.append(Message(code, head + text, place, hint))
 
 
-@dataclass(slots=True)
+@mutable
 class TomlTable:
     """One table of the file, at `path`."""
 

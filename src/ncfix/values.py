@@ -1,11 +1,11 @@
-"""Values that travel: `frozen` is `dataclass(frozen=True, slots=True)`, made in a tenth of the time.
+"""Dataclasses made in a tenth of the time: `frozen` for values that travel, `mutable` for what changes.
 
-For each class `dataclasses` writes six methods as text and compiles every one while the module is imported. ncfix has
-hundreds of such classes: that took a third of a short run. Here five of the six methods are functions that need no
-text, and `__init__` is written when a class is first called, which most classes of a run never are.
+For each class `dataclasses` writes three to six methods as text and compiles every one while the module is imported.
+ncfix has hundreds of such classes: that took a third of a short run. Here all but one of the methods are functions that
+need no text, and `__init__` is written when a class is first called, which most classes of a run never are.
 
 All else is left to `dataclasses`: its `field`, `fields`, `replace` and `asdict`, and `match`, take these classes for
-what they are. One thing differs: a subclass of one that is a dataclass itself has to be `frozen`, too.
+what they are. One thing differs: a subclass of a frozen one that is a dataclass itself has to be `frozen`, too.
 """
 
 from __future__ import annotations
@@ -29,45 +29,68 @@ def frozen(
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Field, field))
-def frozen(
-    cls: type[T] | None = None, /, *, slots: bool = True, eq: bool = True, repr: bool = True, kw_only: bool = False
-) -> type[T] | Callable[[type[T]], type[T]]:
-    """Make a class a frozen dataclass; the options are those of `dataclasses.dataclass`.
+def frozen(cls: type[T] | None = None, /, **options: bool) -> type[T] | Callable[[type[T]], type[T]]:
+    """Make a class a dataclass with slots that does not change; the options are those of `dataclasses.dataclass`.
 
     A method that the class writes itself stays. Setting or deleting an attribute of an object raises
     FrozenInstanceError.
     """
+    if cls is None:
+        return lambda cls: _made(cls, True, **options)
+    return _made(cls, True)
 
-    def made(cls: type[T]) -> type[T]:
-        written = {name for name, method in vars(cls).items() if method is not None}
-        cls = dataclass(init=False, repr=False, eq=False, slots=slots, kw_only=kw_only)(cls)
-        methods: dict[str, object] = {"__init__": _Init(cls), "__setattr__": _refuse, "__delattr__": _refuse}
-        if repr:
-            methods["__repr__"] = _in_words
-        if eq:
-            methods["__eq__"], methods["__hash__"] = _comparing(cls)
+
+@overload
+def mutable(cls: type[T], /) -> type[T]: ...
+
+
+@overload
+def mutable(
+    *, slots: bool = True, eq: bool = True, repr: bool = True, kw_only: bool = False
+) -> Callable[[type[T]], type[T]]: ...
+
+
+@dataclass_transform(field_specifiers=(Field, field))
+def mutable(cls: type[T] | None = None, /, **options: bool) -> type[T] | Callable[[type[T]], type[T]]:
+    """Make a class a dataclass with slots that may change, and has no hash if objects are compared (`eq`)."""
+    if cls is None:
+        return lambda cls: _made(cls, False, **options)
+    return _made(cls, False)
+
+
+def _made(
+    cls: type[T], stays: bool, *, slots: bool = True, eq: bool = True, repr: bool = True, kw_only: bool = False
+) -> type[T]:
+    written = {name for name, method in vars(cls).items() if method is not None}
+    cls = dataclass(init=False, repr=False, eq=False, slots=slots, kw_only=kw_only)(cls)
+    methods: dict[str, object] = {"__init__": _Init(cls, stays)}
+    if repr:
+        methods["__repr__"] = _in_words
+    if eq:
+        methods["__eq__"], hashed = _comparing(cls)
+        methods["__hash__"] = hashed if stays else None
+    if stays:
+        methods["__setattr__"] = methods["__delattr__"] = _refuse
         if slots:
             methods["__getstate__"], methods["__setstate__"] = _items, _set_items
-        for name in methods.keys() - written:
-            setattr(cls, name, methods[name])
-        return cls
-
-    return made if cls is None else made(cls)
+    for name in methods.keys() - written:
+        setattr(cls, name, methods[name])
+    return cls
 
 
 class _Init:
     """The `__init__` of a class, until it is first asked for: then it is written, and takes this one's place."""
 
-    def __init__(self, cls: type) -> None:
-        self.cls = cls
+    def __init__(self, cls: type, stays: bool) -> None:
+        self.cls, self.stays = cls, stays
 
     def __get__(self, instance: object, owner: type | None = None) -> object:
-        init: Any = _init_of(self.cls)
+        init: Any = _init_of(self.cls, self.stays)
         setattr(self.cls, "__init__", init)  # noqa: B010  (mypy: a method is put in its place)
         return init.__get__(instance, owner)
 
 
-def _init_of(cls: Any) -> Callable[..., None]:
+def _init_of(cls: Any, stays: bool) -> Callable[..., None]:
     """The `__init__` that `dataclasses` would write."""
     names: dict[str, Any] = {"put": PUT, "MISSING": MISSING}
     positional, by_name, lines = ["self"], list[str](), list[str]()
@@ -85,7 +108,7 @@ def _init_of(cls: Any) -> Callable[..., None]:
             item = f"{preset}()" if made else preset
         else:
             continue
-        lines.append(f"put(self, {name!r}, {item})")
+        lines.append(f"put(self, {name!r}, {item})" if stays else f"self.{name} = {item}")
     if hasattr(cls, "__post_init__"):
         lines.append("self.__post_init__()")
     parameters = ", ".join([*positional, *(["*", *by_name] if by_name else [])])

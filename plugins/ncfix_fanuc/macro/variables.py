@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from ncfix.control.expressions import (
     ARITHMETIC,
@@ -29,6 +28,7 @@ from ncfix.control.expressions import (
     scaled,
 )
 from ncfix.text.tree import Expression
+from ncfix.values import mutable
 from ncfix_iso.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, NumberedParameters, Store
 
 VACANT = math.nan
@@ -190,7 +190,7 @@ POSITIONS = (range(5001, 5021), range(5021, 5041), range(5041, 5061))
 """End of the block before, machine position, present position."""
 
 
-@dataclass(slots=True)
+@mutable
 class MacroVariables(NumberedParameters):
     """All variables.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from ncfix.control import control as base
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, X, Y, Z, mask_of
@@ -13,7 +13,7 @@ from ncfix.control.moves import AT_START, Motion, MotionEnd, MotionKind, Pass, P
 from ncfix.control.setup import WORK_OFFSET, Run, Setup, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 from ncfix_heidenhain.klartext.free import ContourElement
 from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING, FormulaScope, QParameters
 
@@ -53,7 +53,7 @@ class HolePosition:
     height: float = 0.0
 
 
-@dataclass(slots=True)
+@mutable
 class PathFunctionState:
     """What the next path function may need of the ones before.
 
@@ -81,7 +81,7 @@ class PathFunctionState:
     free: dict[tuple[str, int], ContourElement | None] = field(default_factory=dict)
 
 
-@dataclass(slots=True)
+@mutable
 class CycleInForce:
     """The cycle that CYCL CALL, M99 and M89 execute.
 

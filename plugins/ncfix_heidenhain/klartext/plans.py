@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from ncfix.control.expressions import FUNCTIONS, SUMS, Evaluate, Expressions, Unknown, Value, nominal
 from ncfix.text.reach import UNREAD, Deletable, deletable
@@ -27,7 +27,7 @@ from ncfix.text.tree import (
     Template,
     Word,
 )
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 PATH_FUNCTIONS = frozenset({"l", "lp", "ln", "c", "cp", "cr", "ct", "ctp", "cc", "rnd", "chf"})
 OPENING = ("tool ", "cycl ", "plane ", "trans ", "appr ", "dep ")
@@ -188,7 +188,7 @@ def plan_of(template: Template) -> KlartextPlan:
 # -- Q parameters ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(slots=True)
+@mutable
 class QParameters:
     """The Q parameters; QL parameters belong to one program, the others to all.
 
@@ -221,7 +221,7 @@ class QParameters:
             self.assign(name, value)
 
 
-@dataclass(slots=True)
+@mutable
 class FormulaScope:
     """What a formula may refer to: the numbers of the program, where those of the block begin, and the parameters."""
 

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 
 from ncfix.control.control import UNPLACED
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z, mask_of
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import AT_START, MotionEnd, UnknownAxes
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 from ncfix_heidenhain.klartext.control import SPATIAL, KlartextControl
 from ncfix_heidenhain.klartext.plans import MOVING
 
@@ -71,7 +70,7 @@ def _letters_of(addresses: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(letter for letter in letters if letter in INDEX)
 
 
-@dataclass(slots=True)
+@mutable
 class FramePosition:
     """A position along the axes of the frame, and why some of it is not known."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Hashable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ncfix.control import control as shared
@@ -12,6 +12,7 @@ from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
 from ncfix.control.setup import Run
 from ncfix.control.state import Saved
 from ncfix.text.dialect import Dialect
+from ncfix.values import mutable
 from ncfix_iso.rs274.groups import ARCS, RULES, Rules, with_own_codes
 from ncfix_iso.rs274.parameters import NumberedParameters, Store
 
@@ -37,7 +38,7 @@ POLAR = frozenset("@^")
 AXES = frozenset(LETTERS) | POLAR
 
 
-@dataclass(slots=True)
+@mutable
 class Block:
     """One block while it is executed.
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 from ncfix.control.expressions import Evaluate, Fault, nominal
 from ncfix.control.flow import NO_LABEL, NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow
+from ncfix.values import mutable
 from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.plans import FlowLine, RS274Unit
@@ -31,7 +31,7 @@ BY_CODE = "M98"
 """The kind of calls that share #1 to #30 with the caller."""
 
 
-@dataclass(slots=True)
+@mutable
 class Label:
     """Where an o-word was first met, as what, and how many times a `repeat` is still to run."""
 

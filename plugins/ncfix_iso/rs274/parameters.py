@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from ncfix.control.expressions import (
     ARITHMETIC,
@@ -29,6 +29,7 @@ from ncfix.control.expressions import (
     remainder,
 )
 from ncfix.text.tree import NamedParameter, NumberedParameter
+from ncfix.values import mutable
 
 EQUAL = 1e-6
 """Two numbers are equal that differ by less."""
@@ -154,7 +155,7 @@ Store = dict[Key, Value]
 """The parameters of one scope that have been set."""
 
 
-@dataclass(slots=True)
+@mutable
 class NumberedParameters:
     """All parameters.
 

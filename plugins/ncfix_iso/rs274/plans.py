@@ -6,7 +6,7 @@ Everything that does not depend on numbers is settled once per shape, so that a 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ from ncfix.text.tree import (
     Template,
     Word,
 )
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.control import POLAR
 from ncfix_iso.rs274.groups import TOOL_CHANGE, Rules
@@ -103,7 +103,7 @@ class FlowLine:
     span: Span
 
 
-@dataclass(slots=True)
+@mutable
 class RS274Plan:
     """What is done with every block of a shape.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 
 from ncfix.control.expressions import (
@@ -28,6 +28,7 @@ from ncfix.control.expressions import (
     power,
 )
 from ncfix.text.tree import Binary, Constant, Expression, NumberedParameter
+from ncfix.values import mutable
 from ncfix_siemens.sinumerik.blocks import BRACKET
 
 CONSTANTS: dict[str, Value] = {"true": 1.0, "false": 0.0, "$pi": math.pi}
@@ -41,7 +42,7 @@ MOST_CELLS = 100_000
 """Elements of an array that is filled; those of a larger one count as known only at run time."""
 
 
-@dataclass(slots=True)
+@mutable
 class Local:
     """The variables that one program has defined.
 
@@ -55,7 +56,7 @@ class Local:
     values: dict[Key, Value] = field(default_factory=dict)
 
 
-@dataclass(slots=True)
+@mutable
 class SinumerikVariables:
     """All variables; what nobody has set is known only at run time.
 

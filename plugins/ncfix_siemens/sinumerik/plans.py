@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
 from ncfix.control.expressions import Evaluate, left_out
@@ -28,7 +28,7 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 from ncfix_siemens.sinumerik.blocks import BRACKET, STATEMENT
 from ncfix_siemens.sinumerik.expressions import FUNCTIONS_OF_NUMBERS, TEXT_FUNCTIONS, compiled
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, SHORTEST_WAY, VECTOR
@@ -101,7 +101,7 @@ class Branching:
 Step = AssignedVariable | Calling | Branching
 
 
-@dataclass(slots=True)
+@mutable
 class SinumerikPlan:
     """What is done with every block of a shape.
 

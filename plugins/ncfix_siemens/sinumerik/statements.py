@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from ncfix.control.coordinates import INDEX
 from ncfix.control.expressions import Evaluate, Fault, Unknown, nominal, number
 from ncfix.control.frames import WORLD
 from ncfix.text.tree import Expression, FunctionCall, NamedParameter, NumberedParameter
+from ncfix.values import mutable
 from ncfix_siemens.sinumerik import framing, motion
 from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import set_pole
@@ -176,7 +177,7 @@ FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH
 TAKES_WORDS = frozenset({40, 740, 750, 580, 590}) | POLES | WORKING_AREA
 
 
-@dataclass(slots=True)
+@mutable
 class Turn:
     """One block while it is executed.
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from ncfix.control.lanes.block_rows import words
 from ncfix.control.pointing import FloatArray, Pointing, Ways, to_each
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.text.tree import StringLiteral as Label
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 from ncfix_siemens.sinumerik.expressions import INITIAL, constant
 from ncfix_siemens.sinumerik.plans import Branching, SinumerikPlan, plan_of
 from ncfix_siemens.sinumerik.vocabulary import HALF_A_TURN
@@ -298,7 +298,7 @@ def units_of(program: Program, external: str = "") -> list[SinumerikUnit]:
 # -- where the vectors A3 B3 C3 of the blocks to come point the tool ---------------------------------------------------
 
 
-@dataclass(slots=True)
+@mutable
 class Directions:
     """The ways to point the tool in blocks from `begin` on."""
 

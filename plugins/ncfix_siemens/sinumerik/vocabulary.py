@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from ncfix.control.coordinates import INDEX, LETTERS
 from ncfix.control.frames import ZEROS
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 _SETTERS = """
     movt ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos
@@ -226,7 +226,7 @@ RTP, RFP, SDIS, DP, DPR = range(5)
 # -- what a block says -------------------------------------------------------------------------------------------------
 
 
-@dataclass(slots=True)
+@mutable
 class BlockWordValues:
     """The words of a block while it is executed.
 
@@ -292,7 +292,7 @@ class Drilling:
     points: tuple[tuple[int, int], ...] = ()
 
 
-@dataclass(slots=True)
+@mutable
 class Modes:
     """What is in force besides the modal state that all controls have.
 
@@ -333,7 +333,7 @@ class Modes:
     by_block: frozenset[str] = frozenset()
 
 
-@dataclass(slots=True)
+@mutable
 class NamedTools:
     """Tools that are called by name: numbers that stand for them here, beyond those that a magazine has."""
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib.util import find_spec
 from time import monotonic, sleep
 
 from ncfix.batch.programs import program_files
 from ncfix.diagnostics import UsageError
+from ncfix.values import mutable
 
 LOOK_S = 1.0
 """How often a folder is looked at where the system says nothing."""
@@ -34,7 +35,7 @@ def state_of(path: str) -> State | None:
     return found.st_size, found.st_mtime_ns, found.st_ino
 
 
-@dataclass(slots=True)
+@mutable
 class WatchedFolder:
     """The programs of a folder, and which of them have been taken.
 

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Set
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import islice
 from typing import NamedTuple
 
 from ncfix.certificate.text import StampFound
+from ncfix.values import mutable
 
 
 class BlockFault(NamedTuple):
@@ -22,7 +23,7 @@ class BlockFault(NamedTuple):
     original: int
 
 
-@dataclass(slots=True)
+@mutable
 class BlockProof:
     """What was found.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from ncfix.certificate.findings import BlockFault
 from ncfix.certificate.reading import Family, TextLine
 from ncfix.certificate.text import Text
+from ncfix.values import mutable
 
 AHEAD = 8
 """Lines that are looked at for where a line that should be here has gone."""
@@ -57,7 +58,7 @@ class LinePair(NamedTuple):
     last: int
 
 
-@dataclass(slots=True)
+@mutable
 class Pairing:
     """Two programs, and how near a corrected line leads to where the correction of an original one should."""
 

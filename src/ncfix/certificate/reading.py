@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from typing import NamedTuple
+
+from ncfix.values import mutable
 
 AXES = frozenset("XYZABCUVW")
 
@@ -52,7 +54,7 @@ class TextWord(NamedTuple):
         return len(self.number.replace(",", ".").partition(".")[2])
 
 
-@dataclass(slots=True)
+@mutable
 class TextLine:
     """A line of a program.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from ncfix.certificate.reading import TextLine, TextWord
 from ncfix.certificate.text import Lines, StraightLines
+from ncfix.values import mutable
 
 NAN = math.nan
 Floats = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Kind(IntEnum):
     """In machine coordinates, or to a reference point: never corrected."""
 
 
-@dataclass(slots=True)
+@mutable
 class AxisStep:
     """What one line does; positions are commands, mm and degree, NaN where they are not known.
 

@@ -7,14 +7,14 @@ import os
 import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import IO, TYPE_CHECKING
 
 from ncfix import files, inputs
 from ncfix.cli import console
 from ncfix.cli.targets import STREAM, OutputTarget, shown, stdin
 from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 if TYPE_CHECKING:
     from ncfix.compensate.driver import Stamp
@@ -77,7 +77,7 @@ def source_of(path: str) -> Iterator[Source]:
             yield Source(path, handle, spool)
 
 
-@dataclass(slots=True)
+@mutable
 class Source:
     """A text that can be read part by part, and again as a whole: what is read of a pipe goes to a file, its `spool`.
 
@@ -162,7 +162,7 @@ class Source:
         return self.spool.read()
 
 
-@dataclass(slots=True)
+@mutable
 class Outlet:
     """Where corrected text goes: into a file at first, and to standard output as soon as its stamp is written.
 

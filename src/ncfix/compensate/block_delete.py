@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from itertools import combinations, repeat
 
 import numpy as np
@@ -37,7 +37,7 @@ from ncfix.machine import Machine
 from ncfix.text.reader import read
 from ncfix.text.tree import Program, Skip
 from ncfix.text.writer import Edit, Splices
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 from ncfix.writer.pieces import SecondReading
 
 DIFFERS = "NCF451"
@@ -389,7 +389,7 @@ def _starts(moves: Moves) -> Mapping[int, bytes]:
 # -- the proof in all positions ----------------------------------------------------------------------------------------
 
 
-@dataclass(slots=True)
+@mutable
 class WholeProof:
     """The proof of a whole program, in each position of block delete.
 

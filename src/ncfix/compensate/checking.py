@@ -7,7 +7,7 @@ it; nothing is written.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
 from ncfix.text import stamp
 from ncfix.text.tree import Program
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 SUSPECTED = "NCF438"
 """A program that seems to have been corrected: what nobody needs to guess of one that says so."""
@@ -100,7 +100,7 @@ def survey_on(task: Task, read: Read) -> Checked:
     return _surveyed(corrector.parts, survey, corrector.report(tally, suspicion))
 
 
-@dataclass(slots=True)
+@mutable
 class Survey:
     """What has been found in a program, or in its parts so far.
 

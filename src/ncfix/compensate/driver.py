@@ -15,7 +15,7 @@ way raises `NotInPartsError`, and the caller takes the program as a whole. Sever
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Protocol
 
@@ -66,7 +66,7 @@ from ncfix.text import stamp
 from ncfix.text.language import Language, language_of
 from ncfix.text.tree import Program
 from ncfix.text.writer import Edit, Splices, spliced
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 from ncfix.writer.emit import Emission
 from ncfix.writer.language import WrittenLanguage
 
@@ -115,7 +115,7 @@ Watch = Callable[[Program, WrittenPlan, Mask | None], object]
 """Is shown each part that has been corrected: its program, its plan, and which motions are its own."""
 
 
-@dataclass(slots=True)
+@mutable
 class Corrector:
     """Corrects a part of a program, or all of it.
 
@@ -413,7 +413,7 @@ class Streamed:
     stamp: Stamp
 
 
-@dataclass(slots=True)
+@mutable
 class Stream:
     """One program on its way. `run` is called once.
 

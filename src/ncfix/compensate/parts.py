@@ -6,7 +6,7 @@ Each part begins behind the last motion of the one before, which is written alre
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,7 +28,7 @@ from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices, left_alone
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 from ncfix.writer.pieces import SecondReading
 
 FRAMES = "the program takes frames or values from where the machine stands"
@@ -54,7 +54,7 @@ class Part:
         return self.program.lines(self.moves.block)
 
 
-@dataclass(slots=True)
+@mutable
 class Parts:
     """Reads and follows a program. `parts` is gone through once.
 
@@ -242,7 +242,7 @@ class ContinuedPart:
         return Intent(self.machine, self.joined.moves, State(direction=self.direction))
 
 
-@dataclass(slots=True, kw_only=True)
+@mutable(kw_only=True)
 class MachineParts(Parts):
     """The parts of a program on a machine, with every tool length known. Gone through once.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +26,7 @@ from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine
 from ncfix.text.tree import Program
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 if TYPE_CHECKING:
     from ncfix.control.flatten import Flat
@@ -151,7 +151,7 @@ class FixReport:
         return replace(self, warnings=(*self.warnings, *found))
 
 
-@dataclass(slots=True)
+@mutable
 class Side:
     """Tip errors on one side of the correction: largest, its line, sum of squares times way."""
 
@@ -186,7 +186,7 @@ def as_written(solution: WrittenPlan) -> Iterator[Finding]:
         yield Finding.of("NCF283", rows, STOPS, MARKS)
 
 
-@dataclass(slots=True)
+@mutable
 class Tally:
     """What has been done to the parts so far.
 

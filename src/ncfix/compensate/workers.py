@@ -23,7 +23,7 @@ import pickle
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import combinations
 from queue import SimpleQueue
 from threading import Thread
@@ -33,7 +33,7 @@ from ncfix.compensate.solve import PrecedingMotion
 from ncfix.control.trace import Checkpoint
 from ncfix.host import tie
 from ncfix.plugins import blamed
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -46,7 +46,7 @@ class WorkerGoneError(Exception):
     """A process that worked on the program has ended before its time."""
 
 
-@dataclass(slots=True)
+@mutable
 class Mailbox:
     """The messages of one process to the others, and theirs to it.
 
@@ -178,7 +178,7 @@ class OpenFiles:
     out: int
 
 
-@dataclass(slots=True)
+@mutable
 class WorkShare:
     """The parts of a program that one process corrects: of every `jobs` parts one.
 
@@ -238,7 +238,7 @@ class WorkShare:
         self.mailbox.send("before", number + 1, what, (number + 1) % self.jobs)
 
 
-@dataclass(slots=True)
+@mutable
 class ReadAhead:
     """Reads a text in pieces of just the size that is wanted, and so many pieces ahead; the last one may be shorter."""
 
@@ -257,7 +257,7 @@ class ReadAhead:
         return text
 
 
-@dataclass(slots=True)
+@mutable
 class BackgroundReader:
     """Reads a text beside the first process, from the file where it stands.
 
@@ -290,7 +290,7 @@ class Worker(Protocol[Made]):
         """The number of each own part, and what has been done to it."""
 
 
-@dataclass(slots=True)
+@mutable
 class WorkerPool(Generic[Result]):
     """This process and those beside it, and what they have done.
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
 from ncfix.control.moves import Arc, CycleCall, Frame, MotionKind, Moves, Pass, Rule
 from ncfix.control.turns import Winding, extremes, half_turns
+from ncfix.values import mutable
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -392,7 +393,7 @@ def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
-@dataclass(slots=True)
+@mutable
 class MotionColumns:
     """Consecutive motions as columns; `programmed` and `unplaced` are bit masks by letter, `start` and `end` (n, 9).
 
@@ -417,7 +418,7 @@ class MotionColumns:
         return path[:-1], path[1:]
 
 
-@dataclass(slots=True)
+@mutable
 class Buffer:
     """Motions that came one by one."""
 

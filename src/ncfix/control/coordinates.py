@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeVar
 
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 LETTERS = "XYZABCUVW"
 """The axis letters of RS274NGC in the order of its parameters; every position here is a list in this order."""
@@ -130,7 +130,7 @@ def angles_in_words(indices: Iterable[int], angles: Iterable[float]) -> str:
     return " ".join(f"{LETTERS[index]}{angle / DEGREE:.3f}" for index, angle in zip(indices, angles, strict=True))
 
 
-@dataclass(slots=True)
+@mutable
 class Places:
     """The book of it; axes are bits of a mask, by letter.
 

@@ -14,10 +14,11 @@ followed instead, up to a bound on all that is executed.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from ncfix.control.expressions import Fault
+from ncfix.values import mutable
 
 ENDLESS = "NCF233"
 NEVER_ENDS = "the program never ends: it jumps back here again and again, and nothing changes in between"
@@ -30,7 +31,7 @@ NO_SUBPROGRAM = "NCF231"
 NO_LABEL = "NCF230"
 
 
-@dataclass(slots=True)
+@mutable
 class BlockBudget:
     """How much may still be executed; a hole of a cycle, and a subprogram that is gone through, count as blocks too.
 
@@ -53,7 +54,7 @@ class BlockBudget:
             raise Fault(ENDLESS, text, "if it does end, most_blocks = ... in the setup file allows more")
 
 
-@dataclass(slots=True)
+@mutable
 class Recurrence:
     """The jumps back that a program has made: what had changed by then, as a count."""
 
@@ -87,7 +88,7 @@ def nothing() -> None:
     """Nothing is to be done."""
 
 
-@dataclass(slots=True)
+@mutable
 class OpenCall(Generic[U]):
     """A call that has not returned.
 
@@ -109,7 +110,7 @@ class OpenCall(Generic[U]):
     sections: list[Section] = field(init=False)
 
 
-@dataclass(slots=True)
+@mutable
 class Section:
     """Blocks from `start` up to `stop` that are executed so many times more, before going on at `back`."""
 

@@ -5,12 +5,12 @@ from options; what a program asks for and is not there is collected, once each.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, NamedTuple
 
 from ncfix.control.coordinates import LETTERS
 from ncfix.diagnostics import Message, Place, UsageError
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 if TYPE_CHECKING:
     from ncfix.control.moves import Kinematics
@@ -123,7 +123,7 @@ PROBED = "results of probing"
 """What `SetupLookup.assumed` calls them where they count as nominal; all else in it was taken as zero."""
 
 
-@dataclass(slots=True)
+@mutable
 class SetupLookup:
     """The setup, and the book of what was asked of it in vain.
 

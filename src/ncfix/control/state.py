@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from ncfix.control.arcs import Point
 from ncfix.control.coordinates import (
@@ -38,13 +38,13 @@ from ncfix.control.setup import Run, SetupLookup
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect
 from ncfix.text.reach import Deletable
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 NO_MOTION = 800
 """G80: no motion code is in force; the state at the start of a program."""
 
 
-@dataclass(slots=True)
+@mutable
 class Cycle:
     """What of a canned cycle stays in force.
 
@@ -62,7 +62,7 @@ class Cycle:
     unknown: bool = False
 
 
-@dataclass(slots=True)
+@mutable
 class Modal:
     """What is in force. G codes in tenths.
 
@@ -113,7 +113,7 @@ class Saved:
     at_return: bool
 
 
-@dataclass(slots=True)
+@mutable
 class Tools:
     """Tool numbers: prepared with T, in the spindle, and of the length offset in force.
 

@@ -9,7 +9,7 @@ A `Checkpoint` is the state of the control between two parts.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from ncfix.text.language import Language, language_of
 from ncfix.text.layout import AXIS_LETTERS
 from ncfix.text.reader import ProgramReading, moved_by
 from ncfix.text.tree import Program, Skip, Template
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles", "calls"})
 """The fields of `Moves` that are the same for all rows."""
@@ -36,7 +36,7 @@ class NotInPartsError(Exception):
     """The program cannot be taken part by part: it has to be read as a whole."""
 
 
-@dataclass(slots=True)
+@mutable
 class PartReader:
     """Reads parts of one program.
 

@@ -21,12 +21,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import FeedMode, MotionKind, Moves
+from ncfix.values import mutable
 
 FloatArray = NDArray[np.float64]
 
@@ -111,7 +111,7 @@ def half_turns(directed: Mask, start: FloatArray, end: FloatArray) -> tuple[Mask
     return over, near | np.append(near[1:], False)
 
 
-@dataclass(slots=True)
+@mutable
 class Winding:
     """Which axes stand where a word that was no plain angle has led them; motions may come in parts.
 

@@ -32,7 +32,7 @@ what it shows. What such a change explains is no reason for another name, nor fo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from itertools import pairwise
 
@@ -44,7 +44,7 @@ from ncfix.diagnosis.forms import EffectForm, shape_variations, side_by_side
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse
 from ncfix.measure.measurement import Array, Index
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
 """Size of everything else together, against the noise of one value."""
@@ -168,7 +168,7 @@ class CandidateOdds:
         return [Member(groups[int(form)], self.sizes[int(own[form].argmax())]) for form in order]
 
 
-@dataclass(repr=False)
+@mutable(repr=False, slots=False)
 class Evidence:
     """All groups in the coordinates of the background, and the names that own them.
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import pairwise
 from pathlib import PurePath
 
@@ -25,7 +25,7 @@ from ncfix.machine import Axis, Machine
 from ncfix.measure import checks
 from ncfix.measure.measurement import Measurement
 from ncfix.plugins import called, registry
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 LINEAR = "XYZ"
 SLANTED = 1e-6
@@ -51,7 +51,7 @@ Reader = Callable[[str, str], Measurement | None]
 """Makes a measurement of a text and its path, or None if the text is not of its kind."""
 
 
-@dataclass
+@mutable(slots=False)
 class Rows:
     """Direct readings as they are collected."""
 
@@ -260,7 +260,7 @@ class Deviation:
     line: int
 
 
-@dataclass(slots=True)
+@mutable
 class Rtl:
     """What stands in a file: texts of its keys with their lines, the targets (mm), and the readings."""
 

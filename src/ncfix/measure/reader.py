@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ncfix.machine import Machine
 from ncfix.measure import checks, foreign
 from ncfix.measure.measurement import CENTRE, CHOICES, COMMON, ENDS, KINDS, STATES, Array, Measurement, MeasurementKind
 from ncfix.toml_text import LARGEST, did_you_mean
+from ncfix.values import mutable
 
 SHOWN = 25
 """Faults that are named one by one; a file with more has a fault of another sort."""
@@ -96,7 +97,7 @@ def _open_end(text: MeasurementLines, last: list[Cell]) -> tuple[Message, ...]:
     return (Message("NCF619", said, place, "was the file cut off? A line end behind it says that it was not"),)
 
 
-@dataclass(slots=True)
+@mutable
 class MeasurementLines:
     """The lines of a file and what is wrong with them."""
 

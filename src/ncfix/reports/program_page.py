@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from functools import cache
 from html import escape
 
@@ -18,6 +18,7 @@ from ncfix.reports.content import machine_sections
 from ncfix.reports.document import Plot
 from ncfix.reports.pages import LIBRARY, asset, card, filled, library, packed, table, with_columns
 from ncfix.reports.rendering import html_plot
+from ncfix.values import mutable
 from ncfix.version import __version__
 
 WHOLE = 300_000
@@ -40,7 +41,7 @@ HIGH = 0.8
 """Share of a limit from which it is shown as high."""
 
 
-@dataclass(slots=True)
+@mutable
 class ProgramPage:
     """What a page is made of.
 

@@ -16,13 +16,13 @@ turns.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 Array = NDArray[np.float64]
 WITHIN = 4
@@ -187,7 +187,7 @@ def fitted(values: Array, places: Sequence[Array], nodes: Sequence[Array]) -> Ar
     return values
 
 
-@dataclass(slots=True)
+@mutable
 class Bending:
     """Corrections along random lines over one axis.
 

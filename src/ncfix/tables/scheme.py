@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 
 import numpy as np
@@ -32,7 +32,7 @@ from ncfix.tables.separable import (
     taken_apart,
     taken_apart_along,
 )
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 MANY_MORE = 12
 """Tables than there are: down to so many, parts are left out by their size alone."""
@@ -64,7 +64,7 @@ MERGED = 0.25
 """Share of what may be left out that may be lost each time by writing a function as a multiple of others."""
 
 
-@dataclass(slots=True)
+@mutable
 class PartSelection:
     """The parts that are chosen of each face, and the layouts that say them.
 

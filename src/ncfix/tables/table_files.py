@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 
 import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
+from ncfix.values import mutable
 
 AGAIN = "export again"
 """What helps with a file that ncfix has written."""
@@ -39,7 +40,7 @@ def as_number(text: str) -> float | None:
     return found if math.isfinite(found) else None
 
 
-@dataclass(slots=True)
+@mutable
 class Remarks:
     """What was found in one file so far. `wrong` is what the control would not load or would misread.
 

@@ -9,7 +9,7 @@ looked for among those.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ncfix.machine import Machine, State
 from ncfix.tables.correction import corners, even_poses, exact_correction, linear_axes, random_poses
 from ncfix.tables.grid import WITHIN, Array, Bending, Grid, between, fitted, on_full_grid
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 LINES = 32
 """Random lines along an axis on which its bending is judged."""
@@ -59,7 +59,7 @@ REMEMBERED = 1 << 16
 Counts = NDArray[np.intp]
 
 
-@dataclass(slots=True)
+@mutable
 class Volume:
     """Corrections of some axes over the positions of some, of which grids are made and judged.
 

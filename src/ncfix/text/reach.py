@@ -7,13 +7,13 @@ line is kept as opaque text of the kind `UNREAD`; whoever gets to it after all, 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.text.tree import Comment, Constant, OWordLine, Skip, Template, Word
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 UNREAD = "unread"
 """The kind of an `Opaque` that could not be read where nobody may need it."""
@@ -87,7 +87,7 @@ def deletable(template: Template, dwell: str) -> Deletable | None:
     return Deletable(switches, not idle)
 
 
-@dataclass(slots=True)
+@mutable
 class Reach:
     """Follows the blocks of a program in the order written.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 from operator import itemgetter
 from typing import Generic, NamedTuple, TypeVar
@@ -26,6 +26,7 @@ from ncfix.text.reach import UNREAD, Reach
 from ncfix.text.shapes import Scan, firsts
 from ncfix.text.tree import END, START, Anchor, Opaque, Program, Span, Template
 from ncfix.text.writer import line_end
+from ncfix.values import mutable
 
 CAPACITY = 5_000
 """How many shapes and texts of a dialect are remembered; the one that was not used for longest goes first."""
@@ -124,7 +125,7 @@ class PartColumns(NamedTuple):
     values: NDArray[np.float64]
 
 
-@dataclass(slots=True)
+@mutable
 class ProgramReading:
     """One program while it is being read, part by part.
 

@@ -9,7 +9,7 @@ not on the digits) ends a stretch, and the emitter takes it by itself.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from ncfix.text.spelling import (
 )
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
+from ncfix.values import mutable
 from ncfix.writer.bulk_arcs import CentreWords, OutputSteps, whole_arcs
 from ncfix.writer.bulk_fit import qualified, sound, with_dwells
 from ncfix.writer.bulk_layouts import CLOSING, OPENING, Layouts
@@ -36,7 +37,7 @@ Mask = NDArray[np.bool_]
 SWAPPED = bytes.maketrans(b".,", b",.")
 
 
-@dataclass
+@mutable(slots=False)
 class Bulk:
     """The stretches of one emission.
 

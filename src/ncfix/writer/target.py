@@ -10,7 +10,7 @@ what it shall be in a block, what is in force, and where the control stands then
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ncfix.control.moves import CycleCall, Frame, Moves
 from ncfix.control.pointing import Pointing
 from ncfix.text.spelling import decimals_for
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 from ncfix.writer.pieces import Pieces
 
 FloatArray = NDArray[np.float64]
@@ -172,7 +172,7 @@ class Target:
         return bool(np.any(np.abs(steps[:, linear]) >= half[linear]))
 
 
-@dataclass(slots=True)
+@mutable
 class Rendered:
     """The edits (start, stop, text) of the source, the lines to put after the block, and what they amount to.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
@@ -19,7 +19,7 @@ from ncfix.cli import console
 from ncfix.cli.options import FOLDER, PATH, PathName, force_option
 from ncfix.diagnostics import ConfigError, UsageError, visible
 from ncfix.outputs import exists_already
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 if TYPE_CHECKING:
     from ncfix.project import Project
@@ -49,7 +49,7 @@ class ProgramGroup:
     folder: str | None = None
 
 
-@dataclass(slots=True)
+@mutable
 class _Groups:
     arguments: list[str]
     found: list[ProgramGroup]

@@ -10,12 +10,13 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import IntEnum, StrEnum
 from typing import Any
 
 from ncfix.cli import console
 from ncfix.diagnostics import Code, visible
+from ncfix.values import mutable
 
 WIDEST = 60
 """Characters of an example's name in the table."""
@@ -74,7 +75,7 @@ def brief(entry: Mapping[str, Any]) -> str:
     return f"{visible(entry['path'])}{line}: {code}: {text.splitlines()[0]}{rest}{stale}{before}"
 
 
-@dataclass(slots=True)
+@mutable
 class Summary:
     """Counts of what became of programs, and why.
 
@@ -149,7 +150,7 @@ def progress(total: int) -> Iterator[Advance]:
         yield step
 
 
-@dataclass(slots=True)
+@mutable
 class OutcomeReporter:
     """Says what there is to say of programs that are done.
 

@@ -6,7 +6,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +24,7 @@ from ncfix.cli.targets import STREAM, Outputs, targets
 from ncfix.diagnostics import ExitCode, NcfixError, Place, UsageError, visible
 from ncfix.inputs import identities
 from ncfix.outputs import check_target
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 if TYPE_CHECKING:
     from ncfix.cli.shop.batch import FixJob
@@ -62,7 +62,7 @@ class FolderCommand(ProjectCommand):
         return [ProgramGroup(self._parameters(project, project.settings(folder)), None, project.folder or os.curdir)]
 
 
-@dataclass(slots=True)
+@mutable
 class StatusPage:
     """What has become of the programs since the start, as a page that a browser reads again and again.
 

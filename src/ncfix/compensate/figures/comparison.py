@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 
 import numpy as np
@@ -40,7 +40,7 @@ from ncfix.control.trace import taken as motions_taken
 from ncfix.diagnostics import DifferenceError, Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 BESIDE = 64
 """Motions on both sides of one that are looked at to find out whether an axis turns round near it."""
@@ -184,7 +184,7 @@ GROUP = 2048
 """Parabolas from which one looks together, counted from where the path begins: the same however it is read."""
 
 
-@dataclass(slots=True)
+@mutable
 class Track:
     """What is at hand of a path.
 
@@ -246,7 +246,7 @@ class Track:
         return replace(curve.taken(slice(start, stop)), first=first)
 
 
-@dataclass(slots=True)
+@mutable
 class Match:
     """Looks from one path to another for what is nearest, as far as both are at hand.
 
@@ -310,7 +310,7 @@ class Match:
         return self.looked_at + self.ahead - 2 * AT_HAND
 
 
-@dataclass(slots=True)
+@mutable
 class RunningComparison:
     """Two programs on their way, and what was found so far.
 

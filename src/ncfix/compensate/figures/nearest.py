@@ -16,7 +16,7 @@ Between the samples of a path more are taken in two cases:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from ncfix import core
 from ncfix.compensate.figures.curve import Curve, CurvePoints, length
 from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places, ranges, stacked, taken
 from ncfix.control.trace import NotInPartsError
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 ALONG = 0.02
 """A point that is so much shorter or longer along the path counts as this share of that farther away."""
@@ -75,7 +75,7 @@ class Nearest:
         self.piece[which], self.share[which], self.gap[which] = other.piece, other.share, other.gap
 
 
-@dataclass(slots=True)
+@mutable
 class Search:
     """Looks for the nearest points of a curve.
 

@@ -9,7 +9,7 @@ path is measured, and stands in the result. Figures, histogram and lists are of 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.compensate.solve import WrittenPlan
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.tree import Program
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 CUT, RAPID, REFUSED, PASSED = range(4)
 """What leads to a place: a corrected cut, a rapid, a refused motion, one passed by rule."""
@@ -83,7 +83,7 @@ class Extent:
         return Extent(min(self.low, float(values.min())), max(self.high, float(values.max())), line)
 
 
-@dataclass(slots=True)
+@mutable
 class PathRecord:
     """What is kept of a path; call `take` with each part in turn, then read `columns()` and the rest.
 
@@ -102,7 +102,7 @@ class PathRecord:
     share: Array = field(default_factory=lambda: np.zeros((2, len(EDGES) - 1)))
     worst: list[ListedPlace] = field(default_factory=list)
     corrections: dict[str, Extent] = field(default_factory=dict)
-    linear: Extent = Extent()  # noqa: RUF009
+    linear: Extent = Extent()
     refused: list[ListedBlock] = field(default_factory=list)
     passed: list[ListedBlock] = field(default_factory=list)
     _parts: list[tuple[dict[str, Array], Array]] = field(default_factory=list)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -27,10 +27,10 @@ from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 
-@dataclass(slots=True)
+@mutable
 class SimulatedErrors:
     """Errors along a path; of as many parts as there may be, the same.
 

@@ -6,7 +6,7 @@ Findings of the parts of a program are put together in `Notes`: the first few ar
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ncfix.compensate.plan.arrays import Array, Index, Mask
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.text.tree import Program
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 MOST = 20
 """So many messages are written out; the rest is counted."""
@@ -66,7 +66,7 @@ class Finding:
         return replace(self, moves=self.moves[rows], values=self.values[rows], axes=axes, turns=turns)
 
 
-@dataclass(eq=False)
+@mutable(eq=False, slots=False)
 class PoseError(RefusedError):
     """Poses that cannot be corrected; `rows` (n,) tells which of those given."""
 
@@ -94,7 +94,7 @@ NoteKey = tuple[int, str, str, str]
 """A position of block delete, a code, its text and hint."""
 
 
-@dataclass(slots=True)
+@mutable
 class Found:
     """Messages of one kind, the first few, and how many there are."""
 
@@ -102,7 +102,7 @@ class Found:
     count: int = 0
 
 
-@dataclass(slots=True)
+@mutable
 class Notes:
     """Findings so far, by position of block delete, code, text and hint."""
 

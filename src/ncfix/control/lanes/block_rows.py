@@ -6,7 +6,7 @@ That is found of one stretch, or of many ahead at once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Protocol
 
 import numpy as np
@@ -17,7 +17,7 @@ from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import N_LETTERS
 from ncfix.control.moves import FeedMode
 from ncfix.text.tree import Program
-from ncfix.values import frozen
+from ncfix.values import frozen, mutable
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -217,7 +217,7 @@ FEWEST = 256
 """Blocks that are offered at least: few enough to be gone through in no time."""
 
 
-@dataclass(slots=True)
+@mutable
 class Lookahead:
     """The blocks that were looked at together, of which one stretch after the other is taken.
 
