@@ -24,13 +24,10 @@ _NAMES = {
     "SLOT2": f"NUM AFSL WID PA PO RAD STA INDA {_NUMBERED} FFCP {_NEW}",
     "LONGHOLE": "NUM LENG PA PO RAD STA INDA FFD FFP1 MID VARI UMODE GMODE DMODE AMODE",
     "CYCLE61": "PA PO LENG WID MID MIDA FALD FFP1 VARI LIM DMODE AMODE",
-    "CYCLE70": "DIATH H1 FAL PIT NT MID FFR TYPTH PA PO NSP CDIR VARI PITA PITM PTAB PTABA GMODE DMODE AMODE",
     "CYCLE71": "PA PO LENG WID STA MID MIDA FDP FALD FFP1 VARI FDP1",
     "CYCLE76": f"LENG WID CRAD PA PO STA MID FAL FALD FFP1 FFD CDIR VARI AP1 AP2 {_NEW[6:]}",
     "CYCLE77": f"PRAD PA PO MID FAL FALD FFP1 FFD CDIR VARI AP1 {_NEW[6:]}",
-    "CYCLE79": f"NUM SWL PA PO STA RC AP1 MIDA MID FAL FALD FFP1 CDIR VARI {_NEW[6:]}",
     "CYCLE90": "DIATH KDIAM PIT FFR CDIR TYPTH PA PO",
-    "CYCLE899": "LENG WID PA PO STA MID MIDA FAL FALD FFP1 CDIR VARI GMODE DMODE AMODE UMODE FS ZFS",
 }
 BOTH = ("POCKET1", "POCKET2", "SLOT1", "SLOT2", "LONGHOLE", "CYCLE76", "CYCLE77", "CYCLE90")
 """Cycles that have DPR behind DP."""
@@ -38,7 +35,7 @@ NAMES = {
     name: ("RTP", "RFP", "SDIS", "DP", *(("DPR",) if name in BOTH else ()), *names.split())
     for name, names in _NAMES.items()
 }
-OLDER = {name: names.index("UMODE") for name, names in NAMES.items() if "UMODE" in names and name != "CYCLE899"}
+OLDER = {name: names.index("UMODE") for name, names in NAMES.items() if "UMODE" in names}
 OLDER |= {"CYCLE76": 20, "CYCLE77": 16, "LONGHOLE": 15}
 """How many arguments the calls of older controls have."""
 

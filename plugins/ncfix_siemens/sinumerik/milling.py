@@ -58,13 +58,10 @@ MILLING = {
     "slot2": MillingCycle(8, way=True, variant=18, mode=28),
     "longhole": MillingCycle(7, way=True, mode=19),
     "cycle61": MillingCycle(4, mode=15, size=6, corner=True),
-    "cycle70": MillingCycle(12, mode=23),
     "cycle71": MillingCycle(4, size=6, angle=8),
     "cycle76": MillingCycle(8, way=True, variant=17, mode=24),
     "cycle77": MillingCycle(6, way=True, variant=14, mode=20),
-    "cycle79": MillingCycle(6, variant=17, mode=22),
     "cycle90": MillingCycle(11, way=True),
-    "cycle899": MillingCycle(6, variant=15, mode=18),
 }
 
 ABSOLUTE, WAY_DOWN = 0, 1
