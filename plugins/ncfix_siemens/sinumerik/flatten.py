@@ -29,8 +29,7 @@ from ncfix.text.tree import (
     Word,
 )
 from ncfix_siemens.sinumerik.cycles import PATTERNS
-from ncfix_siemens.sinumerik.expressions import SinumerikVariables, key_of
-from ncfix_siemens.sinumerik.plans import ANY_PARAMETER, AssignedVariable, Calling, names_in
+from ncfix_siemens.sinumerik.plans import AssignedVariable, Calling, has_value, names_in
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
@@ -182,11 +181,6 @@ def indices(target: NumberedParameter | NamedParameter | FunctionCall) -> tuple[
         case FunctionCall(_, arguments):
             return arguments
     return ()
-
-
-def has_value(variables: SinumerikVariables, name: str) -> bool:
-    """Whether a name in an expression is, or may be, that of a variable whose value is known."""
-    return name == ANY_PARAMETER or not isinstance(variables.value(key_of(name)), Unknown)
 
 
 def is_index(value: Expression | None) -> bool:

@@ -7,7 +7,7 @@ control; branches that need not be followed, and what is refused behind all othe
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING
@@ -28,7 +28,15 @@ from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
 from ncfix_siemens.sinumerik.motion import is_harmless, watch
 from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
-from ncfix_siemens.sinumerik.plans import AssignedVariable, Branching, Calling, SinumerikPlan, is_statement
+from ncfix_siemens.sinumerik.plans import (
+    AssignedVariable,
+    Branching,
+    Calling,
+    SinumerikPlan,
+    has_value,
+    is_statement,
+    names_in,
+)
 from ncfix_siemens.sinumerik.scanning import all_or_none
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import (
@@ -59,6 +67,8 @@ if TYPE_CHECKING:
 
 NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
+MAIN = frozenset({"", "MPF"})
+"""The kinds of programs that are begun by themselves; SPF are called, and CYC and INI are none."""
 PROGRAM_ENDS = frozenset({20, 300, 170})
 TOOL_CHANGE = re.compile(rb"(?im)^[^;\n]*(?<![A-Z0-9_])M[ \t]*=[ \t]*0*6(?![\d.])")
 PERHAPS = re.compile(rb"[Mm][ \t]*=[ \t]*0*6")
@@ -89,8 +99,9 @@ def begins_a_program(unit: SinumerikUnit) -> bool:
 class SinumerikInterpreter(Interpreter[SinumerikUnit]):
     """Follows one program.
 
+    main     the program that is followed: the first of the text, or of an archive the first that is no subprogram
     at_once  T by itself changes the tool; `called`: one has been called
-    again    the first block that may be executed again after a branch that is decided at run time
+    again    stretches of blocks that may be executed again after a branch that is decided at run time, and `why` it is
     """
 
     control: Sinumerik
@@ -102,10 +113,12 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         units = units_of(program)
         if in_parts and len(units) > 1:
             raise NotInPartsError("the text holds several programs")
-        self.main = units[0]
-        self.files |= {unit.name: unit for unit in units[1:] if unit.name}
+        self.main = next((unit for unit in units if unit.kind in MAIN), units[0])
+        self.others = [unit for unit in units if unit is not self.main and unit.name]
+        self.files |= {unit.name: unit for unit in self.others}
         self.flow = SinumerikFlow(control, self.main)
-        self.again: int | None = None
+        self.again: list[tuple[int, int]] = []
+        self.why = ""
         self.at_once = not changes_tools(self.main.all_plans(), program.source)
         self.called = False
         control.solitary = frozenset(block for unit in units for block in unit.solitary())
@@ -165,12 +178,13 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
                 raise NotInPartsError("what is executed is decided at run time") from None
             if self.watcher is not None:
                 raise SourceError.of(RUNTIME, DECIDED_AT_RUNTIME, self.place()) from None
-            self.again = sweep(self.flow)
+            self.why = decided_at_runtime(self.flow)
+            self.again = sweep(self.flow, self.others, self.why)
             return True
 
     def moves(self) -> Moves:
         """The motions of the program, when it has been followed."""
-        return all_or_none(demoted(self.control.moves(), self.again), self.main.program)
+        return all_or_none(demoted(self.control.moves(), self.again, self.why), self.main.program)
 
     def run_lane(self, unit: SinumerikUnit, block: int, plan: SinumerikPlan) -> int:
         """See `Interpreter`; blocks that point the tool go in a lane of their own."""
@@ -355,32 +369,62 @@ def note_letting(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None
 
 
 DECIDED_AT_RUNTIME = "which blocks are executed here is decided at run time"
+GIVE = ', by {}: variables."{}" in the setup file gives it a value'
 NO_MOTIONS = frozenset({40, 740, 750, 250, 260, 1100, 1110, 1120})
 MACHINE = frozenset({530, 1530})
 
 
-def sweep(flow: SinumerikFlow) -> int | None:
-    """Refuse the motions of all that is left; the first block that may be executed again, None for none."""
+def decided_at_runtime(flow: SinumerikFlow) -> str:
+    """Why nobody can say where the program goes on: the variables of its branch that are not known."""
+    conditions = (part for step in flow.unit.branchings(flow.block - 1) for part in step.written)
+    named = dict.fromkeys(name for part in conditions for name in names_in(part))
+    unknown = [name.upper() for name in named if not has_value(flow.control.variables, name)]
+    return DECIDED_AT_RUNTIME + (GIVE.format(" and ".join(unknown), unknown[0]) if unknown else "")
+
+
+def sweep(flow: SinumerikFlow, others: Sequence[SinumerikUnit], why: str) -> list[tuple[int, int]]:
+    """Refuse the motions of all that is left, the programs of the text that it may call included.
+
+    Returns the stretches of blocks that it may execute again.
+    """
     control = flow.control
-    control.refuse_rest(DECIDED_AT_RUNTIME)
-    control.lose_all(DECIDED_AT_RUNTIME)
+    control.refuse_rest(why)
+    control.lose_all(why)
     places = [call.back for call in flow.calls] + [(flow.unit, flow.block - 1)]
-    again = [found for unit, block in places if not unit.external if (found := earliest(unit, block)) is not None]
-    for unit, block in reversed(places):
+    first = [found for unit, block in places if not unit.external if (found := earliest(unit, block)) is not None]
+    called = callable_from(places, others)
+    for unit, block in [*reversed(places), *((unit, unit.begin) for unit in called)]:
         for each in range(block, unit.stop):
             row = each if not unit.external else control.row_block
-            refuse(control, unit.plan(each), row)
-    return min(again, default=None)
+            refuse(control, unit.plan(each), row, why)
+    return [*((block, len(flow.unit.program)) for block in first), *((unit.begin, unit.stop) for unit in called)]
 
 
-def refuse(control: Sinumerik, plan: SinumerikPlan, block: int) -> None:
+NAME_IN_TEXT, NAMED_BY_TEXT = re.compile(r"\w+"), frozenset({"CALL", "PCALL", "EXTCALL"})
+
+
+def callable_from(places: Iterable[tuple[SinumerikUnit, int]], others: Iterable[SinumerikUnit]) -> list[SinumerikUnit]:
+    """The programs among `others` that blocks from these places on may call, directly or by one another."""
+    found: list[SinumerikUnit] = []
+    pending = list(places)
+    while pending:
+        unit, block = pending.pop()
+        lines = (unit.program.text_of(each).partition(";")[0].upper() for each in range(block, unit.stop))
+        names = {name for line in lines for name in NAME_IN_TEXT.findall(line)}
+        new = [each for each in others if each not in found and (each.name in names or names & NAMED_BY_TEXT)]
+        found += new
+        pending += [(each, each.begin) for each in new]
+    return found
+
+
+def refuse(control: Sinumerik, plan: SinumerikPlan, block: int, why: str) -> None:
     """Note the motion of a block, if it has one."""
     if not plan.axes or plan.names & PROGRAMMABLE or not NO_MOTIONS.isdisjoint(plan.g):
         return
     machine = "supa" in plan.names or not MACHINE.isdisjoint(plan.g)
     passing = Passing(Pass.MACHINE_COORDINATES, "machine coordinates") if machine else None
     control.row_block = block
-    lost = dict.fromkeys(control.machine, DECIDED_AT_RUNTIME)
+    lost = dict.fromkeys(control.machine, why)
     words = BlockWordValues(block, axes=plan.axes)
     control.go(MotionKind.RAPID, words, MotionEnd(control.position[:], lost, dict(lost)), 0, passing=passing)
 
@@ -405,9 +449,11 @@ def targets(unit: SinumerikUnit, step: Branching, block: int) -> list[int]:
     return unit.labelled(step.label) or ([unit.begin] if "goto" in step.keyword else [])
 
 
-def demoted(moves: Moves, first: int | None) -> Moves:
-    """The motions with those of blocks from `first` on refused, which may be executed again from another state."""
-    return moves if first is None else moves.refused(moves.block >= first, DECIDED_AT_RUNTIME)
+def demoted(moves: Moves, again: Iterable[tuple[int, int]], why: str) -> Moves:
+    """The motions with those of blocks refused that may be executed again from another state."""
+    for first, stop in again:
+        moves = moves.refused((first <= moves.block) & (moves.block < stop), why)
+    return moves
 
 
 LOUD_M = frozenset({20, 60, 170, 300})

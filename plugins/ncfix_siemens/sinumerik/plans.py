@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Iterator
 from dataclasses import field, replace
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
-from ncfix.control.expressions import Evaluate, left_out
+from ncfix.control.expressions import Evaluate, Unknown, left_out
 from ncfix.control.lanes.block_rows import Lane
 from ncfix.text.reach import Deletable, deletable
 from ncfix.text.tree import (
@@ -30,7 +30,13 @@ from ncfix.text.tree import (
 )
 from ncfix.values import frozen, mutable
 from ncfix_siemens.sinumerik.blocks import BRACKET, STATEMENT
-from ncfix_siemens.sinumerik.expressions import FUNCTIONS_OF_NUMBERS, TEXT_FUNCTIONS, compiled
+from ncfix_siemens.sinumerik.expressions import (
+    FUNCTIONS_OF_NUMBERS,
+    TEXT_FUNCTIONS,
+    SinumerikVariables,
+    compiled,
+    key_of,
+)
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, SHORTEST_WAY, VECTOR
 
 DWELL_WORDS = "FS"
@@ -198,6 +204,11 @@ def names_in(expression: Expression) -> Iterator[str]:
                 yield ANY_PARAMETER
             case NamedParameter(name) | FunctionCall(name):
                 yield name
+
+
+def has_value(variables: SinumerikVariables, name: str) -> bool:
+    """Whether a name in an expression is, or may be, that of a variable whose value is known."""
+    return name == ANY_PARAMETER or not isinstance(variables.value(key_of(name)), Unknown)
 
 
 def parts_in(expression: Expression) -> Iterator[Expression]:

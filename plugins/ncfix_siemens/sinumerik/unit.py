@@ -30,7 +30,7 @@ from ncfix_siemens.sinumerik.expressions import INITIAL, constant
 from ncfix_siemens.sinumerik.plans import Branching, SinumerikPlan, plan_of
 from ncfix_siemens.sinumerik.vocabulary import HALF_A_TURN
 
-HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*(?:;.*)?$", re.IGNORECASE)
+HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(MPF|SPF|CYC|INI))?[ \t]*(?:;.*)?$", re.IGNORECASE)
 PROCEDURE = re.compile(r"PROC[ \t]+(?P<name>\w+)[ \t]*(?:\((?P<parameters>.*)\))?(?P<rest>[^()]*)$", re.IGNORECASE)
 PARAMETER = re.compile(
     r"[ \t]*(?P<var>VAR[ \t]+)?(?P<type>INT|REAL|BOOL|CHAR|STRING|AXIS|FRAME)[ \t]*(?:\[[^\]]*\])?[ \t]*"
@@ -64,7 +64,7 @@ class ProcParameter:
 class SinumerikUnit(TextUnit[SinumerikPlan]):
     """One program of a text.
 
-    name        upper case; empty where no head says it
+    name        upper case; empty where no head says it; so is `kind`: MPF, SPF, ...
     ends        block of a structure's begin -> block of its end, and ELSE -> ENDIF
     others      block of an IF -> block of its ELSE, where it has one
     begins      block of a structure's end -> block of its begin
@@ -80,10 +80,10 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         program: Program,
         blocks: tuple[int, int],
         plans: list[SinumerikPlan | None],
-        name: str = "",
+        name: tuple[str, str] = ("", ""),
         external: str = "",
     ) -> None:
-        self.name = name
+        self.name, self.kind = name
         super().__init__(program, plan_of, external, blocks, plans)
 
     def take(self, program: Program, begin: int, stop: int) -> None:
@@ -280,18 +280,19 @@ def is_remark(plan: SinumerikPlan) -> bool:
 def units_of(program: Program, external: str = "") -> list[SinumerikUnit]:
     """The programs of a text, in the order written."""
     plans: list[SinumerikPlan | None] = [plan_of(template) for template in program.templates]
-    heads: list[tuple[int, str]] = []
+    heads: list[tuple[int, str, str]] = []
     shapes = {i for i, plan in enumerate(plans) if plan is not None and "program head" in plan.opaque}
     for block in np.flatnonzero(np.isin(program.template, list(shapes))).tolist():
         if found := HEAD.match(program.text_of(block)):
-            heads.append((block, found[1].upper()))
+            heads.append((block, found[1].upper(), (found[2] or "").upper()))
     before = set(program.template[: heads[0][0]].tolist()) if heads else set()
     remarks = heads and all(is_remark(plan) for shape in before if (plan := plans[shape]) is not None)
-    starts = [(0, heads[0][1]), *heads[1:]] if remarks else [(0, ""), *heads]
-    stops = [block for block, _ in starts[1:]] + [len(program)]
-    pairs = zip(starts, stops, strict=True)
+    starts = [(0, *heads[0][1:]), *heads[1:]] if remarks else [(0, "", ""), *heads]
+    stops = [block for block, *_ in starts[1:]] + [len(program)]
     return [
-        SinumerikUnit(program, (block, stop), plans, name, external) for (block, name), stop in pairs if stop > block
+        SinumerikUnit(program, (block, stop), plans, (name, kind), external)
+        for (block, name, kind), stop in zip(starts, stops, strict=True)
+        if stop > block
     ]
 
 

@@ -551,3 +551,35 @@ def test_a_plane_lies_the_same_wherever_the_axes_stood_before(root: Path, direct
     ]
     assert where == pytest.approx([where[0]] * len(where))
     assert 0.0 < direction * where[0] <= math.radians(120.0)
+
+
+@pytest.mark.parametrize(
+    "branch",
+    [
+        "IF R99==0 GOTOF LATER\nTRANS X9\nLATER: {}",
+        "IF R99\nTRANS X9\nENDIF\n{}",
+        "CASE(R99) OF 1 GOTOF LATER\nLATER: {}",
+    ],
+)
+@pytest.mark.parametrize("call", ["SUB1", "SUB2", 'CALL "SUB1"', "G4 F1\nSUB1 P2", 'EXTCALL("SUB" << 1)'])
+@pytest.mark.parametrize("first", [True, False])
+def test_what_was_followed_and_may_be_called_again_behind_a_branch_is_refused(
+    branch: str, call: str, first: bool
+) -> None:
+    """The subprogram was executed where everything was known; behind the branch nobody knows from where it is."""
+    main = f"%_N_MAIN_MPF\nG0 X0 Y0 Z9\nSUB1\n{branch.format(call)}\nM30\n"
+    called = "%_N_SUB1_SPF\nG0 X5 Y5 Z5\nG1 X9 F100\nM17\n%_N_SUB2_SPF\nSUB1\nM17\n%_N_SUB3_SPF\nG1 X7\nM17\n"
+    moves = follow(called + main if first else main + called).moves
+    texts = (called + main if first else main + called).splitlines()
+    rules = {texts[block]: {*moves.rule[moves.block == block].tolist()} for block in set(moves.block.tolist())}
+    assert rules["G0 X0 Y0 Z9"] == {Rule.CORRECT}
+    assert rules["G0 X5 Y5 Z5"] == rules["G1 X9 F100"] == {Rule.REFUSE}
+    assert 'variables."R99"' in moves.reasons[moves.reason[-1]]
+
+
+@pytest.mark.parametrize("kind", ["SPF", "CYC", "INI"])
+def test_an_archive_is_followed_from_its_main_program(kind: str) -> None:
+    """Controls archive programs by their names: a subprogram may stand before the program that calls it."""
+    moves = follow(f"%_N_PART_{kind}\nG1 X5 F100\nM17\n%_N_WHOLE_MPF\nG0 X0 Y0 Z0\nG1 X1 F100\nPART\nM30\n").moves
+    assert moves.block.tolist() == [4, 5, 1]
+    assert set(moves.rule.tolist()) == {Rule.CORRECT}
