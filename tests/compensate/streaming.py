@@ -83,11 +83,12 @@ def compared(
     jobs: int = 1,
     setup: Setup = SETUP,
     files: Mapping[str, bytes] | None = None,
+    expected: Found | None = None,
 ) -> str:
-    """Why a program was not corrected in parts; empty if it was, and came out as it does as a whole."""
+    """Why a program was not corrected in parts; empty if it was, and came out as it does as a whole (`expected`)."""
     try:
         found = streamed(source, machine, dialect, size, jobs, setup, files)
     except NotInPartsError as error:
         return str(error)
-    assert_alike(found, whole(source, machine, dialect, setup, files))
+    assert_alike(found, expected or whole(source, machine, dialect, setup, files))
     return ""

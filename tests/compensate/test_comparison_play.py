@@ -30,8 +30,9 @@ DENSE, CLOSE = 0.05, 1e-3
 AGREED = 3e-5
 """mm: the parabolas are within 0.02 um of the path; the corner of a path that is cut off by the points of the brute
 force, where it is taken up that an axis has play, is less than a hundredth of `CLOSE`."""
-AROUND = 150
-"""Lines near to a point that are looked at: those of three steps that take up play, and of two cuts."""
+AROUND, FIRST = 150, 10
+"""Lines near to a point that are looked at: those of three steps that take up play, and of two cuts; and at first."""
+AT_ONCE = 500
 LARGEST = 25.0
 """mm: the largest radius."""
 HALF_A_PER_CENT = 5e-3
@@ -99,11 +100,22 @@ def farthest(path: Dense, other: Dense) -> float:
     begin, end = other.points[:-1][other.cut[1:]], other.points[1:][other.cut[1:]]
     way = end - begin
     square = np.maximum((way**2).sum(axis=1), 1e-30)
-    found = np.full(len(points), np.inf)
-    for each in KDTree((begin + end) / 2).query(points, k=AROUND)[1].T:
-        share = np.clip(((points - begin[each]) * way[each]).sum(axis=1) / square[each], 0, 1)
-        found = np.minimum(found, np.linalg.norm(points - begin[each] - share[:, None] * way[each], axis=1))
-    return float(found.max())
+    tree = KDTree((begin + end) / 2)
+
+    def distances(points: np.ndarray, lines: int) -> np.ndarray:
+        found = np.full(len(points), np.inf)
+        for each in tree.query(points, k=lines)[1].T:
+            share = np.clip(((points - begin[each]) * way[each]).sum(axis=1) / square[each], 0, 1)
+            found = np.minimum(found, np.linalg.norm(points - begin[each] - share[:, None] * way[each], axis=1))
+        return found
+
+    bounds = distances(points, FIRST)  # more lines bring a point only nearer
+    order, largest = np.argsort(-bounds), 0.0
+    for k in range(0, len(order), AT_ONCE):
+        if bounds[order[k]] <= largest:
+            break
+        largest = max(largest, float(distances(points[order[k : k + AT_ONCE]], AROUND).max()))
+    return largest
 
 
 def truth(machine: Machine, original: Moves, other: Moves) -> tuple[float, float]:

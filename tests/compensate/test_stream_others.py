@@ -136,8 +136,9 @@ def machine(root: Path) -> Machine:
 def test_parts_as_the_whole(seed: int, siemens: bool, machine: Machine) -> None:
     source = program(seed, 50, 0.0 if seed < 1 else 0.12, siemens=siemens)
     dialect, setup, files = ("siemens", SETUP, S_FILES) if siemens else ("fanuc", CALCULATOR, F_FILES)
+    expected = whole(source, machine, dialect, setup, files)
     for size in (200, 1500)[seed % 2 :]:
-        compared(source, machine, dialect, size, setup=setup, files=files)
+        compared(source, machine, dialect, size, setup=setup, files=files, expected=expected)
 
 
 def test_what_interrupts_them_leaves_them_in_parts(machine: Machine) -> None:
@@ -156,8 +157,9 @@ def test_what_interrupts_them_leaves_them_in_parts(machine: Machine) -> None:
 
 def test_vectors_are_done_in_parts(machine: Machine) -> None:
     source = program(1, 120, 0.0, siemens=True, vectors=True)
+    expected = whole(source, machine, "siemens")
     for size in (300, 3000):
-        assert compared(source, machine, "siemens", size) == ""
+        assert compared(source, machine, "siemens", size, expected=expected) == ""
 
 
 @pytest.mark.parametrize("compiled", [False, True])
@@ -216,9 +218,10 @@ def test_motions_that_are_refused_for_their_text_where_parts_meet(body: str, mac
     """
     machine = machine.replace(effects=tuple(Effect(f"E{axis}{axis}", (0.005,), Backlash()) for axis in "XYZ"))
     source = f"G21 G90 G94 G54 F500.\nG0 X150. Y150. Z50. B0. C0.\n{body}M30\n".encode()
+    expected = whole(source, machine, "fanuc")
     for size in (60, 80, 100, 150):
-        assert compared(source, machine, "fanuc", size) == ""
-    assert compared(source, machine, "fanuc", 60, jobs=2) == ""
+        assert compared(source, machine, "fanuc", size, expected=expected) == ""
+    assert compared(source, machine, "fanuc", 60, jobs=2, expected=expected) == ""
 
 
 def test_tools_without_a_length_are_named_in_the_order_of_the_program(machine: Machine) -> None:
@@ -357,10 +360,10 @@ def test_corpus(
         if not 300 < len(source) < 8000:
             continue
         try:
-            whole(source, machine, dialect, setup=CALCULATOR)
+            expected = whole(source, machine, dialect, setup=CALCULATOR)
         except NcfixError:
             continue
         tried += 1
-        done += compared(source, machine, dialect, 400, setup=CALCULATOR) == ""
+        done += compared(source, machine, dialect, 400, setup=CALCULATOR, expected=expected) == ""
     figures(f"{done} of {tried} programs of {folder} corrected in parts, with the same bytes")
     assert tried

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conftest import some
+from conftest import FULL, some
 from measure.poses import machine, plan
 from ncfix.diagnosis.diagnosis import diagnose
 from ncfix.diagnosis.mistakes.search import find
@@ -136,8 +136,16 @@ def test_a_mistake_is_found_by_its_odds(kind: str, data: Measurement, known: Mac
 UNITS = [kind for kind in CASES if kind.split(":")[0] in ("unit of values", "inch", "metre", "um", "degree")]
 
 
-@pytest.mark.parametrize("repeated", [False, True])
-@pytest.mark.parametrize("kind", [*UNITS, "tool length: m"])
+SEVERAL = [
+    (kind, repeated)
+    for repeated in (False, True)
+    for kind in [*UNITS, "tool length: m"]
+    if FULL or repeated == kind.startswith("unit of values") or kind == "unit of values: um"
+]
+"""Repeats change what values in another unit say of the noise; of those of positions each kind is taken without."""
+
+
+@pytest.mark.parametrize(("kind", "repeated"), SEVERAL)
 def test_a_unit_of_one_of_several_files(kind: str, repeated: bool, known: Machine) -> None:
     """Where noise comes from repeats, it is in the wrong unit, too."""
     again = np.repeat(np.arange(0, 40, 4), 4) if repeated else []
@@ -160,9 +168,15 @@ def test_a_unit_of_one_of_several_files(kind: str, repeated: bool, known: Machin
 READINGS = {"gauge": ("length",), "bar": ("length",), "tool": ("x", "y", "z"), "probe": ("mx", "my", "mz")}
 
 
-@pytest.mark.parametrize("beside", [0, 2])
-@pytest.mark.parametrize("factor", [1e3, 1e-3, 1 / 25.4])
-@pytest.mark.parametrize("kind", list(READINGS))
+FACTORS = (1e3, 1e-3, 1 / 25.4)
+BESIDE = [(kind, factor, 2) for kind in READINGS for factor in FACTORS]
+BESIDE = BESIDE if FULL else [("gauge", 1e3, 2), ("bar", 1e-3, 2), ("probe", 1 / 25.4, 2)]
+"""One of three files: its name is found in the same way for each kind and each factor."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "factor", "beside"), [*((kind, factor, 0) for kind in READINGS for factor in FACTORS), *BESIDE]
+)
 def test_a_unit_of_readings(kind: str, factor: float, beside: int, known: Machine) -> None:
     """Lengths, targets and positions of a probe are no deviations: in another unit they are off by metres."""
     files = [simulate(plan(known, kind, 80, k), known, Faults(2.0), k) for k in range(3, 4 + beside)]
