@@ -12,7 +12,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow, placed
 from ncfix.compensate.plan.kinematics import joints_from_commands
-from ncfix.control.moves import MotionKind, Moves, Trace
+from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import State, load
 from ncfix.text.dialect import detect
@@ -222,3 +222,15 @@ def test_after_a_retract_of_plane_the_position_has_to_be_said(root: Path, words:
         root, program(f"PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN {words} SEQ+", "L X+5 F500", "L X+5 Y+6 Z+7 FMAX")
     )
     assert moves.rule[-2:].tolist() == [2, 0]
+
+
+def test_directions_are_followed_whatever_the_letters_of_axes_mean(root: Path) -> None:
+    """FUNCTION TCPM AXIS SPAT makes spatial angles of A B C; TX TY TZ are no angles."""
+    lines = ("LN X+10 Y+5 Z+160 TX+0.1 TY+0.05 TZ+0.99 F900", "LN X+20 Y+9 Z+158 NX+0 NY+0 NZ+1 TX+0.2 TY+0 TZ+0.98")
+    by_position, by_angle = (
+        moves_of(root, program("L B+0 C+0 FMAX", f"FUNCTION TCPM F TCP AXIS {axis} PATHCTRL AXIS", *lines, "L Z+170"))
+        for axis in ("POS", "SPAT")
+    )
+    np.testing.assert_array_equal(by_angle.end[:-1], by_position.end[:-1])
+    assert by_angle.rule[:-1].tolist() == by_position.rule[:-1].tolist()
+    assert by_angle.rule[-3:].tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]

@@ -24,6 +24,7 @@ BY_DEPTH, FROM_START = 2000, 1000
 """Motion codes of holes: with depths from the datum, and with depths from where the cycle is called."""
 
 TILTED, DOUBTFUL, TOOL, PRESET, TURNED_DATUM = "tilt", "doubt", "tool", "preset", "turned datum"
+SPATIAL_MODE = "axis spat"
 """The keys under which motions are suspended."""
 
 
@@ -38,6 +39,7 @@ DEPARTED = "where the axis {} stands after a departure (DEP) depends on the radi
 AFTER_PROBING = "where the axis {} stands after a probing cycle is known only at run time"
 FREELY = "where the axis {} stands after a free contour (FK) the control works out"
 AFTER_CYCLE = "where the axis {} stands after a cycle with a path of its own is not followed"
+SPATIAL_ANGLES = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
 SPATIAL = "where the axis {} stands by spatial angles (AXIS SPAT) the control works out"
 LED_BY_CONTROL = frozenset({SPATIAL, RETRACTED, MOVED_ALONG, DEPARTED, AFTER_PROBING, FREELY, AFTER_CYCLE})
 """Rapids while an axis stands where the control itself has led it are passed: the tool is off the workpiece, and the

@@ -12,7 +12,7 @@ from ncfix.control.moves import Motion, MotionEnd, MotionKind, Pass, Passing, Un
 from ncfix.control.posture import WayRules
 from ncfix.control.tcp import led_in_machine, switch
 from ncfix_heidenhain.klartext.arcs import FLAT, Step
-from ncfix_heidenhain.klartext.control import DEPARTED, KlartextControl
+from ncfix_heidenhain.klartext.control import DEPARTED, SPATIAL_ANGLES, SPATIAL_MODE, KlartextControl
 from ncfix_heidenhain.klartext.targets import (
     MotionWords,
     command_of,
@@ -59,7 +59,10 @@ def straight(control: KlartextControl, step: Step) -> None:
     for index, angle in way.items():
         end.target[index] = angle
         end.unknown.pop(index, None)
+    spatial = not step.words.axes & mask_of(way) and control.resume(SPATIAL_MODE)  # a direction is one all the same
     run(control, step, end, step.words.axes | mask_of(way))
+    if spatial:
+        control.suspend(SPATIAL_MODE, SPATIAL_ANGLES)
 
 
 def pointed(control: KlartextControl, words: MotionWords) -> dict[int, float] | None:

@@ -18,7 +18,15 @@ from ncfix.control.tcp import switch
 from ncfix.text.tree import Constant
 from ncfix_heidenhain.klartext.arcs import Step
 from ncfix_heidenhain.klartext.contours import follow_free
-from ncfix_heidenhain.klartext.control import AFTER_PROBING, PRESET, RETRACTED, TOOL, KlartextControl
+from ncfix_heidenhain.klartext.control import (
+    AFTER_PROBING,
+    PRESET,
+    RETRACTED,
+    SPATIAL_ANGLES,
+    SPATIAL_MODE,
+    TOOL,
+    KlartextControl,
+)
 from ncfix_heidenhain.klartext.cycles import pattern_of
 from ncfix_heidenhain.klartext.plans import KlartextPlan
 from ncfix_heidenhain.klartext.targets import MotionWords
@@ -295,7 +303,6 @@ OF_THE_TOOL = frozenset({31, 33, 481, 483, *range(580, 590)})
 TOOL_MEASURED = "NCF281"
 LENGTH_MEASURED = "TCH PROBE {} measures the tool, and its length in the setup is taken to be what the control finds"
 
-SPATIAL_ANGLES = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
 OTHER_POINT = "FUNCTION TCPM with a reference point other than the tip"
 SELECTED = "PRESET SELECT with words of its own, or while coordinates are transformed, is not followed"
 ERROR = "NCF278"
@@ -416,10 +423,11 @@ def select_preset(control: KlartextControl, flow: KlartextFlow, match: re.Match[
 def tcpm(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """FUNCTION TCPM and FUNCTION RESET TCPM."""
     control.resume("tcpm")
+    control.resume(SPATIAL_MODE)
     words = "" if match["reset"] else " ".join(match["rest"].upper().split())
     control.path.by_vector, control.path.spatial = "PATHCTRL VECTOR" in words, "AXIS SPAT" in words
     if control.path.spatial:
-        control.suspend("tcpm", SPATIAL_ANGLES)
+        control.suspend(SPATIAL_MODE, SPATIAL_ANGLES)
     if "REFPNT" in words and "TIP-TIP" not in words:
         control.suspend("tcpm", OTHER_POINT)
     tip_control(control, on=not match["reset"])
