@@ -54,7 +54,7 @@ KLARTEXT_CODES: dict[str, Code] = {
         "the two changes a correction by some nanometres.",
         "Give the length that the tool has when it cuts, not that before it is measured.",
     ),
-    "NCF486": Code(
+    "NCF284": Code(
         "Cycle 19: spatial angles, or positions of axes",
         "A machine parameter decides whether the angles of cycle 19 are spatial angles or positions of the rotary "
         "axes. Here the axes had not been turned before, which would have shown it, and the two are different planes. "

@@ -152,7 +152,7 @@ def test_cycle_19_is_understood_by_where_the_axes_stand(root: Path) -> None:
 def test_it_is_said_how_the_angles_of_cycle_19_are_taken(root: Path, before: str, angles: str, said: bool) -> None:
     body = (before, "CYCL DEF 19.0 W", f"CYCL DEF 19.1 {angles}", "L B+Q121 C+Q122 FMAX", "L X+5 Y+6 Z+7 FMAX")
     codes = [message.code for message in trace_of(root, program(*body)).messages]
-    assert codes.count("NCF486") == said
+    assert codes.count("NCF284") == said
 
 
 @pytest.mark.parametrize(
