@@ -427,7 +427,10 @@ class Sinumerik(ProgramControl):
 
     def spindle_length(self) -> float:
         """As of every control, by the names of tools."""
-        known = self.given_length(self.tools.spindle)
+        number = self.tools.spindle
+        known = self.given_length(number)
+        if known is None and f"length of tool {self.named.name(number)}" in self.knowledge.assumed:
+            return 0.0  # asked for already, by its name
         return math.nan if known is None else known
 
     def length_under_tcp_with(self, tool: Vector, number: int | None) -> float:

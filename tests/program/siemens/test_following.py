@@ -583,3 +583,10 @@ def test_an_archive_is_followed_from_its_main_program(kind: str) -> None:
     moves = follow(f"%_N_PART_{kind}\nG1 X5 F100\nM17\n%_N_WHOLE_MPF\nG0 X0 Y0 Z0\nG1 X1 F100\nPART\nM30\n").moves
     assert moves.block.tolist() == [4, 5, 1]
     assert set(moves.rule.tolist()) == {Rule.CORRECT}
+
+
+def test_a_tool_that_is_taken_as_zero_is_so_without_its_edge_too() -> None:
+    """It has been asked for by its name; without a length it would be asked for again, by the number that it has here."""
+    found = follow('T="MILL" M6\nG0 X0 Y0 Z9 D1\nG0 X1 D0\nG1 X2 F100', assume_zero=True)
+    assert found.assumed == ("length of tool MILL",)
+    assert found.moves.tool_length.tolist() == [0.0, 0.0, 0.0]
