@@ -586,7 +586,7 @@ def test_an_archive_is_followed_from_its_main_program(kind: str) -> None:
 
 
 def test_a_tool_that_is_taken_as_zero_is_so_without_its_edge_too() -> None:
-    """It has been asked for by its name; without a length it would be asked for again, by the number that it has here."""
+    """It was asked for by its name; without a length it would be asked for again, by the number that it has here."""
     found = follow('T="MILL" M6\nG0 X0 Y0 Z9 D1\nG0 X1 D0\nG1 X2 F100', assume_zero=True)
     assert found.assumed == ("length of tool MILL",)
     assert found.moves.tool_length.tolist() == [0.0, 0.0, 0.0]
