@@ -183,13 +183,14 @@ class _Judge:
         for line in self.original.line[rows[moved.any(axis=1)]][:3]:
             self.verdict.complain(int(line), "an axis that was to be left was moved")
 
-    def without(self, off: Floats, command: Floats, left: NDArray[np.bool_], length: float) -> float:
-        """How far a tip is off (3,) but for the ways along which axes (9,) that were left would take it."""
+    def without(self, off: Floats, command: Floats, left: NDArray[np.bool_], length: Floats) -> Floats:
+        """How far tips are off (n, 3) but for the ways along which axes (9,) that were left would take them, (n,)."""
         columns = [column for column in np.flatnonzero(left) if column in self.machine.linear]
-        near = np.vstack((command, command + np.eye(9)[columns]))
-        tips = self.machine.tip(near, np.full(len(near), length))
-        ways = (tips[1:] - tips[0]).T
-        return float(np.linalg.norm(off - ways @ np.linalg.lstsq(ways, off, rcond=None)[0]))
+        if not columns:
+            return np.linalg.norm(off, axis=1)
+        tip = self.machine.tip(command, length)
+        ways = np.stack([self.machine.tip(command + np.eye(9)[column], length) - tip for column in columns], axis=-1)
+        return np.linalg.norm(off - (ways @ (np.linalg.pinv(ways) @ off[..., None]))[..., 0], axis=1)
 
     def rests(self, segments: Segments, k: int) -> bool:
         """A motion word alone makes LinuxCNC call a motion to where it is."""
@@ -287,8 +288,10 @@ class _Judge:
 
         distance = paths.nearest(intended, real, guess, low, high)[1]
         off = real - intended(guess)
-        for row in np.flatnonzero(self.left[of].any(axis=1)):
-            distance[row] = self.without(off[row], command[row], self.left[of[row]], self.length[pieces[row]])
+        for left in np.unique(self.left[of], axis=0):
+            if left.any():
+                rows = (self.left[of] == left).all(axis=1)
+                distance[rows] = self.without(off[rows], command[rows], left, self.length[pieces[rows]])
         excused = self.entry_error(segments, pieces, of) * (1 - u)
         allowed = self.terms.tolerance + np.sqrt(3) * self.halves(of, pieces) + excused
         allowed = allowed + self.rotary_rounding(pieces, of, segments, command)
