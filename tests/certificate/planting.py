@@ -29,9 +29,9 @@ from ncfix.text.reader import read
 ROOT = Path(__file__).parents[2]
 LANGUAGES = ("linuxcnc", "iso", "fanuc", "siemens", "heidenhain")
 SETUP = Setup(
-    work_offsets={name: {"X": 10.0, "Y": -5.0, "Z": 40.0} for name in ("G54", "PRESET")},
+    work_offsets={name: {"X": 10.0, "Y": -5.0, "Z": 40.0} for name in ("G54", "G55", "PRESET")},
     tools={1: Tool(80.0, 3.0)},
-    initial={"X": 0.0, "Y": 0.0, "Z": 350.0, "A": 0.0, "C": 0.0},
+    initial={"X": 0.0, "Y": 0.0, "Z": 350.0, "A": 0.0, "B": 0.0, "C": 0.0},
 )
 GIVEN = Given(offsets=SETUP.work_offsets, tools={1: 80.0}, initial=SETUP.initial)
 STEP = 0.001

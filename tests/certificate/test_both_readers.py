@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
-from certificate.planting import machine
+from certificate.planting import SETUP, machine
 from ncfix.certificate.proof import prove
 from ncfix.cli.shop.certificates import given_of
 from ncfix.compensate import FixOptions
@@ -119,3 +119,55 @@ def test_corrections_within_the_limits_of_the_machine() -> None:
 def test_feeds_are_those_of_the_original(old: bytes, new: bytes, fault: str) -> None:
     text, known = corrected()
     assert faults_of(text.replace(old, new), known) == [fault]
+
+
+KLARTEXT = "BEGIN PGM A MM\nTOOL CALL 1 Z S800\nL X+0 Y+0 Z+100 FMAX\n{}END PGM A MM\n"
+DIGITS = {
+    "a word of finer digits that is left, for the control rounds it": (
+        "three",
+        FixOptions(verify=False),
+        "heidenhain",
+        "L X-5.9013 Y+6.2 Z+38.32 FMAX\nL X-17.933 Y+17.6069 F500\nCC X-21.308 Y+16.6778\nC X-22.5326 Y+19.9572 DR-\n",
+    ),
+    "an axis that finer digits have brought to its place": (
+        "three",
+        FixOptions(verify=False, tolerance_um=2.0),
+        "heidenhain",
+        "L X-16.3434 Y+8.8125 FMAX\nL Z+40.0000 FMAX\nL Z+39.3173 F1000\n"
+        "CC X-19.6132 Y+20.7746\nC X-31.8124 Y+18.5467 DR-\n",
+    ),
+    "finer digits in turned coordinates": (
+        "three",
+        FixOptions(verify=False, strategy="position", tolerance_um=5.0),
+        "heidenhain",
+        "CYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+90\nL X+2.011 Y-0.2777 FMAX\nL Z+36.91 F640\nL X+21.6242 F640\n",
+    ),
+    "a piece near the end of its block where rotary axes are corrected, too": (
+        "table",
+        FixOptions(verify=False, strategy="full"),
+        "iso",
+        "G21 G17 G40 G90 G94\nT1 M6\nG54\nG43 H1\nG0 X2.85 Y-2.8 Z30.57 A12. C41.\nG1 Z26.63 F1000.\n"
+        "G3 X-6.82 Y4.02 Z26.48 I-5.13 J2.99\nG1 X-6.42 Y6.51\nG3 X-4.51 Y-18.64 I2.73 J-12.44\nG0 Z90.\nM2\n",
+    ),
+}
+
+
+@pytest.mark.parametrize(("name", "options", "dialect", "text"), DIGITS.values(), ids=DIGITS)
+def test_digits_and_near_ends_are_no_alarm(name: str, options: FixOptions, dialect: str, text: str) -> None:
+    """Each was one in a program as a CAM system writes it."""
+    source = (KLARTEXT.format(text) if dialect == "heidenhain" else text).encode()
+    known, language = machine(name), get(dialect)
+    fixed = fix_program(read(source, "part", language), known, SETUP, options).text
+    proof = prove(source, fixed, known, given_of(SETUP, language), dialect)
+    assert not proof.faults
+    assert proof.proved_motions == proof.motions
+
+
+def test_a_word_that_acts_at_the_end_of_a_split_block() -> None:
+    """It goes to the last piece, and may be written without a blank before it."""
+    text = b"G21 G17 G90 G94 G54\nG0 X0. Y0. Z50.\nG1 X80. Y70. F500.\nG1 X-80.G9Y-70.\nX-61. Y32. G09\nM2\n"
+    fixed = fix_program(read(text, "part", get("iso")), machine("three"), Setup(assume_zero=True), FixOptions()).text
+    given = given_of(Setup(assume_zero=True), get("iso"))
+    assert fixed.count(b"\n") > text.count(b"\n") + 1  # besides the stamp
+    assert not prove(text, fixed, machine("three"), given, "iso").faults
+    assert prove(text, fixed.replace(b" G09", b""), machine("three"), given, "iso").faults

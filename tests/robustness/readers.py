@@ -58,12 +58,30 @@ EXTRAS: Mapping[str, tuple[bytes, ...]] = {
         b"G10 L2 P1 X1",
         b"@5 ^30",
         b"G38.2 Z-1",
+        b"/G55",
+        b"/2 G1 X7. Y8.",
     ),
-    "iso": (b"G81 X1 Y1 Z-5 R2", b"G68 R30", b"G92 X0", b"G41 D1", b"G2 X1 R1", b"#100=1"),
-    "fanuc": (b"IF[#1EQ2]GOTO10", b"G65 P9000 A1", b"G68.2 X1 Y1 Z1 I1 J2 K3", b"G53.1", b"#101=#5041", b"M98 P100 L2"),
+    "iso": (b"G81 X1 Y1 Z-5 R2", b"G68 R30", b"G92 X0", b"G41 D1", b"G2 X1 R1", b"#100=1", b"/G55", b"/2 G0 Z9."),
+    "fanuc": (
+        b"IF[#1EQ2]GOTO10",
+        b"G65 P9000 A1",
+        b"G68.2 X1 Y1 Z1 I1 J2 K3",
+        b"G53.1",
+        b"#101=#5041",
+        b"M98 P100 L2",
+        b"/G55",
+        b"/2 G69",
+    ),
     "siemens": (
         *(b"TRANS X1", b"ROT RPL=30", b"CYCLE81(10,0,2,-5)", b"R1=R2*2", b"IF R1>2 GOTOF A", b"A:", b"MCALL CYCLE83("),
-        *(b'CYCLE800(1,"T",200000,57,20,-30,5,30,0,0,0,0,0,-1)', b"G2 CR=5 X1", b"G1 AP=30 RP=5", b"DEF REAL B"),
+        *(
+            b'CYCLE800(1,"T",200000,57,20,-30,5,30,0,0,0,0,0,-1)',
+            b"G2 CR=5 X1",
+            b"G1 AP=30 RP=5",
+            b"DEF REAL B",
+            b"/G500",
+            b"/1 AROT Z20",
+        ),
     ),
     "heidenhain": (
         *(b"CYCL DEF 200 DRILLING Q200=2 ~", b"Q201=-5", b"CALL LBL 1 REP 3", b"LBL 1", b"Q1 = Q2 * 3", b"CC X+1 Y+1"),
@@ -72,6 +90,8 @@ EXTRAS: Mapping[str, tuple[bytes, ...]] = {
             b"CP IPA+90 DR+",
             b"FN 9: IF +Q1 EQU +2 GOTO LBL 1",
             b"LN X+1 NX0.1",
+            b"/L Z+9 FMAX",
+            b"/CYCL DEF 7.1 X+3",
         ),
     ),
 }
@@ -167,13 +187,13 @@ def _program(language: str, text: bytes) -> None:
     traced(read(text, "part", get(language)), _machine("table"), _setup())
 
 
-def _corrected(language: str, text: bytes) -> None:
+def _corrected(language: str, text: bytes, name: str = "three") -> None:
     """Correct it, and let the second reader judge: where both follow it they must agree."""
-    program = read(text, "part", get(language))
-    fixed = fix_program(program, _machine("three"), _setup(), FixOptions(verify=False, allow_refused=True, force=True))
+    program, known = read(text, "part", get(language)), _machine(name)
+    fixed = fix_program(program, known, _setup(), FixOptions(verify=False, allow_refused=True, force=True))
     if b"ncfix" in text.lower():
         return
-    proof = prove(text, fixed.text, _machine("three"), GIVEN, language)
+    proof = prove(text, fixed.text, known, GIVEN, language)
     assert not proof.faults, f"{proof.faults[:3]}\n{fixed.text.decode('latin-1')}"
 
 
@@ -207,6 +227,8 @@ def _readers() -> Iterator[tuple[str, Reader]]:
         yield f"program.{language}", partial(_program, language)
         yield f"corrected.{language}", partial(_corrected, language)
         yield f"second.{language}", partial(_second, language)
+        for name in ("table", "play"):
+            yield f"{name}.{language}", partial(_corrected, language, name=name)
     yield "machine", lambda text: load_machine(text) and None
     yield "setup", lambda text: load_setup(text.decode("latin-1")) and None
     yield "measurement", lambda text: read_measurement(text, _machine("table")) and None
@@ -226,7 +248,11 @@ def seeds(reader: str) -> tuple[bytes, ...]:
     kind, _, language = reader.partition(".")
     if language:
         rng = random.Random(reader)
-        plain = [Writer(language, rng, bool(k % 2), False, {}, []).program(12) for k in range(4)]
+        turns = {"linuxcnc": "", "iso": "turned"}.get(language, "tilted" if kind == "table" else "turned")
+        plain = []
+        for k, length in enumerate((8, 8, 3, 3)):
+            five, frame = kind == "table" and k == 3, turns if k < 2 else ""
+            plain.append(Writer(language, rng, bool(k % 2), five, {}, [], frame).program(length))
         lines = EXTRAS[language]
         return tuple(plain + [_with(text, lines, rng) for text in plain])
     if kind in FILES:

@@ -18,8 +18,8 @@ from ncfix.machine import Machine
 
 SLACK = 3e-6
 """mm; numbers agree to that, apart from digits: the correction is solved to 1 nm."""
-FULL = 0.2
-"""mm within which commands are taken for those of a correction that turns rotary axes, too."""
+BACK = 1000
+"""Lines before one in which the word is looked for that brought an axis to its place."""
 WHOLE_TURN = 2 * math.pi - 1e-9
 """rad; an arc that turns farther is a full circle: it ends where it begins, which is right to the digit there only."""
 KEPT = 1000
@@ -43,7 +43,10 @@ class Expected:
     def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float = 1.0) -> None:
         self.first, self.second, self.given = first, second, given
         x, y, z = (a + b for a, b in zip(machine.workpiece_offset, given.workpiece_offset, strict=True))
-        self.machine = machine.replace(workpiece_offset=(x, y, z), conditions=dict(given.inputs))
+        placed = ((x, y, z), dict(given.inputs))
+        if placed != (machine.workpiece_offset, machine.conditions):  # else what the machine has worked out counts
+            machine = machine.replace(workpiece_offset=placed[0], conditions=placed[1])
+        self.machine = machine
         self.model = TipModel.of(self.machine)
         self.strategy = second.stamp.strategy if second.stamp else "rotary-then-linear"
         ours, theirs = (follower_of(text.family, machine.axis_names, given, self.model) for text in (first, second))
@@ -140,7 +143,11 @@ class Expected:
         turns = np.abs(self.ours.sweep[ours]) > WHOLE_TURN
         near[turns] = np.maximum(near[turns], self.tolerance)
         rapid = (self.ours.kind[ours] == Kind.RAPID) == (self.theirs.kind[theirs] == Kind.RAPID)
-        off = np.abs(self.their_ends[theirs] - self.expected[ours])
+        done, expected = self.their_ends[theirs], self.expected[ours]
+        if self.strategy == "full" and self.model is not None:
+            expected = self.model.aimed(*self.columns(ours), done)
+            expected = np.where(self.machine.rotary, self.our_ends[ours], expected)
+        off = np.abs(done - expected)
         there: Mask = rapid & ((off <= near) | ~self.ours.said[ours]).all(axis=1)
         return there
 
@@ -150,7 +157,7 @@ class Expected:
         if found is None:
             found = 3 * self.control_halves(unit) + SLACK
             if self.strategy == "full":
-                found = np.where(self.machine.rotary, self.machine.max_correction[1], FULL)
+                found = np.where(self.machine.rotary, self.machine.max_correction[1], found + self.tolerance)
             self._near[unit] = found
         return found
 
@@ -190,23 +197,46 @@ class Expected:
 
     # -- digits -----------------------------------------------------------------------------------------------------
 
-    def half_steps(self, step: AxisStep, added: bool = False) -> Array:
+    def half_steps(self, step: AxisStep, piece: AxisStep | None = None, *, added: bool = False) -> Array:
         """Half of the last digit of each axis, as it is written in a block, (n_axes,) mm and rad.
 
-        added  the number stands in an added line, which has the digits of the control only
+        piece  all that stands for the block: where a word of it was left as it is, the control's digits count, to which
+               the control rounds the number
+        added  the numbers stand in an added line, which has the digits of the control only
         """
-        at = np.array([self.ours.at[step.row]])
-        if added:
-            return self.along(self.control_halves(step.unit)[None], at)[0]
-        named = step.named
-        written = tuple(
-            named[name].decimals if name in named and named[name].value is not None else 0
-            for name in self.machine.axis_names
-        )
-        found = self._halves.get((step.unit, written))
-        if found is None:
-            found = self._halves[step.unit, written] = self.halves(np.array([step.unit]), np.array([written]))[0]
-        return self.along(found[None], at)[0]
+        found = self.control_halves(step.unit)
+        named = {name: word for name, word in step.named.items() if word.value is not None}
+        if not added:
+            written = tuple(named[name].decimals if name in named else 0 for name in self.machine.axis_names)
+            key = (step.unit, written)
+            if key not in self._halves:
+                self._halves[key] = self.halves(np.array([step.unit]), np.array([written]))[0]
+            found = self._halves[key]
+        if piece is not None:
+            found, coarse = found.copy(), self.control_halves(step.unit)
+            digits = self.control_digits(np.array([step.unit]))[0].tolist()
+            for k, name in enumerate(self.machine.axis_names):
+                if name in named and piece.named.get(name) == named[name]:
+                    value = named[name].value or 0.0
+                    rest = abs(value - round(value, digits[k]))
+                    found[k] = coarse[k] + rest * (math.pi / 180 if self.machine.rotary[k] else step.unit)
+        return self.along(found[None], np.array([self.ours.at[step.row]]))[0]
+
+    def unrounded(self, step: AxisStep, piece: AxisStep) -> Array:
+        """How far the control rounds axes that the last line for a block does not name, (n_axes,) mm and rad.
+
+        That is where the word that brought an axis to its place has more digits than the control.
+        """
+        digits = self.control_digits(np.array([piece.unit]))[0].tolist()
+        found = self.control_halves(piece.unit).copy()
+        for k, name in enumerate(self.machine.axis_names):
+            rows = range(piece.row - 1, max(piece.row - BACK, 0), -1)
+            word = piece.named.get(name) or next(
+                (word for row in rows if (word := self.second.lines[row].word(name))), None
+            )
+            if name in piece.named or word is None or word.decimals <= digits[k]:
+                found[k] = 0.0
+        return self.along(found[None], np.array([self.ours.at[step.row]]))[0]
 
     def along(self, numbers: Array, at: Indices) -> Array:
         """How far off numbers of X Y Z (k, n_axes) of steps (k,), which may be turned, lead commands at most."""

@@ -373,22 +373,18 @@ class Prover(Deviations):
         loose = full or any(row in self.polar for row in range(pair.first, pair.last + 1))
         loose = loose or abs(step.sweep) > WHOLE_TURN
         if not said.all() and self._changed(pair):
-            most = self.half_steps(step, True) + np.where(rotary, TURNED, AS_IF)
+            most = self.half_steps(step, added=True) + np.where(rotary, TURNED, AS_IF)
             return (UNSAID, True) if loose or (off <= most).all() else (OFF.format(*self.worst(off, most)), False)
         anew = self.first.family is Family.KLARTEXT and step.kind is Kind.ARC  # a C or CP may have become a CR
-        halves = self.half_steps(step, anew or len(pieces) > 1)
-        if len(pieces) == 1:  # less than a digit of the control is left out
-            left = [
-                name in step.named and pieces[0].named.get(name) == step.named[name] for name in self.machine.axis_names
-            ]
-            halves = np.where(left if step.turn is None else all(left), self.half_steps(step, True), halves)
+        whole = pieces[0] if len(pieces) == 1 else None
+        halves = self.half_steps(step, whole, added=anew or whole is None)
         allowed = halves * 1.002 + np.where(rotary, TURNED, self.tolerance if loose else SLACK)
         added = np.where(said & ~rotary, np.abs(done - meant), 0.0)
-        if (off > allowed).any():
+        if (off > allowed).any() and (off > allowed + self.unrounded(step, pieces[-1])).any():
             if not self._changed(pair):
                 return LEFT, True
             return OFF.format(*self.worst(off, allowed)), False
-        if (added > self.machine.max_correction[0] + self.half_steps(step, True)).any():
+        if (added > self.machine.max_correction[0] + self.half_steps(step, added=True)).any():
             return "a correction is larger than the machine file allows", False
         low, high = self.machine.ranges.T
         inside, there = meant, done
