@@ -193,22 +193,26 @@ class QParameters:
     """The Q parameters; QL parameters belong to one program, the others to all.
 
     values   those that the program has set, or the setup gives
+    read     those that the program has read or measured, so that no setup gives them
     changes  how often a parameter has got another value
     """
 
     values: dict[str, Value] = field(default_factory=dict)
+    read: set[str] = field(default_factory=set)
     changes: int = 0
 
     def get(self, name: str) -> Value:
         """The value of a parameter; one that was never set is unknown."""
-        value = self.values.get(name, Unknown(name))
-        return Unknown(name, value.nominal) if isinstance(value, Unknown) else value
+        return self.values.get(name, Unknown(name))
 
     def assign(self, name: str, value: Value) -> None:
         """Set a parameter."""
         unknown, number = isinstance(value, Unknown), nominal(value)
         self.changes += name not in self.values or nominal(self.values[name]) != number or unknown
-        self.values[name] = Unknown(name, number) if unknown else number
+        self.values[name] = number
+        if isinstance(value, Unknown):
+            self.read |= set() if value.why else {name}
+            self.values[name] = Unknown(value.why or name, number)
 
     def enter(self) -> dict[str, Value]:
         """A program is called: it has QL parameters of its own. Returns those of the caller, for `leave`."""

@@ -247,6 +247,22 @@ def test_where_the_control_would_stop(body: str, code: str) -> None:
     assert error.value.messages[0].place.line >= 2
 
 
+@pytest.mark.parametrize(
+    ("set_by", "hint"),
+    [
+        ("", 'variables."Q5" in the setup file'),
+        ("Q5 = Q9 + 1", 'variables."Q9" in the setup file'),
+        ("Q5 = Q5 + 1", 'variables."Q5" in the setup file'),
+        ("FN 18: SYSREAD Q5 = ID990 NR6", "the program reads or measures it"),
+        ("FN 18: SYSREAD Q9 = ID990 NR6\nQ5 = Q9 + 1", "the program reads or measures it"),
+    ],
+)
+def test_what_decides_a_jump_is_named_by_what_it_comes_from(set_by: str, hint: str) -> None:
+    with pytest.raises(SourceError) as error:
+        follow(f"{set_by}\nFN 9: IF +Q5 EQU +1 GOTO LBL 1\nLBL 1")
+    assert error.value.messages[0].hint.startswith(hint)
+
+
 def test_holes() -> None:
     body = "CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=10\nL Z+50 FMAX\nL X+10 Y+20 FMAX M99\n"
     body += "L IX+5 M89\nL IX+5\nL IX+5 M99\nL IX+5"
