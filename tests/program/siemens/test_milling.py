@@ -89,6 +89,7 @@ def test_how_it_is_written(body: str, expected: str) -> None:
         (f"{POCKET}\nG1 X5 F100", "after a cycle"),
         (f"FOR R1=1 TO 2\n{POCKET.replace(',20,', ',20*R1,')}\nENDFOR", "several states"),
         ('CYCLE72("CONTOUR",40,0,1,-10,5,0,0,1000,200,11,41,1,5,200,1,5)', "the control makes up"),
+        ("CYCLE899(40,0,1,-10,50,20,5,6,0,4,2,0,0,500,0,11,0,1,10)", "the control makes up"),
     ],
 )
 def test_what_is_refused(body: str, why: str) -> None:
