@@ -34,13 +34,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
-from ncfix.diagnosis.forms import EffectForm, shape_variations, side_by_side
+from ncfix.diagnosis.forms import EffectForm, shape_variations
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse
 from ncfix.measure.measurement import Array, Index
@@ -120,7 +121,9 @@ class Background:
 
 def in_noise(covariance: Array, relative: Array) -> Array:
     """A covariance (m, m) in units of each value's noise; `relative` (m,)."""
-    return covariance / relative[:, None] / relative
+    scaled = covariance / relative[:, None]
+    scaled /= relative
+    return scaled
 
 
 def marginal(squares: float, log_determinant: float, count: int, freedom: float) -> float:
@@ -180,7 +183,7 @@ class Evidence:
     groups: tuple[EffectForm, ...]
     named: int
     most: int = len(SHARES)
-    columns: Array = field(init=False)
+    columns: NDArray[np.float32] = field(init=False)
     bounds: Array = field(init=False)
     y: Array = field(init=False)
     forms: dict[str, list[int]] = field(init=False)
@@ -193,12 +196,13 @@ class Evidence:
 
     def __post_init__(self) -> None:
         """Carry everything into the coordinates, once."""
-        self.bounds = np.concatenate([[0], np.cumsum([group.columns.shape[1] for group in self.groups])])
-        seen = np.empty((int(self.bounds[-1]), self.background.rotation.shape[1]))
+        self.bounds = np.concatenate([[0], np.cumsum([group.width for group in self.groups])])
+        rotation = (self.background.rotation / self.background.sigma).astype(np.float32)
+        seen = np.empty((int(self.bounds[-1]), rotation.shape[1]), dtype=np.float32)
         for start in range(0, len(self.groups), TOGETHER):
             some = self.groups[start : start + TOGETHER]
             part = slice(int(self.bounds[start]), int(self.bounds[start + len(some)]))
-            seen[part] = self.background.seen(side_by_side(group.columns for group in some)).T
+            np.matmul(np.concatenate([group.single.T for group in some]), rotation, out=seen[part])
         self.columns = seen.T
         self.y = self.background.seen(self.background.data.y)
         self.forms = {}
@@ -215,6 +219,18 @@ class Evidence:
         """Where a group's columns are."""
         return slice(int(self.bounds[index]), int(self.bounds[index + 1]))
 
+    def own(self, index: int) -> Array:
+        """A group's columns, (n, w)."""
+        return self.columns[:, self.part(index)].astype(np.float64)
+
+    def across(self, others: Array) -> Array:
+        """The inner products of some columns (n, k) with those of all groups, (k, p)."""
+        found = np.empty((others.shape[1], self.columns.shape[1]))
+        for start in range(0, len(self.groups), TOGETHER):
+            part = slice(self.bounds[start], self.bounds[min(start + TOGETHER, len(self.groups))])
+            np.matmul(others.T, self.columns[:, part].astype(np.float64), out=found[:, part])
+        return found
+
     def candidate_odds(self, members: Sequence[Member], beside: Array | None = None) -> CandidateOdds:
         """The odds of all groups beside these members, at their likeliest share of the background.
 
@@ -225,17 +241,13 @@ class Evidence:
         factor, own = self._solved(members, beside, share)
         across = [m.size * self._products(share, m.group) for m in members]
         if beside is not None:
-            across.append((beside / self.background.variance(share)[:, None]).T @ self.columns)
+            across.append(self.across(beside / self.background.variance(share)[:, None]))
         taken = np.concatenate([np.zeros((0, self.columns.shape[1])), *across])
         taken = solve_triangular(factor, taken, lower=True, check_finite=False)
         total, count = inner.squares - float(own @ own) + freedom, len(self.y) + freedom
         projected = inner.projected - taken.T @ own
         sizes = self.background.data.sizes
-        odds = np.empty((len(self.groups), len(sizes)))
-        for groups, places, blocks in self._blocks(share):
-            lost = np.moveaxis(taken[:, places], 0, 1)
-            odds[groups] = log_odds(blocks - np.swapaxes(lost, 1, 2) @ lost, projected[places], total, count, sizes)
-        return CandidateOdds(odds, sizes)
+        return CandidateOdds(block_odds(self._blocks(share), projected, taken, total, count, sizes), sizes)
 
     def likelihood(self, members: Sequence[Member], beside: Array | None = None) -> float:
         """Log likelihood of the data with these members there and no others, whatever the share of the background."""
@@ -295,8 +307,8 @@ class Evidence:
             weighed, last = beside / self.background.variance(share)[:, None], places[-1]
             seen[last] = weighed.T @ self.y
             whole[last, last] += beside.T @ weighed
-            for own, part, size in zip(places, parts, sizes, strict=False):
-                whole[last, own] = size * weighed.T @ self.columns[:, part]
+            for own, member, size in zip(places, members, sizes, strict=False):
+                whole[last, own] = size * weighed.T @ self.own(member.group)
         return whole, seen
 
     def strength(self, group: int, share: float) -> Array:
@@ -308,16 +320,14 @@ class Evidence:
         """The inner products of a group's columns with all, (w, p); computed once."""
         key = share, group
         if key not in self.products:
-            weighed = self.columns[:, self.part(group)] / self.background.variance(share)[:, None]
-            self.products[key] = weighed.T @ self.columns
+            self.products[key] = self.across(self.own(group) / self.background.variance(share)[:, None])
         return self.products[key]
 
     def _pair(self, share: float, first: int, second: int) -> Array:
         """The inner products of two groups' columns, (v, w); computed once."""
         key = share, first, second
         if key not in self.pairs:
-            weighed = self.columns[:, self.part(second)] / self.background.variance(share)[:, None]
-            self.pairs[key] = self.columns[:, self.part(first)].T @ weighed
+            self.pairs[key] = self.own(first).T @ (self.own(second) / self.background.variance(share)[:, None])
         return self.pairs[key]
 
     def _inner(self, share: float) -> DataProducts:
@@ -325,20 +335,16 @@ class Evidence:
         if share not in self.inner:
             variance = self.background.variance(share)
             weighed = self.y / variance
-            self.inner[share] = DataProducts(
-                self.columns.T @ weighed, float(self.y @ weighed), float(np.log(variance).sum())
-            )
+            projected = self.across(weighed[:, None])[0]
+            self.inner[share] = DataProducts(projected, float(self.y @ weighed), float(np.log(variance).sum()))
         return self.inner[share]
 
     def _blocks(self, share: float) -> Blocks:
         """The inner products of all groups with themselves; computed once."""
         if share not in self.blocks:
-            variance, self.blocks[share] = self.background.variance(share), []
-            for alike in self._by_width().values():
-                places = np.array([range(self.part(k).start, self.part(k).stop) for k in alike], dtype=np.int64)
-                own = [self.columns[:, self.part(k)] for k in alike]
-                products = np.stack([columns.T / variance @ columns for columns in own])
-                self.blocks[share].append((np.asarray(alike), places.reshape(len(alike), -1), products))
+            variance = self.background.variance(share)
+            own = map(self.own, range(len(self.groups)))
+            self.blocks[share] = blocks_of([columns.T / variance @ columns for columns in own])
         return self.blocks[share]
 
     def numbers(self, members: Sequence[Member], share: float) -> list[Array]:
@@ -347,7 +353,7 @@ class Evidence:
             return []
         factor, own = self._solved(members, None, share)
         found = solve_triangular(factor, own, lower=True, trans="T", check_finite=False)
-        widths = [self.groups[m.group].columns.shape[1] for m in members]
+        widths = [self.groups[m.group].width for m in members]
         parts = np.split(found, np.cumsum(widths)[:-1])
         return [m.size * part for m, part in zip(members, parts, strict=True)]
 
@@ -356,11 +362,36 @@ class Evidence:
         numbers = self.numbers(members, share)
         return [self.groups[m.group].columns @ own for m, own in zip(members, numbers, strict=True)]
 
-    def _by_width(self) -> dict[int, list[int]]:
-        widths: dict[int, list[int]] = {}
-        for index, width in enumerate(np.diff(self.bounds).tolist()):
-            widths.setdefault(width, []).append(index)
-        return widths
+
+def blocks_of(products: Sequence[Array]) -> Blocks:
+    """The inner products (w, w) of each group's columns with themselves, those of one width together."""
+    bounds = [0, *accumulate(len(each) for each in products)]
+    widths: dict[int, list[int]] = {}
+    for group, own in enumerate(products):
+        widths.setdefault(len(own), []).append(group)
+    return [
+        (
+            np.asarray(alike),
+            np.add.outer([bounds[k] for k in alike], np.arange(w)),
+            np.stack([products[k] for k in alike]),
+        )
+        for w, alike in widths.items()
+    ]
+
+
+def block_odds(
+    blocks: Blocks, projected: Array, taken: Array, total: float, count: float, sizes: Sequence[float]
+) -> Array:
+    """Log odds of every group in every size, (groups, sizes).
+
+    projected  (p,) inner products of all columns with the data; taken (k, p): of the inner products of columns taken'
+               taken is gone to what is there besides; total, count: as in `log_odds`
+    """
+    odds = np.empty((sum(len(groups) for groups, _, _ in blocks), len(sizes)))
+    for groups, places, inner in blocks:
+        lost = np.moveaxis(taken[:, places], 0, 1)
+        odds[groups] = log_odds(inner - np.swapaxes(lost, 1, 2) @ lost, projected[places], total, count, sizes)
+    return odds
 
 
 def log_odds(inner: Array, projected: Array, total: float, count: float, sizes: Sequence[float]) -> Array:

@@ -25,6 +25,7 @@ from itertools import accumulate, combinations, pairwise, product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.diagnosis.catalogue import Candidate
 from ncfix.diagnosis.catalogue.candidate import (
@@ -56,6 +57,8 @@ HOLD_POINTS = tuple(product((-0.5, 0.5), repeat=3))
 """Where what grows is held, in times `view.FAR` its size: in the middle of each eighth of it."""
 HOLD_SPREAD = 0.5 / np.sqrt(3)
 """How far from there it may be, rms, in each direction."""
+TOGETHER = 32
+"""Candidates or forms whose columns are worked out at once: of all of them these would take much memory."""
 LEAD_SHARE = 0.5
 """Share of a tilt's squares that must be the tilt, not the shifts of a pivot elsewhere: else it has no lever here."""
 UNNAMED_FAMILY = "unnamed"
@@ -110,12 +113,28 @@ class EffectForm:
 
     owner     the candidate
     loading   (k, p) from p independent numbers to its coefficients, per um
-    columns   (m, p) what those show, um
+    single    (m, p) what those show, um; of thousands of them single precision is half of all memory, and rounds
+              far below what any instrument reads
     """
 
     owner: Candidate
     loading: Array
-    columns: Array
+    single: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, owner: Candidate, loading: Array, columns: Array) -> EffectForm:
+        """With these columns."""
+        return cls(owner, loading, columns.astype(np.float32))
+
+    @property
+    def columns(self) -> Array:
+        """(m, p) what the independent numbers show, um."""
+        return self.single.astype(np.float64)
+
+    @property
+    def width(self) -> int:
+        """How many independent numbers there are."""
+        return int(self.single.shape[1])
 
 
 @frozen(repr=False, slots=False)
@@ -131,10 +150,8 @@ def visible_forms(data: ResidualData, candidates: Sequence[Candidate]) -> Visibl
     basis = orthonormal(data.base / data.relative[:, None])
     groups: list[EffectForm] = []
     invisible = []
-    every = data.design([effect for candidate in candidates for effect in candidate.effects])
-    ends = np.cumsum([0, *(sum(effect.basis.size for effect in each.effects) for each in candidates)])
-    for candidate, start, stop in zip(candidates, ends[:-1], ends[1:], strict=True):
-        design, loadings = every[:, start:stop], candidate.loadings
+    for candidate, design in zip(candidates, _designs(data, [each.effects for each in candidates]), strict=True):
+        loadings = candidate.loadings
         if candidate.grows:
             design, loadings = data.expansion(candidate.effects), tuple(expansion_loadings(loadings))
         forms = [form for loading in loadings if (form := _form(data, candidate, loading, design)) is not None]
@@ -164,9 +181,10 @@ def changes(data: ResidualData, groups: Sequence[EffectForm], first: int) -> tup
     for group in groups:
         columns = np.where(later[:, None], group.columns, 0.0)
         size = data.size(columns)
-        if size > UNSEEN_UM and _visible_shares(data, basis, [replace(group, columns=columns)])[0] >= VISIBLE:
+        if size > UNSEEN_UM:
             owner = replace(group.owner, name=CHANGE + group.owner.name, title=CAME + group.owner.title, constant=False)
-            found.append(EffectForm(owner, group.loading / size, columns / size))
+            form = EffectForm.of(owner, group.loading / size, columns / size)
+            found += [form] if _visible_shares(data, basis, [form])[0] >= VISIBLE else []
     return tuple(found)
 
 
@@ -181,12 +199,17 @@ def expansion_loadings(loadings: Sequence[Array]) -> Iterator[Array]:
             yield np.hstack([np.kron(np.array([[1.0], *([x] for x in place)]), course), about])
 
 
-def without_lacking_constants(data: ResidualData, columns: Array, named: Sequence[EffectForm]) -> Array:
-    """Columns without what constants that the machine file lacks would show: that is left to those."""
+def without_lacking_constants(
+    data: ResidualData, parts: Iterable[Array], named: Sequence[EffectForm]
+) -> Iterator[Array]:
+    """Columns (m, p) in parts without what constants that the machine file lacks would show: that is left to those."""
     constants = [group.columns for group in named if group.owner.constant]
     if not constants:
-        return columns
-    return columns - np.concatenate(constants, axis=1) @ data.shares(columns, constants)
+        yield from parts
+        return
+    own, shares = np.concatenate(constants, axis=1), data.shares(constants)
+    for columns in parts:
+        yield columns - own @ (shares @ columns)
 
 
 def _form(data: ResidualData, candidate: Candidate, loading: Array, design: Array) -> EffectForm | None:
@@ -197,7 +220,7 @@ def _form(data: ResidualData, candidate: Candidate, loading: Array, design: Arra
     if size < UNSEEN_UM or _lead_squares(candidate, loading, design) < LEAD_SHARE * float((columns**2).sum()):
         return None
     turned = principal_rotation(columns) / size
-    return EffectForm(candidate, loading @ turned, columns @ turned)
+    return EffectForm.of(candidate, loading @ turned, columns @ turned)
 
 
 def _lead_squares(candidate: Candidate, loading: Array, design: Array) -> float:
@@ -221,9 +244,9 @@ def side_by_side(parts: Iterable[Array]) -> Array:
     return np.concatenate([part.T for part in parts]).T
 
 
-def _ends(groups: Sequence[EffectForm]) -> list[int]:
+def column_bounds(groups: Sequence[EffectForm]) -> list[int]:
     """Where the columns of each begin and end, once they stand side by side."""
-    return [0, *accumulate(group.columns.shape[1] for group in groups)]
+    return [0, *accumulate(group.width for group in groups)]
 
 
 def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> list[float]:
@@ -232,7 +255,7 @@ def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectFor
         return []
     columns = np.concatenate([group.columns.T for group in groups]) / data.relative
     squares, hidden = np.einsum("ij,ij->i", columns, columns), ((columns @ basis) ** 2).sum(axis=1)
-    parts = [slice(start, stop) for start, stop in pairwise(_ends(groups))]
+    parts = [slice(start, stop) for start, stop in pairwise(column_bounds(groups))]
     return [float(1.0 - hidden[part].sum() / squares[part].sum()) for part in parts]
 
 
@@ -351,15 +374,15 @@ def combined_form(data: ResidualData, owner: Candidate, parts: Sequence[Array]) 
     whole = side_by_side(scaled)
     squares, vectors = np.linalg.eigh(whole.T @ whole)
     kept = np.cumsum(squares) > DROPPED * squares.sum()
-    return EffectForm(owner, np.zeros((0, int(kept.sum()))), whole @ vectors[:, kept])
+    return EffectForm.of(owner, np.zeros((0, int(kept.sum()))), whole @ vectors[:, kept])
 
 
 def _joint_forms(data: ResidualData) -> Iterator[EffectForm | None]:
     """Of every joint, by all it may depend on: its six errors with the same share each, and each alone."""
     sorts = [(axis, *sort) for axis in _moved(data.measured) for sort in _sorts(data.measured, axis)]
     parts = [part for _, _, components in sorts for component in components for part in component]
-    designs = _designs(data, [Effect(name, (), **options) for name, options, _ in parts])
-    shown = iter([design @ loading for design, (_, _, loading) in zip(designs, parts, strict=True)])
+    designs = _designs(data, [zero([Effect(name, (), **options)]) for name, options, _ in parts])
+    shown = (design @ loading for design, (_, _, loading) in zip(designs, parts, strict=True))
     for axis, what, components in sorts:
         own = [side_by_side([next(shown) for _ in component]) for component in components]
         yield combined_form(data, _something(axis, f"something of {axis.name}", what), own)
@@ -368,10 +391,13 @@ def _joint_forms(data: ResidualData) -> Iterator[EffectForm | None]:
             yield combined_form(data, replace(_something(axis, component[0][0], what), effects=effects), [part])
 
 
-def _designs(data: ResidualData, effects: Sequence[Effect]) -> list[Array]:
-    """What each effect's coefficients show."""
-    ends = np.cumsum([effect.basis.size for effect in effects])
-    return np.split(data.design(zero(effects)), ends[:-1], axis=1)
+def _designs(data: ResidualData, effects: Sequence[Sequence[Effect]]) -> Iterator[Array]:
+    """What the coefficients of each of several groups of effects show; of some groups at once."""
+    for start in range(0, len(effects), TOGETHER):
+        some = effects[start : start + TOGETHER]
+        every = data.design([effect for group in some for effect in group])
+        ends = accumulate(sum(effect.basis.size for effect in group) for group in some)
+        yield from np.split(every, list(ends)[:-1], axis=1)
 
 
 def _something(axis: Axis, error: str, what: str) -> Candidate:
@@ -438,11 +464,9 @@ def unnamed_alternatives(data: ResidualData, named: Sequence[EffectForm]) -> tup
     """
     anywhere = list(_smooth_fields(data))
     found = [group for group in (*anywhere, *(_joint_forms(data) if anywhere else ())) if group is not None]
-    if found and any(group.owner.constant for group in named):
-        columns = without_lacking_constants(data, side_by_side(group.columns for group in found), named)
-        ends = np.cumsum([group.columns.shape[1] for group in found])[:-1]
-        parts = np.split(columns, ends, axis=1)
-        found = [replace(group, columns=own) for group, own in zip(found, parts, strict=True)]
+    if any(group.owner.constant for group in named):
+        parts = without_lacking_constants(data, (group.columns for group in found), named)
+        found = [EffectForm.of(each.owner, each.loading, own) for each, own in zip(found, parts, strict=True)]
     return tuple(_not_in_catalogue(data, found, named))
 
 
@@ -454,8 +478,8 @@ def _not_in_catalogue(
     single = [(group, errors) for group in groups if (errors := _errors(group))]
     wanted = set().union(*(errors for _, errors in single))
     holding = [(group, errors) for group in named if (errors := _errors(group) & wanted)]
-    spans = [_span(left) for left in _beside(data, basis, [group for group, _ in holding])]
-    shown = _beside(data, basis, [group for group, _ in single])
+    spans = [_span(left).astype(np.float32) for left in _beside(data, basis, [group for group, _ in holding])]
+    shown = [left.astype(np.float32) for left in _beside(data, basis, [group for group, _ in single])]
     held: set[int] = set()
     for error in sorted(wanted):
         by = [span for span, (_, errors) in zip(spans, holding, strict=True) if error in errors and span.shape[1]]
@@ -466,12 +490,12 @@ def _not_in_catalogue(
     return [group for group in groups if id(group) not in same]
 
 
-def _beside(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> list[Array]:
+def _beside(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> Iterator[Array]:
     """What each form shows beside an orthonormal basis of what is free, in units of each value's noise."""
-    if not groups:
-        return []
-    columns = side_by_side(group.columns for group in groups) / data.relative[:, None]
-    return np.split(without(basis, columns), _ends(groups)[1:-1], axis=1)
+    for start in range(0, len(groups), TOGETHER):
+        some = groups[start : start + TOGETHER]
+        columns = side_by_side(group.columns for group in some) / data.relative[:, None]
+        yield from np.split(without(basis, columns), column_bounds(some)[1:-1], axis=1)
 
 
 def _span(columns: Array) -> Array:
@@ -482,11 +506,11 @@ def _span(columns: Array) -> Array:
     return orthonormal(columns)
 
 
-def _largest_shown(parts: Sequence[Array], by: Sequence[Array]) -> list[float]:
+def _largest_shown(parts: Sequence[NDArray[np.float32]], by: Sequence[NDArray[np.float32]]) -> list[float]:
     """Of the squares of each part those that one orthonormal basis can show, the largest."""
     if not by:
         return [0.0] * len(parts)
-    squares = (side_by_side(by).T @ side_by_side(parts)) ** 2
+    squares = (np.concatenate(by, axis=1).T @ np.concatenate(parts, axis=1)) ** 2
     rows = np.cumsum([0, *(each.shape[1] for each in by[:-1])])
     columns = np.cumsum([0, *(each.shape[1] for each in parts[:-1])])
     found: list[float] = np.add.reduceat(np.add.reduceat(squares, rows), columns, axis=1).max(axis=0).tolist()

@@ -18,17 +18,29 @@ How large the noise is, from what, and whether anything is left beyond it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, eigh, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
-from ncfix.diagnosis.evidence import MISSHAPEN, TOGETHER, Background, entry_price, in_noise, log_odds, marginal
+from ncfix.diagnosis.evidence import (
+    MISSHAPEN,
+    TOGETHER,
+    Background,
+    Blocks,
+    block_odds,
+    blocks_of,
+    entry_price,
+    in_noise,
+    marginal,
+)
 from ncfix.diagnosis.forms import (
     EffectForm,
+    column_bounds,
     shape_variations,
     side_by_side,
     without_lacking_constants,
@@ -85,16 +97,17 @@ class Contrasts:
     vectors: Array
     joined: Array
 
-    @property
-    def columns(self) -> Array:
-        """The basis itself, (m, n)."""
-        m, k = self.vectors.shape
-        return np.eye(m, m - k, -k) - self.vectors @ (self.joined @ self.vectors[k:].T)
-
     def seen(self, values: Array) -> Array:
         """Columns of values (m, p) as contrasts, (n, p); far quicker by a few reflections."""
         k = self.vectors.shape[1]
         return values[k:] - self.vectors[k:] @ (self.joined.T @ (self.vectors.T @ values))
+
+    def values(self, contrasts: Array) -> Array:
+        """Columns of values (m, p) that have these contrasts (n, p) and nothing of the base."""
+        k = self.vectors.shape[1]
+        found = -self.vectors @ (self.joined @ (self.vectors[k:].T @ contrasts))
+        found[k:] += contrasts
+        return found
 
     def of(self, covariance: Array) -> Array:
         """The covariance (m, m) of values as one of contrasts, (n, n)."""
@@ -120,33 +133,34 @@ def everything_covariance(data: ResidualData, named: Sequence[EffectForm]) -> Ar
 
     But nothing of the constants that the machine file lacks: those are looked for, not taken for granted.
     """
-    columns = without_lacking_constants(
-        data, _everything(named, [group.columns for group in named], len(data.y)), named
-    )
-    return columns @ columns.T
+    covariance, parts = np.zeros((len(data.y), len(data.y))), _everything(named, (group.columns for group in named))
+    for columns in without_lacking_constants(data, parts, named):
+        covariance += columns @ columns.T
+    return covariance
 
 
 def everything_at(data: ResidualData, named: Sequence[EffectForm], ahead: Sequence[Array]) -> tuple[Array, Array]:
     """The same of v values at further poses, of which each form shows `ahead` (v, p) um: (v, v), and with the old
     values, (v, m).
     """
-    new = _everything(named, ahead, len(ahead[0]) if ahead else 0)
-    old = _everything(named, [group.columns for group in named], len(data.y))
+    new = side_by_side([np.zeros((len(ahead[0]) if ahead else 0, 0)), *_everything(named, ahead)])
+    old = side_by_side([np.zeros((len(data.y), 0)), *_everything(named, (group.columns for group in named))])
     lacking = [k for k, group in enumerate(named) if group.owner.constant]
     if lacking:
         constants = [named[k].columns for k in lacking]
-        shares = data.shares(old, constants)
+        shares = data.shares(constants) @ old
         old = old - np.concatenate(constants, axis=1) @ shares
         new = new - np.concatenate([ahead[k] for k in lacking], axis=1) @ shares
     return new @ new.T, new @ old.T
 
 
-def _everything(named: Sequence[EffectForm], shown: Sequence[Array], count: int) -> Array:
-    """Columns (count, p) of a little of every name: what each form shows, each name with the same share."""
-    kept = [(group, own) for group, own in zip(named, shown, strict=True) if not group.owner.constant]
-    forms = Counter(group.owner.name for group, _ in kept)
-    parts = [own / np.sqrt(forms[group.owner.name] * len(forms)) for group, own in kept]
-    return side_by_side([np.zeros((count, 0)), *parts])
+def _everything(named: Sequence[EffectForm], shown: Iterable[Array]) -> Iterator[Array]:
+    """Columns (count, p) of a little of every name, in parts: what each form shows, each name with the same share."""
+    forms = Counter(group.owner.name for group in named if not group.owner.constant)
+    kept = ((group.owner, own) for group, own in zip(named, shown, strict=True) if not group.owner.constant)
+    parts = (own / np.sqrt(forms[owner.name] * len(forms)) for owner, own in kept)
+    while some := list(islice(parts, TOGETHER)):
+        yield side_by_side(some)
 
 
 def estimated_background(
@@ -155,20 +169,16 @@ def estimated_background(
     """Estimate how much the instrument wanders, where these names may act besides, and find the coordinates."""
     sigma, freedom = _noise(data)
     free = error_contrasts(data.base / relative[:, None])
-    left = free.columns
-    slow, drift = _drift_correlation(data, relative), 0.0
     inner = free.of(in_noise(everything, relative))
+    slow, drift, noise = _drift_correlation(data, relative), 0.0, None
     if slow is not None:
         seen = free.of(slow)
         drift = _likeliest_drift(
             DriftLikelihood(free, sigma * relative, data.y, inner, seen, freedom), named, data.sizes
         )
-    if drift:
-        factor = np.linalg.cholesky(np.eye(left.shape[1]) + drift**2 * seen)
-        left = solve_triangular(factor, left.T, lower=True).T
-        inner = solve_triangular(factor, solve_triangular(factor, inner, lower=True).T, lower=True)
-    spectrum, vectors = eigh(inner, driver="evd")
-    rotation = (left @ vectors) / relative[:, None]
+        noise = np.eye(len(seen)) + drift**2 * seen if drift else None
+    spectrum, vectors = eigh(inner, noise, driver="evd" if noise is None else "gvd", overwrite_a=True, overwrite_b=True)
+    rotation = free.values(vectors) / relative[:, None]
     return Background(data, relative, rotation, np.maximum(spectrum, 0.0), sigma, freedom, drift, everything, slow)
 
 
@@ -197,7 +207,7 @@ class DriftLikelihood:
     scale       (m,) standard deviations of the values, um
     y           (m,) the values, um
     everything  (n, n) covariance of a little of everything at 1 um; slow: of the wandering at the size of the noise
-    freedom     of what is known of the noise; factors of the covariances, each computed once
+    freedom     of what is known of the noise
     """
 
     free: Contrasts
@@ -206,29 +216,26 @@ class DriftLikelihood:
     everything: Array
     slow: Array
     freedom: float
-    factors: dict[float, Array] = field(default_factory=dict)
 
     def likelihood(self, size: float) -> float:
         """Log likelihood of the data with a wandering of this size, that of the noise integrated out."""
-        white = self.white(size, self.seen([self.y]))[:, 0]
-        determinant = 2 * float(np.log(np.diag(self._factor(size))).sum())
-        return marginal(float(white @ white), determinant, len(white), self.freedom)
+        white, determinant = self.white(size, [])
+        return marginal(float(white[:, 0] @ white[:, 0]), determinant, len(white), self.freedom)
 
-    def white(self, size: float, seen: Array) -> Array:
-        """Contrasts of values (n, p) where noise, everything and such a wandering are one."""
-        white: Array = solve_triangular(self._factor(size), seen, lower=True, check_finite=False)
-        return white
-
-    def seen(self, columns: Sequence[Array]) -> Array:
-        """Contrasts of columns of values, one beside the other, in units of each value's noise, (n, p)."""
-        return self.free.seen(np.column_stack(columns) / self.scale[:, None])
-
-    def _factor(self, size: float) -> Array:
-        if size not in self.factors:
-            covariance = EVERYTHING_SHARE**2 * self.everything + size**2 * self.slow
-            covariance[np.diag_indices_from(covariance)] += 1.0
-            self.factors[size] = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
-        return self.factors[size]
+    def white(self, size: float, groups: Sequence[EffectForm]) -> tuple[Array, float]:
+        """Contrasts of the data and of the columns of some forms, in units of each value's noise, where noise,
+        everything and such a wandering are one, (n, 1 + p); and the log determinant of the covariance of these.
+        """
+        covariance = size**2 * self.slow
+        covariance += EVERYTHING_SHARE**2 * self.everything
+        covariance[np.diag_indices_from(covariance)] += 1.0
+        factor = cholesky(covariance.T, lower=True, overwrite_a=True, check_finite=False)
+        seen = np.empty((len(covariance), 1 + column_bounds(groups)[-1]), order="F")
+        seen[:, :1] = self.free.seen(self.y[:, None] / self.scale[:, None])
+        for group, (start, stop) in zip(groups, pairwise(column_bounds(groups)), strict=True):
+            seen[:, 1 + start : 1 + stop] = self.free.seen(group.columns / self.scale[:, None])
+        white = solve_triangular(factor, seen, lower=True, overwrite_b=True, check_finite=False)
+        return np.asarray(white), 2 * float(np.log(np.diag(factor)).sum())
 
 
 def _likeliest_drift(asked: DriftLikelihood, named: Sequence[EffectForm], sizes: Sequence[float]) -> float:
@@ -236,9 +243,9 @@ def _likeliest_drift(asked: DriftLikelihood, named: Sequence[EffectForm], sizes:
     plain = [asked.likelihood(size) for size in DRIFT_SIZES]
     most = int(np.argmax(plain)) + 1
     courses = [group for group in named if group.owner.slow]
-    seen = asked.seen([asked.y, *(group.columns for group in courses)]) if most > 1 else np.zeros((0, 1))
-    whites = (asked.white(size, seen) for size in DRIFT_SIZES[:most] if most > 1)
-    beside = [_beside_names(white, asked.freedom, courses, named, sizes) for white in whites] or [(0.0, 0.0)]
+    wandering = DRIFT_SIZES[:most] if most > 1 else ()
+    beside = [_beside_names(asked.white(size, courses)[0], asked.freedom, courses, named, sizes) for size in wandering]
+    beside = beside or [(0.0, 0.0)]
     best = int(np.argmax([own + gained for own, (gained, _) in zip(plain, beside, strict=False)]))
     missed = MISSHAPEN * beside[best][1] / float(np.median(asked.scale))
     return max(size for size in DRIFT_SIZES[:most] if size <= max(DRIFT_SIZES[best], missed))
@@ -252,42 +259,28 @@ def _beside_names(
     """
     forms = Counter(group.owner.name for group in named)
     prices = np.log([len(forms) * forms[group.owner.name] * len(sizes) for group in courses])
-    ends = np.cumsum([0, *(group.columns.shape[1] for group in courses)])
-    gained, shown = 0.0, 0.0
+    ends = column_bounds(courses)
+    y, columns, length = white[:, 0], white[:, 1:], len(white) + freedom
+    inner = blocks_of([part.T @ part for part in np.split(columns, ends[1:-1], axis=1)]) if courses else []
+    gained, shown, beside = 0.0, 0.0, np.zeros((len(y), 0))
     for count in range(1, MOST_COURSES + 1 if courses else 1):
-        y, columns = white[:, 0], white[:, 1:]
-        odds = _odds(columns, columns, y, float(y @ y) + freedom, len(y) + freedom, ends, sizes) - prices[:, None]
+        less = _taken(beside, beside)
+        left = y - less @ (less.T @ y)
+        odds = block_odds(inner, columns.T @ left, less.T @ columns, float(y @ left) + freedom, length, sizes)
+        odds -= prices[:, None]
         best, large = (int(k) for k in np.unravel_index(int(odds.argmax()), odds.shape))
         helped = float(odds[best, large]) - entry_price(count) + entry_price(count - 1)
         if helped <= 0:
             break
         gained, shown = gained + helped, max(shown, sizes[large])
-        white = _beside(white, sizes[large] * columns[:, ends[best] : ends[best + 1]])
+        beside = np.concatenate([beside, sizes[large] * columns[:, ends[best] : ends[best + 1]]], axis=1)
     return gained, shown
 
 
-def _odds(
-    columns: Array, weighed: Array, y: Array, total: float, count: float, ends: Array, sizes: Sequence[float]
-) -> Array:
-    """The log odds of every form in every size, (forms, sizes), for values y (n,) of `total` squares.
-
-    columns  (n, p) of the forms, one beside the other, which begin and end at `ends`; weighed: the same times the
-             inverse of the covariance
-    """
-    widths = np.diff(ends)
-    found = np.empty((len(widths), len(sizes)))
-    for width in np.unique(widths):
-        alike = np.flatnonzero(widths == width)
-        own, other = (np.stack([each[:, ends[k] : ends[k + 1]].T for k in alike]) for each in (columns, weighed))
-        found[alike] = log_odds(own @ np.swapaxes(other, 1, 2), other @ y, total, count, sizes)
-    return found
-
-
-def _beside(white: Array, there: Array) -> Array:
-    """The same, white where these columns are there at unit size besides."""
-    own, sizes, _ = np.linalg.svd(there, full_matrices=False)
-    less: Array = white - own @ ((1 - 1 / np.sqrt(1 + sizes**2))[:, None] * (own.T @ white))
-    return less
+def _taken(weighed: Array, columns: Array) -> Array:
+    """A (m, k): beside columns (m, k) that are there at unit size, `weighed` by a precision, that is less by A A'."""
+    factor = cholesky(np.eye(columns.shape[1]) + columns.T @ weighed, lower=True, check_finite=False)
+    return np.asarray(solve_triangular(factor, weighed.T, lower=True, check_finite=False).T)
 
 
 def downweighted(
@@ -297,38 +290,92 @@ def downweighted(
 
     `everything` is the covariance of a little of everything, um^2; `groups` are all effects that may be there.
     """
-    there = GENEROUS_SHARE**2 * in_noise(everything, data.relative)
-    z = np.abs(leave_one_out(data, there))
+    plain = PlainModel.of(data, everything)
+    beside = np.zeros((len(data.y), 0))
+    z = np.abs(plain.leave_one_out(beside))
     for _ in range(MOST_EFFECTS):
         few = _standing_out(data, z).mean() <= FAILED
-        offered = [group for group in groups if group.owner.dynamic] if few else groups
-        effect = _likeliest_effect(data, there, np.maximum(1.0, z / TAIL), offered) if len(offered) else None
+        effect = plain.likeliest_effect(groups, few, beside, np.maximum(1.0, z / TAIL))
         if effect is None:
             break
-        there = there + effect @ effect.T
-        z = np.abs(leave_one_out(data, there))
+        beside = np.concatenate([beside, effect], axis=1)
+        z = np.abs(plain.leave_one_out(beside))
     gross, row = _standing_out(data, z), data.row
     relative = data.relative * np.maximum(1.0, z / TAIL)
     return np.where((row >= 0) & gross[np.maximum(row, 0)], ASIDE * data.relative, relative), gross
 
 
-def leave_one_out(data: ResidualData, there: Array) -> Array:
-    """For every value: what it is, minus what all others predict of it, over its standard deviation; (m,).
+@frozen(repr=False, slots=False)
+class PlainModel:
+    """The base, noise and a generous amount of everything; what is there besides enters by its columns.
 
-    `there` is the covariance of what is there besides noise and base, in units of each value's noise, (m, m).
+    y          (m,) the values, in units of each value's noise, as all that follows
+    precision  (m, m) the inverse of the covariance with the base free
+    inner      with it, of forms, or of those that drives may show, from some number on, each computed once
     """
-    precision = _precision(data, np.eye(len(there)) + there)
-    z = precision @ (data.y / data.relative) / np.sqrt(np.maximum(np.diag(precision), 1e-12))
-    spread = float(np.median(np.abs(z))) / 0.6745
-    return z / (spread or 1.0)
 
+    data: ResidualData
+    y: Array
+    precision: Array
+    inner: dict[tuple[bool, int], Blocks] = field(default_factory=dict)
 
-def _precision(data: ResidualData, covariance: Array) -> Array:
-    """The inverse of a covariance in units of each value's noise, with the base free, (m, m)."""
-    base = orthonormal(data.base / data.relative[:, None])
-    precision = inverse(covariance)
-    solved = precision @ base
-    return np.asarray(precision - solved @ np.linalg.solve(base.T @ solved, solved.T), dtype=np.float64)
+    @classmethod
+    def of(cls, data: ResidualData, everything: Array) -> PlainModel:
+        """With everything's covariance (m, m) at 1 um, um^2."""
+        base = orthonormal(data.base / data.relative[:, None])
+        precision = inverse(np.eye(len(data.y)) + GENEROUS_SHARE**2 * in_noise(everything, data.relative))
+        solved = precision @ base
+        precision -= solved @ np.linalg.solve(base.T @ solved, solved.T)
+        return cls(data, data.y / data.relative, precision)
+
+    def less(self, beside: Array) -> Array:
+        """A (m, k): beside columns (m, k) that are there at unit size the precision is less by A A'."""
+        return _taken(self.precision @ beside, beside)
+
+    def leave_one_out(self, beside: Array) -> Array:
+        """For every value: what it is, minus what all others predict of it, over its standard deviation; (m,)."""
+        less = self.less(beside)
+        solved = self.precision @ self.y - less @ (less.T @ self.y)
+        z = solved / np.sqrt(np.maximum(np.diag(self.precision) - (less**2).sum(axis=1), 1e-12))
+        spread = float(np.median(np.abs(z))) / 0.6745
+        return np.asarray(z / (spread or 1.0))
+
+    def likeliest_effect(self, groups: Sequence[EffectForm], dynamic: bool, beside: Array, wide: Array) -> Array | None:
+        """The likeliest effect of all, or of what drives may show, in its likeliest size, and what it may differ in
+        shape: columns (m, k); None if none is likely.
+
+        Values count less as their noise is `wide`: what stands out for other reasons shall not bring an effect.
+        """
+        some = [group for group in groups if group.owner.dynamic or not dynamic]
+        doubtful = np.flatnonzero(wide > 1)
+        spoilt = np.zeros((len(wide), len(doubtful)))
+        spoilt[doubtful, np.arange(len(doubtful))] = np.sqrt(wide[doubtful] ** 2 - 1)
+        less = self.less(np.concatenate([beside, spoilt], axis=1))
+        solved = self.precision @ self.y - less @ (less.T @ self.y)
+        total, count = float(self.y @ solved), float(len(self.y) - self.data.base.shape[1])
+        best, found = LIKELY, None
+        for start in range(0, len(some), TOGETHER):
+            part = some[start : start + TOGETHER]
+            columns = LARGE * side_by_side(group.columns for group in part) / self.data.relative[:, None]
+            inner = self._inner(dynamic, start, columns, column_bounds(part))
+            odds = block_odds(inner, columns.T @ solved, less.T @ columns, total, count, self.data.sizes)
+            form, size = (int(k) for k in np.unravel_index(int(odds.argmax()), odds.shape))
+            if odds[form, size] > best:
+                own = column_bounds(part)[form : form + 2]
+                best, found = float(odds[form, size]), self.data.sizes[size] * columns[:, slice(*own)]
+        if found is None:
+            return None
+        weighed = self.precision @ found - less @ (less.T @ found)
+        shown = found @ np.linalg.solve(np.eye(found.shape[1]) + found.T @ weighed, weighed.T @ self.y)
+        return np.concatenate([found, MISSHAPEN * shown[:, None] * shape_variations(self.data)], axis=1)
+
+    def _inner(self, dynamic: bool, start: int, columns: Array, bounds: Sequence[int]) -> Blocks:
+        """Of the forms from number `start` on; computed once."""
+        key = dynamic, start
+        if key not in self.inner:
+            parts = (np.split(each, bounds[1:-1], axis=1) for each in (columns, self.precision @ columns))
+            self.inner[key] = blocks_of([own.T @ weighed for own, weighed in zip(*parts, strict=True)])
+        return self.inner[key]
 
 
 def _standing_out(data: ResidualData, z: Array) -> NDArray[np.bool_]:
@@ -336,30 +383,6 @@ def _standing_out(data: ResidualData, z: Array) -> NDArray[np.bool_]:
     gross = np.zeros(data.count, dtype=bool)
     gross[data.row[(z > GROSS) & (data.row >= 0)]] = True
     return gross
-
-
-def _likeliest_effect(data: ResidualData, there: Array, wide: Array, groups: Sequence[EffectForm]) -> Array | None:
-    """The likeliest effect in its likeliest size, and what it may differ in shape: columns in units of each value's
-    noise, (m, k); None if none is likely.
-
-    Values count less as their noise is `wide`: what stands out for other reasons shall not bring an effect.
-    """
-    precision, y = _precision(data, np.diag(wide**2) + there), data.y / data.relative
-    total, count = float(y @ precision @ y), float(len(y) - data.base.shape[1])
-    best, found = LIKELY, None
-    for start in range(0, len(groups), TOGETHER):
-        some = groups[start : start + TOGETHER]
-        columns = LARGE * side_by_side(group.columns for group in some) / data.relative[:, None]
-        ends = np.cumsum([0, *(group.columns.shape[1] for group in some)])
-        odds = _odds(columns, precision @ columns, y, total, count, ends, data.sizes)
-        form, size = (int(k) for k in np.unravel_index(int(odds.argmax()), odds.shape))
-        if odds[form, size] > best:
-            best, found = float(odds[form, size]), data.sizes[size] * columns[:, ends[form] : ends[form + 1]]
-    if found is None:
-        return None
-    solved = precision @ found
-    shown = found @ np.linalg.solve(np.eye(found.shape[1]) + found.T @ solved, solved.T @ y)
-    return np.concatenate([found, MISSHAPEN * shown[:, None] * shape_variations(data)], axis=1)
 
 
 @frozen(slots=False)

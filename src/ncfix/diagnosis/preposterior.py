@@ -63,7 +63,7 @@ def shown_at(new: Observation, groups: Sequence[EffectForm]) -> list[Array]:
     design = new.um[:, None] * new.design([effect for owner in owners.values() for effect in owner.effects])
     ends = np.cumsum([sum(effect.basis.size for effect in owner.effects) for owner in owners.values()])
     designs = dict(zip(owners, np.split(design, ends[:-1], axis=1), strict=True))
-    nothing = [np.zeros((len(design), group.columns.shape[1])) for group in groups]
+    nothing = [np.zeros((len(design), group.width)) for group in groups]
     return [
         none if group.owner.kept_out else designs[group.owner.name] @ group.loading
         for none, group in zip(nothing, groups, strict=True)
@@ -153,7 +153,7 @@ class _Predictor:
         """What the numbers of a form show in the new poses, um; nothing where it has no name."""
         if group < len(self.named):
             return self.named[group]
-        return np.zeros((len(self.variations[1]), self.scale.evidence.groups[group].columns.shape[1]))
+        return np.zeros((len(self.variations[1]), self.scale.evidence.groups[group].width))
 
     def _carried(self, share: float) -> tuple[Array, Array]:
         """What a little of everything carries from the old values to the new ones, (v, m), and the columns of what is

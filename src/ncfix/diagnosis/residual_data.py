@@ -143,13 +143,13 @@ class ResidualData:
             parts.append(-each.um[:, None] * shown.reshape(len(shown), -1))
         return np.concatenate(parts)
 
-    def shares(self, columns: Array, of: Sequence[Array]) -> Array:
-        """What least squares of columns (m, p) give each of some other columns, beside all that is free, (k, p)."""
+    def shares(self, of: Sequence[Array]) -> Array:
+        """What least squares of values (m,) give each of some columns, beside all that is free, (k, m)."""
         free = np.concatenate([self.base, *of], axis=1) / self.relative[:, None]
         size = np.linalg.norm(free, axis=0)
         size = np.where(size > 0, size, 1.0)
-        inverse = np.linalg.pinv(free / size, rcond=UNTELLABLE)[self.base.shape[1] :] / self.relative
-        shares: Array = (inverse @ columns) / size[self.base.shape[1] :, None]
+        own = slice(self.base.shape[1], None)
+        shares: Array = np.linalg.pinv(free / size, rcond=UNTELLABLE)[own] / self.relative / size[own, None]
         return shares
 
     @cached_property

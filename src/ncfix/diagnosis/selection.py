@@ -77,7 +77,7 @@ def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: 
 
 def _white(evidence: Evidence, group: int, share: float) -> Array:
     """The columns of a form in units of noise and background, (n, p)."""
-    return evidence.columns[:, evidence.part(group)] / np.sqrt(evidence.background.variance(share))[:, None]
+    return evidence.own(group) / np.sqrt(evidence.background.variance(share))[:, None]
 
 
 def _leading(evidence: Evidence, group: int, share: float) -> Array:
@@ -87,7 +87,7 @@ def _leading(evidence: Evidence, group: int, share: float) -> Array:
     if not effects:
         return _white(evidence, group, share)
     own = form.loading[: sum(effect.basis.size for effect in effects)]
-    there = (form.columns != 0).any(axis=1)  # of two dates those of the later one only
+    there = (form.single != 0).any(axis=1)  # of two dates those of the later one only
     columns = np.where(there[:, None], background.data.design(effects) @ own, 0.0)
     return background.seen(columns) / np.sqrt(background.variance(share))[:, None]
 
