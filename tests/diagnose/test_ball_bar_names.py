@@ -9,7 +9,8 @@ import pytest
 from tests.hidden import ballbar
 
 from ncfix.diagnosis.catalogue.dynamic import with_motion
-from ncfix.diagnosis.diagnosis import diagnose
+from ncfix.diagnosis.diagnosis import diagnose, weighed
+from ncfix.diagnosis.selection import aliases, plainest, with_alternatives
 from ncfix.machine import loads
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.reader import reads
@@ -50,3 +51,25 @@ def test_drives_are_named_and_nothing_is_added(kind: str, tmp_path: Path) -> Non
     found = diagnose([reads(ballbar.measured(mill, rng).encode(), machine)], machine)
     assert found.findings[0].candidate.name == wanted.strip("^")
     assert found.findings[0].effects == ()
+
+
+@pytest.mark.parametrize(("axis", "name", "play"), [(0, "backlash X", "EBX"), (1, "lateral play EXY", "EBY")])
+def test_play_at_one_height_is_first_that_of_a_shift(axis: int, name: str, play: str) -> None:
+    """A tilt at reversal, with the shift that it brings where the lever is always the same, is named beside it."""
+    random, machine, rows = np.random.default_rng(2), loads(ballbar.MACHINE), []
+    for number, way in enumerate([1, -1]):
+        angle = way * np.linspace(0, 2 * np.pi, 181)
+        came = np.sign(np.round(way * np.stack([-np.sin(angle), np.cos(angle)])[axis], 9))
+        length = RADIUS - 3e-3 * came * np.cos(angle) + random.normal(scale=4e-4, size=len(angle))
+        rows += [
+            f"{number},{RADIUS * np.cos(a):.6f},{RADIUS * np.sin(a):.6f},150,0,0,150,{RADIUS},{own:.6f},{FEED}"
+            for a, own in zip(angle, length, strict=True)
+        ]
+    head = "# ncfix-measurement: 1\n# kind: length\n# noise_um: 0.4\nset,X,Y,Z,cx,cy,cz,radius,length,feed_mm_min\n"
+    file = with_motion(reads((head + "\n".join(rows) + "\n").encode(), machine), machine)
+    _, scale = weighed([file], machine)
+    tilt = f"angular play {play}"
+    [member] = scale.candidate_odds({}).likeliest(scale.evidence.forms[tilt])
+    found = plainest(scale, with_alternatives(scale, {tilt: member}))
+    assert found.named == [name]
+    assert tilt in aliases(found, name)

@@ -53,6 +53,7 @@ from ncfix.diagnosis.selection import (
     Selected,
     aliases,
     findable_sizes,
+    plainest,
     select,
     with_alternatives,
     with_constants,
@@ -475,7 +476,7 @@ def _selected(scale: Comparison) -> Selected:
     """What is there: curves and the like while lacking constants are free, then those, then what holds."""
     freed = with_constants_free(scale.evidence)
     members = select(freed, (*freed.names, *freed.evidence.alternatives))
-    return passing(scale, with_alternatives(scale, with_constants(scale, members)))
+    return passing(scale, plainest(scale, with_alternatives(scale, with_constants(scale, members))))
 
 
 def _with_mistake(diagnosis: Diagnosis, wrong: Mistake, given: Machine) -> Diagnosis:

@@ -42,6 +42,8 @@ ALIKE = 3.0
 """Log odds (20 to 1) within which another name explains a member's part as well."""
 ASSUMED = 3.0
 """So much less count odds between names that act in the same way: they rest on courses and shapes that are assumed."""
+NO_BETTER = 1.0
+"""Log odds within which a name is no better than one that consists of a part of its errors only."""
 TOGETHER = 3
 """Names that are tried as a whole where none helps by itself."""
 NEARLY = 20.0
@@ -244,6 +246,30 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
         )
     ranked = {name: members[name] for name in sorted(members, key=lambda name: -odds[name])}
     return Selected(ranked, odds, runners_up, frozenset(evidence.alternatives), acting_alike)
+
+
+def plainest(scale: Comparison, selected: Selected) -> Selected:
+    """With names that consist of fewer errors where they say as much: a backlash in the place of an angular play with
+    one lever, which brings a backlash.
+    """
+    for name in selected.named:
+        others, least = _less(selected.members, name), selected.odds[name] - ASSUMED * NO_BETTER
+        fewer = {
+            each: selected.runners_up[name][each]
+            for each in selected.acting_alike[name]
+            if _errors(scale.evidence, each) < _errors(scale.evidence, name) and selected.runners_up[name][each] > least
+        }
+        if fewer:
+            plain = max(fewer, key=lambda each: fewer[each])
+            forms = scale.candidate_odds(others).likeliest(scale.evidence.forms[plain], FORMS)
+            found = ({**others, plain: form} for form in forms)
+            selected = with_alternatives(scale, max(found, key=scale.weight))
+    return selected
+
+
+def _errors(evidence: Evidence, name: str) -> set[str]:
+    """The errors that a name consists of."""
+    return {effect.name for effect in evidence.groups[evidence.forms[name][0]].owner.effects}
 
 
 def _formed(scale: Comparison, members: Members) -> dict[str, Member]:
