@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import multivariate_normal
 
-from ncfix.diagnosis.evidence import log_odds
+from ncfix.diagnosis.effect_form import log_odds
 from ncfix.diagnosis.forms import principal_rotation
 from ncfix.diagnosis.joint_fit import pose_regions
 from ncfix.diagnosis.residual_data import damped

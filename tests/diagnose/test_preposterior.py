@@ -7,8 +7,9 @@ import pytest
 
 from measure.poses import machine, plan
 from ncfix.diagnosis.catalogue import catalogue
+from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import Comparison, Evidence
-from ncfix.diagnosis.forms import EffectForm, shape_variations_with, visible_forms
+from ncfix.diagnosis.forms import shape_variations_with, visible_forms
 from ncfix.diagnosis.noise import estimated_background, everything_at, everything_covariance
 from ncfix.diagnosis.preposterior import PredictedValues, _Predictor, prospect, shown_at
 from ncfix.diagnosis.residual_data import ResidualData, residual_data

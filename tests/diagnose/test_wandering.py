@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnose.worlds import SIGMA_UM, World
-from ncfix.diagnosis.forms import EffectForm
+from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.noise import DRIFT_TIME, estimated_background, everything_covariance
 from ncfix.diagnosis.residual_data import residual_data
 from ncfix.measure.measurement import Array

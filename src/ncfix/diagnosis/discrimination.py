@@ -13,8 +13,8 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import ndtr
 
+from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import Evidence
-from ncfix.diagnosis.forms import EffectForm
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.diagnosis.selection import ALIKE
 from ncfix.measure.instruments import observe

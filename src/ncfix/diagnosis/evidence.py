@@ -10,7 +10,7 @@ Evidence in closed form: how much likelier the data are if an effect is there.
 In the coordinates of the background its covariance is diagonal for every share of "a little of everything". A form of
 an effect is a group of columns Z with independent numbers of variance s^2, a member; members that are there add
 Z Z' s^2 to the covariance, and the scale of the noise is integrated out. A group that is offered beside the members has
-log odds -1/2 ln|1 + s^2 B| - n/2 ln(1 - gain) with B = Z'V^-1 Z (MacKay 1992).
+log odds in closed form (effect_form.py).
 
 One account of evidence: how well a set of effects explains the data, less what each of them must pay.
 
@@ -34,17 +34,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
-from itertools import accumulate, pairwise
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
-from ncfix.diagnosis.forms import EffectForm, shape_variations
+from ncfix.diagnosis.effect_form import Blocks, EffectForm, block_odds, blocks_of
+from ncfix.diagnosis.forms import shape_variations
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse
-from ncfix.measure.measurement import Array, Index
+from ncfix.measure.measurement import Array
 from ncfix.values import frozen, mutable
 
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
@@ -57,8 +58,6 @@ FALLEN = 12.0
 """A share of the background that is less likely than another by this log likelihood adds nothing."""
 Members = Mapping[str, "Member"]
 
-Blocks = list[tuple[Index, Index, Array]]
-"""For each width: numbers of the groups, their columns (g, w), their inner products (g, w, w)."""
 FALSE_ALARM = 0.01
 """How often noise alone may name anything."""
 COMPANION = 0.05
@@ -361,57 +360,6 @@ class Evidence:
         """What each member shows when all are fitted, (m,) um."""
         numbers = self.numbers(members, share)
         return [self.groups[m.group].columns @ own for m, own in zip(members, numbers, strict=True)]
-
-
-def blocks_of(products: Sequence[Array]) -> Blocks:
-    """The inner products (w, w) of each group's columns with themselves, those of one width together."""
-    bounds = [0, *accumulate(len(each) for each in products)]
-    widths: dict[int, list[int]] = {}
-    for group, own in enumerate(products):
-        widths.setdefault(len(own), []).append(group)
-    return [
-        (
-            np.asarray(alike),
-            np.add.outer([bounds[k] for k in alike], np.arange(w)),
-            np.stack([products[k] for k in alike]),
-        )
-        for w, alike in widths.items()
-    ]
-
-
-def block_odds(
-    blocks: Blocks, projected: Array, taken: Array, total: float, count: float, sizes: Sequence[float]
-) -> Array:
-    """Log odds of every group in every size, (groups, sizes).
-
-    projected  (p,) inner products of all columns with the data; taken (k, p): of the inner products of columns taken'
-               taken is gone to what is there besides; total, count: as in `log_odds`
-    """
-    odds = np.empty((sum(len(groups) for groups, _, _ in blocks), len(sizes)))
-    for groups, places, inner in blocks:
-        lost = np.moveaxis(taken[:, places], 0, 1)
-        odds[groups] = log_odds(inner - np.swapaxes(lost, 1, 2) @ lost, projected[places], total, count, sizes)
-    return odds
-
-
-def log_odds(inner: Array, projected: Array, total: float, count: float, sizes: Sequence[float]) -> Array:
-    """Log odds per size, (..., p, p) inner products of columns and (..., p) with the data -> (..., sizes).
-
-    `total` is the sum of squares of the data, `count` its freedom. One Cholesky factor of [[I/s^2 + B, a], [a', total]]
-    has the determinant in its diagonal and what the columns gain in its last row.
-    """
-    width, each = inner.shape[-1], np.asarray(sizes)
-    bordered = np.zeros((*inner.shape[:-2], len(each), width + 1, width + 1))  # the lower half is all that counts
-    bordered[..., :width, :width] = inner[..., None, :, :]
-    bordered[..., width, :width] = projected[..., None, :]
-    bordered[..., width, width] = total
-    places = np.arange(width)
-    bordered[..., places, places] += each[:, None] ** -2
-    factor = np.linalg.cholesky(bordered)
-    occam = width * np.log(each) + np.log(factor[..., places, places]).sum(axis=-1)
-    gain = (factor[..., width, :width] ** 2).sum(axis=-1)
-    odds: Array = -occam - 0.5 * count * np.log1p(-np.minimum(gain / total, 1 - 1e-12))
-    return odds
 
 
 def entry_price(count: int) -> float:

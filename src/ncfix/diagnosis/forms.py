@@ -39,6 +39,7 @@ from ncfix.diagnosis.catalogue.candidate import (
     weighed,
     zero,
 )
+from ncfix.diagnosis.effect_form import EffectForm, column_bounds, side_by_side
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE, Axis, component_title
@@ -105,36 +106,6 @@ SAME_AS_NAME = 0.8
 
 CHANGE, CAME = "change of ", "came since: "
 """Of two dates: how the names begin of what is at the later one only, and their titles."""
-
-
-@frozen(repr=False, slots=False)
-class EffectForm:
-    """One form of a candidate.
-
-    owner     the candidate
-    loading   (k, p) from p independent numbers to its coefficients, per um
-    single    (m, p) what those show, um; of thousands of them single precision is half of all memory, and rounds
-              far below what any instrument reads
-    """
-
-    owner: Candidate
-    loading: Array
-    single: NDArray[np.float32]
-
-    @classmethod
-    def of(cls, owner: Candidate, loading: Array, columns: Array) -> EffectForm:
-        """With these columns."""
-        return cls(owner, loading, columns.astype(np.float32))
-
-    @property
-    def columns(self) -> Array:
-        """(m, p) what the independent numbers show, um."""
-        return self.single.astype(np.float64)
-
-    @property
-    def width(self) -> int:
-        """How many independent numbers there are."""
-        return int(self.single.shape[1])
 
 
 @frozen(repr=False, slots=False)
@@ -237,16 +208,6 @@ def principal_rotation(columns: Array) -> Array:
         return np.ones((1, 1))
     squares, turned = np.linalg.eigh(columns.T @ columns)
     return turned[:, np.cumsum(squares) > NEGLIGIBLE * squares.sum()]
-
-
-def side_by_side(parts: Iterable[Array]) -> Array:
-    """Columns (m, ...) of several beside one another, each column in one piece of memory."""
-    return np.concatenate([part.T for part in parts]).T
-
-
-def column_bounds(groups: Sequence[EffectForm]) -> list[int]:
-    """Where the columns of each begin and end, once they stand side by side."""
-    return [0, *accumulate(group.width for group in groups)]
 
 
 def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> list[float]:

@@ -14,8 +14,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import Background, Comparison, Evidence, Member
-from ncfix.diagnosis.forms import EffectForm, scaled_axes
+from ncfix.diagnosis.forms import scaled_axes
 from ncfix.diagnosis.noise import ASIDE
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.diagnosis.selection import Selected, with_alternatives

@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.diagnosis.discrimination import Hypothesis, HypothesisPairs, chance, exchanged, seen_at, worst
+from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import Comparison, Evidence, Members
-from ncfix.diagnosis.forms import EffectForm
 from ncfix.diagnosis.joint_fit import Mask
 from ncfix.diagnosis.preposterior import prospect
 from ncfix.diagnosis.residual_data import ResidualData

@@ -27,24 +27,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, eigh, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
-from ncfix.diagnosis.evidence import (
-    MISSHAPEN,
-    TOGETHER,
-    Background,
-    Blocks,
-    block_odds,
-    blocks_of,
-    entry_price,
-    in_noise,
-    marginal,
-)
-from ncfix.diagnosis.forms import (
-    EffectForm,
-    column_bounds,
-    shape_variations,
-    side_by_side,
-    without_lacking_constants,
-)
+from ncfix.diagnosis.effect_form import Blocks, EffectForm, block_odds, blocks_of, column_bounds, side_by_side
+from ncfix.diagnosis.evidence import MISSHAPEN, TOGETHER, Background, entry_price, in_noise, marginal
+from ncfix.diagnosis.forms import shape_variations, without_lacking_constants
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse, orthonormal
 from ncfix.measure.measurement import Array, Measurement, groups

@@ -1,0 +1,111 @@
+"""A form of an effect as columns of the data, and its log odds in closed form.
+
+A form whose columns Z have independent numbers of variance s^2 has log odds -1/2 ln|1 + s^2 B| - n/2 ln(1 - gain) with
+B = Z'V^-1 Z, in values of covariance V whose scale is integrated out (MacKay 1992).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnosis.catalogue import Candidate
+from ncfix.measure.measurement import Array, Index
+from ncfix.values import frozen
+
+Blocks = list[tuple[Index, Index, Array]]
+"""For each width: numbers of the groups, their columns (g, w), their inner products (g, w, w)."""
+
+
+@frozen(repr=False, slots=False)
+class EffectForm:
+    """One form of a candidate.
+
+    owner     the candidate
+    loading   (k, p) from p independent numbers to its coefficients, per um
+    single    (m, p) what those show, um; of thousands of them single precision is half of all memory, and rounds
+              far below what any instrument reads
+    """
+
+    owner: Candidate
+    loading: Array
+    single: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, owner: Candidate, loading: Array, columns: Array) -> EffectForm:
+        """With these columns."""
+        return cls(owner, loading, columns.astype(np.float32))
+
+    @property
+    def columns(self) -> Array:
+        """(m, p) what the independent numbers show, um."""
+        return self.single.astype(np.float64)
+
+    @property
+    def width(self) -> int:
+        """How many independent numbers there are."""
+        return int(self.single.shape[1])
+
+
+def side_by_side(parts: Iterable[Array]) -> Array:
+    """Columns (m, ...) of several beside one another, each column in one piece of memory."""
+    return np.concatenate([part.T for part in parts]).T
+
+
+def column_bounds(groups: Sequence[EffectForm]) -> list[int]:
+    """Where the columns of each begin and end, once they stand side by side."""
+    return [0, *accumulate(group.width for group in groups)]
+
+
+def blocks_of(products: Sequence[Array]) -> Blocks:
+    """The inner products (w, w) of each group's columns with themselves, those of one width together."""
+    bounds = [0, *accumulate(len(each) for each in products)]
+    widths: dict[int, list[int]] = {}
+    for group, own in enumerate(products):
+        widths.setdefault(len(own), []).append(group)
+    return [
+        (
+            np.asarray(alike),
+            np.add.outer([bounds[k] for k in alike], np.arange(w)),
+            np.stack([products[k] for k in alike]),
+        )
+        for w, alike in widths.items()
+    ]
+
+
+def block_odds(
+    blocks: Blocks, projected: Array, taken: Array, total: float, count: float, sizes: Sequence[float]
+) -> Array:
+    """Log odds of every group in every size, (groups, sizes).
+
+    projected  (p,) inner products of all columns with the data; taken (k, p): of the inner products of columns taken'
+               taken is gone to what is there besides; total, count: as in `log_odds`
+    """
+    odds = np.empty((sum(len(groups) for groups, _, _ in blocks), len(sizes)))
+    for groups, places, inner in blocks:
+        lost = np.moveaxis(taken[:, places], 0, 1)
+        odds[groups] = log_odds(inner - np.swapaxes(lost, 1, 2) @ lost, projected[places], total, count, sizes)
+    return odds
+
+
+def log_odds(inner: Array, projected: Array, total: float, count: float, sizes: Sequence[float]) -> Array:
+    """Log odds per size, (..., p, p) inner products of columns and (..., p) with the data -> (..., sizes).
+
+    `total` is the sum of squares of the data, `count` its freedom. One Cholesky factor of [[I/s^2 + B, a], [a', total]]
+    has the determinant in its diagonal and what the columns gain in its last row.
+    """
+    width, each = inner.shape[-1], np.asarray(sizes)
+    bordered = np.zeros((*inner.shape[:-2], len(each), width + 1, width + 1))  # the lower half is all that counts
+    bordered[..., :width, :width] = inner[..., None, :, :]
+    bordered[..., width, :width] = projected[..., None, :]
+    bordered[..., width, width] = total
+    places = np.arange(width)
+    bordered[..., places, places] += each[:, None] ** -2
+    factor = np.linalg.cholesky(bordered)
+    occam = width * np.log(each) + np.log(factor[..., places, places]).sum(axis=-1)
+    gain = (factor[..., width, :width] ** 2).sum(axis=-1)
+    odds: Array = -occam - 0.5 * count * np.log1p(-np.minimum(gain / total, 1 - 1e-12))
+    return odds
