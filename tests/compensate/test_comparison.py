@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +24,8 @@ SETUP = Setup(assume_zero=True)
 HEAD = "G21 G90 G94 G17\nG0 X117.0 Y0 Z60\nG1 X117.05 Y0 Z7.15 B4.53 C{c} F2000\n"
 DENSE = 0.06
 """mm from point to point on a path, at most."""
+AT_ONCE = 500
+"""Points, of those that may be the farthest."""
 LEVER = 250.0
 """mm from the axes to the tip, at most."""
 AGREED = 3e-5
@@ -65,14 +68,33 @@ def dense(moves: Moves, rows: list[int]) -> np.ndarray:
 
 def farthest(path: np.ndarray, other: np.ndarray) -> float:
     """The largest distance of points of one path from the other, as lines from point to point, mm."""
-    _, near = KDTree(other).query(path, k=8)
-    found = np.full(len(path), np.inf)
-    for each in (*near.T, *(near.T - 1)):
-        a, b = (other[np.clip(each + k, 0, len(other) - 1)] for k in (0, 1))
-        square = np.maximum(((b - a) ** 2).sum(axis=1), 1e-30)
-        share = np.clip(((path - a) * (b - a)).sum(axis=1) / square, 0, 1)
-        found = np.minimum(found, np.linalg.norm(path - a - share[:, None] * (b - a), axis=1))
-    return float(found.max())
+    tree = KDTree(other)
+
+    def distances(points: np.ndarray, lines: int) -> np.ndarray:
+        _, near = tree.query(points, k=lines)
+        found = np.full(len(points), np.inf)
+        for each in (*near.T, *(near.T - 1)):
+            a, b = (other[np.clip(each + k, 0, len(other) - 1)] for k in (0, 1))
+            square = np.maximum(((b - a) ** 2).sum(axis=1), 1e-30)
+            share = np.clip(((points - a) * (b - a)).sum(axis=1) / square, 0, 1)
+            found = np.minimum(found, np.linalg.norm(points - a - share[:, None] * (b - a), axis=1))
+        return found
+
+    return largest(distances, path, 2, 8)
+
+
+def largest(distances: Callable[[np.ndarray, int], np.ndarray], points: np.ndarray, few: int, lines: int) -> float:
+    """The largest distance of points from the lines that are near to them, so many each.
+
+    More lines bring a point only nearer: of most points a few say that they are not the farthest.
+    """
+    bounds = distances(points, few)
+    order, found = np.argsort(-bounds), 0.0
+    for k in range(0, len(order), AT_ONCE):
+        if bounds[order[k]] <= found:
+            break
+        found = max(found, float(distances(points[order[k : k + AT_ONCE]], lines).max()))
+    return found
 
 
 def truth(machine: Machine, original: Moves, other: Moves) -> tuple[float, float]:

@@ -14,7 +14,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from compensate.side import compared
-from compensate.test_comparison import fixed, moves_of
+from compensate.test_comparison import fixed, largest, moves_of
 from ncfix.compensate.figures.backlash import BacklashBodies
 from ncfix.compensate.figures.curve import Stretches
 from ncfix.compensate.plan.intent import Intent
@@ -32,7 +32,6 @@ AGREED = 3e-5
 force, where it is taken up that an axis has play, is less than a hundredth of `CLOSE`."""
 AROUND, FIRST = 150, 10
 """Lines near to a point that are looked at: those of three steps that take up play, and of two cuts; and at first."""
-AT_ONCE = 500
 LARGEST = 25.0
 """mm: the largest radius."""
 HALF_A_PER_CENT = 5e-3
@@ -109,13 +108,7 @@ def farthest(path: Dense, other: Dense) -> float:
             found = np.minimum(found, np.linalg.norm(points - begin[each] - share[:, None] * way[each], axis=1))
         return found
 
-    bounds = distances(points, FIRST)  # more lines bring a point only nearer
-    order, largest = np.argsort(-bounds), 0.0
-    for k in range(0, len(order), AT_ONCE):
-        if bounds[order[k]] <= largest:
-            break
-        largest = max(largest, float(distances(points[order[k : k + AT_ONCE]], AROUND).max()))
-    return largest
+    return largest(distances, points, FIRST, AROUND)
 
 
 def truth(machine: Machine, original: Moves, other: Moves) -> tuple[float, float]:
