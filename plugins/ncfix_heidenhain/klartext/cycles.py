@@ -38,6 +38,8 @@ NO_CYCLE = "NCF272"
 DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
 """Cycles whose bottom is Q203 + Q201; back boring (204) counts otherwise."""
 
+BORE_MILLING = 208
+"""It mills round the place where it is called, and comes back to it."""
 OLD_MILLING = frozenset({3, 4, 5})
 MILLING = OLD_MILLING | {251, 252, 253, 256, 257, 258, 262, 263, 264, 265, 267}
 """Pockets, slots, studs and threads about the place where they are called, down to Q203 + Q201, or as `OLD` ones. A
@@ -181,8 +183,8 @@ def drill(control: KlartextControl, where: FramePosition, axes: int, heights: tu
         over.unknown[Z] = AFTER_HOLE
     if control.cycle.number in MILLING:
         over.unknown |= {X: AFTER_CYCLE, Y: AFTER_CYCLE}
-        if not refusal:
-            control.moved_as_a_whole(f"cycle {control.cycle.number}")
+    if not refusal and control.cycle.number in MILLING | {BORE_MILLING}:
+        control.moved_as_a_whole(f"cycle {control.cycle.number}")
     above = command_of(control, over, axes | 1 << Z)
     control.stand(above.target, above.unknown, over.unknown)
     control.path.tangent = None

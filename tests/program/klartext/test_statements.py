@@ -180,6 +180,13 @@ def test_a_pocket_is_corrected_at_its_place_and_bottom_which_is_said() -> None:
     assert [message.code for message in trace.messages] == ["NCF280"]
 
 
+def test_bore_milling_comes_back_to_its_place_and_is_said_to_be_moved_as_a_whole() -> None:
+    bore = POCKET.replace("251 POCKET", "208 BORE MILLING").replace("Q218=+60", "Q335=+25")
+    trace = follow(f"L X+1 Y+1 Z+90 FMAX\n{bore}\nL X+50 Y+40 FMAX M99\nL X+80 FMAX M99")
+    assert trace.moves.rule.tolist() == [Rule.CORRECT] * 3
+    assert [message.code for message in trace.messages] == ["NCF280"]
+
+
 @pytest.mark.parametrize(
     "frame", ["CYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+30", "CYCL DEF 7.0 DATUM\nCYCL DEF 7.1 X+5"]
 )
