@@ -26,7 +26,8 @@ Vector = Sequence[float | Array]
 """Along x, y, z: columns (n,), or numbers where all poses have the same."""
 
 CLOSE = 1e-6
-"""mm; a tip that is expected to be closer to its target than 1 nm has arrived."""
+"""mm; a tip that is expected to be closer to its target than 1 nm has arrived. A kink of an error between two passes
+may leave some nanometres."""
 FLAT = 1e-6
 """The volume spanned by the tip's motions per mm of X, Y and Z below which they do not reach every point."""
 PASSES = 40
@@ -39,7 +40,7 @@ class Aim:
     """Where the axes have to be, in columns.
 
     place    (3, n) of the linear axes, mm; where it began if they cannot bring the tip there
-    arrived  (n,) the tip is where it should be, to 1 nm
+    arrived  (n,) the tip is where it should be, to 1 nm, beside a kink of an error to some nanometres
     off      (n,) mm: how far off the tip was where it began
     """
 
