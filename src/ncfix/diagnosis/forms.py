@@ -51,6 +51,8 @@ from ncfix.values import frozen
 
 VISIBLE = 0.05
 """Share of an effect's squares that must be left beside what is free."""
+SHARE_DIGITS = 9
+"""Of such a share: what is behind them is rounding."""
 NEGLIGIBLE = 3e-3
 """Share of a form's squares that may be dropped."""
 UNSEEN_UM = 1e-9
@@ -217,7 +219,7 @@ def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectFor
     columns = np.concatenate([group.columns.T for group in groups]) / data.relative
     squares, hidden = np.einsum("ij,ij->i", columns, columns), ((columns @ basis) ** 2).sum(axis=1)
     parts = [slice(start, stop) for start, stop in pairwise(column_bounds(groups))]
-    return [float(1.0 - hidden[part].sum() / squares[part].sum()) for part in parts]
+    return [max(round(float(1.0 - hidden[part].sum() / squares[part].sum()), SHARE_DIGITS), 0.0) for part in parts]
 
 
 def _smooth_fields(data: ResidualData) -> Iterator[EffectForm | None]:

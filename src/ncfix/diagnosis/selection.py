@@ -256,7 +256,7 @@ def plainest(scale: Comparison, selected: Selected) -> Selected:
         others, least = _less(selected.members, name), selected.odds[name] - ASSUMED * NO_BETTER
         fewer = {
             each: selected.runners_up[name][each]
-            for each in selected.acting_alike[name]
+            for each in sorted(selected.acting_alike[name])
             if _errors(scale.evidence, each) < _errors(scale.evidence, name) and selected.runners_up[name][each] > least
         }
         if fewer:
