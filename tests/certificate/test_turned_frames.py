@@ -73,6 +73,18 @@ def test_rotary_axes_square_the_tool_to_a_plane(name: str) -> None:
         assert any(each is not None and each == pytest.approx(there, abs=1e-6) for each in both)
 
 
+@pytest.mark.parametrize("sense", [-1, 0, 1])
+def test_half_a_turn_may_be_made_either_way_round(sense: int) -> None:
+    """From A-90 both A90 and A-270 are half a turn away: which of them the control takes this reader does not say."""
+    model = TipModel.of(machine("table"))
+    assert model is not None
+    way = model.rotary_way
+    assert way is not None
+    wanted = way.directions(np.radians([[0.0, 90.0]]))[0]
+    here = np.radians([0.0, -90.0])
+    assert way.to(wanted, here, sense=sense, sign=0, inside=False, stays=True) is None
+
+
 def test_the_plane_of_a_cycle800() -> None:
     """Mode 57 turns about X, then the new Y, then the new Z; the last zero point lies along the turned axes."""
     found = SwivelCall.of('CYCLE800(4,"TABLE",200000,57,1,2,3,90,0,90,0,0,5,-1,100,1)')

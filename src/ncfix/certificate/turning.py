@@ -195,7 +195,7 @@ class RotaryWay:
 
         The nearest way. With `sense` the one with the greater (1) or lesser angle of the inner axis, with `sign` the
         one with that sign of it; `inside`: within the travels. Where the outer axis is free it stays; if not `stays`,
-        only at zero. None where there is none, or where two are as near.
+        only at zero. None where there is none, where two are as near, or where an axis makes half a turn.
         """
         ways, free = self._ways(wanted, here)
         if free and not stays and abs(here[self.outer]) > SAME:
@@ -206,11 +206,14 @@ class RotaryWay:
         if sign:
             ways = [each for each in ways if abs(each[inner]) < SAME or (each[inner] > 0) == (sign > 0)]
         if sense and not free:
-            return max(ways, key=lambda each: sense * each[inner], default=None)
+            if any(_is_half_turn(each[inner] - here[inner]) for each in ways):
+                return None  # which of two angles it is
+            ways.sort(key=lambda each: -sense * float(each[inner]))
+            return None if not ways or _is_half_turn(ways[0][self.outer] - here[self.outer]) else ways[0]
         ways.sort(key=lambda each: float(np.abs(each - here).sum()))
         if len(ways) > 1 and np.abs(ways[1] - here).sum() - np.abs(ways[0] - here).sum() < AS_NEAR:
             return None
-        return ways[0] if ways else None
+        return None if not ways or any(map(_is_half_turn, ways[0] - here)) else ways[0]
 
     def _inside(self, way: Floats, here: Floats) -> Floats | None:
         """A way within the travels, each axis whole turns away and nearest to `here`."""
@@ -243,3 +246,8 @@ class RotaryWay:
         if free:
             found = [at[0]] if good[0] and abs(float(at[0][self.outer] - here[self.outer])) < 1e-6 else []
         return found, free
+
+
+def _is_half_turn(angle: float) -> bool:
+    """Whether an angle, rad, is half a turn, which may be made either way round."""
+    return abs(abs(angle) - math.pi) < AS_NEAR
