@@ -113,6 +113,7 @@ def astray(control: KlartextControl, step: Step, *, called: bool) -> str:
 
 AT_RUN_TIME = "NCF277"
 READ = "the program reads or measures it: set it by FN 0 for a program that is to be corrected"
+RADIUS = "it is the radius of the tool: --tool NUMBER=LENGTH,RADIUS"
 ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
 SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
 ELSEWHERE = re.compile(r"CALL\b|SEL\s+PGM\b|F(LT?|CT?)(?=\s|$)", re.IGNORECASE)
@@ -252,8 +253,9 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             code = AT_RUN_TIME if self.watcher is None else RUNTIME
             lacking = value.why
             text = f"where the program goes on depends on {lacking}, which is known only at run time"
-            read = lacking in self.control.scope.parameters.read
-            raise Fault(code, text, READ if read else f'variables."{lacking}" in the setup file gives it a value')
+            read = READ if lacking in self.control.scope.parameters.read else ""
+            hint = RADIUS if lacking == "Q108" else read
+            raise Fault(code, text, hint or f'variables."{lacking}" in the setup file gives it a value')
         return value != 0.0
 
     def assign(self, plan: KlartextPlan) -> None:

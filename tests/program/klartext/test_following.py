@@ -255,11 +255,12 @@ def test_where_the_control_would_stop(body: str, code: str) -> None:
         ("Q5 = Q5 + 1", 'variables."Q5" in the setup file'),
         ("FN 18: SYSREAD Q5 = ID990 NR6", "the program reads or measures it"),
         ("FN 18: SYSREAD Q9 = ID990 NR6\nQ5 = Q9 + 1", "the program reads or measures it"),
+        ("TOOL CALL 5 Z\nQ5 = Q108 * 2", "it is the radius of the tool"),
     ],
 )
 def test_what_decides_a_jump_is_named_by_what_it_comes_from(set_by: str, hint: str) -> None:
     with pytest.raises(SourceError) as error:
-        follow(f"{set_by}\nFN 9: IF +Q5 EQU +1 GOTO LBL 1\nLBL 1")
+        follow(f"{set_by}\nFN 9: IF +Q5 EQU +1 GOTO LBL 1\nLBL 1", tools={5: Tool(80.0)})
     assert error.value.messages[0].hint.startswith(hint)
 
 
