@@ -20,7 +20,7 @@ from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import TURN_DEGREES, beside_corners, layout_of, uses_comma
 from ncfix_heidenhain.klartext.units import STRAIGHT
-from ncfix_heidenhain.klartext.writing import KlartextWriter, spelling_of
+from ncfix_heidenhain.klartext.writing import KlartextWriter, on_its_side, spelling_of
 
 Mask = NDArray[np.bool_]
 
@@ -110,6 +110,7 @@ KLARTEXT = WrittenLanguage(
     writer=KlartextWriter,
     spelling=spelling_of,
     arc_pieces=True,
+    held_angle=on_its_side,
     bulk=in_bulk,
     one_by_one=one_by_one,
     renumber=renumbered,

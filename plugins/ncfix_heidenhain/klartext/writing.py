@@ -360,7 +360,8 @@ class KlartextWriter(BlockWriter):
 # -- rotary words -----------------------------------------------------------------------------------------------------
 # A table that counts below 360 degrees takes -0.001 for 359.999, and the next word may then lead it the long way round.
 # So a program that never writes such an angle does not get one from a correction either: the word stays at the limit,
-# and what that leaves at the tip is part of the figures. Rotary words are corrected under `--strategy full` only.
+# and the linear axes are those of that angle (`WrittenLanguage.held_angle`). The direction of the tool is off by the
+# rest. Rotary words are corrected under `--strategy full` only.
 
 
 @lru_cache(maxsize=16)

@@ -388,7 +388,8 @@ class PartCorrector(Corrector):
         part = continued.joined
         nowhere = np.zeros(len(part.moves.axes))
         guess = None if continued.head is None else PrecedingMotion.steady(nowhere, continued.direction, nowhere)
-        return accepted_plan(part.moves, self.machine, self.task.dialect, self.task.options, guess)
+        task, source = self.task, part.program.source
+        return accepted_plan(part.moves, self.machine, task.dialect, task.options, guess, source=source)
 
     def report(self, tally: Tally, suspicion: tuple[Message, ...]) -> FixReport:
         """The report of all parts."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -241,7 +242,8 @@ def plan_and_write(
     first    the plan to begin with, from `accepted_plan`, if that has been made already
     refused  blocks that are refused whatever the plan is, and why
     """
-    accepted = first or accepted_plan(moves, machine, program.dialect, options, before, refused=refused)
+    dialect, source = program.dialect, program.source
+    accepted = first or accepted_plan(moves, machine, dialect, options, before, refused=refused, source=source)
     kinematics, rounds = kinematics_of(machine), list[Round]()
     while True:
         done = None if before is None else before.in_round(len(rounds)).position
@@ -266,7 +268,7 @@ def plan_and_write(
             raise AssertionError(f"blocks {sorted(emission.conflicts)} are unchanged and yet in conflict")
         for block, why in emission.conflicts.items():
             _explain(accepted.reasons, [block], CODE_OF_TEXT, why)
-        accepted = accepted_plan(moves, machine, program.dialect, options, before, accepted, len(rounds))
+        accepted = accepted_plan(moves, machine, dialect, options, before, accepted, len(rounds), source=source)
 
 
 def accepted_plan(
@@ -278,10 +280,12 @@ def accepted_plan(
     earlier: AcceptedPlan | None = None,
     number: int = 0,
     refused: Mapping[int, Reason] = NONE,
+    source: bytes = b"",
 ) -> AcceptedPlan:
     """Plan until nothing speaks against it; `earlier` says what stays unchanged already, and why, in round `number`.
 
     refused  blocks that are refused in any case, where there is no `earlier` plan
+    source   the text of the program, for a strategy that corrects rotary axes
     """
     unchanged = (
         np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL))
@@ -296,8 +300,9 @@ def accepted_plan(
         intent = Intent(machine, moves, State() if before is None else State(direction=before.direction))
     strategy, closure = get_strategy(options.strategy), closure_of(dialect, moves)
     tolerance = PathTolerance(options.tolerance_mm, rounding(machine))
-    arc_pieces = language_of(dialect, WrittenLanguage).arc_pieces
-    demands = Requirements(tolerance, closure, options.split_rapids, arc_pieces)
+    language = language_of(dialect, WrittenLanguage)
+    held = None if language.held_angle is None else partial(language.held_angle, source)
+    demands = Requirements(tolerance, closure, options.split_rapids, language.arc_pieces)
     history = list[tuple[bool, Array]]()
     bound = np.zeros(len(moves), dtype=bool)
     while True:
@@ -311,7 +316,7 @@ def accepted_plan(
         if len(moves):  # of the last one
             off = planned.start[-1] - moves.start[-1]
             history.append((bool(planned.pieces.unchanged[-1]), np.where(np.isfinite(off), off, 0.0)))
-        planned = replace(planned, pieces=on_digits(intent, planned.pieces))
+        planned = replace(planned, pieces=on_digits(intent, planned.pieces, held=held))
         written = WrittenPieces(intent, planned.pieces, planned.start)
         against = findings(written)
         stays = planned.pieces.unchanged[planned.pieces.first] & ~unchanged

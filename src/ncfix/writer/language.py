@@ -35,8 +35,11 @@ class WrittenLanguage(FollowedLanguage):
     arc_pieces  `writer` can write an arc as several (`Target.arcs`)
     one_by_one  (program, moves, pieces, first piece of each motion) -> (n,) motions that `writer` has to write one by
               one for what else there is about them; None: none
+    held_angle  (text of the program, rotary axis, angle as programmed, corrected, one digit) -> the angle that the
+              control may be told, degrees; None: any
     """
 
     writer: Callable[[Program, int, Any, Target, Spelling], Writer]
     arc_pieces: bool = False
     one_by_one: Callable[[Program, Moves, Pieces, NDArray[np.int64]], NDArray[np.bool_]] | None = None
+    held_angle: Callable[[bytes, str, float, float, float], float] | None = None

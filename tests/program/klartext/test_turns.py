@@ -57,3 +57,12 @@ def test_pieces_of_a_motion_that_begins_below_zero_stay_there() -> None:
     assert turns[0] < -10
     assert sorted(turns) == turns
     assert turns[-1] == 45
+
+
+def test_the_linear_axes_know_that_a_table_is_held_at_zero() -> None:
+    """Under `full` B would go to -0.0006 degrees, and the program has no negative angle: X and Z are those of B+0."""
+    machine = load(str(Path(__file__).parents[3] / "examples/machines/wCBXFZYSt.toml"))
+    body = "L X+0 Y+0 Z+100 B+0 C+0 R0 FMAX\nL X+100 Y+50 Z+20 F500\nL X+120 Y+60 B+0 C+0\nL X+120 B+30 C+45"
+    done = fix_program(read(program(body), "t.h"), machine, SETUP, FixOptions(strategy="full"))
+    assert not re.search(rb"[BC]-", done.text)
+    assert done.report.error_after_um["max"] <= 1.0  # the tolerance; 2.1 um where X and Z were those of the other angle

@@ -14,6 +14,7 @@ arm has changed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
@@ -96,6 +97,7 @@ class WrittenPieces:
         return self.done - self.programmed
 
 
+TURN_DEGREES = 360.0
 TURNED = 1e-12
 """rad; a rotary axis that is so close to its number in the program stands there."""
 
@@ -135,7 +137,11 @@ class Known:
         return here, before, np.sqrt(np.einsum("ij,ij->i", shift, shift))
 
 
-def on_digits(intent: Intent, pieces: Pieces, among: Index | None = None) -> Pieces:
+HeldAngle = Callable[[str, float, float, float], float]
+"""A rotary axis, its angle as programmed and as corrected, and one digit -> what the control may be told, degrees."""
+
+
+def on_digits(intent: Intent, pieces: Pieces, among: Index | None = None, held: HeldAngle | None = None) -> Pieces:
     """The pieces with rotary positions as they will be written; those that the program wrote stay as they are.
 
     among  (k,) pieces that may have others; all if not given
@@ -145,14 +151,31 @@ def on_digits(intent: Intent, pieces: Pieces, among: Index | None = None) -> Pie
     if not rows.size:
         return pieces
     move = pieces.move[rows]
-    commands = picked(pieces.end, rows)
+    commands, fraction = picked(pieces.end, rows), pieces.fraction[rows]
     offset = np.array([frame.offset for frame in moves.frames])[moves.frame[move]][:, moves.rotary]
-    commands[:, moves.rotary] = offset + _rounded(commands[:, moves.rotary] - offset, machine)
-    solved, arrived = intent.aimed(move, pieces.fraction[rows], commands)
+    angles = _rounded(commands[:, moves.rotary] - offset, machine)
+    if held is not None:
+        start, end = (picked(places, move)[:, moves.rotary] - offset for places in (moves.start, moves.end))
+        angles = _held(moves, start + fraction[:, None] * (end - start), angles, machine, held)
+    commands[:, moves.rotary] = offset + angles
+    solved, arrived = intent.aimed(move, fraction, commands)
     end = pieces.end.copy()
     solved = np.where(moves.wordless[move], end[rows], solved)
     end[rows[arrived]] = solved[arrived]
     return replace(pieces, end=end)
+
+
+def _held(moves: Moves, programmed: Array, angles: Array, machine: Machine, held: HeldAngle) -> Array:
+    """Corrected angles (n, n_rotary), rad, as the control may be told them; `programmed`: without correction."""
+    digit = 10.0 ** -decimals_for(float(np.degrees(machine.least_increment[1])))
+    letters = [axis for axis, turns in zip(moves.axes, moves.rotary, strict=True) if turns]
+    told, nominal, found = np.degrees(angles), np.degrees(programmed), angles.copy()
+    for row, column in np.argwhere((told < 0.0) | (told >= TURN_DEGREES)).tolist():
+        before, after = float(nominal[row, column]), float(told[row, column])
+        angle = held(letters[column], before, after, digit)
+        if angle != after:
+            found[row, column] = np.radians(angle)
+    return found
 
 
 def _newly_written(moves: Moves, pieces: Pieces, among: Index) -> Index:
