@@ -164,6 +164,8 @@ def test_statements_of_fagor_are_no_comments(dialect: str, line: str, foreign: b
         ("%PM9001", "code of Philips or MAHO controls"),
         ("#1=10.", ""),
         ("(#RTCP ON)", ""),
+        ("#atan[1]/[1]=3", ""),
+        ("N9 #ROUND [2.2] = 5", ""),
         ("(#1:=10.)", ""),
     ],
 )

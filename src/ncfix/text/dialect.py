@@ -48,7 +48,10 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
         rb"(?:G[ \t]*5[12][ \t]*[XYZ]|G[ \t]*7[79][ \t]*N[ \t]*\d|E[ \t]*[5-8]\d{4}\b|L\d+[ \t]*=))",
     ),
     ("Fagor code (statements in brackets)", rb"(?i)\((?![ \t]*RET[ \t]*\))" + FAGOR),
-    ("code of Fagor or ISG controls (# and a word)", rb"(?im)^[ \t]*(?:N\d+[ \t]*)?(#[ \t]*[A-Z]{2,}[A-Z\d]*)"),
+    (
+        "code of Fagor or ISG controls (# and a word)",
+        rb"(?im)^[ \t]*(?:N\d+[ \t]*)?(#[ \t]*[A-Z]{2,}[A-Z\d]*+)(?![ \t]*\[)",
+    ),
     ("Syntec code", rb"(?im)^[ \t]*(%[ \t]*@MACRO\b|[#@]\d+[ \t]*:=)"),
 )
 """Other families of controls: what people call their language, and what shows it; for `Dialect.foreign`.
