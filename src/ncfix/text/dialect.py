@@ -424,10 +424,17 @@ def check_content(source: bytes, path: str, dialect: Dialect) -> None:
         raise SourceError.of("NCF103", f"this is a {other}, not a program", Place(path), "-m and --setup name others")
     code = beginning_without_comments(source)
     for family, pattern in dialect.foreign:
-        if found := re.search(pattern, code):
+        found = re.search(pattern, code)
+        if found and not is_keyword(found[found.re.groups and 1], dialect):
             text = f"this is {family}, not {dialect.title}"
             place = place_of(source, found.start(found.re.groups and 1), path, "utf-8")
             raise SourceError.of("NCF103", text, place, HINTS.get(family, ANOTHER))
+
+
+def is_keyword(sign: bytes, dialect: Dialect) -> bool:
+    """Whether what shows another language is, or begins, a keyword of this one."""
+    word = "".join(sign.decode("latin-1").upper().split())
+    return any(keyword.startswith(word) for keyword, _ in dialect.keywords)
 
 
 def beginning_without_comments(source: bytes) -> bytes:
