@@ -6,6 +6,7 @@ import random
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from certificate.planting import GIVEN, cases
@@ -40,7 +41,7 @@ def test_lines_of_a_shape_are_read_as_one_by_one(family: Family) -> None:
         if family is Family.KLARTEXT and rng.random() < 0.7:
             pieces = [*rng.choice((["12", "L"], ["L"])), *pieces]
         texts.append("".join(rng.choice(BLANKS) + piece for piece in pieces) + rng.choice(BLANKS))
-    found = Lines(family, texts, range(1, len(texts) + 1))
+    found = Lines(family, "\n".join(texts).encode(), np.arange(1, len(texts) + 1))
     assert len(found) == len(texts)
     for line, text in zip(found, texts, strict=True):
         alone = READERS[family](line.number, text)

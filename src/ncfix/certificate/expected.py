@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from ncfix.certificate.families import follower_of
 from ncfix.certificate.following import Given
 from ncfix.certificate.model import Array, Mask, TipModel, Ways
 from ncfix.certificate.reading import AXES, TextLine
-from ncfix.certificate.steps import AxisStep, Indices, Kind
+from ncfix.certificate.steps import AxisStep, Indices, Kind, ProgramSteps
 from ncfix.certificate.text import Text
 from ncfix.machine import Machine
 
@@ -22,16 +23,22 @@ BACK = 1000
 """Lines before one in which the word is looked for that brought an axis to its place."""
 WHOLE_TURN = 2 * math.pi - 1e-9
 """rad; an arc that turns farther is a full circle: it ends where it begins, which is right to the digit there only."""
+PART = 8192
+"""Steps that are worked out at once."""
 KEPT = 1000
 """Answers that are kept for the same question soon again."""
 PoseColumns = tuple[Mask, Array, Array]
 """Of motions: under tool-centre-point control (n,), the length of the tool (n,) mm, directions (n, n_axes)."""
 
 
+def parts(steps: Indices) -> Iterator[Indices]:
+    """So many of them as are looked at together."""
+    return (steps[first : first + PART] for first in range(0, len(steps), PART))
+
+
 class Expected:
     """The steps of an original and of its correction, and where the correction of each should end.
 
-    our_ends, their_ends  ends of steps (n, n_axes), mm and rad
     expected    commands at which the corrected steps should end (n, n_axes), mm and rad; NaN where that is not known
     sure        (n,) it is known
     directions  the last direction of each axis (n, n_axes); 0 where it has not moved yet, or is not sure
@@ -60,7 +67,6 @@ class Expected:
         self.expected, self.directions = np.full((n, axes), math.nan), np.zeros((n, axes), dtype=np.int8)
         self.one_sided = np.zeros(n, dtype=bool)
         if self.model is not None:
-            self.our_ends, self.their_ends = (self.model.internal(each.end) for each in (self.ours, self.theirs))
             self._expect(self.model)
         self.sure = np.isfinite(self.expected).all(axis=1)
         self.told = self.sure & ~self.ours.unsaid
@@ -75,7 +81,8 @@ class Expected:
         at = np.flatnonzero(known)
         if at.size:
             self._signs(model, at)
-            self.expected[at] = model.aimed(*self.columns(at))
+        for part in parts(at):
+            self.expected[part] = model.aimed(*self.columns(part))
 
     def _signs(self, model: TipModel, known: Indices) -> None:
         """The last direction of each axis at the end of each step, as its program means it; 0 where it is not sure."""
@@ -83,17 +90,18 @@ class Expected:
         if not self.machine.depends_on_direction:
             self.one_sided[known] = True
             return
-        ways, rows = Ways.of(model, ours, known), np.arange(len(known))
-        tcp, length = ours.tcp[known], np.nan_to_num(ours.length[known])
-        end = model.joints(ways.end, tcp, length)
-        way, lately, at_last = (
-            end - model.joints(ways.at(rows, np.full(len(known), 1 - share)), tcp, length)
-            for share in (1e-4, 1e-2, 1e-6)
-        )
         signs, clear = np.zeros_like(self.directions), np.zeros(self.directions.shape, dtype=bool)
-        signs[known] = np.where(np.isfinite(way) & (np.abs(way) > 1e-11), np.sign(way), 0)
-        same = (np.abs(lately) < 1e-9) | (np.sign(lately) == np.where(np.abs(at_last) > 1e-11, np.sign(at_last), 0))
-        clear[known] = np.isfinite(way) & same  # and it does not turn round at the end
+        for part in parts(known):
+            ways, rows = Ways.of(model, ours, part), np.arange(len(part))
+            tcp, length = ours.tcp[part], np.nan_to_num(ours.length[part])
+            end = model.joints(ways.end, tcp, length)
+            way, lately, at_last = (
+                end - model.joints(ways.at(rows, np.full(len(part), 1 - share)), tcp, length)
+                for share in (1e-4, 1e-2, 1e-6)
+            )
+            signs[part] = np.where(np.isfinite(way) & (np.abs(way) > 1e-11), np.sign(way), 0)
+            same = (np.abs(lately) < 1e-9) | (np.sign(lately) == np.where(np.abs(at_last) > 1e-11, np.sign(at_last), 0))
+            clear[part] = np.isfinite(way) & same  # and it does not turn round at the end
         lost = np.ones(n, dtype=bool)
         lost[known] = False
         lost |= ours.tcp != np.concatenate([[False], ours.tcp[:-1]])
@@ -108,10 +116,14 @@ class Expected:
         sure = (last < 0) | ~np.take_along_axis(breaks, last, axis=0)
         self.one_sided = sure[:, list(self.machine.directed)].all(axis=1)
 
+    def ends(self, steps: ProgramSteps, at: Indices) -> Array:
+        """Where some steps (k,) of a program end, (k, n_axes), mm and rad."""
+        return steps.end[at] * np.where(self.machine.rotary, math.pi / 180, 1.0)
+
     def columns(self, at: Indices) -> tuple[Array, Mask, Array, Array]:
         """Of steps: ends (n, n_axes), under TCP (n,), tool lengths (n,), directions (n, n_axes)."""
         ours = self.ours
-        return self.our_ends[at], ours.tcp[at], np.nan_to_num(ours.length[at]), self.directions[at].astype(np.float64)
+        return self.ends(ours, at), ours.tcp[at], np.nan_to_num(ours.length[at]), self.directions[at].astype(np.float64)
 
     # -- where lines lead -------------------------------------------------------------------------------------------
 
@@ -143,10 +155,10 @@ class Expected:
         turns = np.abs(self.ours.sweep[ours]) > WHOLE_TURN
         near[turns] = np.maximum(near[turns], self.tolerance)
         rapid = (self.ours.kind[ours] == Kind.RAPID) == (self.theirs.kind[theirs] == Kind.RAPID)
-        done, expected = self.their_ends[theirs], self.expected[ours]
+        done, expected = self.ends(self.theirs, theirs), self.expected[ours]
         if self.strategy == "full" and self.model is not None:
             expected = self.model.aimed(*self.columns(ours), done)
-            expected = np.where(self.machine.rotary, self.our_ends[ours], expected)
+            expected = np.where(self.machine.rotary, self.ends(self.ours, ours), expected)
         off = np.abs(done - expected)
         there: Mask = rapid & ((off <= near) | ~self.ours.said[ours]).all(axis=1)
         return there
@@ -171,7 +183,7 @@ class Expected:
             size = min(4 * size, count - done)
             ours, theirs = self.ours.at[row + done :][:size], self.theirs.at[at + done :][: size + 1]
             good = (ours >= 0) & (theirs[:-1] >= 0) & (theirs[1:] >= 0)
-            good &= self.told[ours] & np.isfinite(self.their_ends[theirs[:-1]]).all(axis=1)
+            good &= self.told[ours] & np.isfinite(self.theirs.end[theirs[:-1]]).all(axis=1)
             good &= self._are_there(ours, theirs[:-1])
             if not good.all():
                 return done + int(np.argmin(good))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ncfix.certificate.model import TipModel
 from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Floats, Kind, ModesInForce, ProgramSteps, StraightRun
-from ncfix.certificate.text import Lines, StraightLines, Text
+from ncfix.certificate.text import StraightLines, Text
 from ncfix.certificate.turning import TurnedFrame
 from ncfix.values import frozen
 
@@ -59,7 +59,7 @@ def skips(switches: bool | frozenset[int] | None, line: TextLine) -> bool:
 
 def positions(text: Text, given: Given) -> list[Given]:
     """What is given in each position of the switches of block delete that a program asks, all of them off first."""
-    asked = sorted({line.skipped for line in text.lines} - {0}) if given.skip is None else []
+    asked = sorted({line.skipped for _, line in text.apart()} - {0}) if given.skip is None else []
     if not asked or len(asked) > MOST_SWITCHES:
         return [given]
     every = (on for count in range(len(asked) + 1) for on in combinations(asked, count))
@@ -130,9 +130,9 @@ class AxisFollower:
     def run(self, text: Text) -> ProgramSteps:
         """Follow the lines of a program."""
         lines = text.lines
-        if self._has_jumps(text):
+        if any(line.odd is JUMPS for _, line in text.apart()):
             self.lost["jumps"] = JUMPS
-        log: list[AxisStep | StraightRun] = []
+        log = ProgramSteps(lines, self.axes)
         straight = None if text.read is None or self.lost else text.read.straight(self.axes)
         stops = [] if straight is None else _stops(straight.is_straight)
         row, tried = 0, 0
@@ -140,15 +140,15 @@ class AxisFollower:
             if straight is not None and not self.lost and row >= tried and stops[row] - row >= LEAST:
                 run = self.straight_run(straight, row, stops[row])
                 if run is not None:
-                    log.append(run)
+                    log.add_run(run)
                     row = stops[row]
                     continue
                 tried = row + 1 if self.kind is None or self.kind > Kind.FEED else stops[row]
             self._line(row, lines[row], log)
             row += 1
-        return ProgramSteps(log, lines, self.axes, straight)
+        return log.done()
 
-    def _line(self, row: int, line: TextLine, log: list[AxisStep | StraightRun]) -> None:
+    def _line(self, row: int, line: TextLine, log: ProgramSteps) -> None:
         """Follow one line."""
         if line.odd or (self.lost and any(map(REWRITTEN.match, self.lost))):
             self.foreign.add(row)
@@ -162,18 +162,9 @@ class AxisFollower:
                 found = self.turn.step(found)
                 if self.turn.tilted and self.length != found.length:
                     found.why = "the length of the tool is not in force in a tilted plane"
-            log.append(found)
+            log.add(found)
             if found.why:
                 self.forget()
-
-    @staticmethod
-    def _has_jumps(text: Text) -> bool:
-        """Whether there is a line with a loop, a jump or a call; plain lines are none."""
-        lines = text.lines
-        if isinstance(lines, Lines):
-            plain = np.array([shape is not None for shape in lines.shapes], dtype=bool)
-            lines = [lines[row] for row in np.flatnonzero(~plain[lines.kinds]).tolist()] if len(lines) else ()
-        return any(line.odd is JUMPS for line in lines)
 
     def straight_run(self, lines: StraightLines, row: int, stop: int) -> StraightRun | None:
         """The steps of lines that only bring axes straight to places; None if that takes more than columns."""

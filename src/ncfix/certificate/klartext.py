@@ -184,6 +184,10 @@ class KlartextFollower(AxisFollower):
     def _path(self, row: int, line: TextLine, lead: str, words: Mapping[str, TextWord]) -> AxisStep:
         """A motion by a path function."""
         turn, keys = line.word("PA"), {word.name for word in line.codes}
+        if lead == "LN":
+            step = self.step(row, Kind.FEED, dict(self.at), line, "a surface normal or a direction of the tool (LN)")
+            step.foreign = True
+            return step
         if lead not in ("L", "C", "CR", "CP") or (lead == "CP") != (turn is not None):
             return self.step(row, Kind.FEED, dict(self.at), line, f"{lead} is not known to this reader")
         self.kind = Kind.RAPID if "FMAX" in keys else Kind.FEED

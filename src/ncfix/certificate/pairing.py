@@ -8,11 +8,13 @@ lines are told apart by where they lead.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from array import array
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import field
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.certificate.findings import BlockFault
 from ncfix.certificate.reading import Family, TextLine
@@ -58,6 +60,52 @@ class LinePair(NamedTuple):
     last: int
 
 
+class LinePairs(Sequence[LinePair]):
+    """Pairs in the order of their lines."""
+
+    def __init__(self, numbers: Iterable[int] = ()) -> None:
+        self._numbers = array("i", numbers)
+
+    @property
+    def columns(self) -> NDArray[np.int32]:
+        """(n, 3) as in `LinePair`."""
+        return np.array(self._numbers, dtype=np.int32).reshape(-1, 3)
+
+    def __len__(self) -> int:
+        return len(self._numbers) // 3
+
+    @overload
+    def __getitem__(self, at: int) -> LinePair: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> list[LinePair]: ...
+
+    def __getitem__(self, at: int | slice) -> LinePair | list[LinePair]:
+        if isinstance(at, slice):
+            return [self[k] for k in range(len(self))[at]]
+        first = 3 * (at + len(self) if at < 0 else at)
+        return LinePair(*self._numbers[first : first + 3])
+
+    def append(self, row: int, first: int, last: int) -> None:
+        """One more pair."""
+        self._numbers.extend((row, first, last))
+
+    def append_run(self, row: int, at: int, count: int) -> None:
+        """So many lines with one line each in their place."""
+        both = np.arange(count, dtype=np.int32)[:, None] + np.array([row, at, at], dtype=np.int32)
+        self._numbers.frombytes(both.tobytes())
+
+    def pop(self) -> LinePair:
+        """Take the last one out."""
+        last = self[-1]
+        del self._numbers[-3:]
+        return last
+
+
+NO_KEY, EMPTY_KEY = 0, 1
+"""Of lines that hold only a path, and of those that hold nothing."""
+
+
 @mutable
 class Pairing:
     """Two programs, and how near a corrected line leads to where the correction of an original one should."""
@@ -69,7 +117,7 @@ class Pairing:
     moves: Callable[[int], bool]
     followed: Callable[[int], bool]
     foreign: Callable[[int], bool]
-    pairs: list[LinePair] = field(default_factory=list)
+    pairs: LinePairs = field(default_factory=LinePairs)
     faults: list[BlockFault] = field(default_factory=list)
     unsure: set[int] = field(default_factory=set)
     """Original lines among which nobody can say which added line belongs to which."""
@@ -80,39 +128,37 @@ class Pairing:
         own, other = self._keys(self.original), self._keys(self.corrected)
         i = j = 0
         while i < len(ours) or j < len(theirs):
-            if i < len(ours) and j < len(theirs) and own[i] is not None and own[i] == other[j]:
-                self.pairs.append(LinePair(i, j, j))
+            if i < len(ours) and j < len(theirs) and own[i] == other[j] != NO_KEY:
+                self.pairs.append(i, j, j)
                 i, j = i + 1, j + 1
-            elif (i < len(ours) and own[i] is None) or (j < len(theirs) and other[j] is None):
+            elif (i < len(ours) and own[i] == NO_KEY) or (j < len(theirs) and other[j] == NO_KEY):
                 i, j = self._stretch(own, other, i, j)
             else:
                 i, j = self._apart(own, other, i, j)
 
-    def _keys(self, text: Text) -> list[str | None]:
-        """What the lines of a program hold besides a path and its pace, as `_key`; alike lines have the same."""
+    def _keys(self, text: Text) -> Sequence[int]:
+        """What the lines of a program hold besides a path and its pace, as a number; alike lines have the same."""
         lines = text.read
         if lines is None:
-            return [self._key(line) for line in text.lines]
-        known: dict[tuple[int, tuple[str, ...]], str | None] = {}
-        digits, begins, shapes = lines.digits, lines.begins.tolist(), lines.shapes
+            return [_number(self._key(line)) for line in text.lines]
+        found, known = array("q", bytes(8 * len(lines))), dict[tuple[int, tuple[str, ...]], str | None]()
+        digits, begins, shapes = lines.digits, lines.begins, lines.shapes
         bare = [shape is not None and bool(shape.path) and not shape.rest and not shape.numbered for shape in shapes]
-        found: list[str | None] = [None] * len(lines)
-        others = np.flatnonzero(~np.array(bare, dtype=bool)[lines.kinds]).tolist() if found else []
-        for row, kind in zip(others, lines.kinds[others].tolist(), strict=True):
+        others = np.flatnonzero(~np.array(bare, dtype=bool)[lines.kinds]) if bare else np.zeros(0, dtype=np.intp)
+        for row, kind, begin in zip(*map(np.ndarray.tolist, (others, lines.kinds[others], begins[others])), strict=True):
             shape = shapes[kind]
-            if shape is None or (shape.numbered and not digits[begins[row]].isdecimal()):
-                found[row] = self._key(lines[row])
+            if shape is None or (shape.numbered and not digits(begin).isdecimal()):
+                found[row] = _number(self._key(lines[row]))
                 continue
-            begin = begins[row]
             block, held = "", shape.held
             if shape.rest.startswith("N{}"):
-                block, held = f"N{digits[begin + held[0]]}", held[1:]
-            each = (kind, tuple([digits[begin + k] for k in held]))
+                block, held = f"N{digits(begin + held[0])}", held[1:]
+            each = (kind, tuple([digits(begin + k) for k in held]))
             if each not in known:
                 key = self._key(lines[row])
                 known[each] = key if key is None else key.removeprefix(block)
             tail = known[each]
-            found[row] = tail if tail is None else block + tail
+            found[row] = _number(tail if tail is None else block + tail)
         return found
 
     def _key(self, line: TextLine) -> str | None:
@@ -128,12 +174,12 @@ class Pairing:
             return None
         return PACE.sub("", bare) if line.path else bare
 
-    def _stretch(self, own: list[str | None], other: list[str | None], i: int, j: int) -> tuple[int, int]:
+    def _stretch(self, own: Sequence[int], other: Sequence[int], i: int, j: int) -> tuple[int, int]:
         """Lines that hold a path only, from here on in both; the line before may have been split, too."""
         end, stop = i, j
-        while end < len(own) and own[end] is None:
+        while end < len(own) and own[end] == NO_KEY:
             end += 1
-        while stop < len(other) and other[stop] is None:
+        while stop < len(other) and other[stop] == NO_KEY:
             stop += 1
         if self.pairs and self.pairs[-1].row == i - 1 and self.original.lines[i - 1].path:
             i, j = i - 1, self.pairs.pop().first
@@ -143,7 +189,7 @@ class Pairing:
         while (row := row + 1) < end:
             count = min(end - row, stop - j) - 1
             if count > SEVERAL and (count := self._one_by_one(row, j, count)):
-                self.pairs.extend(LinePair(row + k, j + k, j + k) for k in range(count))
+                self.pairs.append_run(row, j, count)
                 row, j, astray = row + count, j + count, False
             if more > 0 and not self.followed(row) and not (j < stop and ours[row].says(theirs[j])):
                 astray = True  # until a line leads where it should
@@ -161,7 +207,7 @@ class Pairing:
                 last += (not behind.path and following.path != []) or (
                     put_back and not _begins(following, "CC", *ARCS)  # a pole before an arc belongs to that one
                 )
-            self.pairs.append(LinePair(row, j, last))
+            self.pairs.append(row, j, last)
             astray = astray and not (self.moves(row) and self.followed(row) and self.nearness(row, last))
             more -= last - j
             j = last + 1
@@ -200,12 +246,11 @@ class Pairing:
             found = next((at for at in range(most + 1, stop) if self.nearness(row, at)), None)
         return first if found is None else found
 
-    def _apart(self, own: list[str | None], other: list[str | None], i: int, j: int) -> tuple[int, int]:
+    def _apart(self, own: Sequence[int], other: Sequence[int], i: int, j: int) -> tuple[int, int]:
         """Lines that hold more than a path and differ: one is lost, added, or changed."""
-        here = other[j] if j < len(other) else None
-        there = own[i] if i < len(own) else None
-        lost = next((k for k in range(1, FAR) if i + k < len(own) and own[i + k] == here), FAR) if here else FAR
-        more = next((k for k in range(1, FAR) if j + k < len(other) and other[j + k] == there), FAR) if there else FAR
+        here = other[j] if j < len(other) else NO_KEY
+        there = own[i] if i < len(own) else NO_KEY
+        lost, more = _ahead(own, i, here), _ahead(other, j, there)
         if j >= len(other) or (lost < FAR and lost <= more):
             count = len(own) - i if j >= len(other) else lost
             for row in range(i, i + count):
@@ -215,7 +260,7 @@ class Pairing:
             count = len(other) - j if i >= len(own) else more
             self._extra(j, j + count)
             return i, j + count
-        self.pairs.append(LinePair(i, j, j))
+        self.pairs.append(i, j, j)
         return i + 1, j + 1
 
     def _lost(self, row: int) -> None:
@@ -230,6 +275,18 @@ class Pairing:
         for line in self.corrected.lines[first:stop]:
             if line.rest.strip() or line.path:
                 self.faults.append(BlockFault("a line that the original does not have", line.number, 0))
+
+
+def _number(key: str | None) -> int:
+    """A number for what a line holds, the same for the same; that two texts have one by chance is harmless."""
+    return NO_KEY if key is None else hash(key) if key else EMPTY_KEY
+
+
+def _ahead(keys: Sequence[int], at: int, wanted: int) -> int:
+    """How far behind a line there is one with this key, `FAR` if there is none near."""
+    if wanted in (NO_KEY, EMPTY_KEY):
+        return FAR
+    return next((k for k in range(1, FAR) if at + k < len(keys) and keys[at + k] == wanted), FAR)
 
 
 def _begins(line: TextLine, *names: str) -> bool:

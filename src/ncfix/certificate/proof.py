@@ -16,11 +16,11 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.certificate.deviations import ASIDE, FEW, HALF_TURN, MANY, Deviations, Moved
-from ncfix.certificate.expected import SLACK, WHOLE_TURN
+from ncfix.certificate.expected import SLACK, WHOLE_TURN, parts
 from ncfix.certificate.findings import BlockFault, BlockProof
 from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, Given, positions, skips
 from ncfix.certificate.model import Mask, Ways
-from ncfix.certificate.pairing import LinePair, Pairing, text_faults
+from ncfix.certificate.pairing import LinePair, LinePairs, Pairing, text_faults
 from ncfix.certificate.reading import Family
 from ncfix.certificate.steps import AxisStep, Indices, Kind
 from ncfix.certificate.text import Text, same_but_axes
@@ -56,7 +56,7 @@ def prove(
     try:
         family = Family.of(original, dialect)
         first, second = Text.of(original, family), Text.of(corrected, family)
-        if second.is_renumbered and second.block_numbers != first.block_numbers:
+        if second.is_renumbered and not np.array_equal(second.block_numbers, first.block_numbers):
             first, second = first.without_block_numbers(), second.without_block_numbers()
         settings = positions(first, given) if b"/" in original else [given]
         prover, *others = (Prover(first, second, machine, each, tolerance_um) for each in settings)
@@ -66,8 +66,10 @@ def prove(
         proof = prover.run(pairing)
         for each in others:
             each.begin_apart = prover.begin_apart
-            pairs = [pair for pair in pairing.pairs if not skips(each.given.skip, first.lines[pair.row])]
-            joint = each.run(replace(pairing, pairs=pairs, faults=[]))
+            skipped = [row for row, line in first.apart() if skips(each.given.skip, line)]
+            pairs = pairing.pairs.columns
+            pairs = pairs[~np.isin(pairs[:, 0], skipped)]
+            joint = each.run(replace(pairing, pairs=LinePairs(pairs.ravel().tolist()), faults=[]))
             proof.join(joint, {first.lines[row].number for row in prover.ours})
         return proof
     finally:
@@ -84,7 +86,7 @@ class Prover(Deviations):
         self.proof = BlockProof(stamp=second.stamp)
         self.polar: set[int] = set()
         if second.family is Family.KLARTEXT:
-            self.polar = {row for row, line in enumerate(second.lines) if line.word("PA")}
+            self.polar = {row for row, line in second.apart() if line.word("PA")}
         """Lines of the corrected program whose digits are those of an angle about a pole."""
         self.begin_apart: set[int] = set()
         """Motions that begin elsewhere in another position of block delete: `fix` does not split them, and rapids may
@@ -105,7 +107,7 @@ class Prover(Deviations):
                 self.proof.leave(UNSURE, fault.original or fault.line)
             else:
                 self.proof.fault(*fault)
-        pairs = np.array(pairing.pairs, dtype=np.intp).reshape(-1, 3)
+        pairs = pairing.pairs.columns
         plain = self._are_plain(pairs, pairing.unsure)
         self.proof.blocks += int(plain.sum())
         self.proof.motions += int(plain.sum())
@@ -141,8 +143,8 @@ class Prover(Deviations):
             elif step.kind != Kind.FIXED:
                 plain[k] = True
         self.proof.blocks += sum(1 for fault in pairing.faults if fault.original)
-        if plain.any():
-            self._motions(*pairs[plain].T)
+        for part in parts(np.flatnonzero(plain)):
+            self._motions(*pairs[part].T)
         self.proof.faults.sort(key=lambda fault: fault.line)
         return self.proof
 
@@ -160,7 +162,7 @@ class Prover(Deviations):
         found[found] = known[ours.at[row[found]]]
         for rows in (self.foreign, unsure):
             found &= ~np.isin(row, list(rows))
-        found &= ~np.isin(np.asarray(first.numbers)[row], list(self.proof.faulty))
+        found &= ~np.isin(self.first.numbers[row], list(self.proof.faulty))
         where = np.flatnonzero(found)
         found[where] = same_but_axes(first, row[where], second, at[where])
         return found
@@ -186,13 +188,10 @@ class Prover(Deviations):
 
     def _foreign_near(self, fault: BlockFault, pairing: Pairing) -> bool:
         """Whether what is wrong with lines may be due to what this reader does not know."""
-        row = (
-            fault.original - 1
-            if fault.original
-            else max(
-                (pair.row for pair in pairing.pairs if self.second.lines[pair.last].number < fault.line), default=0
-            )
-        )
+        row = fault.original - 1
+        if not fault.original:
+            rows, _, last = pairing.pairs.columns.T
+            row = int(rows[self.second.numbers[last] < fault.line].max(initial=0))
         near = range(max(row - 2, 0), min(row + 3, len(self.first.lines)))
         return any(self._is_foreign(at) or (at in self.ours and bool(self.ours[at].why)) for at in near)
 
@@ -230,7 +229,7 @@ class Prover(Deviations):
         if math.isnan(step.length):
             if step.tcp or self.machine.depends_on_tool_length:
                 return "the length of the tool is not known"
-            step.length = 0.0
+            step.length = self.ours.length[self.ours.at[step.row]] = 0.0
         if step.unsteady:
             return "cutter radius compensation is on"
         return ""
@@ -309,11 +308,12 @@ class Prover(Deviations):
         if not len(moved.row) or self.strategy == "full" or self.model is None:
             return np.zeros(len(moved.row), dtype=bool)
         ours = self.ours
-        meant, done, expected = self.our_ends[moved.ours], self.their_ends[moved.stop - 1], self.expected[moved.ours]
+        meant, done = self.ends(ours, moved.ours), self.ends(self.theirs, moved.stop - 1)
+        expected = self.expected[moved.ours]
         rotary, (low, high) = self.machine.rotary, self.machine.ranges.T
         single = moved.stop - moved.begin == 1
         units = ours.unit[moved.ours]
-        written = np.where(single[:, None], ours.decimals(moved.ours, self.control_digits(units)), 0)
+        written = np.where(single[:, None], ours.written[moved.ours], 0).astype(np.intp)
         halves = self.along(self.halves(units, written), moved.ours)
         right = (np.abs(done - expected) <= halves * 1.002 + np.where(rotary, TURNED, SLACK)).all(axis=1)
         right &= (ours.said[moved.ours] | rotary).all(axis=1)
@@ -356,7 +356,8 @@ class Prover(Deviations):
         """What is wrong with the end of a motion, and whether that is only not proved."""
         assert self.model is not None
         at = self.ours.at[step.row]
-        meant, done, expected = self.our_ends[at], self.their_ends[self.theirs.at[pieces[-1].row]], self.expected[at]
+        done = self.ends(self.theirs, self.theirs.at[pieces[-1].row])
+        meant, expected = self.ends(self.ours, at), self.expected[at]
         rotary = self.machine.rotary
         full = self.strategy == "full" and bool(rotary.any())
         if full:

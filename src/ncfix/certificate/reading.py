@@ -218,11 +218,11 @@ def _sinumerik(number: int, text: str) -> TextLine:
 DECIMAL = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)"
 KLARTEXT_WORD = re.compile(
     rf"(;.*)|(R0|RL|RR|FMAX|F ?AUTO|DR[+-])(?![\w.,])"
-    rf"|(I?(?:[XYZABCUVW]|P[AR])|R|FQ?|LA|M|S)({DECIMAL}|[+-]?Q12[0-2])(?![\w.,])"
+    rf"|(I?(?:[XYZABCUVW]|P[AR])|[NT][XYZ]|R|FQ?|LA|M|S)({DECIMAL}|[+-]?Q12[0-2])(?![\w.,])"
     rf"|([A-Z]+)|([^ \t])",
     re.IGNORECASE,
 )
-KLARTEXT_LEAD = frozenset(("L", "C", "CC", "CP", "CR", "M", "STOP"))
+KLARTEXT_LEAD = frozenset(("L", "LN", "C", "CC", "CP", "CR", "M", "STOP"))
 KLARTEXT_STATEMENT = re.compile(
     r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$|CYCL DEF (?:32|247)\b|FN ?[0-8]\b"
     r"|Q[LRS]?\d+ ?=|PLANE (?:SPATIAL|RESET)\b|CYCL DEF (?:7|10)\.\d"

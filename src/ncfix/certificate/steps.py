@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.reading import TextLine, TextWord
-from ncfix.certificate.text import Lines, StraightLines
+from ncfix.certificate.text import KEPT, MOST_DIGITS, StraightLines
 from ncfix.values import mutable
 
 NAN = math.nan
+AT_ONCE = 500
+"""Steps that are put into columns together."""
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.intp]
@@ -89,6 +91,7 @@ class StraightRun(NamedTuple):
     """Lines one behind the other that only bring axes straight to places: k steps of a axes.
 
     start, end  (k, a), mm and degree; `said` (k, a)
+    written     (k, a) digits behind the points of words
     feed        (k,), NaN for none; `rapid` (k,)
     unsaid      (k,) a word is an increment from where the program has not brought the axis
     """
@@ -98,6 +101,7 @@ class StraightRun(NamedTuple):
     start: Floats
     end: Floats
     said: Bools
+    written: NDArray[np.int8]
     feed: Floats
     unsaid: Bools
     modes: ModesInForce
@@ -139,7 +143,8 @@ class StraightRun(NamedTuple):
         start = np.vstack([np.array(at)[None], end[:-1]])
         paces = _carried(lines.feed[part], lines.values, feed)
         fast = lines.rapid[part] if klartext else _carried(lines.code[part], lines.values, 0.0 if rapid else 1.0) == 0.0
-        return cls(rows[0], fast, start, end, known, paces, (has & ~known).any(axis=1), modes)
+        written = np.where(has, np.maximum(lines.decimals[word], 0), 0).astype(np.int8)
+        return cls(rows[0], fast, start, end, known, written, paces, (has & ~known).any(axis=1), modes)
 
 
 def _carried(word: Indices, values: Floats, before: float) -> Floats:
@@ -151,83 +156,93 @@ def _carried(word: Indices, values: Floats, before: float) -> Floats:
 class ProgramSteps(Mapping[int, AxisStep]):
     """The steps of a program by the index of their line, and in columns (n,) or (n, a) as in `AxisStep`.
 
-    at        (lines,) which step a line is; -1: none
+    at        (lines + 1,) which step a line is; -1: none
     before    (lines + 1,) how many steps there are before a line
-    followed  (n,) whether this reader could follow it
+    why       which of `reasons`
     feed      NaN for none
     across    0 1 2 for X Y Z
     unsaid    a word is an increment from where the program has not brought the axis
+    written   digits behind the points of the words of axes
     turn      (n,) which of `rotations` (t, 3, 3) the coordinates have; 0: they are not turned
     """
 
-    def __init__(
-        self,
-        log: Sequence[AxisStep | StraightRun],
-        lines: Sequence[TextLine],
-        names: Sequence[str],
-        straight: StraightLines | None,
-    ) -> None:
-        """Of single steps and runs of them, in the order of their lines."""
-        self._lines, self._names, self._straight = lines, names, straight
-        axes = len(names)
-        sizes = [1 if isinstance(each, AxisStep) else len(each.rapid) for each in log]
-        n = sum(sizes)
-        self.rows = np.empty(n, dtype=np.intp)
-        self.kind = np.empty(n, dtype=np.int8)
-        self.start, self.end, self.said = np.empty((n, axes)), np.empty((n, axes)), np.empty((n, axes), dtype=bool)
-        self.followed, self.foreign = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
-        self.unsaid = np.zeros(n, dtype=bool)
-        self.tcp, self.unsteady, self.by_vector = (np.zeros(n, dtype=bool) for _ in range(3))
-        self.length, self.feed, self.unit = np.empty(n), np.empty(n), np.empty(n)
-        self.feed_mode, self.across = np.empty(n, dtype=np.intp), np.full(n, 2, dtype=np.intp)
-        self.centre, self.sweep = np.full((n, 3), NAN), np.zeros(n)
-        self.turn, self.rotations = np.zeros(n, dtype=np.intp), np.eye(3)[None]
-        self._made: list[AxisStep | None] = [None] * n
-        single: list[int] = []
-        first = 0
-        for each, size in zip(log, sizes, strict=True):
-            if isinstance(each, AxisStep):
-                single.append(first)
-                self._made[first] = each
-            else:
-                self._enter(each, slice(first, first + size))
-            first += size
-        if single:
-            self._enter_each(np.array(single), [each for each in log if isinstance(each, AxisStep)])
-        self.at = np.full(len(lines) + 1, -1, dtype=np.intp)
-        self.at[self.rows] = np.arange(n)
-        self.before = np.searchsorted(self.rows, np.arange(len(lines) + 1))
+    def __init__(self, lines: Sequence[TextLine], names: Sequence[str]) -> None:
+        """No steps yet; `add` and `add_run` take them in, in the order of their lines."""
+        self._lines, self._names = lines, names
+        self._size, self._waiting = 0, list[AxisStep]()
+        self._kept: dict[int, AxisStep] = {}
+        """Those whose words are formulas, by their indices: what these are worth is not in the line."""
+        most, axes = len(lines), len(names)
+        self.rows, self.kind = np.empty(most, dtype=np.int32), np.empty(most, dtype=np.int8)
+        self.start, self.end, self.said = np.empty((most, axes)), np.empty((most, axes)), np.empty((most, axes), bool)
+        self.written = np.empty((most, axes), dtype=np.int8)
+        self.why, self.reasons = np.zeros(most, dtype=np.int32), [""]
+        self.tcp, self.foreign, self.unsaid, self.unsteady, self.by_vector = (np.zeros(most, bool) for _ in range(5))
+        self.length, self.feed, self.unit = np.empty(most), np.empty(most), np.empty(most)
+        self.feed_mode, self.across = np.empty(most, dtype=np.int16), np.zeros(most, dtype=np.int8)
+        self.centre, self.sweep = np.zeros((most, 3)), np.zeros(most)  # memory is taken where there are arcs
+        self.turn, self.rotations = np.zeros(most, dtype=np.int32), np.eye(3)[None]
+        self._reason_of = {"": 0}
 
-    def _enter(self, run: StraightRun, at: slice) -> None:
-        self.rows[at] = np.arange(run.row, run.row + len(run.rapid))
+    def add(self, step: AxisStep) -> None:
+        """One more step."""
+        if any(word.value is None for word in self._lines[step.row].path):
+            self._kept[self._size + len(self._waiting)] = step
+        self._waiting.append(step)
+        if len(self._waiting) >= AT_ONCE:
+            self._enter_each()
+
+    def add_run(self, run: StraightRun) -> None:
+        """So many more."""
+        self._enter_each()
+        count, modes = len(run.rapid), run.modes
+        at = slice(self._size, self._size + count)
+        self.rows[at] = np.arange(run.row, run.row + count)
         self.kind[at] = np.where(run.rapid, Kind.RAPID, Kind.FEED)
         self.start[at], self.end[at], self.said[at], self.feed[at] = run.start, run.end, run.said, run.feed
-        self.unsaid[at] = run.unsaid
-        modes = run.modes
+        self.unsaid[at], self.written[at] = run.unsaid, run.written
         self.tcp[at], self.length[at], self.unit[at] = modes.tcp, modes.length, modes.unit
         self.feed_mode[at], self.unsteady[at], self.by_vector[at] = modes.feed_mode, modes.unsteady, modes.by_vector
         self.turn[at] = self._turn_of(modes.turn)
+        self._size += count
 
-    def _enter_each(self, at: Indices, steps: Sequence[AxisStep]) -> None:
+    def done(self) -> ProgramSteps:
+        """All steps are there."""
+        self._enter_each()
+        for name, column in list(vars(self).items()):
+            if isinstance(column, np.ndarray) and name != "rotations":
+                setattr(self, name, column[: self._size])
+        self.at = np.full(len(self._lines) + 1, -1, dtype=np.int32)
+        self.at[self.rows] = np.arange(self._size)
+        self.before = np.searchsorted(self.rows, np.arange(len(self._lines) + 1)).astype(np.int32)
+        self.followed = self.why == 0
+        """(n,) whether this reader could follow it."""
+        self._made: dict[int, AxisStep] = {}
+        return self
+
+    def _enter_each(self) -> None:
+        """Put the steps that wait into columns."""
+        steps, self._waiting = self._waiting, []
+        at = slice(self._size, self._size + len(steps))
+        self._size += len(steps)
+        if not steps:
+            return
+        for name in ("kind", "start", "end", "said", "foreign", "tcp", "unsteady", "by_vector", "length", "unit"):
+            getattr(self, name)[at] = [getattr(step, name) for step in steps]
         self.rows[at] = [step.row for step in steps]
-        self.kind[at] = [step.kind for step in steps]
-        self.start[at] = [step.start for step in steps]
-        self.end[at] = [step.end for step in steps]
-        self.said[at] = [step.said for step in steps]
-        self.followed[at] = [not step.why for step in steps]
-        self.foreign[at] = [step.foreign for step in steps]
-        self.unsaid[at] = [not all(step.said[self._names.index(name)] for name in step.named) for step in steps]
-        self.tcp[at] = [step.tcp for step in steps]
-        self.unsteady[at] = [step.unsteady for step in steps]
-        self.by_vector[at] = [step.by_vector for step in steps]
-        self.length[at] = [step.length for step in steps]
-        self.feed[at] = [NAN if step.feed is None else step.feed for step in steps]
-        self.unit[at] = [step.unit for step in steps]
         self.feed_mode[at] = [step.feed_mode for step in steps]
-        self.across[at] = ["XYZ".index(step.across) for step in steps]
-        self.centre[at] = [step.centre for step in steps]
-        self.sweep[at] = [step.sweep for step in steps]
-        self.turn[at] = [self._turn_of(step.turn) for step in steps]
+        self.feed[at] = [NAN if step.feed is None else step.feed for step in steps]
+        self.unsaid[at] = [not all(step.said[self._names.index(name)] for name in step.named) for step in steps]
+        self.written[at] = [[_digits(step.named.get(name)) for name in self._names] for step in steps]
+        for index, step in enumerate(steps, at.start):
+            if step.why:
+                self.why[index] = self._reason_of.setdefault(step.why, len(self.reasons))
+                self.reasons += [step.why] if self.why[index] == len(self.reasons) else []
+            if step.kind is Kind.ARC:
+                self.across[index] = "XYZ".index(step.across)
+                self.centre[index], self.sweep[index] = step.centre, step.sweep
+            if step.turn is not None:
+                self.turn[index] = self._turn_of(step.turn)
 
     def _turn_of(self, rotation: Floats | None) -> int:
         """Which of `rotations` one is, a new one if need be."""
@@ -253,55 +268,43 @@ class ProgramSteps(Mapping[int, AxisStep]):
         return isinstance(row, int) and 0 <= row < len(self.at) and bool(self.at[row] >= 0)
 
     def __getitem__(self, row: int) -> AxisStep:
-        at = self.at[row] if 0 <= row < len(self.at) else -1
+        at = self.step_of(row)
         if at < 0:
             raise KeyError(row)
-        found = self._made[at]
+        found = self._kept.get(at) or self._made.get(at)
         if found is None:
+            if len(self._made) >= KEPT:
+                self._made.clear()
             found = self._made[at] = self._step(row, at)
         return found
 
     def _step(self, row: int, at: int) -> AxisStep:
-        """A step of a run."""
-        feed = float(self.feed[at])
+        """A step made of the columns."""
+        feed, arc = float(self.feed[at]), self.kind[at] == Kind.ARC
+        x, y, z = self.centre[at].tolist() if arc else (NAN, NAN, NAN)
         return AxisStep(
             row,
             Kind(int(self.kind[at])),
             self.start[at].tolist(),
             self.end[at].tolist(),
             self.said[at].tolist(),
-            {word.name: word for word in self._lines[row].path},
-            "",
+            {word.name: word for word in self._lines[row].path if word.name in self._names},
+            self.reasons[self.why[at]],
             bool(self.tcp[at]),
             float(self.length[at]),
             None if math.isnan(feed) else feed,
             int(self.feed_mode[at]),
             float(self.unit[at]),
+            centre=(x, y, z),
+            across="XYZ"[self.across[at]] if arc else "Z",
+            sweep=float(self.sweep[at]),
+            foreign=bool(self.foreign[at]),
             unsteady=bool(self.unsteady[at]),
             by_vector=bool(self.by_vector[at]),
             turn=self.rotations[self.turn[at]] if self.turn[at] else None,
         )
 
-    def decimals(self, at: Indices, least: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Digits behind the point of the words of axes of steps (k,), where they may be more than `least`; (k, a)."""
-        found = np.zeros((len(at), len(self._names)), dtype=np.intp)
-        lines, straight = self._lines, self._straight
-        single = np.array([self._made[step] is not None for step in at.tolist()], dtype=bool)
-        for k in np.flatnonzero(single).tolist():
-            named = self[int(self.rows[at[k]])].named
-            for name, word in named.items():
-                if word.value is not None:
-                    found[k, self._names.index(name)] = word.decimals
-        runs = np.flatnonzero(~single)
-        if runs.size and straight is not None and isinstance(lines, Lines):
-            digits = lines.digits
-            words = straight.word[self.rows[at[runs]]]
-            values = straight.values
-            before = np.ceil(np.log10(np.maximum(np.floor(np.abs(values)) + 1, 1))) + (values < 0)
-            most = np.fromiter(map(len, digits), np.intp, len(digits)) - before - 1
-            where = np.nonzero((words >= 0) & (most[words] > least[runs]))
-            for k, column, number in zip(*map(np.ndarray.tolist, where), words[where].tolist(), strict=True):
-                text = digits[number]
-                point = max(text.find("."), text.find(","))
-                found[runs[k], column] = 0 if point < 0 else len(text) - 1 - point
-        return found
+
+def _digits(word: TextWord | None) -> int:
+    """Digits behind the point of a word with a plain number."""
+    return 0 if word is None or word.value is None else min(word.decimals, MOST_DIGITS)

@@ -8,9 +8,9 @@ numbers also stand in columns.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +18,28 @@ from numpy.typing import NDArray
 from ncfix.certificate.reading import AXES, DECIMAL, NUMBER, PATH_WORDS, READERS, Family, TextLine, TextWord
 from ncfix.values import frozen
 
+Floats = NDArray[np.float64]
+Indices = NDArray[np.signedinteger[Any]]
+PART = 4096
+"""Lines that are taken apart at once."""
+MOST_DIGITS = 99
+"""Behind a point, that are counted."""
+KEPT = 1000
+"""Lines that are kept for those who look again soon."""
+
 
 @frozen
 class Text:
     """A program as lines.
 
-    read  its lines as they were read, of which the plain ones stand in columns; None if `lines` are others
+    source   its text without the stamp
+    numbers  (n,) those of the lines, from 1
+    read     its lines as they were read, of which the plain ones stand in columns; None if `lines` are others
     """
 
     family: Family
+    source: bytes
+    numbers: NDArray[np.int32]
     lines: Sequence[TextLine]
     stamp: StampFound | None
     read: Lines | None = None
@@ -34,24 +47,30 @@ class Text:
     @classmethod
     def of(cls, source: bytes, family: Family) -> Text:
         """Read a program; the line of its stamp, if it has one, is kept apart."""
-        text = source.decode("latin-1")
-        rows = text.removesuffix(end := "\n" if "\n" in text else "\r").split(end) if text else []
-        numbers, stamp = list(range(1, len(rows) + 1)), None
-        if b"ncfix" in source.lower() and (found := STAMP.search(text)):
-            at = text.count(end, 0, found.start())
-            stamp = StampFound(at + 1, found[1].lower(), found[2].lower(), float(found[3]))
-            del rows[at], numbers[at]
-        rows = [row.rstrip("\r") for row in rows] if "\r" in text else rows
-        if MARK in text:
-            return cls(family, [READERS[family](*each) for each in zip(numbers, rows, strict=True)], stamp)
-        lines = Lines(family, rows, numbers)
-        return cls(family, lines, stamp, lines)
+        end = b"\n" if b"\n" in source else b"\r"
+        text = source.removesuffix(end)
+        if b"\r" in text:
+            text = text.replace(b"\r", b"\n") if end == b"\r" else RETURNS.sub(b"", text)
+        numbers, stamp = np.arange(1, text.count(b"\n") + 2 if source else 1, dtype=np.int32), None
+        if found := STAMP.search(text):
+            at = text.count(b"\n", 0, found.start())
+            machine, strategy, tolerance = (group.decode().lower() for group in found.groups())
+            stamp = StampFound(at + 1, machine, strategy, float(tolerance))
+            before, behind = text.rfind(b"\n", 0, found.start()), text.find(b"\n", found.start())
+            text = text[: max(before, 0)] if behind < 0 else text[: before + 1] + text[behind + 1 :]
+            numbers = np.delete(numbers, at)
+        if MARK.encode() in text:
+            rows = text.decode("latin-1").split("\n")
+            lines = [READERS[family](*each) for each in zip(numbers.tolist(), rows, strict=True)]
+            return cls(family, text, numbers, lines, stamp)
+        read = Lines(family, text, numbers)
+        return cls(family, text, numbers, read, stamp, read)
 
-    @property
-    def block_numbers(self) -> list[int]:
-        """The numbers of the blocks that have one."""
-        found = (line.block or (BLOCK_NUMBER.match(line.rest) or [""] * 2)[1] for line in self.lines)
-        return [int(number) for number in found if number]
+    def apart(self) -> Iterator[tuple[int, TextLine]]:
+        """The lines that are not plain, and their indices."""
+        lines = self.read
+        rows = range(len(self.lines)) if lines is None else np.flatnonzero(~lines.plain).tolist()
+        return ((row, self.lines[row]) for row in rows)
 
     @property
     def is_renumbered(self) -> bool:
@@ -59,10 +78,16 @@ class Text:
         if self.family not in RENUMBERED:
             return False
         numbers, (start, step) = self.block_numbers, RENUMBERED[self.family]
-        pairs = list(zip([start - step, *numbers], numbers, strict=False))
-        gaps = sum(number == before + 2 * step for before, number in pairs)  # there is the number of the stamp
-        counted = all(number in (start, before + step, before + 2 * step) for before, number in pairs)
+        ahead = np.diff(numbers, prepend=start - step)
+        gaps = int((ahead == 2 * step).sum())  # there is the number of the stamp
+        counted = bool(((ahead == step) | (ahead == 2 * step) | (numbers == start)).all())
         return counted and gaps <= (self.stamp is not None)
+
+    @property
+    def block_numbers(self) -> NDArray[np.float64]:
+        """The numbers of the blocks that have one."""
+        pattern = LEADING_NUMBER if self.family is Family.KLARTEXT else BLOCK_NUMBER
+        return np.array(pattern.findall(self.source), dtype=np.float64)
 
     def without_block_numbers(self) -> Text:
         """The same program where nobody looks at block numbers, nor at those to which jumps go."""
@@ -79,10 +104,12 @@ class StampFound(NamedTuple):
     tolerance_um: float
 
 
-STAMP = re.compile(r"\bncfix \d\S* machine ([0-9a-f]+) strategy ([\w-]+) tolerance ([\d.e-]+) um", re.IGNORECASE)
+STAMP = re.compile(rb"\bncfix \d\S* machine ([0-9a-f]+) strategy ([\w-]+) tolerance ([\d.e-]+) um", re.IGNORECASE)
+RETURNS = re.compile(rb"\r+(?=\n|\Z)")
 RENUMBERED = {Family.KLARTEXT: (0, 1), Family.SINUMERIK: (10, 10)}
 """The first number that blocks get anew, and the step to the next."""
-BLOCK_NUMBER = re.compile(r"[ \t]*/?[ \t]*N[ \t]*(\d+)", re.IGNORECASE)
+BLOCK_NUMBER = re.compile(rb"^[ \t]*/?[ \t]*N[ \t]*(\d+)", re.IGNORECASE | re.MULTILINE)
+LEADING_NUMBER = re.compile(rb"^[ \t]*(?:/[ \t]*)?(\d+)(?=[ \t]|$)", re.MULTILINE)
 ANY_BLOCK_NUMBER = re.compile(r"[ \t]*\bN[ \t]*\d+[ \t]*", re.IGNORECASE)
 
 
@@ -132,28 +159,31 @@ STRAIGHT = frozenset(("G", "F", "L", "FMAX"))
 class Lines(Sequence[TextLine]):
     """The lines of a program, taken apart when they are looked at.
 
-    kinds    (n,) which of `shapes` each line has; a shape is None if it takes more than a look to read it
-    digits   the numbers of the program as they are written; those of a line begin at `begins` (n,)
+    kinds     (n,) which of `shapes` each line has; a shape is None if it takes more than a look to read it
+    plain     (n,) which lines have another one
+    begins    (n + 1,) the first number of each line, and one more
+    values    all numbers of the program; `decimals` their digits behind the point, -1 for those without a point
     """
 
-    def __init__(self, family: Family, rows: Sequence[str], numbers: Sequence[int]) -> None:
-        """Of the text of each line, and its number."""
-        self.family, self.rows, self.numbers = family, rows, numbers
+    def __init__(self, family: Family, source: bytes, numbers: Indices) -> None:
+        """Of a text with so many lines, and their numbers."""
+        self.family, self.numbers, self.source = family, numbers, source
         self.klartext = family is Family.KLARTEXT
-        pattern, text = PLAIN_DECIMAL if self.klartext else PLAIN_NUMBER, "\n".join(rows)
-        parts = pattern.split(text)
-        self.digits: list[str] = parts[1::2]
-        keys = MARK.join(parts[::2]).split("\n") if rows else []
+        self.text = np.frombuffer(source, dtype=np.uint8)
+        ends = np.append(np.flatnonzero(self.text == ord("\n")), len(source))[: len(numbers)]
+        self.starts = np.append(0, ends + 1).astype(np.int32)
         known: dict[str, int] = {}
-        self.kinds = np.fromiter((known.setdefault(key, len(known)) for key in keys), np.intp, len(rows))
+        parts = [self._part(first, known) for first in range(0, max(len(numbers), 1), PART)]
+        kinds, places, sizes, values, decimals = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+        self.kinds, self.places, self.sizes, self.values, self.decimals = kinds, places, sizes, values, decimals
         self.shapes = [self._shape(key) for key in known]
-        counts = np.array([key.count(MARK) for key in known], dtype=np.intp)
-        self.ends = np.cumsum(counts[self.kinds]) if rows else np.zeros(0, dtype=np.intp)
-        self.begins = self.ends - counts[self.kinds] if rows else self.ends
-        self._made: list[TextLine | None] = [None] * len(rows)
+        self.plain = np.array([shape is not None for shape in self.shapes], dtype=bool)[kinds]
+        counts = np.array([key.count(MARK) for key in known], dtype=np.int32)
+        self.begins = np.append(0, np.cumsum(counts[kinds])).astype(np.int32)
+        self._made: dict[int, TextLine] = {}
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self.numbers)
 
     @overload
     def __getitem__(self, at: int) -> TextLine: ...
@@ -163,22 +193,31 @@ class Lines(Sequence[TextLine]):
 
     def __getitem__(self, at: int | slice) -> TextLine | list[TextLine]:
         if isinstance(at, slice):
-            return [self[row] for row in range(len(self.rows))[at]]
-        found = self._made[at]
+            return [self[row] for row in range(len(self))[at]]
+        row = at + len(self) if at < 0 else at
+        found = self._made.get(row)
         if found is None:
-            found = self._made[at] = self._line(at)
+            if len(self._made) >= KEPT:
+                self._made.clear()
+            found = self._made[row] = self._line(row)
         return found
 
+    def digits(self, number: int) -> str:
+        """A number as it is written."""
+        place = int(self.places[number])
+        return self.source[place : place + int(self.sizes[number])].decode("latin-1")
+
     def _line(self, row: int) -> TextLine:
-        number, text, shape = self.numbers[row], self.rows[row], self.shapes[self.kinds[row]]
-        if shape is None:
-            return READERS[self.family](number, text)
-        digits = self.digits[self.begins[row] : self.ends[row]]
+        number, shape = int(self.numbers[row]), self.shapes[self.kinds[row]]
+        digits: list[str] = []
+        if shape is not None:
+            digits = [self.digits(at) for at in range(self.begins[row], self.begins[row + 1])]
+        if shape is None or (shape.numbered and not digits[0].isdecimal()):
+            text = self.source[self.starts[row] : self.starts[row + 1] - 1]
+            return READERS[self.family](number, text.decode("latin-1"))
         rest, block = shape.rest.format(*(digits[k] for k in shape.held)) if shape.held else shape.rest, ""
         if self.klartext:
             block = digits[0] if shape.numbered else ""
-            if shape.numbered and not block.isdecimal():
-                return READERS[self.family](number, text)
             words = [
                 TextWord(name[-1], (it := digits[k]), float(it.replace(",", ".")), "+" if len(name) > 1 else "=")
                 for name, k in shape.path
@@ -192,21 +231,60 @@ class Lines(Sequence[TextLine]):
             codes = [TextWord(name, (it := digits[k]), float(it)) for name, k in shape.codes]
         return TextLine(number, words, codes, rest, block, plain=True)
 
-    def _values(self) -> NDArray[np.float64]:
-        """All numbers."""
-        digits = [each.replace(",", ".") for each in self.digits] if self.klartext else self.digits
-        return np.fromiter(map(float, digits), np.float64, len(digits))
+    def _part(self, first: int, known: dict[str, int]) -> tuple[Indices, Indices, Indices, Floats, NDArray[np.int8]]:
+        """Of lines from one on their kinds, and of their numbers the places, sizes, values and digits behind the point.
+
+        known  takes in keys that are new
+        """
+        count = min(PART, len(self) - first)
+        start, end = int(self.starts[first]), max(int(self.starts[first + count]) - 1, 0)
+        text = self.source[start:end].decode("latin-1")
+        pieces = (PLAIN_DECIMAL if self.klartext else PLAIN_NUMBER).split(text)
+        keys = MARK.join(pieces[::2]).split("\n")[:count]
+        kinds = np.fromiter((known.setdefault(key, len(known)) for key in keys), np.int32, count)
+        lengths = np.fromiter(map(len, pieces), np.int32, len(pieces))
+        ends, sizes = np.cumsum(lengths, dtype=np.int32)[1::2] + np.int32(start), lengths[1::2].copy()
+        decimals = np.full(len(ends), -1, dtype=np.int8)
+        if len(ends):
+            inside = self.text[start:end]
+            points = np.flatnonzero((inside == ord(".")) | (inside == ord(","))) + start
+            which = np.minimum(np.searchsorted(ends, points, side="right"), len(ends) - 1)
+            points, which = (each[(points >= (ends - sizes)[which]) & (points < ends[which])] for each in (points, which))
+            decimals[which] = np.minimum(ends[which] - points - 1, MOST_DIGITS)
+        digits = pieces[1::2]
+        if self.klartext and "," in text:
+            digits = [each.replace(",", ".") for each in digits]
+        values = np.fromiter(map(float, digits), np.float64, len(digits))
+        return kinds, ends - sizes, sizes, values, decimals
+
+    def are_whole(self, numbers: Indices) -> NDArray[np.bool_]:
+        """Which numbers are digits only."""
+        return (self.decimals[numbers] < 0) & (self.text[self.places[numbers]] >= ord("0"))
+
+    def same(self, numbers: Indices, other: Lines, others: Indices) -> NDArray[np.bool_]:
+        """Which numbers (k,) are written as those (k,) of another program."""
+        sizes = self.sizes[numbers]
+        found: NDArray[np.bool_] = sizes == other.sizes[others]
+        for size in np.unique(sizes[found]).tolist():
+            at = np.flatnonzero(found & (sizes == size))
+            here, there = (
+                lines.text[lines.places[each[at]][:, None] + np.arange(size)]
+                for lines, each in ((self, numbers), (other, others))
+            )
+            found[at] = (here == there).all(axis=1)
+        return found
 
     def straight(self, axes: Sequence[str]) -> StraightLines:
         """The lines that only bring these axes straight to places, in columns."""
-        n = len(self.rows)
+        n = len(self)
         found = StraightLines(
             np.zeros(n, dtype=bool),
-            np.full((n, len(axes)), -1, dtype=np.intp),
+            np.full((n, len(axes)), -1, dtype=np.int32),
             np.zeros((n, len(axes)), dtype=bool),
-            self._values(),
-            np.full(n, -1, dtype=np.intp),
-            np.full(n, -1, dtype=np.intp),
+            self.values,
+            self.decimals,
+            np.full(n, -1, dtype=np.int32),
+            np.full(n, -1, dtype=np.int32),
             np.zeros(n, dtype=bool),
         )
         order = np.argsort(self.kinds, kind="stable")
@@ -229,7 +307,7 @@ class Lines(Sequence[TextLine]):
                 elif name == "FMAX":
                     found.rapid[rows] = True
             if shape.numbered:
-                found.is_straight[rows] &= [self.digits[at].isdecimal() for at in begin.tolist()]
+                found.is_straight[rows] &= self.are_whole(begin)
         return found
 
     def _shape(self, key: str) -> PlainShape | None:
@@ -270,7 +348,6 @@ def same_but_axes(first: Lines, rows: NDArray[np.intp], second: Lines, others: N
     kinds, theirs = first.kinds[rows], second.kinds[others]
     codes, inverse = np.unique(kinds * len(second.shapes) + theirs, return_inverse=True)
     found = np.zeros(len(rows), dtype=bool)
-    digits, texts = np.array(first.digits, dtype=object), np.array(second.digits, dtype=object)
     order = np.argsort(inverse, kind="stable")
     bounds = np.searchsorted(inverse[order], np.arange(len(codes) + 1))
     for code, begin, end in zip(codes.tolist(), bounds, bounds[1:], strict=False):
@@ -284,7 +361,7 @@ def same_but_axes(first: Lines, rows: NDArray[np.intp], second: Lines, others: N
         same = np.ones(len(each), dtype=bool)
         blocks = [(0, 0)] if one.numbered else []
         for k, j in (*zip(one.held, other.held, strict=True), *blocks):
-            same &= digits[here + k] == texts[there + j]
+            same &= first.same(here + k, second, there + j)
         found[each] = same
     return found
 
@@ -295,15 +372,16 @@ class StraightLines(NamedTuple):
     is_straight  (n,) which lines these are
     word         (n, a) where the number of the word of an axis stands among `values`; -1: it has none
     counted      (n, a) this word is an increment, whatever the mode
-    values       all numbers of the program
+    values       all numbers of the program, and how many `decimals` they have; -1: without a point
     code, feed   (n,) the same of G, 0 or 1, and of F
     rapid        (n,) with FMAX
     """
 
     is_straight: NDArray[np.bool_]
-    word: NDArray[np.intp]
+    word: Indices
     counted: NDArray[np.bool_]
-    values: NDArray[np.float64]
-    code: NDArray[np.intp]
-    feed: NDArray[np.intp]
+    values: Floats
+    decimals: NDArray[np.int8]
+    code: Indices
+    feed: Indices
     rapid: NDArray[np.bool_]
