@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.findings import BlockFault
-from ncfix.certificate.reading import Family, TextLine
-from ncfix.certificate.text import Text
+from ncfix.certificate.reading import NUMBER, Family, TextLine
+from ncfix.certificate.text import Text, hash_of
 from ncfix.values import mutable
 
 AHEAD = 8
@@ -102,6 +102,7 @@ class LinePairs(Sequence[LinePair]):
         return last
 
 
+BLOCK = re.compile(rf"N({NUMBER})")
 NO_KEY, EMPTY_KEY = 0, 1
 """Of lines that hold only a path, and of those that hold nothing."""
 
@@ -141,25 +142,21 @@ class Pairing:
         lines = text.read
         if lines is None:
             return [_number(self._key(line)) for line in text.lines]
-        found, known = array("q", bytes(8 * len(lines))), dict[tuple[int, tuple[str, ...]], str | None]()
-        digits, begins, shapes = lines.digits, lines.begins, lines.shapes
-        bare = [shape is not None and bool(shape.path) and not shape.rest and not shape.numbered for shape in shapes]
-        others = np.flatnonzero(~np.array(bare, dtype=bool)[lines.kinds]) if bare else np.zeros(0, dtype=np.intp)
-        for row, kind, begin in zip(*map(np.ndarray.tolist, (others, lines.kinds[others], begins[others])), strict=True):
-            shape = shapes[kind]
-            if shape is None or (shape.numbered and not digits(begin).isdecimal()):
-                found[row] = _number(self._key(lines[row]))
-                continue
-            block, held = "", shape.held
-            if shape.rest.startswith("N{}"):
-                block, held = f"N{digits(begin + held[0])}", held[1:]
-            each = (kind, tuple([digits(begin + k) for k in held]))
-            if each not in known:
-                key = self._key(lines[row])
-                known[each] = key if key is None else key.removeprefix(block)
-            tail = known[each]
-            found[row] = _number(tail if tail is None else block + tail)
-        return found
+        found = np.full(len(lines), NO_KEY)
+        for shape, rows in lines.by_shape():
+            begins = lines.begins[rows]
+            if shape is None or (shape.numbered and not lines.are_whole(begins).all()):
+                found[rows] = [_number(self._key(lines[row])) for row in rows.tolist()]
+            elif shape.rest or not shape.path:
+                blocks, held = np.zeros(len(rows), dtype=np.intp), shape.held
+                if shape.rest.startswith("N{}"):
+                    blocks, held = lines.hashes(len(rows), begins + held[0]), held[1:]
+                _, some, which = np.unique(
+                    lines.hashes(len(rows), *(begins + k for k in held)), return_index=True, return_inverse=True
+                )
+                keys = [self._key(lines[row]) for row in rows[some].tolist()]
+                found[rows] = np.array([_number(key) for key in keys])[which] ^ blocks[some][which] ^ blocks
+        return array("q", found)
 
     def _key(self, line: TextLine) -> str | None:
         """What a line holds besides a path and its pace; None for a line that holds nothing else."""
@@ -279,7 +276,10 @@ class Pairing:
 
 def _number(key: str | None) -> int:
     """A number for what a line holds, the same for the same; that two texts have one by chance is harmless."""
-    return NO_KEY if key is None else hash(key) if key else EMPTY_KEY
+    if not key:
+        return NO_KEY if key is None else EMPTY_KEY
+    block = BLOCK.match(key)
+    return hash(key[block.end() :]) ^ hash_of(block[1]) if block else hash(key)
 
 
 def _ahead(keys: Sequence[int], at: int, wanted: int) -> int:

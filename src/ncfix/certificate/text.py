@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, NamedTuple, overload
 
 import numpy as np
@@ -47,11 +48,11 @@ class Text:
     @classmethod
     def of(cls, source: bytes, family: Family) -> Text:
         """Read a program; the line of its stamp, if it has one, is kept apart."""
-        end = b"\n" if b"\n" in source else b"\r"
-        text = source.removesuffix(end)
+        text = source
         if b"\r" in text:
-            text = text.replace(b"\r", b"\n") if end == b"\r" else RETURNS.sub(b"", text)
-        numbers, stamp = np.arange(1, text.count(b"\n") + 2 if source else 1, dtype=np.int32), None
+            text = RETURNS.sub(b"", text) if b"\n" in text else text.replace(b"\r", b"\n")
+        count = text.count(b"\n") + (not text.endswith(b"\n")) if text else 0
+        numbers, stamp = np.arange(1, count + 1, dtype=np.int32), None
         if found := STAMP.search(text):
             at = text.count(b"\n", 0, found.start())
             machine, strategy, tolerance = (group.decode().lower() for group in found.groups())
@@ -60,7 +61,7 @@ class Text:
             text = text[: max(before, 0)] if behind < 0 else text[: before + 1] + text[behind + 1 :]
             numbers = np.delete(numbers, at)
         if MARK.encode() in text:
-            rows = text.decode("latin-1").split("\n")
+            rows = text.decode("latin-1").split("\n")[: len(numbers)]
             lines = [READERS[family](*each) for each in zip(numbers.tolist(), rows, strict=True)]
             return cls(family, text, numbers, lines, stamp)
         read = Lines(family, text, numbers)
@@ -139,6 +140,8 @@ class PlainShape(NamedTuple):
 PLAIN_NUMBER = re.compile(rf"({NUMBER})")
 PLAIN_DECIMAL = re.compile(rf"(?<![Rr])({DECIMAL})")
 """Numbers of Klartext, but for that of R0."""
+NUMBER_RUN, DECIMAL_RUN = re.compile("([-+.0-9]+)"), re.compile("((?<![Rr])[-+.,0-9]+)")
+"""The same, faster, where all that these find are numbers."""
 MARK = "\0"
 PLAIN_SHAPES = {
     Family.WORDS: re.compile(rf"((?:[ \t]*[A-Za-z][ \t]*{MARK})+)[ \t]*(?:\([^(){MARK}]*\)|;[^{MARK}]*)?"),
@@ -239,7 +242,7 @@ class Lines(Sequence[TextLine]):
         count = min(PART, len(self) - first)
         start, end = int(self.starts[first]), max(int(self.starts[first + count]) - 1, 0)
         text = self.source[start:end].decode("latin-1")
-        pieces = (PLAIN_DECIMAL if self.klartext else PLAIN_NUMBER).split(text)
+        pieces, values = self._numbers(text)
         keys = MARK.join(pieces[::2]).split("\n")[:count]
         kinds = np.fromiter((known.setdefault(key, len(known)) for key in keys), np.int32, count)
         lengths = np.fromiter(map(len, pieces), np.int32, len(pieces))
@@ -251,15 +254,42 @@ class Lines(Sequence[TextLine]):
             which = np.minimum(np.searchsorted(ends, points, side="right"), len(ends) - 1)
             points, which = (each[(points >= (ends - sizes)[which]) & (points < ends[which])] for each in (points, which))
             decimals[which] = np.minimum(ends[which] - points - 1, MOST_DIGITS)
-        digits = pieces[1::2]
-        if self.klartext and "," in text:
-            digits = [each.replace(",", ".") for each in digits]
-        values = np.fromiter(map(float, digits), np.float64, len(digits))
         return kinds, ends - sizes, sizes, values, decimals
+
+    def _numbers(self, text: str) -> tuple[list[str], Floats]:
+        """A text cut at its numbers, which are every other piece, and their values."""
+        fast, thorough = (DECIMAL_RUN, PLAIN_DECIMAL) if self.klartext else (NUMBER_RUN, PLAIN_NUMBER)
+        for pattern in (fast, thorough):
+            pieces = pattern.split(text)
+            digits = pieces[1::2]
+            if self.klartext and "," in text:
+                digits = [each.replace(",", ".") for each in digits]
+            try:
+                return pieces, np.fromiter(map(float, digits), np.float64, len(digits))
+            except ValueError:  # some of it is no number: signs or points by themselves
+                continue
+        raise AssertionError("what these patterns match are numbers")
 
     def are_whole(self, numbers: Indices) -> NDArray[np.bool_]:
         """Which numbers are digits only."""
         return (self.decimals[numbers] < 0) & (self.text[self.places[numbers]] >= ord("0"))
+
+    def by_shape(self) -> Iterator[tuple[PlainShape | None, Indices]]:
+        """The shapes, and the lines that have them."""
+        order = np.argsort(self.kinds, kind="stable")
+        bounds = np.searchsorted(self.kinds[order], np.arange(len(self.shapes) + 1))
+        return zip(self.shapes, (order[begin:end] for begin, end in pairwise(bounds.tolist())), strict=True)
+
+    def hashes(self, lines: int, *numbers: Indices) -> NDArray[np.intp]:
+        """What so many lines have for numbers (lines,), as these are written, in one; of one number as `hash_of`."""
+        found = np.zeros(lines, dtype=np.uint64)
+        for each in numbers:
+            sizes, places = self.sizes[each], self.places[each]
+            for k in range(int(sizes.max(initial=0))):
+                here = np.flatnonzero(sizes > k)
+                found[here] = found[here] * np.uint64(FACTOR) + self.text[places[here] + k]
+            found += np.uint64(len(numbers) > 1)
+        return found.view(np.intp)
 
     def same(self, numbers: Indices, other: Lines, others: Indices) -> NDArray[np.bool_]:
         """Which numbers (k,) are written as those (k,) of another program."""
@@ -287,12 +317,9 @@ class Lines(Sequence[TextLine]):
             np.full(n, -1, dtype=np.int32),
             np.zeros(n, dtype=bool),
         )
-        order = np.argsort(self.kinds, kind="stable")
-        bounds = np.searchsorted(self.kinds[order], np.arange(len(self.shapes) + 1))
-        for shape, first, stop in zip(self.shapes, bounds, bounds[1:], strict=False):
+        for shape, rows in self.by_shape():
             if shape is None or not shape.is_straight or not all(name[-1] in axes for name, _ in shape.path):
                 continue
-            rows = order[first:stop]
             begin = self.begins[rows]
             for name, k in shape.path:
                 found.word[rows, axes.index(name[-1])] = begin + k
@@ -341,6 +368,17 @@ class Lines(Sequence[TextLine]):
         if any(name in other for name, _ in codes):
             return None
         return PlainShape(tuple(path), tuple(codes), "".join(pieces), tuple(held), head > 0)
+
+
+FACTOR = 0x9E3779B97F4A7C15
+
+
+def hash_of(digits: str) -> int:
+    """A number of 64 bits for a number as it is written."""
+    found = 0
+    for digit in digits.encode("latin-1"):
+        found = (found * FACTOR + digit) & (2**64 - 1)
+    return found - (found >> 63 << 64)
 
 
 def same_but_axes(first: Lines, rows: NDArray[np.intp], second: Lines, others: NDArray[np.intp]) -> NDArray[np.bool_]:

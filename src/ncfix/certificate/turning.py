@@ -15,7 +15,7 @@ from ncfix.values import frozen
 
 AXIS = {"X": 0, "Y": 1, "Z": 2}
 SAME = 1e-9
-MOST_STEPS = 40
+MOST_STEPS, MOST_KNOWN = 40, 100
 AS_NEAR = 1e-3
 """rad; two ways that differ by less are as near."""
 
@@ -180,6 +180,7 @@ class RotaryWay:
 
     def __init__(self, directions: Callable[[Floats], Floats], travel: Floats) -> None:
         self.directions, self.travel = directions, travel
+        self._known: dict[tuple[bytes, bytes], tuple[list[Floats], bool]] = {}
         self.outer = 0 if self._turns_about_one_line() else 1
         """Which of the two turns about a line that is fixed in the workpiece."""
 
@@ -197,7 +198,12 @@ class RotaryWay:
         one with that sign of it; `inside`: within the travels. Where the outer axis is free it stays; if not `stays`,
         only at zero. None where there is none, where two are as near, or where an axis makes half a turn.
         """
-        ways, free = self._ways(wanted, here)
+        key = (wanted.tobytes(), here.tobytes())  # programs turn to the same planes again and again
+        if key not in self._known:
+            if len(self._known) >= MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = self._ways(wanted, here)
+        ways, free = self._known[key]
         if free and not stays and abs(here[self.outer]) > SAME:
             return None
         if inside:
@@ -208,9 +214,9 @@ class RotaryWay:
         if sense and not free:
             if any(_is_half_turn(each[inner] - here[inner]) for each in ways):
                 return None  # which of two angles it is
-            ways.sort(key=lambda each: -sense * float(each[inner]))
+            ways = sorted(ways, key=lambda each: -sense * float(each[inner]))
             return None if not ways or _is_half_turn(ways[0][self.outer] - here[self.outer]) else ways[0]
-        ways.sort(key=lambda each: float(np.abs(each - here).sum()))
+        ways = sorted(ways, key=lambda each: float(np.abs(each - here).sum()))
         if len(ways) > 1 and np.abs(ways[1] - here).sum() - np.abs(ways[0] - here).sum() < AS_NEAR:
             return None
         return None if not ways or any(map(_is_half_turn, ways[0] - here)) else ways[0]
