@@ -203,3 +203,16 @@ def test_a_pole_that_is_put_back_behind_a_circle_belongs_to_the_circle() -> None
     text = "".join(f"{number} {block}\n" for number, block in enumerate(blocks)).encode()
     proof = proof_of(text, "three", {"X": 0.0, "Y": 0.0, "Z": 200.0}, "heidenhain")
     assert proof.faults == []
+
+
+def test_a_surface_normal_is_not_followed_and_all_behind_it_is() -> None:
+    text = (
+        b"0 BEGIN PGM A MM\n1 TOOL CALL 1 Z S8000\n2 L X+0 Y+0 Z+90 A+0 C+0 R0 FMAX\n3 M128\n"
+        b"4 L X+10 Y+5 Z+2 A+5 C+40 F900\n"
+        b"5 LN X+12 Y+6 Z+2 NX+0.1 NY+0 NZ+0.995\n6 L X+14 Y+6 Z+2.5 A+6 C+44\n7 L X+55 Y+3 Z+2 A+9 C+80\n"
+        b"8 L Z+90 R0 FMAX M30\n9 END PGM A MM\n"
+    )
+    proof = proof_of(text, "table", {}, "heidenhain")
+    assert (proof.faults, proof.motions, proof.proved_motions) == ([], 6, 4)
+    assert "surface normal" in proof.left[6]
+    assert sorted(proof.left) == [6, 7]  # pieces may belong to either

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ncfix.certificate.expected import SLACK, Expected, PoseColumns
 from ncfix.certificate.model import LEVER, Array, Mask, Ways
 from ncfix.certificate.pairing import LinePair
-from ncfix.certificate.steps import Indices, Kind
+from ncfix.certificate.steps import Kind
+from ncfix.certificate.text import Indices
 
 MANY, FEW = 11, 3
 """At so many places on a motion, or a piece of one, its way is looked at: on long and on short ones."""

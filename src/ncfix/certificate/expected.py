@@ -13,8 +13,8 @@ from ncfix.certificate.families import follower_of
 from ncfix.certificate.following import Given
 from ncfix.certificate.model import Array, Mask, TipModel, Ways
 from ncfix.certificate.reading import AXES, TextLine
-from ncfix.certificate.steps import AxisStep, Indices, Kind, ProgramSteps
-from ncfix.certificate.text import Text
+from ncfix.certificate.steps import AxisStep, Kind, ProgramSteps
+from ncfix.certificate.text import Indices, Text
 from ncfix.machine import Machine
 
 SLACK = 3e-6

@@ -85,9 +85,10 @@ class AxisFollower:
 
     shortest   M126: rotary axes go the shorter way, which is another one from half a turn on
     by_vector  under tool-centre-point control the tool turns in a plane, not its axes at even rates
+    ended      the program has ended
     """
 
-    shortest = by_vector = False
+    shortest = by_vector = ended = False
 
     def __init__(self, axes: Sequence[str], family: Family, given: Given, model: TipModel | None) -> None:
         self.axes, self.family, self.given, self.model = tuple(axes), family, given, model
@@ -157,6 +158,8 @@ class AxisFollower:
         if skips(self.given.skip, line):
             return
         found = self.block(row, line)
+        if self.ended:
+            self.lost["end"] = "behind the end of the program"
         if found is not None:
             if self.turn is not None and not found.why and found.kind is not Kind.FIXED:
                 found = self.turn.step(found)
@@ -463,7 +466,7 @@ class AxisFollower:
                     self.choose_edge(1)
                 self.unsay()
             case 2 | 30:
-                self.lost["end"] = "behind the end of the program"
+                self.ended = True
             case 96 | 97 | 98 | 99 | 198 if self.family is not Family.KLARTEXT:
                 self.lost["jumps"] = JUMPS
             case None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.steps import Kind, ProgramSteps
+from ncfix.certificate.text import Indices
 from ncfix.certificate.turning import RotaryWay
 from ncfix.machine import Machine, State
 from ncfix.values import frozen
@@ -152,14 +153,14 @@ class Ways:
     end: Array
     arc: Mask
     centre: Array
-    across: NDArray[np.intp]
+    across: Indices
     sweep: Array
     columns: tuple[int, int, int]
     turn: Array | None
     """(n, 3, 3), how the coordinates are turned in which arcs lie; None where none are."""
 
     @classmethod
-    def of(cls, model: TipModel, steps: ProgramSteps, at: NDArray[np.intp]) -> Ways:
+    def of(cls, model: TipModel, steps: ProgramSteps, at: Indices) -> Ways:
         """Those of steps (n,)."""
         turn = steps.turn[at]
         return cls(
@@ -173,7 +174,7 @@ class Ways:
             steps.rotations[turn] if turn.any() else None,
         )
 
-    def _numbers(self, here: NDArray[np.intp], places: Array) -> Array:
+    def _numbers(self, here: Indices, places: Array) -> Array:
         """X Y Z (k, 3) in the coordinates of the arcs that motions (k,) are."""
         return places if self.turn is None else np.einsum("kji,kj->ki", self.turn[here], places)
 
@@ -182,7 +183,7 @@ class Ways:
         far = np.abs(self.end - self.start) > np.where(rotary, SHORT_RAD, SHORT_MM)
         return ~(far.any(axis=1) | self.arc)
 
-    def at(self, row: NDArray[np.intp], share: Array) -> Array:
+    def at(self, row: Indices, share: Array) -> Array:
         """The commands at shares (k,) of motions (k,), shape (k, n_axes)."""
         begin, end = self.start[row], self.end[row]
         found: Array = begin + share[:, None] * (end - begin)
@@ -205,7 +206,7 @@ class Ways:
             found[on[:, None], columns] = places
         return found
 
-    def share(self, row: NDArray[np.intp], place: Array, rotary: Mask) -> Array:
+    def share(self, row: Indices, place: Array, rotary: Mask) -> Array:
         """Where on motions (k,) a place (k, n_axes) is nearest, as a share; of arcs by the angle."""
         way, weight = self.end[row] - self.start[row], np.where(rotary, LEVER**2, 1.0)
         square = np.einsum("ij,ij,j->i", way, way, weight)

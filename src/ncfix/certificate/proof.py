@@ -22,8 +22,8 @@ from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, Given, po
 from ncfix.certificate.model import Mask, Ways
 from ncfix.certificate.pairing import LinePair, LinePairs, Pairing, text_faults
 from ncfix.certificate.reading import Family
-from ncfix.certificate.steps import AxisStep, Indices, Kind
-from ncfix.certificate.text import Text, same_but_axes
+from ncfix.certificate.steps import AxisStep, Kind
+from ncfix.certificate.text import Indices, Text, same_but_axes
 from ncfix.machine import Machine
 
 TURNED = 1e-9

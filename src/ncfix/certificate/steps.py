@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.reading import TextLine, TextWord
-from ncfix.certificate.text import KEPT, MOST_DIGITS, StraightLines
+from ncfix.certificate.text import KEPT, MOST_DIGITS, Indices, StraightLines
 from ncfix.values import mutable
 
 NAN = math.nan
@@ -19,7 +19,6 @@ AT_ONCE = 500
 """Steps that are put into columns together."""
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 
 class Kind(IntEnum):

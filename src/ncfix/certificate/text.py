@@ -252,7 +252,9 @@ class Lines(Sequence[TextLine]):
             inside = self.text[start:end]
             points = np.flatnonzero((inside == ord(".")) | (inside == ord(","))) + start
             which = np.minimum(np.searchsorted(ends, points, side="right"), len(ends) - 1)
-            points, which = (each[(points >= (ends - sizes)[which]) & (points < ends[which])] for each in (points, which))
+            points, which = (
+                each[(points >= (ends - sizes)[which]) & (points < ends[which])] for each in (points, which)
+            )
             decimals[which] = np.minimum(ends[which] - points - 1, MOST_DIGITS)
         return kinds, ends - sizes, sizes, values, decimals
 
