@@ -115,9 +115,10 @@ class Prover(Deviations):
             pair = pairing.pairs[k]
             line = self.first.lines[pair.row]
             if pair.row in pairing.unsure:
+                unsure = self.ours.get(pair.row)
                 self.proof.blocks += 1
-                self.proof.motions += pair.row in self.ours
-                self.proof.leave(UNSURE, line.number)
+                self.proof.motions += unsure is not None
+                self.proof.leave((unsure and unsure.why) or UNSURE, line.number)
                 continue
             self._text(pairing, pair)
             if not line.rest.strip() and not line.path:
