@@ -8,15 +8,18 @@ and joined. Where the extension fails the printed numbers are used, and `Canon.e
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
-import resource
 import shutil
+import signal
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,25 +164,42 @@ def _run_rs274(home: Path, source: Path, controls: Controls, folder: Path | None
 
 def _run_extension(home: Path, source: Path, controls: Controls, folder: Path | None, timeout: float) -> Floats | None:
     """One row per motion in full precision (`canon_child.py`), None where the extension crashes."""
-    parameters, request, rows = home / "gcode.var", home / "request.json", home / "rows.bin"
+    parameters, rows = home / "gcode.var", home / "rows.bin"
     parameters.write_text(_parameters(controls, 1.0))
     tools = [[number, 0.0, length, diameter] for number, (length, diameter) in _tools(controls).items()]
-    wanted = {"parameter_file": str(parameters), "tools": tools, "block_delete": controls.block_skip}
-    request.write_text(json.dumps({**wanted, "initial": controls.initial}))
     ini = _write_ini(home, home / "tool.tbl", parameters, folder)
-    command = [SYSTEM_PYTHON, CHILD, source, rows, request]
-    done = _run(command, home, timeout, {"INI_FILE_NAME": str(ini)})
-    if done.returncode not in (0, 1) or not rows.exists():
-        return None
-    return np.fromfile(rows).reshape(-1, WIDTH)
+    files = {"home": home, "ini": ini, "program": source, "rows": rows, "parameter_file": parameters}
+    wanted = {name: str(path) for name, path in files.items()}
+    limits = {"timeout": timeout, "output_limit": OUTPUT_LIMIT}
+    request = {**wanted, "tools": tools, "block_delete": controls.block_skip, "initial": controls.initial, **limits}
+    code = _extension()(json.dumps(request))
+    if code == -signal.SIGALRM:
+        raise subprocess.TimeoutExpired(str(CHILD), timeout)
+    return np.fromfile(rows).reshape(-1, WIDTH) if code in (0, 1) and rows.exists() else None
 
 
-def _run(
-    command: list[object], home: Path, timeout: float, more: Mapping[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
-    environment = {"HOME": str(home), "PATH": os.environ.get("PATH", "/usr/bin:/bin"), "LC_ALL": "C", **(more or {})}
+@cache
+def _extension() -> Callable[[str], int]:
+    """Sends a request to `canon_child.py`, which serves as long as this process lasts; its answer."""
+    command = [SYSTEM_PYTHON, str(CHILD)]
+    environment = {"PATH": os.environ.get("PATH", "/usr/bin:/bin"), "LC_ALL": "C"}
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen(command, text=True, bufsize=1, cwd="/", env=environment, **pipes)
+    atexit.register(process.communicate)
+
+    def ask(request: str) -> int:
+        process.stdin.write(request + "\n")
+        return int(process.stdout.readline())
+
+    return ask
+
+
+def _run(command: list[object], home: Path, timeout: float) -> subprocess.CompletedProcess[str]:
+    """Through a shell that sets the limit: were it set by a function, this whole process would be copied."""
+    environment = {"HOME": str(home), "PATH": os.environ.get("PATH", "/usr/bin:/bin"), "LC_ALL": "C"}
+    limited = ["sh", "-c", f'ulimit -f {OUTPUT_LIMIT // 512}; exec "$@"', "sh"]
     return subprocess.run(
-        [str(part) for part in command],
+        [*limited, *(str(part) for part in command)],
         cwd=home,
         env=environment,
         stdin=subprocess.DEVNULL,
@@ -187,7 +207,6 @@ def _run(
         encoding="latin-1",
         timeout=timeout,
         check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (OUTPUT_LIMIT, OUTPUT_LIMIT)),
     )
 
 

@@ -1,17 +1,21 @@
-"""Runs LinuxCNC's `gcode` extension over one program: `canon_child.py PROGRAM ROWS REQUEST`, under the system's Python.
+"""Runs LinuxCNC's `gcode` extension over programs, under the system's Python: a request on each line of standard input
+is answered by an exit code on a line of standard output.
 
-REQUEST is a JSON file: parameter_file, tools [[number, offset x, offset z, diameter], ...], block_delete, initial (a
-machine position). ROWS gets one row of `WIDTH` doubles for every canonical motion: full precision where the `rs274`
-program prints four decimals. Lengths leave in mm, angles in degrees. Exit code 1 and a line on stderr when the
-interpreter refuses the program.
+A request is JSON: home (the folder to be in), ini, program, rows, parameter_file, tools [[number, offset x, offset z,
+diameter], ...], block_delete, initial (a machine position), timeout in s, output_limit in bytes. The file `rows` gets
+one row of `WIDTH` doubles for every canonical motion: full precision where the `rs274` program prints four decimals.
+Lengths leave in mm, angles in degrees. The exit code is 1 where the interpreter refuses the program, negative where a
+signal has ended it. Each program is run by a copy of this process: the extension keeps much between programs.
 """
 
 import array
 import ctypes
 import json
 import math
+import os
+import resource
+import signal
 import sys
-import traceback
 
 MM = 25.4  # the extension reports inches whatever the program's unit is
 WIDTH = 36
@@ -136,33 +140,44 @@ class Canon:
         return [x * cosine - y * sine, x * sine + y * cosine, z]
 
 
-def attach_tool_table():
+def attach_tool_table(library):
     """Without this the extension dies at M6 and G41: nobody has opened the tool table that `rs274` left in $HOME."""
-    library = ctypes.CDLL("libtooldata.so.0", mode=ctypes.RTLD_GLOBAL)
     if library._Z14tool_mmap_userv() != 0:
         raise OSError("no tool table in $HOME/.tool.mmap")
 
 
-def main(program, rows, request):
-    attach_tool_table()
-    import gcode
-
-    with open(request) as file:
-        wanted = json.load(file)
+def run(wanted, library, gcode):
+    """Run one program; the exit code."""
+    os.chdir(wanted["home"])
+    os.environ.update(HOME=wanted["home"], INI_FILE_NAME=wanted["ini"])
+    resource.setrlimit(resource.RLIMIT_FSIZE, (wanted["output_limit"],) * 2)
+    signal.alarm(math.ceil(wanted["timeout"]))
+    attach_tool_table(library)
     canon = Canon(wanted)
     start = " ".join(f"{axis}{value:.9f}" for axis, value in zip("XYZABC", wanted["initial"], strict=True))
-    result, line = gcode.parse(program, canon, "G21 G90 G53 G0 " + start, "G90 G17 G40 G49 G80 G94")
-    with open(rows, "wb") as out:
+    result, _ = gcode.parse(wanted["program"], canon, "G21 G90 G53 G0 " + start, "G90 G17 G40 G49 G80 G94")
+    with open(wanted["rows"], "wb") as out:
         canon.rows.tofile(out)
-    if result > gcode.MIN_ERROR:
-        print(f"line {line}: {gcode.strerror(result)}", file=sys.stderr)
-        return 1
-    return 0
+    return int(result > gcode.MIN_ERROR)
+
+
+def serve():
+    """Answer requests until there are no more."""
+    library = ctypes.CDLL("libtooldata.so.0", mode=ctypes.RTLD_GLOBAL)
+    import gcode
+
+    answers = os.dup(1)
+    os.dup2(2, 1)  # what the extension prints is no answer
+    for request in sys.stdin:
+        child = os.fork()
+        if child == 0:
+            code = 2
+            try:
+                code = run(json.loads(request), library, gcode)
+            finally:
+                os._exit(code)
+        os.write(answers, b"%d\n" % os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main(*sys.argv[1:]))
-    except Exception:
-        traceback.print_exc()
-        sys.exit(2)
+    serve()
