@@ -24,13 +24,16 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 LETTERS = "XYZABCUVW"
 COMPONENTS = "XYZABC"
+EYE = np.eye(3)
+CROSS = np.cross(np.eye(3)[:, None], np.eye(3)).swapaxes(1, 2).reshape(3, 9)
+"""v @ CROSS, as a matrix, times another vector is v x that vector."""
 EFFECT_KEYS = {"name", "basis", "degree", "order", "period", "positions", "knots", "center", "scale"}
 EFFECT_KEYS |= {"coefficients", "covariance", "reference", "carried"}
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A rigid motion per row: p -> turn @ p + shift."""
+    """A rigid motion per row: p -> turn @ p + shift; turn is (n, 3, 3), or (1, 3, 3) for all rows."""
 
     turn: Floats
     shift: Floats
@@ -50,14 +53,10 @@ class Motion:
 
 def turned(vector: Floats) -> Floats:
     """Rotation matrices (n, 3, 3) of rotation vectors (n, 3), rad (Rodrigues)."""
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    skew = np.zeros((*vector.shape, 3))
-    skew[..., 0, 1], skew[..., 0, 2], skew[..., 1, 2] = -vector[..., 2], vector[..., 1], -vector[..., 0]
-    skew -= np.swapaxes(skew, -1, -2)
-    safe = np.where(angle > 1e-12, angle, 1.0)
-    first = np.where(angle > 1e-12, np.sin(angle) / safe, 1.0)
-    second = np.where(angle > 1e-12, (1 - np.cos(angle)) / safe**2, 0.5)
-    return np.eye(3) + first * skew + second * skew @ skew
+    angle = np.sqrt((vector * vector).sum(axis=-1))[..., None, None]
+    skew = (vector @ CROSS).reshape(*vector.shape, 3)
+    square = vector[..., :, None] * vector[..., None, :]
+    return np.cos(angle) * EYE + np.sinc(angle / np.pi) * skew + np.sinc(angle / (2 * np.pi)) ** 2 / 2 * square
 
 
 def about(point: Floats, rotation: Floats, translation: Floats) -> Motion:
@@ -145,13 +144,15 @@ class Joint:
         n = len(position)
         if self.rotary:
             return about(self.point, np.radians(position)[:, None] * self.direction, np.zeros((n, 3)))
-        return Motion(np.broadcast_to(np.eye(3), (n, 3, 3)), position[:, None] * self.direction)
+        return Motion(EYE[None], position[:, None] * self.direction)
 
     def actual(self, position: Floats, direction: Floats) -> Motion:
         """What it really does: L E M inverse(L), or L E M for carried locations, outermost."""
         m = self.nominal(position + self._zero_offset(position, direction))
         e = self._errors(position, direction, m)
         own = m @ e if self.moving else e @ m
+        if not any(effect.location for effect in self.effects):
+            return own
         place = self._location(position, direction, carried=False)
         return self._location(position, direction, carried=True) @ place @ own @ place.inverse()
 
@@ -176,6 +177,8 @@ class Joint:
     def _small(self, effects: list[Effect], position: Floats, direction: Floats, carrier: Motion | None) -> Motion:
         """All the effects as one small motion: rotations add as vectors, each turning about its own reference."""
         rotation, shift = np.zeros((len(position), 3)), np.zeros((len(position), 3))
+        if not effects:
+            return Motion(EYE[None], shift)
         for effect in effects:
             vector = effect.value(position, direction)[:, None] * self.triad[effect.component % 3]
             if effect.component < 3:
@@ -254,7 +257,7 @@ class Machine:
 
     def _branch(self, joints: tuple[Joint, ...], q: Floats, direction: Floats | None) -> Motion:
         n = len(q)
-        moved = Motion(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)))
+        moved = Motion(EYE[None], np.zeros((n, 3)))
         for joint in joints:
             column = LETTERS.find(joint.name)
             position = q[:, column] if column >= 0 else np.zeros(n)
