@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from conftest import FULL
 from ncfix.compensate.plan import deviation, limits, path
 from ncfix.compensate.plan.arcs import Closure
 from ncfix.compensate.plan.figure_tally import PathError
@@ -18,6 +19,9 @@ from ncfix.compensate.plan.written import Known, WrittenPieces
 from ncfix.control.moves import FeedMode, Frame, MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.writer.pieces import Pieces
+
+SAMPLES = 200 if FULL else 50
+"""At how many places of a piece errors are looked at; pieces bend little."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +155,9 @@ def joints(machine: Machine, commands: np.ndarray, tcp: np.ndarray, length: np.n
     return q
 
 
-def dense_errors(machine: Machine, moves: Moves, plan: Plan, count: int = 200, with_play: bool = False) -> np.ndarray:
+def dense_errors(
+    machine: Machine, moves: Moves, plan: Plan, count: int = SAMPLES, with_play: bool = False
+) -> np.ndarray:
     """Tip errors along every block of a plan, (pieces, count) mm, by a loop over pieces: start left out, end included.
 
     Pieces that only take up a jump (shorter than a millionth of the block) are left out (NaN); so are rapids.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
-from compensate.motions import Arc, changed, dense_errors, motions, plan, sweep_of
+from compensate.motions import SAMPLES, Arc, changed, dense_errors, motions, plan, sweep_of
 from ncfix.compensate.plan.arcs import Closure, turns_begun
 from ncfix.compensate.plan.path import Plan
 from ncfix.compensate.plan.strategies import get_strategy
@@ -32,7 +32,7 @@ def gentle(seed: int = 0, topology: str = "three-axis") -> Machine:
 
 def worst(machine: Machine, moves: Moves, result: Plan) -> float:
     """The largest error from the second motion on: the first one begins uncorrected."""
-    errors = dense_errors(machine, moves, result, 400)[result.pieces.move > 0]
+    errors = dense_errors(machine, moves, result, 2 * SAMPLES)[result.pieces.move > 0]
     return float(np.nanmax(errors))
 
 

@@ -20,6 +20,8 @@ from ncfix.text.dialect import get
 from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, initial={"X": 0.0, "Y": 0.0, "Z": 100.0})
+OPTIONS = FixOptions(tolerance_um=5.0)
+"""Coarse: these motions are cut into few pieces."""
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +37,7 @@ def pocket(decimals: int, seed: int) -> bytes:
 
 
 def corrected(text: bytes, machine: Machine, force: bool = False) -> tuple[bytes, set[str]]:
-    fixed = fix_program(read(text, "part.ngc", "linuxcnc"), machine, SETUP, FixOptions(force=force))
+    fixed = fix_program(read(text, "part.ngc", "linuxcnc"), machine, SETUP, replace(OPTIONS, force=force))
     return fixed.text, {warning.code for warning in fixed.report.warnings}
 
 
@@ -77,13 +79,13 @@ def test_a_program_in_parts_is_judged_by_more_than_the_first(machine: Machine, s
     """Too little is in each part to tell; it is told before anything of the program is passed on."""
     once, _ = corrected(pocket(2, seed=1), machine)
     again = unstamped(once)
-    task = Task(machine, SETUP, FixOptions(), None, "part.ngc", get("linuxcnc"), size)
+    task = Task(machine, SETUP, OPTIONS, None, "part.ngc", get("linuxcnc"), size)
     for jobs in (1, 2):
         with pytest.raises(RefusedError) as caught:
             run(task, again, jobs)
         assert caught.value.code == "NCF438"
-    _, done = run(replace(task, options=FixOptions(force=True)), again, 1)
-    whole = fix_program(read(again, "part.ngc", "linuxcnc"), machine, SETUP, FixOptions(force=True))
+    _, done = run(replace(task, options=replace(OPTIONS, force=True)), again, 1)
+    whole = fix_program(read(again, "part.ngc", "linuxcnc"), machine, SETUP, replace(OPTIONS, force=True))
     assert [message.code for message in done.report.warnings] == [message.code for message in whole.report.warnings]
 
 
@@ -95,5 +97,5 @@ def test_the_beginning_of_a_long_program_is_judged(machine: Machine, monkeypatch
     monkeypatch.setattr(driver, "LOOKED", 10)
     _, codes = corrected(again, machine)
     assert "NCF438" not in codes
-    task = Task(machine, SETUP, FixOptions(), None, "part.ngc", get("linuxcnc"), 500)
+    task = Task(machine, SETUP, OPTIONS, None, "part.ngc", get("linuxcnc"), 500)
     assert "NCF438" not in {message.code for message in run(task, again, 1)[1].report.warnings}

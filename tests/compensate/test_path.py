@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
-from compensate.motions import Arc, changed, dense_errors, motions, plan
+from compensate.motions import SAMPLES, Arc, changed, dense_errors, motions, plan
 from conftest import some
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import MotionKind, Moves, Rule
@@ -34,13 +34,13 @@ def worst_of(machine: Machine, moves: Moves, strategy: str, with_play: bool = Fa
     """The largest error in mm from the second motion on, and the number of pieces."""
     result = plan(machine, moves, get_strategy(strategy), TOLERANCE)
     assert not result.pieces.unchanged.any()
-    errors = dense_errors(machine, moves, result, 200, with_play)[result.pieces.move > 0]
+    errors = dense_errors(machine, moves, result, SAMPLES, with_play)[result.pieces.move > 0]
     return float(np.nanmax(errors)), len(result.pieces)
 
 
 @pytest.mark.parametrize(("kind", "tcp"), CONTROLS)
 def test_short_blocks_through_random_poses(kind: str, tcp: bool, capsys: pytest.CaptureFixture[str]) -> None:
-    """100 um and 200 urad on every joint, all bases, 10,000 poses in all or a fifth, 200 samples a block."""
+    """100 um and 200 urad on every joint, all bases, 10,000 poses in all or a fifth, `SAMPLES` a piece."""
     rng = np.random.default_rng(len(kind) + 10 * tcp)
     machine = random_machine(rng, TOPOLOGIES[kind], SMOOTH)
     count = some(800 if tcp else 1900)

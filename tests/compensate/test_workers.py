@@ -16,6 +16,7 @@ import pytest
 
 from compensate.streaming import run
 from compensate.test_stream import OPTIONS, SETUP, program, streamed
+from conftest import FULL
 from ncfix.cli import console
 from ncfix.cli.shop.batch import FixJob
 from ncfix.cli.streams import Outlet, Source
@@ -168,7 +169,7 @@ CHANGES = (
 
 
 @pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("at", [60, 100, 140, 150])
+@pytest.mark.parametrize("at", [60, 100, 140, 150] if FULL else [60, 150])
 def test_a_tool_that_is_used_within_one_part(change: tuple[bytes, bytes], at: int, machine: Machine) -> None:
     """What is not known of it is told, whichever process has that part."""
     connections = program(5, 200, 0.0).splitlines()
