@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conftest import FULL
 from differential import errors, fanuc
 from differential.fanuc_programs import Author
 from differential.sinumerik import tips
@@ -25,7 +26,7 @@ from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
 from ncfix.text.reader import read
 
-PROGRAMS = int(os.environ.get("NCFIX_FANUC", "3"))
+PROGRAMS = int(os.environ.get("NCFIX_FANUC", "3" if FULL else "2"))
 FIRST = int(os.environ.get("NCFIX_SEED", "0"))
 OFFSETS = {54: (0.0, 0.0, 60.0), 55: (5.0, -7.0, 70.0)}
 EXTENDED = {1: (2.5, -4.0, 55.0), 2: (-3.0, 4.0, 65.0)}

@@ -62,7 +62,7 @@ def verdict_of(
     return run
 
 
-CASES = [(PLAIN, 3), (PLAIN, 4), (PLAIN, 5), (ARCS, 4), *([(ARCS, 3), (ARCS, 5)] if FULL else [])]
+CASES = [(PLAIN, 3), (PLAIN, 5), (ARCS, 4), *([(PLAIN, 4), (ARCS, 3), (ARCS, 5)] if FULL else [])]
 
 
 @pytest.mark.parametrize(("source", "decimals"), CASES)

@@ -2,7 +2,7 @@
 
 Judged by an interpreter and a model of the machine that share nothing with the product.
 `NCFIX_SIEMENS_HOLES=20 pytest tests/differential/test_siemens_holes.py -s` takes as many programs of each kind; a usual
-run takes a third of the kinds for each strategy, in which any two choices, and nearly any three, stand together.
+run takes a quarter of the kinds for each strategy, in which any two choices, and most three, stand together.
 """
 
 from __future__ import annotations
@@ -87,10 +87,10 @@ def judged(text: str, strategy: str, model: errors.Machine, machine: Machine, ta
 
 
 def taken(strategy: str, root: Path, shift: int) -> Tally:
-    """What becomes of programs of every kind, or of a third of them."""
+    """What becomes of programs of every kind, or of a quarter of them."""
     model, machine, tally = errors.load(root / MACHINE), load(str(root / MACHINE)), Tally()
     for number, kind in enumerate(COMBINATIONS):
-        if not (EACH or FULL) and sum(CHOICES[word] for word in kind) % 3 != shift:
+        if not (EACH or FULL) and sum(CHOICES[word] for word in kind) % 4 != shift:
             continue
         for seed in range(FIRST, FIRST + max(EACH, 1)):
             text = program(1000 * number + seed, *kind)

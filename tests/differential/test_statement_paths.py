@@ -23,7 +23,7 @@ from differential.generated import MACHINES, SETUP, terms_of
 from differential.judge import judge
 from differential.tnc import UnknownError
 
-COUNT = int(os.environ.get("NCFIX_STATEMENTS", "8" if FULL else "5"))
+COUNT = int(os.environ.get("NCFIX_STATEMENTS", "8" if FULL else "4"))
 SEED = int(os.environ.get("NCFIX_STATEMENTS_SEED", "1"))
 NO_SUCH_ARC = (ArithmeticError, MemoryError, RuntimeWarning, ValueError)
 UNKNOWN = (*NO_SUCH_ARC, LookupError, NotImplementedError, SyntaxError, UnknownError)

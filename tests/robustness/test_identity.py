@@ -1,4 +1,5 @@
-"""A machine without an error: every program comes back byte for byte, or its first unreadable line is named."""
+"""A machine without an error: every program, in a usual run every second, comes back byte for byte, or its first
+unreadable line is named."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from conftest import FULL
 from differential import corpus, product
 
 DIALECTS = ("linuxcnc", "iso", "grbl")
@@ -21,9 +23,8 @@ def test_programs_come_back_byte_for_byte(
     figures: Callable[[str], None],
 ) -> None:
     same, unreadable, faults = 0, [], []
-    for entry in corpus.entries(shared("corpus")):
-        if entry.dialect != dialect:
-            continue
+    entries = [entry for entry in corpus.entries(shared("corpus")) if entry.dialect == dialect]
+    for entry in entries[:: 1 if FULL else 2]:
         outcome = product.fix(entry.path, machine_file("perfect"), tmp_path)
         name = entry.path.name
         if outcome.code == product.DONE and outcome.text == entry.path.read_bytes():

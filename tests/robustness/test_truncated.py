@@ -1,4 +1,4 @@
-"""Programs cut off after every line, every second in a usual run: never a fault, never a guess."""
+"""Programs cut off after every line, every third in a usual run: never a fault, never a guess."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_cut_after_every_line(
     axes = "".join(LETTERS[column] for column in (*model.linear, *model.rotary))
     setup = setups.write(tmp_path, case.controls, axes, case.start)
     lines = case.source.splitlines(keepends=True)
-    for count in range(1 if FULL else 2 - len(name) % 2, min(len(lines), 16), 1 if FULL else 2):
+    for count in range(1 if FULL else 3 - len(name) % 3, min(len(lines), 16), 1 if FULL else 3):
         source = "".join(lines[:count]).encode()
         outcome = product.fix_text(source, machine_file(case.machine), tmp_path, "--setup", setup, "--allow-refused")
         assert outcome.code in (product.DONE, product.USAGE, product.UNREADABLE, product.REFUSED), outcome.errors
