@@ -43,8 +43,8 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "a batch": Kind(20, 300, {}),
-    "one long program": Kind(1, 20000, {"NCFIX_PART_BYTES": "20000"}),
+    "a batch": Kind(12, 300, {}),
+    "one long program": Kind(1, 12000, {"NCFIX_PART_BYTES": "20000"}),
 }
 
 

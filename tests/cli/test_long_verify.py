@@ -116,8 +116,8 @@ def test_faults_of_millimetres_are_found_in_any_parts(verify: Any, corrected: li
 def test_play_is_taken_up_in_any_parts(root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A zigzag in which axes turn round in each corner, and a walk at random, on a machine with play."""
     original, fixed = tmp_path / "a.ngc", tmp_path / "b.ngc"
-    text = [f"G1 X{20 + 60 * (k % 2)} Y{10 + 0.5 * k + 3 * (k % 3)} Z{-(k % 5)}" for k in range(100)]
-    walk = np.cumsum(np.random.default_rng(1).choice([-0.6, 0.0, 0.9, 0.3, -0.55], (50, 3)), axis=0)
+    text = [f"G1 X{20 + 60 * (k % 2)} Y{10 + 0.5 * k + 3 * (k % 3)} Z{-(k % 5)}" for k in range(60)]
+    walk = np.cumsum(np.random.default_rng(1).choice([-0.6, 0.0, 0.9, 0.3, -0.55], (30, 3)), axis=0)
     text += [f"G1 X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in walk % 60 + [20, 100, 0]]
     original.write_text("\n".join(["G21 G90 G94 G17 F900", "G0 X20 Y5 Z5", *text, "M2", ""]))
     given = ("-m", root / "examples/machines/wCBXFZYSt.toml", "--assume-zero", "--dialect", "linuxcnc")

@@ -136,16 +136,13 @@ def test_a_mistake_is_found_by_its_odds(kind: str, data: Measurement, known: Mac
 UNITS = [kind for kind in CASES if kind.split(":")[0] in ("unit of values", "inch", "metre", "um", "degree")]
 
 
-SEVERAL = [
-    (kind, repeated)
-    for repeated in (False, True)
-    for kind in [*UNITS, "tool length: m"]
-    if FULL or repeated == kind.startswith("unit of values") or kind == "unit of values: um"
-]
-"""Repeats change what values in another unit say of the noise; of those of positions each kind is taken without."""
+SEVERAL = [(kind, repeated) for repeated in (False, True) for kind in [*UNITS, "tool length: m"]]
+FEW = [("inch", False), ("degree", False), ("tool length: m", False)]
+FEW += [("unit of values: inch", False), ("unit of values: um", True)]
+"""Repeats change what values in another unit say of the noise; in one file each unit is found by `CASES`."""
 
 
-@pytest.mark.parametrize(("kind", "repeated"), SEVERAL)
+@pytest.mark.parametrize(("kind", "repeated"), SEVERAL if FULL else FEW)
 def test_a_unit_of_one_of_several_files(kind: str, repeated: bool, known: Machine) -> None:
     """Where noise comes from repeats, it is in the wrong unit, too."""
     again = np.repeat(np.arange(0, 40, 4), 4) if repeated else []
@@ -169,14 +166,11 @@ READINGS = {"gauge": ("length",), "bar": ("length",), "tool": ("x", "y", "z"), "
 
 
 FACTORS = (1e3, 1e-3, 1 / 25.4)
-BESIDE = [(kind, factor, 2) for kind in READINGS for factor in FACTORS]
-BESIDE = BESIDE if FULL else [("gauge", 1e3, 2), ("bar", 1e-3, 2), ("probe", 1 / 25.4, 2)]
-"""One of three files: its name is found in the same way for each kind and each factor."""
+IN_UNITS = [(kind, factor, beside) for kind in READINGS for factor in FACTORS for beside in (0, 2)]
+"""Of one file, and of one of three."""
 
 
-@pytest.mark.parametrize(
-    ("kind", "factor", "beside"), [*((kind, factor, 0) for kind in READINGS for factor in FACTORS), *BESIDE]
-)
+@pytest.mark.parametrize(("kind", "factor", "beside"), IN_UNITS if FULL else IN_UNITS[::5])
 def test_a_unit_of_readings(kind: str, factor: float, beside: int, known: Machine) -> None:
     """Lengths, targets and positions of a probe are no deviations: in another unit they are off by metres."""
     files = [simulate(plan(known, kind, 80, k), known, Faults(2.0), k) for k in range(3, 4 + beside)]
