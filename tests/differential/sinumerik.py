@@ -201,14 +201,35 @@ class Control(Standing):
 
     def drill(self, clear: float, depth: float) -> None:
         """Down and up."""
-        across, frame = PLANES[self.modes["plane"]][2], self.frame
-        for height in (depth, clear):
-            p = frame.back(self.base)
-            p[across] = height * self.modes["unit"]
-            self.base = frame.of(p)
-            if height == depth:
-                q = self.axes(self.base[None], self.rotary())
-                self.paths.append(Path(self.mark, self.line, "hole", q, self.real_length))
+        self.to_height(depth)
+        self.paths.append(
+            Path(self.mark, self.line, "hole", self.axes(self.base[None], self.rotary()), self.real_length)
+        )
+        self.to_height(clear)
+
+    def to_height(self, height: float) -> None:
+        """Along the tool only."""
+        frame = self.frame
+        p = frame.back(self.base)
+        p[PLANES[self.modes["plane"]][2]] = height * self.modes["unit"]
+        self.base = frame.of(p)
+
+    def along(self, bodies: list[tuple[int, str]], values: list[float]) -> None:
+        """CYCLE72: where the lines of its contour end is a point at its bottom, unless the corner there is cut off.
+
+        Codes are what they were behind it.
+        """
+        modes = dict(self.modes)
+        clear, reference, _, deep = values[:4]
+        bottom = reference - deep if len(values) > 16 and values[21] % 10 == 1 else deep
+        for self.line, body in bodies:
+            self.block(body.split(";")[0].strip())
+            if "RND" in body or "CHF" in body:
+                self.to_height(bottom)
+            else:
+                self.drill(bottom, bottom)
+        self.to_height(clear)
+        self.modes = modes
 
     # -- frames -------------------------------------------------------------------------------------------------------
 

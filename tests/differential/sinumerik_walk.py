@@ -9,6 +9,7 @@ from typing import Any, Protocol
 PROCEDURE = re.compile(r"PROC (\w+)\(")
 CALL = re.compile(r"(\w+)\(([^()]*)\)")
 LETTING = re.compile(r"(R\d+)\s*=\s*([^=].*)")
+CONTOUR = re.compile(r'CYCLE72\("(\w+):(\w+)",(.*)\)')
 FOR = re.compile(r"FOR (\w+)=(.+) TO (.+)")
 
 
@@ -26,6 +27,9 @@ class Executes(Protocol):
 
     def block(self, body: str) -> None:
         """Do what a line says that leads nowhere else."""
+
+    def along(self, bodies: list[tuple[int, str]], values: list[float]) -> None:
+        """Mill along lines of the text, each with its number."""
 
 
 class Walk:
@@ -63,6 +67,10 @@ class Walk:
         if found := FOR.fullmatch(body):
             self.control.assign(found[1], self.control.value(found[2]))
             self.loops.append((self.at, found[1], self.control.value(found[3])))
+        elif found := CONTOUR.search(self.lines[self.at - 1]):
+            first, last = (n for n, line in enumerate(self.lines) if line.startswith((f"{found[1]}:", f"{found[2]}:")))
+            inner = [(n + 1, line) for n, line in enumerate(self.lines[first + 1 : last], first + 1)]
+            self.control.along(inner, [float(part or "0") for part in found[3].split(",")])
         elif (found := CALL.fullmatch(body)) and found[1] in self.procedures:
             self.call(found[1], found[2])
         elif found := LETTING.fullmatch(body):

@@ -11,7 +11,8 @@ Holes in a row (HOLES1) and on a circle (HOLES2): where the control takes the mo
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 
 from ncfix.control.coordinates import LETTERS, mask_of, rotated
 from ncfix.control.expressions import number
@@ -179,8 +180,9 @@ def call_of(control: Sinumerik, drilling: Drilling, block: int, *, modal: bool) 
         fixed = fixed or ("" if control.stated else UNSTATED)
     plane, name = control.modal.plane, drilling.name.upper()
     points = tuple((place, plane.of(LETTERS)[axis]) for place, axis in drilling.points)
-    across, bound = LETTERS[plane.across], not (drilling.sure or points)
-    return CycleCall(name, drilling.values, drilling.depths, across, modal, fixed, bound, points)
+    across, bound = LETTERS[plane.across], not drilling.sure and (modal or drilling.name not in MILLING)
+    led = plane.of(LETTERS) if drilling.name in MILLING and MILLING[drilling.name].named else ()
+    return CycleCall(name, drilling.values, drilling.depths, across, modal, fixed, bound, points, led)
 
 
 def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: bool) -> None:
@@ -208,6 +210,27 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
         named, over, _ = lead_to(control, block, drilling.place, name)
         control.builder.rests(mask_of(index for index in control.machine if index not in GEOMETRY))
     drill(control, named, over, drilling, refusal=WITH_WORDS if words.axes else "")
+
+
+def along_contour(control: Sinumerik, block: int, drilling: Drilling, place: tuple[float, float]) -> Callable[[], None]:
+    """Down to the bottom of a contour, where that begins; what is to be done behind its last block."""
+    take_up(control)
+    mind_carried(control)
+    control.use_all_start_positions()
+    assert drilling.depth is not None
+    named, over, _ = lead_to(control, block, place, drilling.name)
+    control.builder.rests(mask_of(index for index in control.machine if index not in GEOMETRY))
+    modal, stated, down = copy(control.modal), control.stated, at_height(control, over, drilling.depth)
+    drill(control, named, over, drilling)
+    up = control.here()
+    control.stand(down.target, down.unknown, down.lost)
+    control.contour = True
+
+    def leave() -> None:
+        control.modal, control.stated, control.contour = modal, stated, False
+        control.stand(up.target, up.unknown, up.lost)
+
+    return leave
 
 
 def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
@@ -256,7 +279,7 @@ def drill(
     lost = control.lost_in_frame()
     if drilling.name in MILLING:
         lost = lost | dict.fromkeys(control.modal.plane.pair, AFTER_CYCLE)
-        if not refusal:
+        if not refusal and not MILLING[drilling.name].named:
             control.moved_as_a_whole(drilling.name.upper())
     if clear is None or depth is None:
         up = control.here(lost | {across: AFTER_CYCLE})

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import NamedTuple
 
 from ncfix.control.expressions import Evaluate, Fault, Unknown, Value, number
-from ncfix.control.flow import NO_LABEL, Jump, Let, OpenCall, Operation, ProgramFlow, Repeat
+from ncfix.control.flow import NO_LABEL, Jump, Let, OpenCall, Operation, ProgramFlow, Repeat, Section
 from ncfix.text.tree import Expression, NamedParameter, NumberedParameter
 from ncfix_siemens.sinumerik.expressions import Key, Local, compiled, name_of, of_kind, renamed
 from ncfix_siemens.sinumerik.plans import AssignedVariable, Branching
@@ -15,6 +17,18 @@ from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import BROKEN, SinumerikUnit
 
 SKIPPED_PART = "a part of this structure is skipped by block delete (/): whether the control finds it there is not sure"
+
+
+LABELS = re.compile(r"\s*((?!N\d+\b)[A-Z_]\w*)\s*:\s*((?!N\d+\b)[A-Z_]\w*)\s*", re.IGNORECASE)
+"""Two labels; block numbers are none, since they may change."""
+
+
+class Stretch(NamedTuple):
+    """Blocks of a text, from `start` up to `stop`."""
+
+    unit: SinumerikUnit
+    start: int
+    stop: int
 
 
 class AtRuntimeError(Exception):
@@ -186,6 +200,22 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
             return self.times
 
         return Repeat(start, times, stop)
+
+    def stretch(self, name: str, find: Callable[[str], SinumerikUnit | None]) -> Stretch | None:
+        """The blocks that a contour cycle names: a subprogram, `NAME`, or those from label to label, `FIRST:LAST`."""
+        if labels := LABELS.fullmatch(name):
+            here = self.block - 1
+            start, last = (self.unit.find(label.upper(), here, "goto") for label in labels.groups())
+            if start is None or last is None or start > last or start <= here <= last:
+                return None
+            return Stretch(self.unit, start, last + 1)
+        unit = find(name) if name.isidentifier() else None
+        return None if unit is None or unit is self.unit else Stretch(unit, unit.begin, unit.stop)
+
+    def go_along(self, stretch: Stretch, name: str, leave: Callable[[], object]) -> None:
+        """Execute blocks as those of a subprogram."""
+        self.enter(OpenCall(name, (stretch.unit, stretch.start), leave=leave))
+        self.sections.append(Section(stretch.start, stretch.stop, stretch.unit.stop, 1))
 
     # -- variables ----------------------------------------------------------------------------------------------------
 

@@ -14,18 +14,31 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ncfix.control.control import MOVED_AS_A_WHOLE
 from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.expressions import number
+from ncfix.control.flatten import NOT_FLAT
 from ncfix.control.flow import Call
 from ncfix.control.interpreter import RUNTIME, Interpreter
 from ncfix.control.moves import MotionEnd, MotionKind, Moves, Pass, Passing
 from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
-from ncfix.diagnostics import Place, SourceError
+from ncfix.diagnostics import Place, RefusedError, SourceError
 from ncfix.text.tree import Program
+from ncfix_siemens.sinumerik.cycles import along_contour, made
 from ncfix_siemens.sinumerik.destination import destination
-from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
+from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow, Stretch
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
+from ncfix_siemens.sinumerik.milling import (
+    ALONG,
+    NO_CONTOUR,
+    NO_START,
+    NOT_ALONE,
+    NOT_REWRITTEN,
+    contour_named,
+    milling_of,
+    start_of,
+)
 from ncfix_siemens.sinumerik.motion import is_harmless, watch
 from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
 from ncfix_siemens.sinumerik.plans import (
@@ -69,6 +82,7 @@ NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
 MAIN = frozenset({"", "MPF"})
 """The kinds of programs that are begun by themselves; SPF are called, and CYC and INI are none."""
+CONTOUR = "the contour that {} mills has to stay what it is, and cannot be written out flat"
 PROGRAM_ENDS = frozenset({20, 300, 170})
 TOOL_CHANGE = re.compile(rb"(?im)^[^;\n]*(?<![A-Z0-9_])M[ \t]*=[ \t]*0*6(?![\d.])")
 PERHAPS = re.compile(rb"[Mm][ \t]*=[ \t]*0*6")
@@ -208,7 +222,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             return False
         modes = control.modes
         busy = control.at_start or modes.carried or modes.modal_cycle or modes.rounds or self.flow.sections
-        by_block = control.acting or modes.by_block
+        by_block = control.acting or control.contour or modes.by_block
         return not (
             busy or by_block or control.unknown or control.over or modes.diameter == "DIAM90" or leads_along(control)
         )
@@ -267,6 +281,9 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         if called is not None:
             flow.follow((Call(lambda: flow.called(called, turn.arguments, turn.written, turn.times)),))
             return False
+        if turn.contour is not None:
+            self.mill_along(turn.contour, turn.words, block)
+            return False
         steps = [step for step in plan.steps if isinstance(step, Branching)]
         if steps:
             if block not in unit.operations:
@@ -285,6 +302,40 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         if turn.ends or not PROGRAM_ENDS.isdisjoint(turn.m):
             flow.finish()
         return flow.ended
+
+    def mill_along(self, step: Calling, words: BlockWordValues, block: int) -> None:
+        """A cycle that mills along a contour: down to its bottom where that begins, then block after block."""
+        if self.in_parts:
+            raise NotInPartsError("a contour stands elsewhere in the program")
+        control, modal, called = self.control, self.control.modal, step.name.upper()
+        drilling, name = milling_of(control, step, modal=False), contour_named(control, step)
+        fault, found = drilling.fault, self.flow.stretch(name, self.find)
+        if words.axes or modal.incremental or modal.compensated:
+            fault = fault or NOT_ALONE
+        if found is None:
+            made(control, block, refusal=(fault or NO_CONTOUR).format(called))
+            return
+        if control.external or found.unit.external:
+            fault = fault or NOT_REWRITTEN
+        place, wrong = self.start_of(found)
+        if self.watcher is not None:
+            raise RefusedError.of(NOT_FLAT, CONTOUR.format(called), self.place())
+        if fault or wrong:
+            made(control, block, refusal=(fault or wrong).format(called))
+            return
+        control.warn(MOVED_AS_A_WHOLE, ALONG.format(called))
+        self.flow.go_along(found, name, along_contour(control, block, drilling, place))
+
+    def start_of(self, contour: Stretch) -> tuple[tuple[float, float], str]:
+        """Where a contour begins, in program units, and why it cannot be followed."""
+        control, unit = self.control, contour.unit
+        first, wrong = start_of(control, [unit.plan(block) for block in range(contour.start, contour.stop)])
+        control.numbers, control.first = unit.numbers, unit.first[contour.start + first]
+        words = self.evaluate(unit.plan(contour.start + first), contour.start + first)
+        one, two = (words.values.get(letter) for letter in control.modal.plane.of(LETTERS))
+        if one is None or two is None or words.forms:
+            return (0.0, 0.0), wrong or NO_START
+        return (one, two), wrong
 
     def opaque(self, plan: SinumerikPlan, text: str) -> None:
         """Text that is no motion, or that nobody understands."""

@@ -1,5 +1,8 @@
 """Milling cycles that say at which place and how deep they work: pockets, slots, studs, faces, threads.
 
+One that mills along a contour (CYCLE72) goes down where that begins, and the blocks of the contour are followed at its
+bottom; so each of its points is corrected where it stands.
+
 Such a cycle is one motion to its bottom at the place that its call names, and is moved as a whole: its place, the
 height that it counts from (RFP) and its bottom by the same way. So it keeps its size and its steps in depth. What
 counts from RFP (DPR, a way down in DP, the depth of a chamfer) stays as it is written.
@@ -10,12 +13,13 @@ controls: "SINUMERIK, cycles".
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from ncfix.control.coordinates import X, Y, Z
+from ncfix.control.coordinates import CENTRE_LETTERS, LETTERS, Plane, X, Y, Z
 from ncfix.control.expressions import Unknown
 from ncfix.values import frozen
-from ncfix_siemens.sinumerik.plans import Calling
+from ncfix_siemens.sinumerik.plans import Branching, Calling, SinumerikPlan
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import DP, DPR, RFP, RTP, Drilling
 
@@ -31,6 +35,8 @@ class MillingCycle(NamedTuple):
     size     of a face, of which the place is a corner: length and width
     corner   the hundreds and thousands of the mode may make these an opposite corner
     angle    by which the face is turned about its corner; 0: it is not
+    named    a contour, which the argument before all these names, says where it works
+    counts   how many arguments a call may have, that name among them; empty: any
     """
 
     point: int
@@ -40,6 +46,8 @@ class MillingCycle(NamedTuple):
     size: int = 0
     corner: bool = False
     angle: int = 0
+    named: bool = False
+    counts: frozenset[int] = frozenset()
 
     @property
     def places(self) -> set[int]:
@@ -59,6 +67,7 @@ MILLING = {
     "longhole": MillingCycle(7, way=True, mode=19),
     "cycle61": MillingCycle(4, mode=15, size=6, corner=True),
     "cycle71": MillingCycle(4, size=6, angle=8),
+    "cycle72": MillingCycle(0, variant=9, mode=21, named=True, counts=frozenset({*range(6, 18), 23})),
     "cycle76": MillingCycle(8, way=True, variant=17, mode=24),
     "cycle77": MillingCycle(6, way=True, variant=14, mode=20),
     "cycle90": MillingCycle(11, way=True),
@@ -77,6 +86,8 @@ NO_DEPTH = "how deep {} goes is not clear: RTP, RFP and its bottom have to lie b
 NO_WAY_DOWN = "how deep {} goes is not clear: its mode (AMODE) asks for a way down, a positive number"
 TWO_DEPTHS = "the depth of the cycle {} is given twice, DP and DPR, and they are not the same"
 OF_CHAMFER = "{} mills a chamfer, and its mode (AMODE) does not say that the depth (ZFS) is a way down"
+OWN_CONTOUR = "{} is called by MCALL, and its contour says where it works"
+OTHER_COUNT = "{} is called with a number of arguments of which it is not known what they mean"
 OTHER_PLANE = "{} chooses another plane (DMODE) than the one in force"
 IN_DIAMETERS = "{} is called while X counts as a diameter"
 
@@ -110,7 +121,9 @@ class MillingCall:
             fault = TWO_DEPTHS
         elif not (self.numbers[RTP] > reference >= bottom) or not (by_way or heights):
             fault = NO_DEPTH
-        elif self.digit(self.form.variant) == CHAMFER and self.digit(self.form.mode, 2) != WAY_DOWN:
+        elif self.digit(self.form.variant) == CHAMFER and (
+            self.form.named or self.digit(self.form.mode, 2) != WAY_DOWN
+        ):
             fault = OF_CHAMFER
         return bottom, heights, fault
 
@@ -121,7 +134,9 @@ class MillingCall:
 
     @property
     def points(self) -> tuple[tuple[int, int], ...]:
-        """The arguments that are places, and the axis of the plane of each."""
+        """The arguments that are places, and the axis of the plane of each; none where a contour says that."""
+        if self.form.named:
+            return ()
         corners = [(self.form.size + axis, axis) for axis, own in enumerate(self.corners) if own]
         return ((self.form.point, 0), (self.form.point + 1, 1), *corners)
 
@@ -147,20 +162,24 @@ def said_in(control: Sinumerik, step: Calling) -> tuple[tuple[float | str | None
 
 def milling_of(control: Sinumerik, step: Calling, *, modal: bool) -> Drilling:
     """A milling cycle as it is called; an argument that is left out is zero."""
-    form, name = MILLING[step.name], step.name.upper()
+    form, name, first = MILLING[step.name], step.name.upper(), int(MILLING[step.name].named)
     said, sure = said_in(control, step)
     numbers = [
         0.0 if part is None else value if isinstance(value, float) else None
-        for value, part in zip(said, step.written, strict=True)
+        for value, part in zip(said[first:], step.written[first:], strict=True)
     ]
     numbers += [0.0] * (1 + max(form.places) - len(numbers))
     if any(numbers[place] is None for place in form.places):
         return Drilling(step.name, numbers[RTP], None, AT_RUN_TIME.format(name), said, sure, control.external, ())
-    written = frozenset(place for place, part in enumerate(step.written) if part is not None)
+    written = frozenset(place for place, part in enumerate(step.written[first:]) if part is not None)
     call = MillingCall(form, [value or 0.0 for value in numbers], written)
     bottom, heights, fault = call.bottom
     chosen = call.digit(form.mode and form.mode - 1)
-    if modal and any(numbers[form.point : form.point + 2]):
+    if form.counts and len(said) not in form.counts:
+        fault = OTHER_COUNT
+    if modal and form.named:
+        fault = fault or OWN_CONTOUR
+    elif modal and any(numbers[form.point : form.point + 2]):
         fault = fault or OWN_PLACE
     elif not modal and not written >= {form.point, form.point + 1}:
         fault = fault or NO_PLACE
@@ -173,10 +192,73 @@ def milling_of(control: Sinumerik, step: Calling, *, modal: bool) -> Drilling:
         None if fault else numbers[RTP],
         bottom,
         fault.format(name),
-        (*call.numbers[:DP], *said[DP:]),
+        (*said[:first], *call.numbers[:DP], *said[first + DP :]),
         sure,
         control.external,
-        tuple((place, 1) for place in (*heights, RFP)),
-        None if modal else call.place,
+        tuple((first + place, 1) for place in (*heights, RFP)),
+        None if modal or form.named else call.place,
         () if modal else call.points,
     )
+
+
+# -- contours ----------------------------------------------------------------------------------------------------------
+
+CONTOUR_WORDS = frozenset({*CENTRE_LETTERS, "CR", "AR", "RND", "CHF", "CHR", "F"})
+CONTOUR_CODES = frozenset({0, 10, 20, 30, 400, 900})
+CONTOUR_NAMES = frozenset({"diamof", "ret"})
+ENDS = frozenset({20, 170})
+"""M2 and M17."""
+CONTOURS = {0: "{0}", 1: "E_LAB_A_{0}:E_LAB_E_{0}", 2: "{1}:{2}"}
+"""What CYCLE62 means by its second argument: a subprogram, a contour of the editor, two labels."""
+
+NO_CONTOUR = "the contour of {} is not found: it has to be a subprogram, or to stand between two labels"
+NOT_REWRITTEN = "{} or its contour is in the file of a subprogram, which is not rewritten"
+OTHER_BLOCK = "the contour of {} has a block that is more than a line or an arc in the plane in force"
+NO_START = "the contour of {} does not begin with G0 or G1 to a place of which both words are known numbers"
+NOT_ALONE = "{} has to be called in a block by itself, in G90 and G40"
+ALONG = "{} is corrected at each point of its contour, at its bottom; its depth is corrected where the contour begins"
+
+
+def contour_named(control: Sinumerik, step: Calling) -> str:
+    """The contour that a call of CYCLE72 names, itself or by one CYCLE62 before it; empty if it names none."""
+    said, _ = said_in(control, step)
+    name = said[0] if said and isinstance(said[0], str) else ""
+    if not name and len(control.contours) == 1:
+        name = control.contours[0]
+    control.milled = True
+    return name
+
+
+def contour_call(control: Sinumerik, step: Calling) -> None:
+    """CYCLE62: one more contour for the next cycle."""
+    said, _ = said_in(control, step)
+    name, kind, first, last = (*said, *[None] * 4)[:4]
+    form = CONTOURS.get(round(kind) if isinstance(kind, float) else 0, "")
+    control.contours = [] if control.milled else control.contours
+    control.contours.append(form.format(name or "", first or "", last or ""))
+    control.milled = False
+
+
+def start_of(control: Sinumerik, plans: Sequence[SinumerikPlan]) -> tuple[int, str]:
+    """Which of the blocks of a contour leads to where it begins, and why they are none."""
+    plane = control.modal.plane
+    end = next((place for place, plan in enumerate(plans) if "ret" in plan.names or not ENDS.isdisjoint(plan.m)), None)
+    if not all(may_be_contour(plan, plane) for plan in plans[: None if end is None else end + 1]):
+        return 0, OTHER_BLOCK
+    first = next((place for place, plan in enumerate(plans) if plan.axes), 0)
+    starts = plans[first].axes == plane.axes and not {0, 10}.isdisjoint(plans[first].g)
+    return first, "" if starts else NO_START
+
+
+def may_be_contour(plan: SinumerikPlan, plane: Plane) -> bool:
+    """Whether a block leads along a line or an arc in the plane, if anywhere, and does nothing else."""
+    for step in plan.steps:
+        match step:
+            case Calling(name) if name in CONTOUR_NAMES:
+                continue
+            case Branching("label"):
+                continue
+        return False
+    others = {setting.address for setting in plan.settings} - CONTOUR_WORDS - {*plane.of(LETTERS)}
+    quiet = plan.skip is None and plan.opaque <= {"program head"} and ENDS.issuperset(plan.m)
+    return quiet and not others and plan.axes & ~plane.axes == 0 and CONTOUR_CODES | {plane.code} >= {*plan.g}

@@ -84,7 +84,7 @@ def moved(control: Sinumerik, words: BlockWordValues, special: frozenset[str]) -
     machine = next((name for name in ("supa", "g53", "g153") if name in special), "")
     if not machine:
         mind_carried(control)
-    corner = control.modes.rounds or not CORNERS.isdisjoint(words.values)
+    corner = control.modes.rounds or control.contour or not CORNERS.isdisjoint(words.values)
     control.at_corner = not machine and (corner or control.cornered)
     words.whole = words.whole or control.at_corner or is_one_piece(control, words)
     oriented(control, words)

@@ -81,6 +81,8 @@ class Sinumerik(ProgramControl):
     cornered    the last motion ended at a corner that the control rounds or breaks
     acting      a synchronized action without ID has come since the last motion: it acts in the block of the next
     pattern     the places to which the last pattern of holes has led
+    contours    those that CYCLE62 has named for the next cycle; `milled`: one has used them
+    contour     the blocks that are executed are those of a contour, which a cycle mills
     solitary    blocks after which no line may be put, since REPEAT would leave it out
     fresh_tool  a tool has been called since the last motion
     changed_by_cycle  a name that is not known has followed a call of a tool at once, or a number (L6) one at any time:
@@ -107,6 +109,8 @@ class Sinumerik(ProgramControl):
         self.heading: Sequence[float] | None = None
         self.whole = self.cornered = self.acting = False
         self.stated = True
+        self.contours: list[str] = []
+        self.milled = self.contour = False
         self.solitary: frozenset[int] = frozenset()
         self.variables = SinumerikVariables.given(run.setup.variables)
         self.named = NamedTools()

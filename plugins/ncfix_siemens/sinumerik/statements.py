@@ -20,7 +20,7 @@ from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix_siemens.sinumerik.destination import set_pole
 from ncfix_siemens.sinumerik.expressions import compiled
 from ncfix_siemens.sinumerik.framing import into_spindle, set_length
-from ncfix_siemens.sinumerik.milling import MILLING
+from ncfix_siemens.sinumerik.milling import MILLING, contour_call
 from ncfix_siemens.sinumerik.orientation import swivel
 from ncfix_siemens.sinumerik.plans import LISTS, AssignedVariable, Calling, SinumerikPlan, evaluates, plain_text
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
@@ -186,6 +186,7 @@ class Turn:
     frame       the name of a frame instruction, which takes the axis words
     subprogram  what is called after the block, with its arguments, so many times; `called` is the name that does it
     elsewhere   the number that is called after the block, and is no subprogram at hand
+    contour     the call of a cycle that mills along a contour
     modal       MCALL stands in the block
     ends        RET stands in the block
     used        something takes the axis words for itself
@@ -203,6 +204,7 @@ class Turn:
     written: tuple[Expression | None, ...] = ()
     times: int = 1
     elsewhere: str = ""
+    contour: Calling | None = None
     modal: bool = False
     ends: bool = False
     used: bool = False
@@ -256,6 +258,8 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         turn.handed += step.written[RESULTS.get(name, len(step.written)) :]
     elif name == "cycle800":
         swivel(control, turn.words.block, step)
+    elif name in MILLING and MILLING[name].named and not turn.modal and find(name) is None:
+        turn.contour = step
     elif name in DRILLING or (name in MILLING and find(name) is None):
         cycle(control, turn.words, step, modal=turn.modal)
     else:
@@ -355,6 +359,11 @@ def come_back(control: Sinumerik, turn: Turn, step: Calling) -> None:
         control.refuse_rest(RETURNS_ELSEWHERE)
 
 
+def contour(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """CYCLE62."""
+    contour_call(control, step)
+
+
 def measure(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """MEAS and MEAW without a value stand with a motion."""
     turn.special.add("meas")
@@ -367,6 +376,7 @@ SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
     "mcall": modal_call,
     "def": define,
     "ret": come_back,
+    "cycle62": contour,
     "meas": measure,
     "meaw": measure,
     **dict.fromkeys(ENDED_BY.keys() - {"trafoof"}, end_unfollowed),

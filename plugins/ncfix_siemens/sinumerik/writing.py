@@ -226,7 +226,7 @@ class SinumerikWriter(BlockWriter):
         arguments, sunk = shifted(call, off, int(target.decimals[across]))
         if call.bound or self._is_inside_out(call, sunk):
             arguments, sunk = None, 0.0
-        if call.points:
+        if call.name.lower() in MILLING and not call.modal:
             position = self._placed(call, arguments)
         else:
             position = self._led_to(call, arguments) if call.modal else self._called(call, arguments)
@@ -236,6 +236,8 @@ class SinumerikWriter(BlockWriter):
     def _placed(self, call: CycleCall, arguments: list[str] | None) -> FloatArray:
         """At a place that the call names: the arguments that say so and how deep."""
         target, position = self.target, self.target.start.copy()
+        for column in map(target.letters.index, call.led):
+            position[column] = target.ends[0][column]
         changed = {} if arguments is None else {place: arguments[place] for place, _ in call.depths}
         for place, letter in call.points:
             column = target.letters.index(letter)
@@ -271,8 +273,9 @@ class SinumerikWriter(BlockWriter):
     def _is_inside_out(self, call: CycleCall, sunk: float) -> bool:
         """Whether the hole would end on the other side of the height that its cycle counts from; where that moves with
         it, whether it would rise above that at which the cycle ends."""
-        if (RFP, 1) in call.depths:
-            clear, start, gap = (number_of(call, place) for place in (RTP, RFP, SDIS))
+        first = int(MILLING[call.name.lower()].named) if call.name.lower() in MILLING else 0
+        if (first + RFP, 1) in call.depths:
+            clear, start, gap = (number_of(call, first + place) for place in (RTP, RFP, SDIS))
             return sunk > max(clear - start - gap, 0.0)
         reference = call.arguments[RFP] if len(call.arguments) > RFP else None
         nominal = float(self.target.nominal[self.across])

@@ -302,7 +302,8 @@ CODES: dict[str, Code] = {
     "NCF280": Code(
         "A cycle that is moved as a whole",
         "The control makes a pocket, a stud, a face or a thread about the place of the call. That place and the bottom "
-        "are corrected; by how much the errors differ across what is milled stays, and is not in the figures.",
+        "are corrected; by how much the errors differ across what is milled stays, and is not in the figures. Of a "
+        "contour that a cycle mills (CYCLE72), each point is corrected; the depth is that of where it begins.",
         "Mill what has to be exact all round by blocks of its own.",
     ),
     "NCF381": Code(

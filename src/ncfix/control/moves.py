@@ -120,6 +120,7 @@ class CycleCall:
     fixed      why no other call may be written in its place, or beside it; empty: it may
     bound      an argument is known only at run time: the depth stays as the program has it
     points     (place, letter): the arguments that are coordinates of where it works; empty: where the axes stand
+    led        letters of axes that other blocks lead to where it works: those of a contour
     """
 
     name: str
@@ -130,6 +131,7 @@ class CycleCall:
     fixed: str = ""
     bound: bool = False
     points: tuple[tuple[int, str], ...] = ()
+    led: tuple[str, ...] = ()
 
 
 @frozen

@@ -331,6 +331,10 @@ class _Emitter:
         fractions, ends, wordless = pieces.fraction[rows], frame.program(pieces.end[rows].copy()), self.wordless[row]
         if wordless.any():
             ends[:, wordless] = start[wordless]
+        call = moves.call_of(row)
+        if call is not None and call.led and self.reading.end is not None:  # the blocks that do may have been refused
+            columns = [moves.axes.index(letter) for letter in call.led]
+            ends[:, columns] = frame.program(self.reading.end[row].copy())[columns]
         shares = np.diff(fractions, prepend=0.0) if len(fractions) > 1 else fractions
         arcs = pieces.arc[rows] if len(fractions) > 1 and pieces.arc[rows].any() else None
         return Target(
@@ -366,7 +370,7 @@ class _Emitter:
             rotation=frame.frame.rotation,
             offset=frame.frame.offset,
             wordless=tuple(wordless.tolist()),
-            call=moves.call_of(row),
+            call=call,
             measured=() if moves.measured is None else tuple(moves.measured[row].tolist()),
             spelled=() if moves.spelled is None else tuple(moves.spelled[row].tolist()),
             level=self.levels.wanted(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import pytest
 
 from differential.sinumerik_milling import NAMES, OLDER
+from ncfix.diagnostics import RefusedError
 from ncfix.testing.judging import SHIFT
 from program.siemens.test_holes import fixed, written
 
@@ -88,7 +89,7 @@ def test_how_it_is_written(body: str, expected: str) -> None:
         (f"{POCKET} M8", "more than words"),
         (f"{POCKET}\nG1 X5 F100", "after a cycle"),
         (f"FOR R1=1 TO 2\n{POCKET.replace(',20,', ',20*R1,')}\nENDFOR", "several states"),
-        ('CYCLE72("CONTOUR",40,0,1,-10,5,0,0,1000,200,11,41,1,5,200,1,5)', "the control makes up"),
+        ('CYCLE63("CONTOUR",1,40,0,1,5,500,,5,3,0,0,0,,,,,,1,2,,,,0,1,101)', "the control makes up"),
         ("CYCLE899(40,0,1,-10,50,20,5,6,0,4,2,0,0,500,0,11,0,1,10)", "the control makes up"),
     ],
 )
@@ -106,3 +107,88 @@ def test_a_subprogram_of_that_name_is_no_cycle() -> None:
     """It is followed, as the control would."""
     body = f"{POCKET}\nM30\n%_N_POCKET3_SPF\nPROC POCKET3(REAL A)\nG1 X5 F100\nM17"
     assert "G1 X4.988 F100" in fixed(body).text.decode()
+
+
+CONTOUR = 'CYCLE72("{}",40,0,1,-10,5,0,0,1000,200,{},41,1,5,200,1,5)'
+SUBPROGRAM = "M30\n%_N_SHAPE_SPF\n{}\nM17"
+SHAPE = "G1 G90 X10 Y20\nX30 RND=2\nG2 X40 Y30 CR=10\nG3 X50 Y40 I10 J0\nG1 X10 Y20"
+MOVED = "G1 G90 X9.988 Y20.021\nX29.988 RND=2\nG2 X39.988 Y30.021 CR=10\nG3 X49.988 Y40.021 I10 J0\nG1 X9.988 Y20.021"
+EDITOR = "M30\nE_LAB_A_ONE: ;#SM Z:2\n;#7__DlgK contour definition begin;*GP*\nG17 G90 DIAMOF;*GP*\n{}\nE_LAB_E_ONE:"
+LABELS = "M30\nFIRST:\n{}\nLAST:"
+
+
+@pytest.mark.parametrize(
+    ("calls", "contour"),
+    [
+        (CONTOUR.format("SHAPE", 11), SUBPROGRAM),
+        (CONTOUR.format("shape", 11) + "\n" + CONTOUR.format("SHAPE", 2), SUBPROGRAM),
+        (CONTOUR.format("FIRST:LAST", 10011), LABELS),
+        (CONTOUR.format("FIRST:LAST", 11).replace("1000", "R9"), LABELS),
+        ('CYCLE62("ONE",1,,)\n' + CONTOUR.format("", 111), EDITOR),
+        ('CYCLE62("SHAPE",0)\n' + CONTOUR.format("", 111), SUBPROGRAM),
+        ('CYCLE62(,2,"FIRST","LAST")\n' + CONTOUR.format("", 111), LABELS),
+        ("FOR R1=1 TO 2\n" + CONTOUR.format("SHAPE", 11) + "\nENDFOR", SUBPROGRAM),
+    ],
+)
+def test_a_contour_is_corrected_at_its_points_and_its_cycle_in_depth(calls: str, contour: str) -> None:
+    """The height in force, and the code for motions, are those of before behind it."""
+    found = fixed(f"{calls}\nX5 Y6\n{contour.format(SHAPE)}")
+    assert not found.report.refused
+    text = found.text.decode()
+    assert calls.replace("40,0,1,-10", "40,0.008,1,-9.992") + "\nX4.988 Y6.021\n" in text
+    assert contour.format(MOVED) in text
+    assert [each.code for each in found.report.warnings].count("NCF280") == 1
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        (CONTOUR.format("OTHER", 11) + "\n", "is not found"),
+        (CONTOUR.format("N10:N20", 11) + "\nM30\nN10 G1 X5 Y6\nX7\nN20", "is not found"),
+        (CONTOUR.format("LAST:FIRST", 11) + "\n" + LABELS.format(SHAPE), "is not found"),
+        (CONTOUR.format("", 11) + "\n" + LABELS.format(SHAPE), "is not found"),
+        ('CYCLE62("A",0)\nCYCLE62("SHAPE",0)\n' + CONTOUR.format("", 1) + SUBPROGRAM.format(SHAPE), "is not found"),
+        (CONTOUR.format("FIRST:LAST", 15) + "\n" + LABELS.format(SHAPE), "a chamfer"),
+        (CONTOUR.format("FIRST:LAST", 11)[:-1] + ",0)\n" + LABELS.format(SHAPE), "number of arguments"),
+        ("G91\n" + CONTOUR.format("FIRST:LAST", 11) + "\nG90\n" + LABELS.format(SHAPE), "in G90 and G40"),
+        ("MCALL " + CONTOUR.format("FIRST:LAST", 11) + "\nX5 Y6\nMCALL\n" + LABELS.format(SHAPE), "by MCALL"),
+        *(
+            (CONTOUR.format("FIRST:LAST", 11) + "\n" + LABELS.format(f"{SHAPE}\n{block}"), "more than a line")
+            for block in (
+                "G1 Z5",
+                "G91 X5",
+                "M8",
+                "TRANS X5",
+                "R1=5",
+                "/X5",
+                "SHAPE",
+                "G42 X5",
+                "T2",
+                "G18",
+                "ANG=5 X3",
+            )
+        ),
+        (CONTOUR.format("FIRST:LAST", 11) + "\n" + LABELS.format("G1 X5\nY6"), "does not begin"),
+        (CONTOUR.format("FIRST:LAST", 11) + "\n" + LABELS.format("X5 Y6\nX7"), "does not begin"),
+        (CONTOUR.format("FIRST:LAST", 11) + "\n" + LABELS.format("G1 X=R9 Y6\nX7"), "does not begin"),
+        (CONTOUR.format("FIRST:LAST", 11) + "\n" + LABELS.format("G1 X=IC(5) Y6\nX7"), "does not begin"),
+    ],
+)
+def test_which_contours_are_refused(body: str, why: str) -> None:
+    reasons = [each.reason for each in fixed(body).report.refused]
+    assert any(why in reason for reason in reasons), reasons
+
+
+def test_a_contour_is_not_written_out() -> None:
+    with pytest.raises(RefusedError, match=r"NCF239.*the contour that CYCLE72 mills"):
+        fixed(
+            "FOR R1=1 TO 2\nX=R1*5\nENDFOR\n" + CONTOUR.format("FIRST:LAST", 11) + "\n" + LABELS.format(SHAPE),
+            flat=True,
+        )
+
+
+def test_a_contour_that_is_milled_in_two_frames_is_refused() -> None:
+    """Where its points are corrected otherwise it cannot be one."""
+    call = CONTOUR.format("FIRST:LAST", 11)
+    body = f"{call}\nROT Z90\n{call}\nROT\n{LABELS.format(SHAPE)}"
+    assert any("several states" in each.reason for each in fixed(body).report.refused)
